@@ -178,28 +178,29 @@ impl Film {
     /// [`FilmError::Other`] if windows, layers or units differ, [`FilmError::NoMore`] if there are no others.
     pub(crate) fn begin_after(&mut self, base: &Self) -> Result<(), FilmError> {
         let more = self.format.samples.saturating_sub(base.format.samples);
-        let all = SumFormat { samples: more, ..self.format }.plus(&base.format);
+        let others = self.format.of_part(base.format.samples, more);
+        let all = others.plus(&base.format);
         if self.window != base.window || all.is_none() {
             return Err(FilmError::Other);
         }
         if more == 0 || !base.is_complete() {
             return Err(FilmError::NoMore { samples: base.format.samples, asked: self.format.samples });
         }
-        self.format.samples = more;
+        self.format = others;
         Ok(())
     }
 
-    /// An empty film of the window, with sums of `samples` samples.
+    /// An empty film of the window, with sums of `samples` of the picture's samples from `first` on.
     ///
     /// # Errors
     /// [`FilmError::Memory`].
-    pub(crate) fn empty_with(&self, samples: u32) -> Result<Self, FilmError> {
-        Self::new(self.width, self.height, self.window, SumFormat { samples, ..self.format })
+    pub(crate) fn empty_with(&self, first: u32, samples: u32) -> Result<Self, FilmError> {
+        Self::new(self.width, self.height, self.window, self.format.of_part(first, samples))
     }
 
-    /// States the number of samples of an empty film.
-    pub(crate) fn set_samples(&mut self, samples: u32) {
-        self.format.samples = samples;
+    /// Leaves the first samples out of an empty film.
+    pub(crate) fn set_first_sample(&mut self, first: u32) {
+        self.format = self.format.of_part(first, self.format.samples.saturating_sub(first));
     }
 
     /// Width of the full picture, pixels.

@@ -123,7 +123,7 @@ impl PartialRender {
         })?;
         match rest {
             Some(rest) => *film = rest,
-            None => film.set_samples(asked - base.as_ref().map_or(0, |base| base.format().samples)),
+            None => film.set_first_sample(base.as_ref().map_or(0, |base| base.format().samples)),
         }
         file.set_len(sound).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|error| self.error(error))?;
         let mut kept = self.lock();

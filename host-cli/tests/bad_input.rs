@@ -170,6 +170,8 @@ fn names_that_do_not_exist() {
         ("--set", "floor.gloss=1", ["'gloss'", "the properties of a material are"]),
         ("--set", "floor.diffuse=2", ["albedo", "0 to 1"]),
         ("--ic-error", "nan", ["--ic-error", "0.025"]),
+        ("--adaptive", "0", ["positive number", "off"]),
+        ("--adaptive", "inf", ["positive number", "off"]),
         ("--card", "serial:", ["serial port", "serial:PATH[@BAUD]"]),
         ("--card", "serial:/dev/x@fast", ["no speed", "such as 115200"]),
         ("--card", "serial:/dev/x@1200", ["too slow", "use 4800 or more"]),

@@ -37,6 +37,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--sampling", "mixture"], "sampling", json!("mixture")),
         (&["--irradiance-cache", "on"], "ic-error", json!(0.025_f32)),
         (&["--ic-error", "0.5", "--irradiance-cache", "on"], "ic-error", json!(0.5)),
+        (&["--adaptive", "0.5"], "adaptive", json!(0.5)),
     ]
 }
 

@@ -24,7 +24,7 @@ mod self_test;
 pub use self::fault::{Fault, FaultCode, Parameter};
 pub use self::pixel::{
     ALBEDO_STEPS, DEPTH_STEPS, LAYERED_PIXEL_BYTES, LayerSums, NORMAL_STEPS, PIXEL_BYTES, PIXELS_BYTES,
-    Pixel, PixelLayers, PixelSums, SumScale, record_bytes,
+    PROBES, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, record_bytes,
 };
 pub use self::self_test::{
     CASES_PER_COMMAND, MemoryPattern, MemoryTest, OPERAND_BYTES, RESULT_BYTES, RESULTS, WORDS_PER_LINE,
@@ -37,7 +37,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 14;
+pub const PROTOCOL_VERSION: u16 = 15;
 
 /// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
@@ -123,6 +123,21 @@ pub struct FrameParameters {
     /// `true` for one of several frames of a picture: irradiance records of a tile are kept in card memory, where there is room
     /// beyond the image, for a frame of other samples.
     pub keep_records: bool,
+    /// Adaptive sampling: threshold of the deviation of a pixel's samples over the root of their mean, W^(1/2)/(sr^(1/2) m), finite and above 0, above
+    /// which samples after the first [`PROBES`] are means of several paths. `None` for one path a sample.
+    pub adaptive_threshold: Option<f32>,
+}
+
+/// Maximum number of paths of a sample by adaptive sampling.
+pub const MAX_PATHS: u32 = 16;
+
+impl FrameParameters {
+    /// Maximum number of paths that a pixel has, probes of earlier samples included.
+    pub fn max_paths(&self) -> u64 {
+        let of_sample = if self.adaptive_threshold.is_some() { MAX_PATHS } else { 1 };
+        let probes = if self.adaptive_threshold.is_some() { PROBES } else { 0 };
+        u64::from(self.samples) * u64::from(of_sample) + u64::from(probes)
+    }
 }
 
 /// Pixel filter: the density of a pixel's samples around its centre, in both directions alike. Samples are drawn from the filter and

@@ -241,7 +241,7 @@ fn the_page_is_of_this_version() {
 /// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
 #[test]
 fn golden_structures() {
-    assert_eq!(PROTOCOL_VERSION, 14);
+    assert_eq!(PROTOCOL_VERSION, 15);
     let budget = Budget {
         sram_bytes: 1,
         dram_bytes: 2,
@@ -293,6 +293,7 @@ fn golden_structures() {
         filter: Filter::BlackmanHarris,
         in_flight: 9,
         keep_records: true,
+        adaptive_threshold: Some(1.0),
     };
     let zero = [0; 4];
     let camera = [one, zero, zero, zero, one, zero, zero, zero, one, one, one, zero].concat();
@@ -305,7 +306,8 @@ fn golden_structures() {
         &one,
         &[8, 2, 0xac, 2, 1, 1, 50],
         &one,
-        &[1, 2, 9, 1],
+        &[1, 2, 9, 1, 1],
+        &one,
     ]
     .concat();
     assert_eq!(encoded(&Command::BeginFrame(frame)), bytes);

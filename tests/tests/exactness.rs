@@ -174,6 +174,7 @@ proptest! {
         cards in prop::sample::select(&["emulated-micro:2", "emulated:1", "emulated-large:1", "emulated-large:2"][..]),
         irradiance_error in prop::sample::select(&[None, Some(0.1), Some(1e-4)][..]),
         has_layers: bool,
+        is_adaptive: bool,
     ) {
         let scene = everything();
         let base = settings().with(|s| {
@@ -182,6 +183,9 @@ proptest! {
             s.photons.caustic_photons = Some(500);
             s.integrator.gather_rays = 5;
             s.integrator.irradiance_error = irradiance_error;
+            if is_adaptive {
+                (s.integrator.samples, s.integrator.adaptive_threshold) = (5, Some(0.5));
+            }
             s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
             s.schedule.tile = Some(8);
         });
@@ -226,6 +230,31 @@ fn nor_do_they_with_precomputed_irradiance() {
 #[test]
 fn nor_do_they_with_textures_cut_outs_mirrors_glass_and_lights_of_every_kind() {
     check_variants_of(&everything(), &settings().with(|s| s.photons.caustic_photons = Some(3000)));
+}
+
+#[test]
+fn nor_do_they_with_adaptive_sampling() {
+    let scene = everything();
+    for irradiance_error in [None, Some(0.1)] {
+        let with = |settings: RenderSettings| {
+            settings.with(|s| {
+                (s.picture.width, s.picture.height) = (23, 19);
+                (s.photons.count, s.photons.caustic_photons) = (3000, Some(500));
+                (s.integrator.gather_rays, s.integrator.irradiance_error) = (4, irradiance_error);
+                (s.integrator.samples, s.integrator.adaptive_threshold) = (6, Some(0.3));
+            })
+        };
+        let adaptive = render_or_panic(&scene, &with(settings()));
+        let expected = sums(&adaptive.film);
+        let even = with(settings()).with(|s| s.integrator.adaptive_threshold = None);
+        let of_even = render_or_panic(&scene, &even).statistics.rays.eye;
+        assert!(adaptive.statistics.rays.eye > 2 * of_even, "pixels have several paths a sample");
+        for variant in variants() {
+            let variant = with(variant);
+            let film = render_or_panic(&scene, &variant).film;
+            assert!(sums(&film) == expected, "{variant:?} changes the picture");
+        }
+    }
 }
 
 #[test]

@@ -49,14 +49,17 @@ fn pass(
 
 fn technique() -> impl Strategy<Value = RenderSettings> {
     let radiance = prop_oneof![Just(Radiance::Density), Just(Radiance::Precomputed)];
-    (any::<bool>(), any::<bool>(), radiance).prop_map(|(is_cached, has_layers, radiance)| {
-        settings().with(|s| {
-            s.integrator.irradiance_error = is_cached.then_some(0.1);
-            s.integrator.planned_samples = Some(3);
-            s.photons.radiance = radiance;
-            s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
-        })
-    })
+    (any::<bool>(), any::<bool>(), any::<bool>(), radiance).prop_map(
+        |(is_cached, has_layers, is_adaptive, radiance)| {
+            settings().with(|s| {
+                s.integrator.adaptive_threshold = is_adaptive.then_some(0.3);
+                s.integrator.irradiance_error = is_cached.then_some(0.1);
+                s.integrator.planned_samples = Some(3);
+                s.photons.radiance = radiance;
+                s.picture.layers = if has_layers { Layers::all() } else { Layers::default() };
+            })
+        },
+    )
 }
 
 /// Number of samples, order of gathers and cards of a pass.

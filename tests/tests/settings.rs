@@ -99,6 +99,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             shadow_rays: Pixels = 3,
             sampling: Pixels = Sampling::Reflection,
             irradiance_error: Pixels = Some(0.5),
+            adaptive_threshold: Pixels = Some(0.1),
         }
         schedule: Schedule {
             tile: Work = Some(5),

@@ -183,7 +183,7 @@ fn render_with<'a, M: MeasuredMemory>(
     Ok(CurveOutcome { counters: all.counters, traffic: all.traffic })
 }
 
-/// Number of gather rays per pixel; an estimate with the irradiance cache.
+/// Number of gather rays per pixel; an estimate with the irradiance cache and with adaptive sampling.
 fn rays_of_pixel(frame: &FrameParameters) -> u64 {
     let samples = frame.samples as u64;
     match frame.irradiance_error {

@@ -55,7 +55,7 @@ impl<'a> KeptSamples<'a> {
         let index = match found {
             Some(index) => index,
             None if self.ranges.len() < MAX_RANGES => {
-                self.ranges.push((samples, self.empty.empty_with(samples.count).ok()?));
+                self.ranges.push((samples, self.empty.empty_with(samples.first, samples.count).ok()?));
                 self.ranges.len() - 1
             }
             None => return None,

@@ -52,7 +52,9 @@ impl PartHead {
         let layers: Layers = self.layers.parse().ok()?;
         let [radiance, depth] = self.units.map(f32::from_bits);
         let is_unit = |unit: f32| unit.is_normal() && unit > 0.0;
-        let format = SumFormat { layers: layers.are_of_chip(), samples, scale: SumScale { radiance, depth } };
+        let is_adaptive = self.settings.get("adaptive").is_some_and(Value::is_number);
+        let scale = SumScale { radiance, depth };
+        let format = SumFormat::of_range(layers.are_of_chip(), (0, samples), is_adaptive, scale);
         let window = Window { x0, x1, y0, y1 };
         let is_possible =
             Film::check(width, height, window).is_ok() && samples > 0 && is_unit(radiance) && is_unit(depth);

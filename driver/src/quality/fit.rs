@@ -2,12 +2,13 @@
 
 use std::ops::RangeInclusive;
 
+use photoncard_shared::message::PROBES;
 use serde::Serialize;
 
 use super::level::{Level, Quality};
 use super::pilot::{Variances, measure};
 use crate::pack::PackedScene;
-use crate::render::{Observer, RenderError, RenderSettings};
+use crate::render::{Integrator, Observer, RenderError, RenderSettings};
 use crate::scene::Scene;
 
 /// Settings that suit a scene.
@@ -25,6 +26,8 @@ pub struct Fit {
     pub interpolates: bool,
     /// Maximum error of interpolated irradiance; infinite where the quality's own is small enough.
     pub max_irradiance_error: f32,
+    /// Threshold of adaptive sampling for pixels of one sample that takes the time of 1, W^(1/2)/(sr^(1/2) m).
+    pub unit_threshold: f64,
     /// Noise of the pilot, from which the settings follow.
     pub measured: Measured,
 }
@@ -42,12 +45,25 @@ pub struct Stated {
     pub shadow_rays: bool,
     /// The irradiance cache, or its error.
     pub cache: bool,
+    /// Adaptive sampling, or its threshold.
+    pub adaptive: bool,
 }
 
 impl Stated {
     /// All settings that a fit would choose.
-    pub const ALL: Self =
-        Self { samples: true, photons: true, gather_rays: true, shadow_rays: true, cache: true };
+    pub const ALL: Self = Self {
+        samples: true,
+        photons: true,
+        gather_rays: true,
+        shadow_rays: true,
+        cache: true,
+        adaptive: true,
+    };
+
+    /// Returns whether there is a setting that only a pilot can choose. Adaptive sampling alone is none: it is off then.
+    pub fn needs_fit(self) -> bool {
+        Self { adaptive: true, ..self } != Self::ALL
+    }
 }
 
 /// Relative standard deviations of samples in a pilot render, and their costs.
@@ -131,6 +147,18 @@ impl Fit {
             integrator.gather_rays =
                 if integrator.irradiance_error.is_some() { self.gather_rays } else { of_sample };
         }
+        if !stated.adaptive {
+            integrator.adaptive_threshold = self.adaptive_threshold(integrator);
+        }
+    }
+
+    /// Threshold of adaptive sampling by which each pixel has the number of samples that it is worth, `n = w s sqrt(1 / c)` with `s` its deviation
+    /// relative to the root of its radiance; `None` for probes alone.
+    fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
+        let samples = integrator.planned();
+        let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
+        let threshold = two_digits(f64::from(samples) * cost.sqrt() * self.unit_threshold);
+        (samples > PROBES && threshold.is_finite() && threshold > 0.0).then_some(threshold)
     }
 }
 
@@ -171,7 +199,8 @@ impl Level {
     /// With `n` of something, samples or rays or photons, a pixel takes the time `c n` and has the variance `v / n`. The sum of
     /// `c n + w^2 v / n` is the least for `n = w sqrt(v / c)`, `w` the worth of accuracy.
     fn fit(&self, variances: &Variances, of: &Pictured) -> Fit {
-        let Variances { place, shadow_ray, gather_ray, photon, lambertian, gather_rays_per_ray } = *variances;
+        let Variances { place, shadow_ray, gather_ray, photon, lambertian, gather_rays_per_ray, level } =
+            *variances;
         let number = |variance: f64, cost: f64| self.worth * (variance / cost).sqrt();
         let samples = within(number(place, 1.0), &self.samples, 4);
         let shadow_rays = number(shadow_ray, COST_OF_SHADOW_RAY) / f64::from(samples);
@@ -187,6 +216,7 @@ impl Level {
             shadow_rays: within(shadow_rays, &SHADOW_RAYS, 1),
             interpolates,
             max_irradiance_error: f32::INFINITY,
+            unit_threshold: level.sqrt() / self.worth,
             measured: Measured {
                 place: place.sqrt(),
                 shadow_ray: shadow_ray.sqrt(),
@@ -205,6 +235,11 @@ fn within(number: f64, bounds: &RangeInclusive<u32>, step: u32) -> u32 {
     }
     let steps = (number / f64::from(step)).ceil() as u32;
     steps.saturating_mul(step).clamp(*bounds.start(), *bounds.end())
+}
+
+/// A positive number rounded to two digits.
+fn two_digits(number: f64) -> f32 {
+    format!("{number:.1e}").parse().unwrap_or(f32::NAN)
 }
 
 /// A number of photons within bounds, rounded up to two digits; the maximum for none that is finite.
@@ -226,6 +261,7 @@ mod tests {
         photon: 3.0,
         lambertian: 1.0,
         gather_rays_per_ray: 0.2,
+        level: 4.0,
     };
     const PICTURED: Pictured = Pictured { pixels: 65_536.0, is_cached: true };
 

@@ -31,6 +31,11 @@ impl Stated {
             let smaller = |own: f32| (!kept.is_null()).then_some(own.min(error));
             integrator.irradiance_error = integrator.irradiance_error.and_then(smaller);
         }
+        if !self.adaptive {
+            let kept = kept.get("adaptive").and_then(Value::as_f64).map(|threshold| threshold as f32);
+            integrator.adaptive_threshold =
+                kept.filter(|threshold| threshold.is_finite() && *threshold > 0.0);
+        }
         integrator.planned_samples = integrator.planned_samples.or(rays("planned-spp"));
     }
 }
@@ -53,6 +58,7 @@ mod tests {
             s.photons.count = 3000;
             s.integrator.samples = 3;
             (s.integrator.gather_rays, s.integrator.shadow_rays) = (40, 6);
+            s.integrator.adaptive_threshold = Some(0.25);
         });
         let asked = RenderSettings::default().with(|s| {
             s.integrator.samples = 7;

@@ -49,6 +49,8 @@ pub(super) struct Variances {
     /// Number of gather rays that a pixel costs for each one of its own: those of irradiance records, and of samples between which
     /// nothing is interpolated.
     pub(super) gather_rays_per_ray: f64,
+    /// Radiance of the median pixel, W/(sr m^2); 1 in a black picture.
+    pub(super) level: f64,
 }
 
 /// Renders the pilots of a picture.
@@ -105,6 +107,7 @@ pub(super) fn measure(
         photon: of_photon(&best, &maps),
         lambertian: best[0].lambertian,
         gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
+        level: level_of(&best),
     })
 }
 
@@ -129,6 +132,13 @@ fn of_pairs<const N: usize>(pairs: [&[Pixels; 2]; N]) -> [f64; N] {
 fn pixels_with_surfaces(pairs: &[&[Pixels; 2]]) -> impl Iterator<Item = usize> {
     let pixels = pairs.first().map_or(0, |[first, _]| first.direct.len());
     (0..pixels).filter(move |&pixel| pairs.iter().copied().flatten().all(|pixels| pixels.is_seen[pixel]))
+}
+
+/// Median radiance of the lit pixels of a pair, W/(sr m^2).
+fn level_of(best: &[Pixels; 2]) -> f64 {
+    let [first, second] = best;
+    Levels::new((0..first.direct.len()).map(|pixel| 0.5 * (first.radiance(pixel) + second.radiance(pixel))))
+        .median()
 }
 
 /// Mean squared error of tiles by a map of one photon, from the difference of two maps whose errors are independent.

@@ -4,7 +4,10 @@
 const LEFT_OUT: f64 = 0.02;
 /// Levels that differences are relative to: each pixel's radiance, or the median of the lit ones where it is darker, as noise in the
 /// dark is seen less.
-pub(super) struct Levels(Vec<f64>);
+pub(super) struct Levels {
+    levels: Vec<f64>,
+    median: f64,
+}
 
 impl Levels {
     /// Levels of pixels with these radiances; all 1 for a black picture.
@@ -13,7 +16,12 @@ impl Levels {
         let mut lit: Vec<f64> = radiances.iter().copied().filter(|radiance| *radiance > 0.0).collect();
         let middle = lit.len() / 2;
         let median = if lit.is_empty() { 1.0 } else { *lit.select_nth_unstable_by(middle, f64::total_cmp).1 };
-        Self(radiances.into_iter().map(|radiance| radiance.max(median)).collect())
+        Self { levels: radiances.into_iter().map(|radiance| radiance.max(median)).collect(), median }
+    }
+
+    /// Median of the lit pixels; 1 for a black picture.
+    pub(super) fn median(&self) -> f64 {
+        self.median
     }
 
     /// Mean over most pixels of `((a - b) / level)^2`.
@@ -22,7 +30,7 @@ impl Levels {
         a: impl IntoIterator<Item = f64>,
         b: impl IntoIterator<Item = f64>,
     ) -> f64 {
-        let pairs = a.into_iter().zip(b).zip(&self.0);
+        let pairs = a.into_iter().zip(b).zip(&self.levels);
         let mut squares: Vec<f64> = pairs.map(|((a, b), level)| ((a - b) / level).powi(2)).collect();
         squares.sort_by(f64::total_cmp);
         let kept = squares.len() - (LEFT_OUT * squares.len() as f64) as usize;

@@ -44,8 +44,10 @@ impl NoiseEstimate {
         if self.is_of_black {
             return;
         }
-        // `A - B` is twice `A - M`.
-        let quarter = squares / count / (sum / count).powi(2);
+        // `A - M` is the share of the pass in `M` times `A - B`: half of it, or more with probes in `A`, which count by half.
+        let [few, all] = [before, after].map(|film| film.format().count().weight_of_light());
+        let halves = 0.5 * all / (all - few);
+        let quarter = squares / count / (sum / count).powi(2) * halves * halves;
         self.squared = Some(quarter * RATIO / (1.0 - RATIO));
         self.samples = all;
     }

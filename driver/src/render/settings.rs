@@ -98,7 +98,8 @@ impl RenderSettings {
     /// If its size or its crop window is not possible.
     pub fn film(&self, scale: SumScale) -> Result<Film, FilmError> {
         let layers = self.picture.layers.are_of_chip();
-        let format = SumFormat { layers, samples: self.integrator.samples, scale };
+        let Integrator { samples, adaptive_threshold, .. } = self.integrator;
+        let format = SumFormat::of_range(layers, (0, samples), adaptive_threshold.is_some(), scale);
         Film::new(self.picture.width, self.picture.height, self.window(), format)
     }
 
@@ -197,6 +198,7 @@ impl RenderSettings {
             filter: self.picture.filter,
             in_flight: self.schedule.in_flight.unwrap_or(u32::MAX),
             keep_records: self.keeps_records(),
+            adaptive_threshold: self.integrator.adaptive_threshold,
         }
     }
 

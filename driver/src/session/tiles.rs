@@ -112,8 +112,8 @@ impl TilesInFlight {
             self.0.iter().map(|in_flight| in_flight.assignment.tile.pixels()).collect();
         pixels.sort_unstable_by(|a, b| b.cmp(a));
         let pixels = pixels.into_iter().take(at_work).fold(0, u64::saturating_add);
-        let rays_of_sample = 2 + u64::from(frame.shadow_rays) + u64::from(frame.gather_rays);
-        pixels.saturating_mul(u64::from(frame.samples)).saturating_mul(rays_of_sample)
+        let rays_of_path = 2 + u64::from(frame.shadow_rays) + u64::from(frame.gather_rays);
+        pixels.saturating_mul(frame.max_paths()).saturating_mul(rays_of_path)
     }
 }
 
@@ -152,6 +152,7 @@ mod tests {
             filter: Filter::Box,
             in_flight: 2,
             keep_records: false,
+            adaptive_threshold: None,
         }
     }
 

@@ -22,6 +22,7 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
         (Parameter::FirstSample, frame.first_sample < budget.samples),
         (Parameter::Samples, frame.samples > 0 && last_sample <= budget.samples),
         (Parameter::PlannedSamples, within(frame.planned_samples, budget.samples)),
+        (Parameter::AdaptiveThreshold, frame.adaptive_threshold.is_none_or(is_length)),
         (Parameter::GatherRays, frame.gather_rays <= budget.gather_rays),
         (Parameter::ShadowRays, frame.shadow_rays <= budget.shadow_rays),
         (Parameter::Neighbors, neighbors(frame.neighbors)),

@@ -1,22 +1,37 @@
 //! The completion of a pixel: light that needs no gather rays, albedo, normal and depth.
 //!
-//! Pixels without gather rays of their own are completed first, once the irradiance records of their block are gathered: each sample is
-//! looked at once. Those with gather rays are found by it. They are completed when no gather of the block waits, and every sample is
+//! Pixels without gather rays of their own are completed first, once the irradiance records of their block are gathered: each path is
+//! looked at once. Those with gather rays are found by it. They are completed when no gather of the block waits, and every path is
 //! looked at again, as no chip has room to keep them.
+//!
+//! Probes ([`super::adaptive`]) are looked at here as well. Those of a pixel without gather rays are its first samples, or come before them in a frame of later
+//! samples; those of the others have a pass of their own.
 
-use photoncard_shared::message::Fault;
+use glam::Vec3;
+use photoncard_shared::message::{Fault, FrameParameters, PROBES};
 
+use super::adaptive::{self, Probes};
 use super::buffers::Shared;
 use super::finished_pixel::{Completion, FinishedPixel};
 use super::flight::Flight;
 use super::light::{Component, PixelLight};
 use super::pixels::{allowed_error_at, direct_light, per_unit, pixel_point, seen_sample};
-use super::position::Pass;
+use super::position::{Pass, Position};
+use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
 use crate::kind::ChipKind;
 use crate::memory::{MemoryPort, Stage};
 use crate::render::eye::{Sight, View};
 use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
+
+/// Use of the light of a path.
+#[derive(Clone, Copy)]
+enum Use {
+    /// A term of the pixel, with its weight. Direct light of a path with gather rays is left to these.
+    Term(f32),
+    /// Choice of the number of paths alone: direct light of all paths is that of shadow rays.
+    Probe,
+}
 
 impl<K: ChipKind> Flight<K> {
     /// Next pixel to be completed in the present pass; `None` after the last.
@@ -28,7 +43,7 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Completes the next sample of a pixel. Returns the pixel with its last sample. A pixel with gather rays is left for a later pass if it
+    /// Completes the next path of a pixel. Returns the pixel with its last path. A pixel with gather rays is left for a later pass if it
     /// is not known to have any.
     ///
     /// # Errors
@@ -39,29 +54,32 @@ impl<K: ChipKind> Flight<K> {
         shared: &mut Shared<K>,
         (flight, pixel): (usize, u32),
     ) -> Result<Option<FinishedPixel>, Fault> {
+        let frame = job.frame;
         self.position.index = pixel;
-        let stored = self.sum(pixel).map(|number| shared.sums.light(job.frame, (flight, number)));
-        let mut completion =
-            self.completion.take().unwrap_or_else(|| Completion::new(stored.unwrap_or(PixelLight::NONE)));
-        let at = self.sample(job.frame, pixel, completion.sample);
         let is_plain = self.pass() == Pass::CompletePlain;
-        let context = &mut job.context(&mut self.counters);
-        match eye::view(context, at)? {
-            Sight::Background(radiance) => {
-                completion.light.add(context.frame, Component::Direct, radiance * per_unit(context));
-            }
-            Sight::Surface(view) => {
-                completion.view.add(&context.scene.header, &view);
-                let has_rays = light_sample(context, &self.cache, shared, (at, &view), &mut completion)?;
-                if has_rays && is_plain {
-                    self.give_rays(pixel);
-                    self.position.index += 1;
-                    return Ok(None);
-                }
-            }
+        let stored = self.sum(pixel).map(|number| shared.sums.light(frame, (flight, number)));
+        let mut completion = self.completion.take().unwrap_or_else(|| {
+            let probes_first = is_plain && adaptive::needs_probes(frame);
+            Completion::new(
+                stored.unwrap_or(PixelLight::NONE),
+                if probes_first { 0 } else { frame.first_sample },
+            )
+        });
+        let sample = completion.sample;
+        let is_term = sample >= frame.first_sample;
+        let weight = self.paths(pixel).weight(frame, sample);
+        let as_what = if is_term { Use::Term(weight) } else { Use::Probe };
+        let has_rays = self.look_at(job, shared, pixel, (as_what, &mut completion))?;
+        if has_rays && is_plain && is_term {
+            self.give_rays(pixel);
+            self.position.index += 1;
+            return Ok(None);
         }
-        completion.sample += 1;
-        if completion.sample < context.frame.samples {
+        if is_plain && sample + 1 == PROBES {
+            self.end_probes(frame, pixel, &completion.probes);
+        }
+        completion.next_path(self.paths(pixel).of_sample(sample));
+        if completion.sample < frame.first_sample.saturating_add(frame.samples) {
             self.completion = Some(completion);
             return Ok(None);
         }
@@ -71,45 +89,140 @@ impl<K: ChipKind> Flight<K> {
         self.counters.interpolated_samples += u64::from(interpolated);
         Ok(Some(FinishedPixel { tile: self.tile.id, index: self.index_in_tile(pixel), light, view }))
     }
+
+    /// Looks at the next probe of the next pixel with gather rays.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    pub(super) fn probe<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+    ) -> Result<(), Fault> {
+        let Some(pixel) = self.first_with_rays(self.position.index..self.block.pixels()) else {
+            self.position = Position::at(Pass::Eye);
+            return Ok(());
+        };
+        self.position.index = pixel;
+        let mut completion = self.completion.take().unwrap_or_else(|| Completion::new(PixelLight::NONE, 0));
+        self.look_at(job, shared, pixel, (Use::Probe, &mut completion))?;
+        completion.next_path(1);
+        if completion.sample < PROBES {
+            self.completion = Some(completion);
+            return Ok(());
+        }
+        self.end_probes(job.frame, pixel, &completion.probes);
+        self.position.index += 1;
+        Ok(())
+    }
+
+    /// Sets the number of a pixel's paths by its probes.
+    fn end_probes(&mut self, frame: &FrameParameters, pixel: u32, probes: &Probes) {
+        if let Some(threshold) = frame.adaptive_threshold {
+            self.set_paths(pixel, probes.paths(threshold));
+        }
+    }
+
+    /// Looks at the present path of a completion. Returns whether it has gather rays.
+    fn look_at<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+        pixel: u32,
+        (as_what, completion): (Use, &mut Completion),
+    ) -> Result<bool, Fault> {
+        let at = self.path(pixel, completion.sample, completion.path);
+        let context = &mut job.context(&mut self.counters);
+        let has_rays = match eye::view(context, at)? {
+            Sight::Background(radiance) => {
+                let light = radiance * per_unit(context);
+                completion.add(context.frame, as_what, Component::Direct, light);
+                false
+            }
+            Sight::Surface(view) => {
+                if completion.path == 0 && matches!(as_what, Use::Term(_)) {
+                    completion.view.add(&context.scene.header, &view);
+                }
+                light_path(context, &self.cache, shared, (at, &view), (as_what, completion))?
+            }
+        };
+        completion.end_light(context.scene.header.radiance_unit);
+        Ok(has_rays)
+    }
 }
 
-/// Adds emission and interpolated irradiance of a sample and, without gather rays, its light by shadow rays and caustics. Returns whether
+impl Completion {
+    /// Advances to the next path, of `count` of the present sample.
+    fn next_path(&mut self, count: u32) {
+        self.path += 1;
+        if self.path >= count {
+            self.path = 0;
+            self.sample += 1;
+        }
+    }
+
+    /// Adds light of the present path, in the image's radiance units.
+    fn add(&mut self, frame: &FrameParameters, as_what: Use, component: Component, light: Vec3) {
+        self.of_path += light;
+        if let Use::Term(weight) = as_what {
+            self.light.add(frame, component, light * weight);
+        }
+    }
+
+    /// Ends the light of the present path, in image radiance units of `unit`.
+    fn end_light(&mut self, unit: f32) {
+        let light = core::mem::replace(&mut self.of_path, Vec3::ZERO);
+        if self.sample < PROBES {
+            self.probes.add(light * unit);
+        }
+    }
+}
+
+/// Adds emission and interpolated irradiance of a path and, of a probe or without gather rays, its light by shadow rays and caustics. Returns whether
 /// it has gather rays.
-fn light_sample<K: ChipKind, M: MemoryPort>(
+fn light_path<K: ChipKind, M: MemoryPort>(
     context: &mut Context<M>,
     cache: &IrradianceCache<K::IrradianceRecords>,
     shared: &mut Shared<K>,
     (at, view): (PixelSample, &View),
-    completion: &mut Completion,
+    (as_what, completion): (Use, &mut Completion),
 ) -> Result<bool, Fault> {
-    let Completion { light, lambertian, interpolated: interpolated_samples, .. } = completion;
     let frame = context.frame;
     let per_unit = per_unit(context);
     let surface = &view.surface;
-    light.add(frame, Component::Direct, surface.emission * per_unit);
+    let is_term = matches!(as_what, Use::Term(_));
+    completion.add(frame, as_what, Component::Direct, surface.emission * per_unit);
     let allowed = allowed_error_at(frame, view);
     let interpolated = allowed.and_then(|allowed| cache.interpolate(&seen_sample(at, view), allowed));
-    *lambertian += u32::from(frame.gather_rays > 0 && surface.reflection.has_lambertian());
+    if is_term {
+        let is_lambertian = frame.gather_rays > 0 && surface.reflection.has_lambertian();
+        completion.lambertian += u32::from(is_lambertian);
+        completion.interpolated += u32::from(interpolated.is_some());
+    }
     if let Some(irradiance) = interpolated {
-        *interpolated_samples += 1;
         let reflected = surface.reflector().lambertian_albedo() * irradiance;
-        light.add(frame, Component::Indirect, reflected * per_unit);
+        completion.add(frame, as_what, Component::Indirect, reflected * per_unit);
     }
     let purpose = if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample };
     let mut point = pixel_point(frame, at, view, purpose);
-    if point.rays > 0 {
-        if purpose == Purpose::Sample {
-            light.count_gather(frame);
+    let has_rays = point.rays > 0;
+    if has_rays && is_term {
+        if purpose == Purpose::Sample && completion.path == 0 {
+            completion.light.count_gather(frame);
         }
         return Ok(true);
+    }
+    if has_rays {
+        // Without photons, which take a search.
+        point.directions = DirectionTable::of_reflection(&point.reflector());
     }
     context.memory.enter(Stage::Shadow);
     // The bits of a surface depend on the way it is read.
     if let Some(seen) = &view.seen {
         eye::surface(context, view.film, seen, &mut point.surface)?;
     }
-    for (component, brought) in direct_light(context, at, &point, shared)? {
-        light.add(frame, component, brought);
+    for (component, light) in direct_light(context, at, &point, shared)? {
+        completion.add(frame, as_what, component, light);
     }
-    Ok(false)
+    Ok(has_rays)
 }

@@ -6,6 +6,7 @@ use photoncard_shared::message::{
     ALBEDO_STEPS, DEPTH_STEPS, FrameParameters, LayerSums, NORMAL_STEPS, PixelSums,
 };
 
+use super::adaptive::Probes;
 use super::light::PixelLight;
 use crate::fixed_point::ColourSum;
 use crate::render::eye::View;
@@ -72,17 +73,32 @@ impl PixelView {
 pub(super) struct Completion {
     pub(super) light: PixelLight,
     pub(super) view: PixelView,
-    /// The next sample.
+    /// Number in the pixel of the next sample.
     pub(super) sample: u32,
-    /// Number of samples of surfaces with a Lambertian part.
+    /// Path of the next sample.
+    pub(super) path: u32,
+    /// Light of the present path, in the image's radiance units.
+    pub(super) of_path: Vec3,
+    /// Light of the probes.
+    pub(super) probes: Probes,
+    /// Number of paths to surfaces with a Lambertian part.
     pub(super) lambertian: u32,
-    /// Number of samples whose irradiance is interpolated.
+    /// Number of paths whose irradiance is interpolated.
     pub(super) interpolated: u32,
 }
 
 impl Completion {
-    /// Completion of a pixel with the light of its gather rays.
-    pub(super) const fn new(light: PixelLight) -> Self {
-        Self { light, view: PixelView::NOTHING, sample: 0, lambertian: 0, interpolated: 0 }
+    /// Completion of a pixel with the light of its gather rays, from a sample on.
+    pub(super) const fn new(light: PixelLight, sample: u32) -> Self {
+        Self {
+            light,
+            view: PixelView::NOTHING,
+            sample,
+            path: 0,
+            of_path: Vec3::ZERO,
+            probes: Probes::NONE,
+            lambertian: 0,
+            interpolated: 0,
+        }
     }
 }

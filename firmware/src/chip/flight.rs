@@ -6,6 +6,7 @@ use heapless::Vec;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
 
+use super::adaptive::{self, Paths};
 use super::finished_pixel::Completion;
 use super::position::{Block, Pass, Position};
 use crate::irradiance_cache::{IrradianceCache, Window};
@@ -34,7 +35,9 @@ pub(super) struct Flight<K: ChipKind> {
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
     /// Number of each pixel's sum in [`super::pixel_sums::PixelSums`], [`PLAIN`] or [`UNSUMMED`].
     sums: <K::TilePixels as Capacity>::Buffer<u16>,
-    /// State of the pixel that is being completed.
+    /// Number of paths of each pixel's samples.
+    paths: <K::TilePixels as Capacity>::Buffer<Paths>,
+    /// State of the pixel that is being completed or probed.
     pub(super) completion: Option<Completion>,
 }
 
@@ -48,6 +51,7 @@ impl<K: ChipKind> Vacant for Flight<K> {
         waiting: 0,
         cache: IrradianceCache::new(),
         sums: Buffer::EMPTY,
+        paths: Buffer::EMPTY,
         completion: None,
     };
 }
@@ -88,6 +92,9 @@ impl<K: ChipKind> Flight<K> {
     pub(super) fn begin_block(&mut self, frame: &FrameParameters) {
         self.block = self.blocks.pop().unwrap_or(Block::EMPTY);
         self.set_all_sums(PLAIN);
+        self.paths.view_mut().clear();
+        // Fits: a tile has at most as many pixels.
+        let _ = self.paths.view_mut().resize(self.block.pixels() as usize, Paths::ONE);
         match allowed_error(frame) {
             None if frame.gather_rays == 0 => self.position = Position::at(Pass::CompletePlain),
             None => self.do_without_records(),
@@ -134,11 +141,34 @@ impl<K: ChipKind> Flight<K> {
         Window { x0, x1: x0 + self.block.width, y0, y1: y0 + self.block.height }
     }
 
-    /// Sample `sample` of the frame's, of pixel `index` of the block.
-    pub(super) fn sample(&self, frame: &FrameParameters, index: u32, sample: u32) -> PixelSample {
+    /// A path of sample `sample` of pixel `index` of the block.
+    pub(super) fn path(&self, index: u32, sample: u32, path: u32) -> PixelSample {
         let [column, row] = self.block.pixel(index);
-        let sample = frame.first_sample.wrapping_add(sample);
+        let sample = self.paths(index).index(sample, path);
         PixelSample { x: self.tile.x + column, y: self.tile.y + row, sample }
+    }
+
+    /// The path of pixel `index` of the block that gather points are stored of, and its weight.
+    pub(super) fn present_path(&self, frame: &FrameParameters, index: u32) -> (PixelSample, f32) {
+        let sample = self.position.sample_of(frame);
+        (self.path(index, sample, self.position.path), self.paths(index).weight(frame, sample))
+    }
+
+    /// Number of paths of the samples of pixel `index` of the block.
+    pub(super) fn paths(&self, index: u32) -> Paths {
+        self.paths.view().get(index as usize).copied().unwrap_or(Paths::ONE)
+    }
+
+    /// Sets the number of paths of the samples of pixel `index` of the block.
+    pub(super) fn set_paths(&mut self, index: u32, paths: Paths) {
+        if let Some(of_pixel) = self.paths.view_mut().get_mut(index as usize) {
+            *of_pixel = paths;
+        }
+    }
+
+    /// Begins the passes of the pixels with gather rays.
+    pub(super) fn begin_pixels(&mut self, frame: &FrameParameters) {
+        self.position = Position::at(if adaptive::needs_probes(frame) { Pass::Probe } else { Pass::Eye });
     }
 
     /// Index in the tile, row-major, of pixel `index` of the block.

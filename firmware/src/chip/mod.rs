@@ -14,6 +14,7 @@
 //! | `Gathers` | nothing: the queue, each gather with its tile in flight |
 //! | `RecordStore` | nothing: the place of the irradiance records that frames of one picture share |
 
+mod adaptive;
 mod buffers;
 mod completion;
 mod finished_pixel;
@@ -205,6 +206,7 @@ impl<K: ChipKind> Chip<K> {
             Pass::Survey => flight.survey(job, shared)?,
             Pass::RecordPoints => flight.choose_record_point(job, shared)?,
             Pass::RecordRays => flight.cast_for_record(job, shared, number)?,
+            Pass::Probe => flight.probe(job, shared)?,
             Pass::Eye => flight.look(job, shared, number)?,
             Pass::Direct => flight.light_directly(job, shared, number)?,
             Pass::Rays => flight.cast_for_pixel(job, shared, number)?,
@@ -225,7 +227,7 @@ impl<K: ChipKind> Chip<K> {
         {
             if flight.pass() == Pass::NextPixels {
                 self.shared.sums.begin(number);
-                flight.position = Position::at(Pass::Eye);
+                flight.begin_pixels(frame);
             } else {
                 flight.begin_block(frame);
             }

@@ -148,6 +148,7 @@ mod tests {
             filter: Default::default(),
             in_flight: 3,
             keep_records: false,
+            adaptive_threshold: None,
         }
     }
 

@@ -1,6 +1,8 @@
 //! The passes of a block's pixels with gather rays of their own, stripe by stripe and sample by sample: these rays, and direct light,
 //! which is weighted against them.
 
+use core::ops::Range;
+
 use photoncard_shared::message::{Fault, FrameParameters};
 
 use super::buffers::Shared;
@@ -75,7 +77,7 @@ impl<K: ChipKind> Flight<K> {
         self.sum(self.position.first + self.position.index).is_some() || shared.sums.has_room(frame)
     }
 
-    /// Looks at the present sample of the next pixel with gather rays.
+    /// Looks at the present path of the next pixel with gather rays.
     pub(super) fn look<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -86,7 +88,7 @@ impl<K: ChipKind> Flight<K> {
             shared.points.clear();
         }
         let [first, stripe] = [self.position.first, self.stripe()];
-        let next = self.first_with_rays(first + self.position.index..first + stripe);
+        let next = self.first_with_path(job.frame, first + self.position.index..first + stripe);
         self.position.index = next.map_or(stripe, |pixel| pixel - first);
         if let Some(pixel) = next {
             self.store_point(job, shared, (flight, pixel))?;
@@ -95,20 +97,33 @@ impl<K: ChipKind> Flight<K> {
             if shared.points.len() > 0 {
                 self.position.pass = Pass::Direct;
             } else {
-                self.end_sample(job.frame);
+                self.end_path(job.frame);
             }
         }
         Ok(())
     }
 
-    /// Casts the eye ray of the present sample of a pixel, and stores its gather point if it has gather rays.
+    /// First of some pixels of the block with gather rays of its own and the present path; `None` without one.
+    fn first_with_path(&self, frame: &FrameParameters, pixels: Range<u32>) -> Option<u32> {
+        let Range { mut start, end } = pixels;
+        let sample = self.position.sample_of(frame);
+        loop {
+            let pixel = self.first_with_rays(start..end)?;
+            if self.position.path < self.paths(pixel).of_sample(sample) {
+                return Some(pixel);
+            }
+            start = pixel + 1;
+        }
+    }
+
+    /// Casts the eye ray of the present path of a pixel, and stores its gather point if it has gather rays.
     fn store_point<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
         shared: &mut Shared<K>,
         (flight, pixel): (usize, u32),
     ) -> Result<(), Fault> {
-        let at = self.sample(job.frame, pixel, self.position.sample);
+        let (at, _) = self.present_path(job.frame, pixel);
         let frame = job.frame;
         let context = &mut job.context(&mut self.counters);
         if let Some(view) = eye::view(context, at)?.surface() {
@@ -130,7 +145,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Adds the light of shadow rays and caustics to the pixel of the present gather point.
+    /// Adds the light of shadow rays and caustics to the pixel of the present gather point, with the weight of its path.
     pub(super) fn light_directly<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -141,14 +156,14 @@ impl<K: ChipKind> Flight<K> {
         if let Some((pixel, stored)) = present
             && let Some(number) = self.sum(pixel.into())
         {
-            let at = self.sample(job.frame, pixel.into(), self.position.sample);
+            let (at, weight) = self.present_path(job.frame, pixel.into());
             let context = &mut job.context(&mut self.counters);
             context.memory.enter(Stage::Shadow);
             let mut point = stored.point(pattern(context.frame, at));
             if stored.read_surface(context, at, &mut point.surface)? {
                 let light = direct_light(context, at, &point, shared)?;
                 for (component, light) in light {
-                    shared.sums.add(context.frame, (flight, number), component, light);
+                    shared.sums.add(context.frame, (flight, number), component, light * weight);
                 }
             }
         }
@@ -167,11 +182,11 @@ impl<K: ChipKind> Flight<K> {
     ) -> Result<(), Fault> {
         let Some((index, pixel)) = shared.points.next(&self.position) else {
             if self.position.end_bin(job.frame.bins) {
-                self.end_sample(job.frame);
+                self.end_path(job.frame);
             }
             return Ok(());
         };
-        let at = self.sample(job.frame, pixel.into(), self.position.sample);
+        let (at, weight) = self.present_path(job.frame, pixel.into());
         let pattern = pattern(job.frame, at);
         let rays = shared.points.take_rays(&mut self.position, index, pattern, job.frame.bins);
         let (Some((_, stored)), Some(number)) = (shared.points.get(index), self.sum(pixel.into())) else {
@@ -181,6 +196,7 @@ impl<K: ChipKind> Flight<K> {
         let (context, outlet) = &mut job.context_and_outlet(&mut self.counters);
         context.memory.enter(Stage::GatherRay);
         let mut point = stored.point(pattern);
+        point.weight = weight;
         if !stored.read_surface(context, at, &mut point.surface)? {
             return Ok(());
         }
@@ -206,11 +222,16 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Goes on to the next sample of the stripe, or to the next stripe.
-    fn end_sample(&mut self, frame: &FrameParameters) {
+    /// Goes on to the next path of the stripe's present sample, to its next sample, or to the next stripe.
+    fn end_path(&mut self, frame: &FrameParameters) {
+        self.position.pass = Pass::Eye;
+        self.position.path += 1;
+        let first = self.position.first;
+        if self.first_with_path(frame, first..first + self.stripe()).is_some() {
+            return;
+        }
         let position = &mut self.position;
-        position.pass = Pass::Eye;
-        if position.next_sample(frame.samples) {
+        if position.next_sample(frame) {
             position.first += K::Points::ENTRIES as u32;
             if position.first >= self.block.pixels() {
                 position.pass = Pass::Wait;

@@ -1,5 +1,7 @@
 //! Progress of a tile: its blocks, and the passes of a block.
 
+use photoncard_shared::message::FrameParameters;
+
 /// A rectangle of a tile's pixels, in coordinates from the tile's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
@@ -66,11 +68,13 @@ pub(super) enum Pass {
     CompletePlain,
     /// The passes of the pixels with gather rays have not begun.
     NextPixels,
-    /// Eye rays of one sample of each pixel of a stripe.
+    /// Probes of the pixels with gather rays.
+    Probe,
+    /// Eye rays of one path of each pixel of a stripe.
     Eye,
-    /// Shadow rays and caustic gathers of the samples with gather rays.
+    /// Shadow rays and caustic gathers of the paths with gather rays.
     Direct,
-    /// Gather rays of the samples, bin by bin.
+    /// Gather rays of the paths, bin by bin.
     Rays,
     /// All rays are cast; gathers wait.
     Wait,
@@ -82,7 +86,10 @@ pub(super) enum Pass {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Position {
     pub(super) pass: Pass,
-    pub(super) sample: u32,
+    /// Sample of the frame's.
+    sample: u32,
+    /// Path of the sample.
+    pub(super) path: u32,
     /// Direction bin.
     pub(super) bin: u32,
     /// First pixel of the stripe: the pixels of the block, row-major, whose gather points are stored together.
@@ -98,7 +105,7 @@ impl Position {
 
     /// The beginning of a pass, at the first sample.
     pub(super) const fn at(pass: Pass) -> Self {
-        Self { pass, sample: 0, bin: 0, first: 0, index: 0, rays: 0 }
+        Self { pass, sample: 0, path: 0, bin: 0, first: 0, index: 0, rays: 0 }
     }
 
     /// Number of rays of the present bin already cast, of the present gather point.
@@ -122,9 +129,15 @@ impl Position {
         next(&mut self.index, count)
     }
 
-    /// Advances to the next of `count` samples, cyclically. Returns whether the sample was the last.
-    pub(super) fn next_sample(&mut self, count: u32) -> bool {
-        next(&mut self.sample, count)
+    /// Number of the present sample in the pixel.
+    pub(super) fn sample_of(&self, frame: &FrameParameters) -> u32 {
+        frame.first_sample.wrapping_add(self.sample)
+    }
+
+    /// Advances to the first path of the next sample of the frame, cyclically. Returns whether the sample was the last.
+    pub(super) fn next_sample(&mut self, frame: &FrameParameters) -> bool {
+        self.path = 0;
+        next(&mut self.sample, frame.samples)
     }
 }
 

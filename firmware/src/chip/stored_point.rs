@@ -92,6 +92,7 @@ impl StoredPoint {
             rays: self.rays.number(),
             directions: self.directions,
             purpose: self.rays.purpose(),
+            weight: 1.0,
         }
     }
 

@@ -208,6 +208,7 @@ fn key(frame: &FrameParameters) -> Option<Key> {
         drain: Drain::Immediate,
         queue: 1,
         in_flight: 1,
+        adaptive_threshold: None,
         ..*frame
     };
     let mut key = [0; KEY_BYTES];

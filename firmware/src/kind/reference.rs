@@ -17,7 +17,7 @@ pub const REFERENCE: Budget = Budget {
     tile_pixels: 4096,
     neighbors: 256,
     gather_rays: MAX_GATHER_RAYS,
-    gather_queue: 17_400,
+    gather_queue: 17_200,
     irradiance_records: 512,
     shadow_rays: 64,
     samples: 4096,

@@ -86,7 +86,7 @@ fn arrive<M: MemoryPort>(
 ) -> Result<Option<GatherRayEnd>, Fault> {
     let mut path = SpecularPath::new(*ray, Carried::Radiance, Passes::NarrowLobes);
     // The division by the number of rays is done here: sums stay within the fixed-point range.
-    let weight = sampled.weight * (1.0 / point.rays as f32);
+    let weight = sampled.weight * (point.weight / point.rays as f32);
     let Some(hit) = hit else {
         return escaped(context, point, &path, sampled, weight);
     };

@@ -24,6 +24,8 @@ pub struct GatherPoint {
     pub directions: DirectionTable,
     /// The purpose of the rays.
     pub purpose: Purpose,
+    /// Weight of the rays' light in the sum that takes it.
+    pub weight: f32,
 }
 
 /// The purpose of a point's gather rays.
@@ -41,18 +43,39 @@ impl GatherPoint {
     /// A point for all light that a sample reflects.
     pub fn sample(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = if surface.reflection.is_black() { 0 } else { rays };
-        Self { surface, pattern, rays, directions: DirectionTable::COSINE, purpose: Purpose::Sample }
+        Self {
+            surface,
+            pattern,
+            rays,
+            directions: DirectionTable::COSINE,
+            purpose: Purpose::Sample,
+            weight: 1.0,
+        }
     }
 
     /// A point for the irradiance of a record, whose surface is white.
     pub fn record(surface: Surface, pattern: Pattern, rays: u32) -> Self {
-        Self { surface, pattern, rays, directions: DirectionTable::COSINE, purpose: Purpose::Record }
+        Self {
+            surface,
+            pattern,
+            rays,
+            directions: DirectionTable::COSINE,
+            purpose: Purpose::Record,
+            weight: 1.0,
+        }
     }
 
     /// A point for the lobe of a surface, with [`Reflector::lobe_share`] of the rays.
     pub fn lobe(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = libm::ceilf(rays as f32 * surface.reflector().lobe_share()) as u32;
-        Self { surface, pattern, rays, directions: DirectionTable::COSINE, purpose: Purpose::Lobe }
+        Self {
+            surface,
+            pattern,
+            rays,
+            directions: DirectionTable::COSINE,
+            purpose: Purpose::Lobe,
+            weight: 1.0,
+        }
     }
 
     /// The reflection that the rays serve, seen from the eye.

@@ -36,6 +36,17 @@ pub(crate) struct IntegratorOptions {
     /// Maximum relative error of interpolated irradiance [default: by --quality, 0.025 for paper]
     #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) ic_error: Option<f32>,
+    /// Adaptive sampling: several paths for each sample of pixels whose first four deviate by more than this, over the root of their radiance; or off
+    /// [default: by --quality, for the scene; off where all other settings of samples and rays are stated]
+    #[arg(long, value_name = "THRESHOLD|off", value_parser = adaptive, allow_negative_numbers = true, hide_short_help = true)]
+    adaptive: Option<Adaptive>,
+}
+
+/// Value of `--adaptive`.
+#[derive(Clone, Copy)]
+enum Adaptive {
+    Off,
+    Threshold(f32),
 }
 
 /// Default maximum relative error of interpolated irradiance.
@@ -54,6 +65,11 @@ impl IntegratorOptions {
             shadow_rays: self.shadow_rays.unwrap_or(base.shadow_rays),
             sampling: self.sampling,
             irradiance_error: (self.is_cached(base) && gather_rays > 0).then_some(error),
+            adaptive_threshold: match self.adaptive {
+                None => base.adaptive_threshold,
+                Some(Adaptive::Off) => None,
+                Some(Adaptive::Threshold(threshold)) => Some(threshold),
+            },
         }
     }
 
@@ -65,6 +81,7 @@ impl IntegratorOptions {
             shadow_rays: self.shadow_rays.is_some(),
             cache: self.irradiance_cache.is_some() || self.ic_error.is_some(),
             photons: false,
+            adaptive: self.adaptive.is_some(),
         }
     }
 
@@ -86,6 +103,14 @@ impl IntegratorOptions {
                 "with --gather-rays 0".to_owned(),
             ),
         ]
+    }
+}
+
+fn adaptive(text: &str) -> Result<Adaptive, String> {
+    match text.parse::<f32>() {
+        _ if text == "off" => Ok(Adaptive::Off),
+        Ok(threshold) if threshold.is_finite() && threshold > 0.0 => Ok(Adaptive::Threshold(threshold)),
+        _ => Err("a threshold is a positive number, such as 0.1, or `off`".to_owned()),
     }
 }
 

@@ -4,7 +4,7 @@ use clap::Args;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
 /// Options of what is prepared.
-pub(crate) const OF_PREPARATION: [&str; 26] = [
+pub(crate) const OF_PREPARATION: [&str; 27] = [
     "assignments",
     "energy_compensation",
     "variant",
@@ -26,6 +26,7 @@ pub(crate) const OF_PREPARATION: [&str; 26] = [
     "sampling",
     "irradiance_cache",
     "ic_error",
+    "adaptive",
     "time",
     "noise",
     "keep_samples",

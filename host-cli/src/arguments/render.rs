@@ -111,7 +111,7 @@ impl RenderOptions {
         unfitted: &Unfitted,
         observer: &dyn Observer,
     ) -> Result<Option<Fit>, RenderError> {
-        if unfitted.stated == Stated::ALL {
+        if !unfitted.stated.needs_fit() {
             return Ok(None);
         }
         let fit = self.quality.fit(scene, packed, &unfitted.settings, observer)?;

@@ -59,6 +59,7 @@ pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitte
         ("photons", is_fitted && !stated.photons),
         ("gather-rays", is_fitted && !stated.gather_rays),
         ("shadow-rays", is_fitted && !stated.shadow_rays),
+        ("adaptive", is_fitted && !stated.adaptive),
         (
             "ic-error",
             is_fitted && !stated.cache && options.samples.aim().is_some_and(|aim| aim.noise.is_some()),

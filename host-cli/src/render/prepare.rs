@@ -6,7 +6,6 @@ use std::sync::OnceLock;
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::quality::Stated;
 use photoncard_driver::render::{Chosen, Phase, PreparedScene, RenderSettings};
 use photoncard_driver::scene::{FixedScene, Scene};
 use serde_json::{Map, Value, json};
@@ -106,11 +105,8 @@ impl<'a> Preparation<'a> {
     fn choose(&self, scene: &Scene, packed: &PackedScene) -> Chosen {
         let Self { options, settings, progress, said } = self;
         let stated = options.stated();
-        let fit = if stated == Stated::ALL {
-            None
-        } else {
-            options.quality.fit(scene, packed, settings, progress)?
-        };
+        let fit =
+            if stated.needs_fit() { options.quality.fit(scene, packed, settings, progress)? } else { None };
         let chosen = settings.clone().with(|settings| {
             if let Some(fit) = &fit {
                 fit.apply(settings, stated);

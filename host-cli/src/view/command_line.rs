@@ -104,8 +104,16 @@ fn of_photons(photons: &PhotonMaps, words: &mut Words) {
 }
 
 fn of_rays(integrator: &Integrator, words: &mut Words) {
-    let Integrator { seed, samples, planned_samples, gather_rays, shadow_rays, sampling, irradiance_error } =
-        integrator;
+    let Integrator {
+        seed,
+        samples,
+        planned_samples,
+        gather_rays,
+        shadow_rays,
+        sampling,
+        irradiance_error,
+        adaptive_threshold,
+    } = integrator;
     words.add("--seed", seed);
     words.add("--spp", samples);
     words.add_some("--planned-spp", *planned_samples);
@@ -114,6 +122,7 @@ fn of_rays(integrator: &Integrator, words: &mut Words) {
     words.add("--sampling", sampling.name());
     words.add("--irradiance-cache", if irradiance_error.is_some() { "on" } else { "off" });
     words.add_some("--ic-error", *irradiance_error);
+    words.add("--adaptive", &adaptive_threshold.map_or("off".to_owned(), |threshold| threshold.to_string()));
 }
 
 /// A word as a shell takes it.

@@ -26,6 +26,7 @@ pub(super) fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
             shadow_rays: shadow_rays.min(1),
             sampling: Sampling::Reflection,
             irradiance_error: (!is_small && gather_rays > 0).then_some(error),
+            adaptive_threshold: None,
             ..settings.integrator
         };
         settings.cards.verify = None;

@@ -32,7 +32,7 @@ impl Wish {
 
     /// Returns whether the quality leaves all settings as they are.
     pub(super) fn states_all(&self) -> bool {
-        self.stated == Stated::ALL
+        !self.stated.needs_fit()
     }
 
     /// All assignments, in the order in which they are applied.

@@ -95,11 +95,13 @@ pub enum Parameter {
     InFlight,
     /// Keeping of irradiance records.
     KeepRecords,
+    /// Threshold of adaptive sampling.
+    AdaptiveThreshold,
 }
 
 impl Parameter {
     /// All parameters, in the order of their numbers.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::Width,
         Self::Height,
         Self::Camera,
@@ -122,6 +124,7 @@ impl Parameter {
         Self::Filter,
         Self::InFlight,
         Self::KeepRecords,
+        Self::AdaptiveThreshold,
     ];
 
     /// The fault of a card that cannot render with this parameter's value.
@@ -154,6 +157,7 @@ impl Parameter {
             Self::Filter => "pixel filter",
             Self::InFlight => "tiles in flight",
             Self::KeepRecords => "keeping of irradiance records",
+            Self::AdaptiveThreshold => "threshold of adaptive sampling",
         }
     }
 }

@@ -10,6 +10,31 @@ pub const ALBEDO_STEPS: u32 = 1 << 19;
 pub const NORMAL_STEPS: u32 = 1 << 18;
 /// Fractions of the depth unit in a sum of depths.
 pub const DEPTH_STEPS: u32 = 1 << 16;
+/// Number of a pixel's first samples, its probes, in a frame with adaptive sampling: the number of paths of each later sample is chosen by their
+/// variance. The light of a probe counts by half.
+pub const PROBES: u32 = 4;
+
+/// Number of samples in a sum.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SampleCount {
+    /// All samples.
+    pub samples: u32,
+    /// Those of them that are probes, [`PROBES`] at most; 0 without adaptive sampling.
+    pub probes: u32,
+}
+
+impl SampleCount {
+    /// Count of samples from `first` on, with or without adaptive sampling.
+    pub fn of_range(first: u32, samples: u32, is_adaptive: bool) -> Self {
+        let probes = PROBES.saturating_sub(first).min(samples);
+        Self { samples, probes: if is_adaptive { probes } else { 0 } }
+    }
+
+    /// Weight of the light of all samples, where a sample that is no probe has 1; 1/2 for none.
+    pub fn weight_of_light(self) -> f64 {
+        (f64::from(self.samples) - 0.5 * f64::from(self.probes)).max(0.5)
+    }
+}
 
 /// Values of a pixel: means over its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -204,13 +229,14 @@ impl PixelSums {
     }
 
     /// Sums without layers that stand for values nearest to those of a pixel.
-    pub fn nearest(pixel: &Pixel, samples: u32, scale: &SumScale) -> Self {
+    pub fn nearest(pixel: &Pixel, count: SampleCount, scale: &SumScale) -> Self {
         let Pixel { radiance, albedo, normal, depth } = *pixel;
         let sees = depth.is_finite();
+        let samples = count.samples;
         let of_all = |value: f32, steps: u32| f64::from(value) * f64::from(samples) * f64::from(steps);
         let depth = of_all(depth, DEPTH_STEPS) / f64::from(scale.depth);
         Self {
-            light: light_of(radiance, samples, scale),
+            light: light_of(radiance, count, scale),
             albedo: albedo.map(|value| (of_all(value, ALBEDO_STEPS) + 0.5) as u32),
             normal: normal.map(|value| rounded(of_all(value, NORMAL_STEPS)) as i32),
             depth: if sees { rounded(depth) } else { 0 },
@@ -221,38 +247,37 @@ impl PixelSums {
 
     /// The sums with layers that stand for values nearest to `layers`; the light is the layers' sum.
     #[must_use]
-    pub fn with_nearest_layers(self, layers: &PixelLayers, samples: u32, scale: &SumScale) -> Self {
+    pub fn with_nearest_layers(self, layers: &PixelLayers, count: SampleCount, scale: &SumScale) -> Self {
         let [direct, indirect, caustic] =
-            [layers.direct, layers.indirect, layers.caustic].map(|light| light_of(light, samples, scale));
+            [layers.direct, layers.indirect, layers.caustic].map(|light| light_of(light, count, scale));
         self.with_layers(LayerSums { direct, indirect, caustic, gathers: layers.gathers as u32 })
     }
 
-    /// Values of the pixel, means over `samples`.
-    pub fn pixel(&self, samples: u32, scale: &SumScale) -> Pixel {
-        let per_sample = 1.0 / f64::from(samples.max(1));
+    /// Values of the pixel, means over the samples.
+    pub fn pixel(&self, count: SampleCount, scale: &SumScale) -> Pixel {
+        let per_sample = 1.0 / f64::from(count.samples.max(1));
         let normal = per_sample / f64::from(NORMAL_STEPS);
         let albedo = per_sample / f64::from(ALBEDO_STEPS);
         let depth = f64::from(scale.depth) / f64::from(DEPTH_STEPS) / f64::from(self.surfaces);
         Pixel {
-            radiance: radiance(self.light, samples, scale),
+            radiance: radiance(self.light, count, scale),
             albedo: self.albedo.map(|sum| (f64::from(sum) * albedo) as f32),
             normal: self.normal.map(|sum| (f64::from(sum) * normal) as f32),
             depth: if self.surfaces > 0 { (self.depth as f64 * depth) as f32 } else { f32::INFINITY },
         }
     }
 
-    /// Values of the layers, means over `samples`; `None` in a frame without layers.
-    pub fn pixel_layers(&self, samples: u32, scale: &SumScale) -> Option<PixelLayers> {
+    /// Values of the layers, means over the samples; `None` in a frame without layers.
+    pub fn pixel_layers(&self, count: SampleCount, scale: &SumScale) -> Option<PixelLayers> {
         let LayerSums { direct, indirect, caustic, gathers } = self.layers?;
-        let [direct, indirect, caustic] =
-            [direct, indirect, caustic].map(|sum| radiance(sum, samples, scale));
+        let [direct, indirect, caustic] = [direct, indirect, caustic].map(|sum| radiance(sum, count, scale));
         Some(PixelLayers { direct, indirect, caustic, gathers: gathers as f32 })
     }
 }
 
 /// Sum of light whose mean is nearest to a radiance.
-fn light_of(radiance: [f32; 3], samples: u32, scale: &SumScale) -> [i64; 3] {
-    let steps = LIGHT_STEPS / f64::from(scale.radiance) * f64::from(samples);
+fn light_of(radiance: [f32; 3], count: SampleCount, scale: &SumScale) -> [i64; 3] {
+    let steps = LIGHT_STEPS / f64::from(scale.radiance) * count.weight_of_light();
     radiance.map(|value| rounded(f64::from(value) * steps).max(0))
 }
 
@@ -262,9 +287,9 @@ fn rounded(value: f64) -> i64 {
 }
 
 /// Mean radiance of a sum of light.
-fn radiance(light: [i64; 3], samples: u32, scale: &SumScale) -> [f32; 3] {
+fn radiance(light: [i64; 3], count: SampleCount, scale: &SumScale) -> [f32; 3] {
     let unit = f64::from(scale.radiance) / LIGHT_STEPS;
-    light.map(|sum| (sum as f64 * unit / f64::from(samples.max(1))) as f32)
+    light.map(|sum| (sum as f64 * unit / count.weight_of_light()) as f32)
 }
 
 #[cfg(test)]
@@ -312,12 +337,16 @@ mod tests {
             ..PixelSums::default()
         };
         let sums = view.with_layers(layers);
-        let pixel = sums.pixel(4, &scale);
+        let count = SampleCount { samples: 4, probes: 0 };
+        let pixel = sums.pixel(count, &scale);
         assert_eq!((pixel.radiance, pixel.albedo), ([3.0; 3], [0.25, 0.0, 0.5]));
         assert_eq!((pixel.normal, pixel.depth), ([0.0, -0.25, 0.0], 0.75));
-        let layers = sums.pixel_layers(4, &scale).unwrap();
+        let layers = sums.pixel_layers(count, &scale).unwrap();
         assert_eq!((layers.direct, layers.caustic, layers.gathers), ([1.0; 3], [2.0; 3], 3.0));
-        let nothing = PixelSums::default().pixel(4, &scale);
+        let nothing = PixelSums::default().pixel(count, &scale);
         assert_eq!(nothing, Pixel { depth: f32::INFINITY, ..Pixel::default() });
+        // Two probes count as one sample.
+        let with_probes = sums.pixel(SampleCount { samples: 4, probes: 2 }, &scale);
+        assert_eq!((with_probes.radiance, with_probes.albedo), ([4.0; 3], pixel.albedo));
     }
 }

@@ -48,6 +48,7 @@ pub(super) fn frame() -> FrameParameters {
         layers: false,
         in_flight: 3,
         keep_records: true,
+        adaptive_threshold: Some(0.5),
     }
 }
 

@@ -29,6 +29,7 @@ impl RenderSettings {
         within("--bins", self.schedule.bins.unwrap_or(1) as u64, 1, MAX_BINS as u64)?;
         self.check_irradiance_error()?;
         self.check_max_distance()?;
+        self.check_adaptive_threshold()?;
         check_chips(self.cards.addresses.iter().map(CardAddress::emulated_chips).sum())?;
         self.check_trace()?;
         self.check_memory_model()?;
@@ -89,6 +90,19 @@ impl RenderSettings {
                 value: distance.to_string(),
                 reason: "a distance is a positive number of metres".into(),
                 remedy: "give a positive number, or `auto`".into(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that the threshold of adaptive sampling is one, if there is any.
+    fn check_adaptive_threshold(&self) -> Result<(), RenderError> {
+        match self.integrator.adaptive_threshold {
+            Some(threshold) if !(threshold.is_finite() && threshold > 0.0) => Err(RenderError::Setting {
+                option: "--adaptive",
+                value: threshold.to_string(),
+                reason: "a threshold is a positive number".into(),
+                remedy: "give a number such as 0.1, or `off`".into(),
             }),
             _ => Ok(()),
         }

@@ -49,6 +49,7 @@ impl RenderSettings {
             shadow_rays,
             sampling,
             irradiance_error,
+            adaptive_threshold,
         } = integrator;
         let window = self.window();
         let mut settings = named([
@@ -73,6 +74,7 @@ impl RenderSettings {
             ("shadow-rays", json!(shadow_rays)),
             ("sampling", json!(sampling.name())),
             ("ic-error", json!(irradiance_error)),
+            ("adaptive", json!(adaptive_threshold)),
         ]);
         // Rays are divided among the planned samples with the irradiance cache alone.
         if irradiance_error.is_some() && integrator.planned() != *samples {

@@ -112,6 +112,9 @@ pub struct Integrator {
     pub sampling: Sampling,
     /// Maximum relative error of interpolated irradiance; `None` to interpolate none.
     pub irradiance_error: Option<f32>,
+    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m): samples of a pixel whose first ones deviate by more, over the root of their mean, are means of
+    /// several paths. `None` for one path a sample.
+    pub adaptive_threshold: Option<f32>,
 }
 
 impl Integrator {
@@ -131,6 +134,7 @@ impl Default for Integrator {
             shadow_rays: 8,
             sampling: Sampling::Product,
             irradiance_error: None,
+            adaptive_threshold: None,
         }
     }
 }

@@ -1,0 +1,120 @@
+//! Adaptive sampling: a pixel whose first samples differ has several paths in each of the others.
+//!
+//! The first [`PROBES`] samples of a pixel are its probes. Each later sample is the mean of `k` paths,
+//!
+//! ```text
+//! k = s / (t sqrt(L)), rounded, 1 to 16
+//! ```
+//!
+//! with `L` the mean of the probes' light over samples and channels, `s^2` its variance over samples, mean of the channels, and `t` the frame's threshold:
+//! the number of samples for an equal error is proportional to `s`, and noise shows by about the inverse root of the light under a tone curve.
+//!
+//! An estimate whose own samples choose their number is biased (Kirk, Arvo 1991, *Unbiased sampling techniques for image synthesis*). Probes
+//! therefore have a fixed weight, half of a sample's, and the expectation of the other samples does not depend on `k`.
+//!
+//! Samples stay what frames are divided into: a path is a function of pixel, sample and `k`, and `k` one of the pixel's probes. A frame of later samples
+//! looks at the probes again.
+
+use glam::Vec3;
+use photoncard_shared::message::{FrameParameters, MAX_PATHS, PROBES};
+
+/// Weight of a probe, in samples.
+const WEIGHT_OF_PROBE: f32 = 0.5;
+
+/// True if the frame has samples whose number of paths the probes choose.
+pub(super) fn needs_probes(frame: &FrameParameters) -> bool {
+    frame.adaptive_threshold.is_some() && frame.first_sample.saturating_add(frame.samples) > PROBES
+}
+
+/// Number of paths of each sample of a pixel after its probes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Paths(u8);
+
+impl Paths {
+    pub(super) const ONE: Self = Self(1);
+
+    /// Number of paths of a sample.
+    pub(super) fn of_sample(self, sample: u32) -> u32 {
+        if sample < PROBES { 1 } else { self.0.into() }
+    }
+
+    /// Index in the pixel of a path of a sample.
+    pub(super) fn index(self, sample: u32, path: u32) -> u32 {
+        let later = sample.saturating_sub(PROBES).wrapping_mul(self.0.into());
+        sample.min(PROBES).wrapping_add(later).wrapping_add(path)
+    }
+
+    /// Weight of each path of a sample.
+    pub(super) fn weight(self, frame: &FrameParameters, sample: u32) -> f32 {
+        match frame.adaptive_threshold {
+            None => 1.0,
+            Some(_) if sample < PROBES => WEIGHT_OF_PROBE,
+            Some(_) => 1.0 / f32::from(self.0),
+        }
+    }
+}
+
+/// Light of a pixel's probes.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Probes {
+    sum: Vec3,
+    squares: Vec3,
+}
+
+impl Probes {
+    pub(super) const NONE: Self = Self { sum: Vec3::ZERO, squares: Vec3::ZERO };
+
+    /// Adds the light of a probe, W/(sr m^2).
+    pub(super) fn add(&mut self, light: Vec3) {
+        self.sum += light;
+        self.squares += light * light;
+    }
+
+    /// Number of paths by all probes and a threshold, W^(1/2)/(sr^(1/2) m).
+    pub(super) fn paths(&self, threshold: f32) -> Paths {
+        let probes = PROBES as f32;
+        let mean = self.sum.element_sum() / (3.0 * probes);
+        let variance = (self.squares - self.sum * self.sum / probes).element_sum() / (3.0 * (probes - 1.0));
+        if !(mean > 0.0 && variance > 0.0) {
+            return Paths::ONE;
+        }
+        // Saturates where the probes' light is infinite.
+        let paths = libm::sqrtf(variance / mean) / threshold + 0.5;
+        Paths((paths as u32).clamp(1, MAX_PATHS) as u8)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::vec::Vec;
+
+    use super::*;
+
+    #[test]
+    fn paths_of_all_samples_are_the_first_of_the_pixel() {
+        for paths in 1..=16 {
+            let paths = Paths(paths);
+            let indices = (0..20)
+                .flat_map(|sample| (0..paths.of_sample(sample)).map(move |path| paths.index(sample, path)));
+            let indices: Vec<u32> = indices.collect();
+            assert!(indices.iter().copied().eq(0..indices.len() as u32), "{paths:?} {indices:?}");
+        }
+    }
+
+    #[test]
+    fn paths_are_in_proportion_to_the_deviation() {
+        let paths = |lights: [f32; 4], threshold: f32| {
+            let mut probes = Probes::NONE;
+            lights.into_iter().for_each(|light| probes.add(Vec3::splat(light)));
+            probes.paths(threshold)
+        };
+        // Mean 4, variance 16 / 3.
+        let lights = [2.0, 2.0, 6.0, 6.0];
+        let ratio = libm::sqrtf(4.0 / 3.0);
+        assert_eq!([1.0, 4.0, 9.0, 99.0].map(|k| paths(lights, ratio / k).0), [1, 4, 9, 16]);
+        assert_eq!(paths(lights, 10.0), Paths::ONE);
+        assert_eq!(paths([0.0; 4], 1e-3), Paths::ONE);
+        assert_eq!(paths([1.0; 4], 1e-3), Paths::ONE);
+        assert_eq!(paths([0.0, 0.0, 0.0, f32::INFINITY], 1.0), Paths::ONE);
+    }
+}

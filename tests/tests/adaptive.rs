@@ -1,0 +1,81 @@
+//! Adaptive sampling: noise falls where samples differ, and the expected picture stays.
+
+use photoncard_driver::render::{Filter, Integrator, PhotonMaps, Picture, RenderSettings, Rendering};
+use photoncard_driver::scene::{Scene, gltf};
+use photoncard_tests::render_or_panic;
+
+const SEEDS: u32 = 160;
+/// Samples of a pixel: the four probes, and one by their choice.
+const SAMPLES: u32 = 5;
+
+fn room() -> Scene {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
+    gltf::load(path.as_ref()).expect("a shipped scene loads")
+}
+
+fn settings(seed: u32, adaptive_threshold: Option<f32>) -> RenderSettings {
+    RenderSettings {
+        picture: Picture { width: 12, height: 12, filter: Filter::Box, ..Picture::default() },
+        photons: PhotonMaps { count: 100, ..PhotonMaps::default() },
+        integrator: Integrator {
+            seed,
+            samples: SAMPLES,
+            gather_rays: 0,
+            shadow_rays: 1,
+            adaptive_threshold,
+            ..Integrator::default()
+        },
+        ..RenderSettings::default()
+    }
+}
+
+/// Mean over the seeds of the picture's mean, its standard error, and the mean variance of a pixel.
+fn moments(threshold: Option<f32>) -> [f64; 3] {
+    let scene = room();
+    let radiances = |seed| -> Vec<f64> {
+        let Rendering { film, .. } = render_or_panic(&scene, &settings(seed, threshold));
+        film.pixels()
+            .map(|pixel| pixel.radiance.iter().map(|&light| f64::from(light)).sum::<f64>() / 3.0)
+            .collect()
+    };
+    let pictures: Vec<Vec<f64>> = (0..SEEDS).map(radiances).collect();
+    let seeds = f64::from(SEEDS);
+    let [_, mean, variance_of_mean] = mean_and_variance(
+        &pictures.iter().map(|pixels| pixels.iter().sum::<f64>() / pixels.len() as f64).collect::<Vec<_>>(),
+    );
+    let pixels = pictures[0].len();
+    let variance = (0..pixels)
+        .map(|pixel| mean_and_variance(&pictures.iter().map(|pixels| pixels[pixel]).collect::<Vec<_>>())[2])
+        .sum::<f64>()
+        / pixels as f64;
+    [mean, (variance_of_mean / seeds).sqrt(), variance]
+}
+
+/// Number, mean and variance of values.
+fn mean_and_variance(values: &[f64]) -> [f64; 3] {
+    let number = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / number;
+    [number, mean, values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (number - 1.0)]
+}
+
+/// Most pixels see an edge of the lamp, of a box or of a shadow. A mean over all paths, of which the probes choose the number, would
+/// be too dark: bright probes bring more paths, and count less.
+#[test]
+fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
+    let [even, even_error, even_variance] = moments(None);
+    let [adaptive, error, variance] = moments(Some(0.02));
+    let allowed = 4.0 * even_error.hypot(error);
+    assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");
+    assert!(allowed < 0.02 * even, "the comparison tells a hundredth apart: {allowed} of {even}");
+    assert!(variance < 0.75 * even_variance, "{variance} of {even_variance}");
+}
+
+/// Light of equal samples has no noise: every sample has one path.
+#[test]
+fn pixels_without_noise_have_one_path_a_sample() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/furnace.gltf");
+    let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
+    let settings = settings(0, Some(0.1)).with(|s| s.integrator.shadow_rays = 0);
+    let rendering = render_or_panic(&scene, &settings);
+    assert_eq!(rendering.statistics.rays.eye, 12 * 12 * u64::from(SAMPLES));
+}
