@@ -4,10 +4,10 @@ use std::f64::consts::PI;
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::photon::trace;
+use photoncard_driver::photon::{trace, trace_caustics};
 use photoncard_driver::scene::{
-    Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Scene, Texture, Triangle,
-    VertexAttributes,
+    Encoding, Environment, Image, Material, PunctualKind, PunctualLight, Reflection, Scene, Texture,
+    Triangle, VertexAttributes,
 };
 use photoncard_firmware::scene::light::{environment_direction, environment_radiance};
 use photoncard_tests::{camera, lambertian, quad, room, scene};
@@ -246,4 +246,60 @@ fn photons_of_panels_are_aimed() {
             .sum();
         check(&cubes, times(COLOUR, sum * f64::from(0.4_f32 * 0.4) / f64::from(steps * steps)), "panel");
     }
+}
+
+/// A mirror of 10 m on the ground, under a slanting sun, and above it a black plate of 1 m: one path in hundreds that meet the mirror meets
+/// the plate. A spot lights the plate with `lamp` times the sun's intensity.
+fn sun_over_a_mirror(lamp: f32) -> Scene {
+    let smooth = Reflection::MetallicRoughness {
+        base_colour: Vec3::ONE,
+        metallic: 1.0,
+        roughness: 0.0,
+        dielectric: Vec3::ZERO,
+        grazing: 1.0,
+        transmission: None,
+    };
+    let materials = vec![lambertian("black", BLACK), Material::new("mirror", smooth)];
+    let square = |y: f32, side: f32, material| {
+        let corner = |i: f32, j: f32| Vec3::new(0.5 * side * i, y, 0.5 * side * j);
+        quad([corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)], material)
+    };
+    let mut triangles = [square(0.0, 10.0, 1), square(3.0, 1.0, 0)].concat();
+    // The plate faces the mirror.
+    triangles[2..].iter_mut().for_each(|triangle| triangle.vertices.reverse());
+    let sun = light(PunctualKind::Directional { direction: Vec3::new(1.0, -1.0, 0.0).normalize() }, COLOUR);
+    let spot = PunctualKind::Spot {
+        position: 2.0 * Vec3::Y,
+        direction: Vec3::Y,
+        inner_cosine: 0.9,
+        outer_cosine: 0.8,
+    };
+    let spot = light(spot, COLOUR.map(|intensity| intensity * lamp));
+    Scene { lights: vec![sun, spot], ..scene(triangles, materials, camera(Vec3::Y, Vec3::Y)) }
+}
+
+/// Where caustics bring next to none of the light, few paths are traced for them, and the photons have the power all the same.
+#[test]
+fn rare_caustics_take_paths_by_their_share_of_the_light_and_keep_their_power() {
+    const SEEDS: u32 = 16;
+    let [much, little] = [0.0, 100.0].map(|lamp| {
+        let packed = PackedScene::new(&sun_over_a_mirror(lamp)).unwrap();
+        let (mut photons, mut power) = (0, [0.0; 3]);
+        for seed in 0..SEEDS {
+            let caustic = trace_caustics(&packed, seed, PHOTONS, &|| true).unwrap();
+            let unit = f64::from(caustic.power_unit()) / f64::from(SEEDS);
+            photons += caustic.len();
+            for photon in caustic.iter() {
+                let own = photon.power.decode();
+                power.iter_mut().zip(own).for_each(|(sum, own)| *sum += f64::from(own) * unit);
+            }
+        }
+        for (found, expected) in power.into_iter().zip(times(COLOUR, 0.5_f64.sqrt())) {
+            let error = found / expected - 1.0;
+            println!("lamp {lamp}: {photons} photons, {found} W, off by {error}");
+            assert!(error.abs() < 0.02, "lamp {lamp}: {found} W instead of {expected} W, off by {error}");
+        }
+        photons
+    });
+    assert!(little > 0 && 6 * little < much, "{little} photons instead of {much}");
 }

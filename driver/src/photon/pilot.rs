@@ -1,7 +1,9 @@
 //! Pilots: first paths of other seeds than the map's, by which the sources and the guide of its paths are chosen.
 
+use std::collections::BTreeMap;
+
 use photoncard_firmware::sampler::hash;
-use photoncard_shared::layout::Photon;
+use photoncard_shared::layout::{GRID_BITS, Photon};
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -11,6 +13,7 @@ use super::guide::{Guide, Sample, Warped};
 use super::importons::ImportonGrid;
 use super::stored::StoredPhoton;
 use super::tracer::{PATHS_PER_TASK, Purpose, Traced, Tracer};
+use crate::light::Sources;
 use crate::pack::PackedScene;
 
 /// Guiding of photon paths.
@@ -26,6 +29,11 @@ pub struct Guiding {
 
 /// Number of tasks of the pilots for aimed and unaimed paths.
 const AIM_TASKS: u64 = 4;
+/// Number of tasks of each pilot for the share of caustics.
+const SHARE_TASKS: u64 = 8;
+/// Number of lower bits of a grid coordinate that a cell of the pilots for the share of caustics spans: 32 to 64 cells along the longest
+/// side of the scene.
+const CELL_BITS: u32 = GRID_BITS - 6;
 /// Maximum of the spread of guided paths, aimed at importons over not aimed, for which paths are aimed at them: a little above 1, as a pilot
 /// of unaimed paths misses rare ones of great use.
 const MAX_SPREAD_BY_AIM: f64 = 1.1;
@@ -57,11 +65,67 @@ pub(super) fn tracer_of_more_photons(packed: &PackedScene, seed: u32) -> Result<
 
 /// Effective number of the photons that the first paths store, by their powers.
 fn effective_photons(tracer: &Tracer, packed: &PackedScene) -> Result<f64, Fault> {
-    let tasks: Result<Vec<Traced>, Fault> = (0..AIM_TASKS)
+    Ok(effective_number(first_photons(tracer, packed, AIM_TASKS)?.into_iter().map(StoredPhoton::power)))
+}
+
+/// Photons that the paths of the first tasks store.
+fn first_photons(tracer: &Tracer, packed: &PackedScene, tasks: u64) -> Result<Vec<StoredPhoton>, Fault> {
+    let tasks: Result<Vec<Traced>, Fault> = (0..tasks)
         .into_par_iter()
         .map(|task| tracer.trace(&mut packed.view().1, task * PATHS_PER_TASK))
         .collect();
-    Ok(effective_number(tasks?.into_iter().flat_map(|traced| traced.photons).map(StoredPhoton::power)))
+    Ok(tasks?.into_iter().flat_map(|traced| traced.photons).collect())
+}
+
+/// Share of the power that arrives at surfaces, of all bounces, that caustics bring where they are: the mean over their light; 1 if no
+/// other light arrives.
+pub(super) fn caustic_share(packed: &PackedScene, seed: u32) -> Result<f64, Fault> {
+    let power_by = |sources: Option<&Sources>, purpose: Purpose| {
+        // Paths of another seed, so that the number of paths does not depend on the photons of the map.
+        let tracer = Tracer::new(packed, sources.unwrap_or(packed.sources()), !seed, purpose);
+        Ok(CellPowers::new(&tracer, first_photons(&tracer, packed, SHARE_TASKS)?))
+    };
+    let caustic: CellPowers = power_by(packed.caustic_sources(), Purpose::Caustics)?;
+    Ok(caustic.share_of(&power_by(packed.aimed_sources(), Purpose::Indirect)?))
+}
+
+/// Powers of photons by cells of space, in the order of the cells, so that sums are those of any machine.
+struct CellPowers(BTreeMap<[u32; 3], CellPower>);
+
+/// Power of the photons of a cell, watts, and the sum of their squares.
+#[derive(Clone, Copy, Default)]
+struct CellPower {
+    power: f64,
+    squares: f64,
+}
+
+impl CellPowers {
+    fn new(tracer: &Tracer, photons: Vec<StoredPhoton>) -> Self {
+        let mut cells = BTreeMap::<_, CellPower>::new();
+        for photon in photons {
+            let power = photon.power() * f64::from(tracer.path_unit);
+            let cell = cells.entry(photon.point().map(|coordinate| coordinate >> CELL_BITS)).or_default();
+            cell.power += power;
+            cell.squares += power * power;
+        }
+        Self(cells)
+    }
+
+    fn power(&self) -> f64 {
+        self.0.values().map(|cell| cell.power).sum()
+    }
+
+    /// Mean share of this light of all light, where it is; at least its share of the whole.
+    fn share_of(&self, all: &Self) -> f64 {
+        let (own, whole) = (self.power(), all.power());
+        // Pairs of photons alone: a photon with itself would make any light of few photons seem focused.
+        let of_cell = |(cell, own): (&[u32; 3], &CellPower)| {
+            let around = all.0.get(cell).map_or(0.0, |all| all.power);
+            (own.power * own.power - own.squares) / around.max(own.power)
+        };
+        let here = self.0.iter().map(of_cell).sum::<f64>() / own;
+        if own < whole { (own / whole).max(here) } else { 1.0 }
+    }
 }
 
 /// Effective number of samples of weights w: `(sum w)^2 / sum w^2` (Kish 1965).

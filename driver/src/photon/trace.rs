@@ -1,11 +1,13 @@
 //! The photon pass: paths until enough photons are stored.
 
+use std::cell::LazyCell;
+
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
 use super::error::PhotonError;
 use super::importons::ImportonGrid;
-use super::pilot::{Guiding, guide, more_useful, tracer_of_more_photons};
+use super::pilot::{Guiding, caustic_share, guide, more_useful, tracer_of_more_photons};
 use super::stored::{Photons, StoredPhoton};
 use super::tracer::{PATHS_PER_TASK, Purpose, Traced, Tracer};
 use crate::light::Sources;
@@ -25,9 +27,15 @@ pub struct PhotonPass {
 
 /// Number of paths after which at least one photon per thousand further paths must be stored.
 const FRUITLESS_PATHS: u64 = 1_000_000;
-/// Maximum number of paths per stored caustic photon, beyond [`FRUITLESS_PATHS`]: a lower yield means that caustics carry
-/// little light, for which few photons suffice.
+/// Number of paths per stored caustic photon that are traced in any case.
 const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
+/// Maximum number of further paths for caustics.
+const MAX_PATHS_TO_CAUSTICS: f64 = 1_000_000.0;
+/// Minimum number of further paths for caustics.
+const MIN_PATHS_TO_CAUSTICS: u64 = 125_000;
+/// Share of the power that surfaces receive from which on caustics are worth [`MAX_PATHS_TO_CAUSTICS`]: paths of smaller shares are
+/// proportionally fewer.
+const FULL_CAUSTIC_SHARE: f64 = 0.1;
 
 /// Traces paths until `count` photons are stored; none if no surface stores photons, and fewer if most light ends on surfaces that
 /// store none. `progress` is called with the number
@@ -54,7 +62,7 @@ pub(crate) fn trace_for(
 ) -> Result<PhotonPass, PhotonError> {
     let is_fruitless = |stored: usize, paths: u64| paths >= FRUITLESS_PATHS + 1_000 * stored as u64;
     let traced = trace_while(packed, importons, (seed, Purpose::Indirect), count, &|stored, paths| {
-        !is_fruitless(stored, paths) && progress(stored)
+        Ok(if !is_fruitless(stored, paths) && progress(stored) { u64::MAX } else { 0 })
     })?;
     let stored = traced.photons.len();
     if stored >= count || !packed.keeps_photons() {
@@ -70,8 +78,8 @@ pub(crate) fn trace_for(
     Ok(traced)
 }
 
-/// Traces paths until `count` caustic photons are stored, or until the yield is so low that the missing ones are invisible.
-/// `go_on` returns whether to go on.
+/// Traces paths until `count` caustic photons are stored, or as many as they are worth: where fewer than one path in twenty stores a
+/// photon, their number follows from the share of light that caustics bring. `go_on` returns whether to go on.
 ///
 /// # Errors
 /// If `go_on` returns false.
@@ -92,21 +100,34 @@ pub(crate) fn trace_caustics_for(
     count: usize,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Photons, PhotonError> {
-    let is_fruitful =
-        |stored: usize, paths| paths < FRUITLESS_PATHS + MAX_PATHS_TO_A_CAUSTIC_PHOTON * stored as u64;
+    // Most scenes with caustics need no pilot.
+    let worth = LazyCell::new(|| caustic_share(packed, seed).map(paths_worth));
     let traced = trace_while(packed, importons, (seed, Purpose::Caustics), count, &|stored, paths| {
-        is_fruitful(stored, paths) && go_on()
+        if !go_on() {
+            return Ok(0);
+        }
+        let left = |least: u64| (least + MAX_PATHS_TO_A_CAUSTIC_PHOTON * stored as u64).saturating_sub(paths);
+        match left(MIN_PATHS_TO_CAUSTICS) {
+            0 => Ok(left((*worth)?)),
+            more => Ok(more),
+        }
     })?;
     if go_on() { Ok(traced.photons) } else { Err(PhotonError::Stopped) }
 }
 
-/// Traces paths until `count` photons are stored, or `go_on(photons, paths)` returns false.
+/// Number of paths that caustics are worth, besides those in proportion to their photons, for their share of the light.
+fn paths_worth(share: f64) -> u64 {
+    let full = (share / FULL_CAUSTIC_SHARE).min(1.0);
+    MIN_PATHS_TO_CAUSTICS.max((full * MAX_PATHS_TO_CAUSTICS) as u64)
+}
+
+/// Traces paths until `count` photons are stored, or `further(photons, paths)`, the number of paths that may follow, is 0.
 fn trace_while(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,
     (seed, purpose): (u32, Purpose),
     count: usize,
-    go_on: &dyn Fn(usize, u64) -> bool,
+    further: &dyn Fn(usize, u64) -> Result<u64, Fault>,
 ) -> Result<PhotonPass, PhotonError> {
     let keeps_photons = match purpose {
         Purpose::Indirect => packed.keeps_photons(),
@@ -125,8 +146,12 @@ fn trace_while(
     let mut list: Vec<StoredPhoton> = Vec::with_capacity(count);
     let mut paths = 0_u64;
     let mut met = 0_u64;
-    while list.len() < count && go_on(list.len(), paths) {
-        let tasks = next_tasks(count - list.len(), list.len(), paths);
+    while list.len() < count {
+        let further = further(list.len(), paths).map_err(PhotonError::Unsound)?;
+        if further == 0 {
+            break;
+        }
+        let tasks = next_tasks(count - list.len(), list.len(), paths).min(further.div_ceil(PATHS_PER_TASK));
         let round: Result<Vec<Traced>, Fault> = (0..tasks)
             .into_par_iter()
             .map(|task| {
