@@ -19,7 +19,7 @@ const IDLE_WAIT: Duration = Duration::from_millis(20);
 /// The port's failure; [`PortError::Closed`] is the regular end of a session.
 pub fn serve<K: ChipKind, M: CardMemory>(
     card: &mut Card<K, M>,
-    port: &mut impl Port,
+    port: &mut (impl Port + ?Sized),
 ) -> Result<(), PortError> {
     let mut buffer = [0; 512];
     loop {

@@ -81,6 +81,7 @@ impl Default for Checksum {
 
 impl Checksum {
     /// Appends bytes.
+    #[inline]
     pub fn update(&mut self, bytes: &[u8]) {
         let (sixteens, rest) = bytes.as_chunks::<16>();
         for [a, b, c, d, behind @ ..] in sixteens {

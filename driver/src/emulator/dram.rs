@@ -13,6 +13,7 @@ use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
 
+use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use crate::pack::CardImage;
 
 /// The host's card image; empty until [`Self::give`].
@@ -154,6 +155,12 @@ impl MemoryPort for EmulatedDram {
             copy_lines(lines, &mut own[first..end]);
         }
         Some(())
+    }
+}
+
+impl MeasuredMemory for EmulatedDram {
+    fn traffic(&self) -> MemoryTraffic {
+        MemoryTraffic::ZERO
     }
 }
 

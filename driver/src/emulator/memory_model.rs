@@ -10,6 +10,7 @@ use photoncard_firmware::memory::{
 use photoncard_shared::address::{LINE_BYTES, Line, Structure};
 
 use super::contents::{Contents, Inspected};
+use super::trace::TraceFile;
 
 /// Caches between a chip and its DRAM: the argument of `--cache`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -228,6 +229,11 @@ impl MemoryTraffic {
 pub trait MeasuredMemory: MemoryPort {
     /// Traffic since the memory was made; zero for a memory that is not modelled.
     fn traffic(&self) -> MemoryTraffic;
+
+    /// Takes the unfinished trace of its reads, if there is one.
+    fn take_trace(&mut self) -> Option<TraceFile> {
+        None
+    }
 }
 
 impl MeasuredMemory for Lines<'_> {
@@ -236,7 +242,7 @@ impl MeasuredMemory for Lines<'_> {
     }
 }
 
-impl<M: MemoryPort, E, L> MeasuredMemory for Inspected<Counted<LineCaches<Counted<M>, E, L>>>
+impl<M: MeasuredMemory, E, L> MeasuredMemory for Inspected<Counted<LineCaches<Counted<M>, E, L>>>
 where
     E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>,
     L: AsRef<[Line]> + AsMut<[Line]>,
@@ -247,6 +253,11 @@ where
             fetched: self.below().below().below().traffic().clone(),
             contents: *self.contents(),
         }
+    }
+
+    fn take_trace(&mut self) -> Option<TraceFile> {
+        // Below the caches: what counts contents, requests, the caches themselves, and what counts fetches.
+        self.below_mut().below_mut().below_mut().below_mut().take_trace()
     }
 }
 

@@ -3,6 +3,7 @@
 pub mod contents;
 pub mod direct;
 mod dram;
+mod measured;
 pub mod memory_model;
 mod names;
 mod tile_lines;
@@ -27,6 +28,7 @@ use photoncard_shared::transport::WINDOW;
 
 use self::dram::EmulatedDram;
 pub use self::dram::SharedImage;
+pub use self::measured::Measured;
 use self::memory_model::{CacheSettings, CacheSpec, MeasuredMemory, MemoryTraffic};
 pub use self::tile_lines::TileLines;
 use self::tile_lines::TileMeter;
@@ -222,13 +224,13 @@ impl Drop for EmulatedCard {
 ///
 /// # Panics
 /// If the chip panicked.
-pub fn serve_card(kind: EmulatedKind, mut port: impl Port + Send) -> std::io::Result<()> {
+pub fn serve_card(kind: EmulatedKind, port: &mut (dyn Port + Send)) -> std::io::Result<()> {
     let dram = EmulatedDram::new(kind.budget().dram_bytes, SharedImage::default(), SharedImage::default());
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("chip".into())
             .stack_size(THREAD_STACK)
-            .spawn_scoped(scope, || run(kind, None, dram, &mut port))?;
+            .spawn_scoped(scope, || run(kind, None, dram, port))?;
         thread.join().map(drop).or_else(|panic| std::panic::resume_unwind(panic))
     })
 }
@@ -237,7 +239,7 @@ fn run(
     kind: EmulatedKind,
     model: Option<(MemoryModel, TileLines)>,
     dram: EmulatedDram,
-    port: &mut impl Port,
+    port: &mut dyn Port,
 ) -> Option<MemoryRecord> {
     match model {
         None => serve_on(kind, dram, port, |_| None),
@@ -247,13 +249,8 @@ fn run(
                 trace => (None, trace),
             };
             let memory = Traced::new(caches.over(Traced::new(dram, below)), above);
-            serve_on(kind, TileMeter::new(memory, tile_lines), port, |meter| {
-                let memory = meter.below_mut();
-                let traffic = MeasuredMemory::traffic(memory.below());
-                // Below the caches: what counts contents, requests, the caches themselves, and what counts fetches.
-                let dram = memory.below_mut().below_mut().below_mut().below_mut();
-                let below = dram.below_mut().take_trace();
-                Some(MemoryRecord { traffic, trace: memory.take_trace().or(below) })
+            serve_on(kind, Measured::new(TileMeter::new(memory, tile_lines)), port, |memory| {
+                Some(MemoryRecord { traffic: memory.traffic(), trace: memory.take_trace() })
             })
         }
     }
@@ -263,7 +260,7 @@ fn run(
 fn serve_on<M: CardMemory, R>(
     kind: EmulatedKind,
     memory: M,
-    port: &mut impl Port,
+    port: &mut dyn Port,
     end: impl FnOnce(&mut M) -> R,
 ) -> R {
     match kind {
@@ -275,7 +272,7 @@ fn serve_on<M: CardMemory, R>(
 
 fn serve_kind<K: kind::ChipKind, M: CardMemory, R>(
     memory: M,
-    port: &mut impl Port,
+    port: &mut dyn Port,
     end: impl FnOnce(&mut M) -> R,
 ) -> R {
     let mut card = Box::new(Card::<K, M>::new(memory));

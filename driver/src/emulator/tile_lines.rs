@@ -8,7 +8,8 @@ use photoncard_firmware::memory::{CardMemory, MemoryPort, Stage};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
-use super::memory_model::MeasuredMemory;
+use super::memory_model::{MeasuredMemory, MemoryTraffic};
+use super::trace::TraceFile;
 
 /// Lines from DRAM of the tiles that a card has rendered, by tile.
 #[derive(Clone, Debug, Default)]
@@ -37,11 +38,6 @@ pub(super) struct TileMeter<M> {
 impl<M> TileMeter<M> {
     pub(super) fn new(memory: M, notes: TileLines) -> Self {
         Self { memory, notes, counted: 0 }
-    }
-
-    /// The memory below.
-    pub(super) fn below_mut(&mut self) -> &mut M {
-        &mut self.memory
     }
 }
 
@@ -82,5 +78,15 @@ impl<M: CardMemory + MeasuredMemory> CardMemory for TileMeter<M> {
 
     fn known_checksum(&self, lines: u32) -> Option<u64> {
         self.memory.known_checksum(lines)
+    }
+}
+
+impl<M: MeasuredMemory> MeasuredMemory for TileMeter<M> {
+    fn traffic(&self) -> MemoryTraffic {
+        self.memory.traffic()
+    }
+
+    fn take_trace(&mut self) -> Option<TraceFile> {
+        self.memory.take_trace()
     }
 }

@@ -181,21 +181,6 @@ impl<M> Traced<M> {
     pub fn new(memory: M, trace: Option<TraceFile>) -> Self {
         Self { memory, trace, stage: Stage::Begin, in_tiles: false }
     }
-
-    /// The memory below.
-    pub fn below(&self) -> &M {
-        &self.memory
-    }
-
-    /// The memory below, mutable.
-    pub fn below_mut(&mut self) -> &mut M {
-        &mut self.memory
-    }
-
-    /// Takes the trace; later reads are not recorded.
-    pub fn take_trace(&mut self) -> Option<TraceFile> {
-        self.trace.take()
-    }
 }
 
 impl<M: MemoryPort> MemoryPort for Traced<M> {
@@ -232,6 +217,10 @@ impl<M: MemoryPort> MemoryPort for Traced<M> {
 impl<M: MeasuredMemory> MeasuredMemory for Traced<M> {
     fn traffic(&self) -> MemoryTraffic {
         self.memory.traffic()
+    }
+
+    fn take_trace(&mut self) -> Option<TraceFile> {
+        self.trace.take().or_else(|| self.memory.take_trace())
     }
 }
 

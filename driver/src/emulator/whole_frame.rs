@@ -21,6 +21,7 @@ use rayon::prelude::*;
 
 use super::THREAD_STACK;
 use super::direct::{RenderedTile, new_chip, render_tile};
+use super::measured::Measured;
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::pack::CardImage;
 use crate::sink::{FinishedTile, TileSink};
@@ -136,7 +137,8 @@ pub fn render_along_curve(
     match caches {
         None => render_with(job, GATHERS_PER_TASK, &|memory| memory, sinks, progress),
         Some(caches) => {
-            render_with(job, GATHERS_PER_COUNTED_TASK, &|memory| caches.over(memory), sinks, progress)
+            let model = |memory| Measured::new(caches.over(memory));
+            render_with(job, GATHERS_PER_COUNTED_TASK, &model, sinks, progress)
         }
     }
 }

@@ -20,16 +20,21 @@ pub(super) fn typical_radius(photons: &Photons, neighbors: u32) -> f64 {
     let neighbors = neighbors as usize;
     let step = (all.len() / SAMPLED_NEIGHBORS).min((neighbors / MIN_NEIGHBORS).max(MIN_STEP)).max(1);
     let rank = (neighbors / step).max(1);
-    let squared_distance = |a: StoredPhoton, b: StoredPhoton| {
-        let sides = [0, 1, 2].map(|axis| u64::from(a.coordinate(axis).abs_diff(b.coordinate(axis))));
-        sides.into_iter().map(|side| side * side).sum::<u64>()
+    let squared_distance = |point: [u32; 3], other: StoredPhoton| {
+        let mut sum = 0;
+        // A loop: compilers may leave `map` as a call.
+        for (axis, coordinate) in point.into_iter().enumerate() {
+            let side = u64::from(coordinate.abs_diff(other.coordinate(axis)));
+            sum += side * side;
+        }
+        sum
     };
     let mut radii: Vec<u64> = all
         .par_iter()
         .step_by((all.len() / SAMPLED_PHOTONS).max(1))
         .map(|photon| {
-            let others = all.iter().step_by(step);
-            let mut distances: Vec<u64> = others.map(|other| squared_distance(*photon, *other)).collect();
+            let (point, others) = (photon.point(), all.iter().step_by(step));
+            let mut distances: Vec<u64> = others.map(|other| squared_distance(point, *other)).collect();
             let farthest = distances.len() - 1;
             *distances.select_nth_unstable(rank.min(farthest)).1
         })

@@ -10,11 +10,11 @@ use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
 use super::sample::{Chosen, Estimate, SampleRate, choose};
-use crate::emulator::EmulatedKind;
 use crate::emulator::contents::Contents;
 use crate::emulator::direct::{RenderedTile, new_chip, render_tiles, render_tiles_apart};
 use crate::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use crate::emulator::whole_frame::{CurveJob, render_along_curve};
+use crate::emulator::{EmulatedKind, Measured};
 use crate::photon_map::{MappedImage, PhotonMapSize};
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::Scene;
@@ -189,7 +189,7 @@ impl Bench<'_> {
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
         let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
-        let model = |memory| caches.over(memory);
+        let model = |memory| Measured::new(caches.over(memory));
         let rendered = match chip {
             EmulatedKind::Reference => self.render::<Reference, _>(&frame, &tiles, &model),
             EmulatedKind::Large => self.render::<Large, _>(&frame, &tiles, &model),
@@ -214,7 +214,7 @@ impl Bench<'_> {
         caches: &CacheSettings,
     ) -> Result<Measurement, RenderError> {
         let (scene, memory) = self.mapped.image.view();
-        let mut memory = caches.over(memory);
+        let mut memory = Measured::new(caches.over(memory));
         let mut counters = Counters::ZERO;
         let mut stopped = (self.is_stopped)();
         self.pool.install(|| {

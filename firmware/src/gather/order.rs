@@ -82,6 +82,7 @@ fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
 
 /// Index of a cell along the 3D Hilbert curve through `2^bits` cells an axis (Skilling 2004, *Programming the Hilbert
 /// curve*); `bits` from 1 to 10.
+#[inline]
 pub fn hilbert_index(cell: [u32; 3], bits: u32) -> u32 {
     let [mut x, mut y, mut z] = cell;
     for level in (1..bits).rev() {
@@ -108,6 +109,7 @@ pub fn hilbert_index(cell: [u32; 3], bits: u32) -> u32 {
 }
 
 /// Cell at an index along the 3D Hilbert curve: the inverse of [`hilbert_index`].
+#[inline]
 pub fn hilbert_cell(index: u32, bits: u32) -> [u32; 3] {
     let coordinate =
         |offset: u32| (0..bits).fold(0, |v, level| v | (index >> (3 * level + offset) & 1) << level);

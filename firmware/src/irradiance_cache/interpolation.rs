@@ -23,16 +23,16 @@ impl<'a> Corners<'a> {
     /// Error of each corner's record at a surface point, infinite without a record. Radii are clamped by neighbours'
     /// (Křivánek 2006): by the triangle inequality, `R_i <= R_j + |p_i - p_j|`.
     pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
-        self.0
-            .map(|record| {
-                let Some(record) = record else { return f32::INFINITY };
-                let radius = self.records().fold(record.radius, |radius, other| {
-                    let distance = libm::sqrtf((other.position - record.position).length_squared());
-                    min(other.radius + distance, radius)
-                });
-                record.error(radius, allowed, position, normal)
-            })
-            .into_iter()
+        let mut errors = [f32::INFINITY; 4];
+        for (error, record) in errors.iter_mut().zip(self.0) {
+            let Some(record) = record else { continue };
+            let radius = self.records().fold(record.radius, |radius, other| {
+                let distance = libm::sqrtf((other.position - record.position).length_squared());
+                min(other.radius + distance, radius)
+            });
+            *error = record.error(radius, allowed, position, normal);
+        }
+        errors.into_iter()
     }
 }
 
@@ -55,7 +55,11 @@ struct Weights {
 
 impl<R: Capacity> IrradianceCache<R> {
     pub(super) fn corners(&self, cell: &Cell) -> Corners<'_> {
-        Corners(cell.corners().map(|corner| self.records.get(&corner).and_then(Option::as_ref)))
+        let mut records = [None; 4];
+        for (record, corner) in records.iter_mut().zip(cell.corners()) {
+            *record = self.records.get(&corner).and_then(Option::as_ref);
+        }
+        Corners(records)
     }
 
     /// The undivided cell that contains a pixel.

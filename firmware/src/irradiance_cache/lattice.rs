@@ -63,7 +63,8 @@ impl Cell {
     pub(super) fn corners(&self) -> [LatticePoint; 4] {
         let LatticePoint { x, y } = self.corner;
         let side = self.side();
-        [(0, 0), (side, 0), (0, side), (side, side)].map(|(dx, dy)| LatticePoint { x: x + dx, y: y + dy })
+        let point = |dx, dy| LatticePoint { x: x + dx, y: y + dy };
+        [point(0, 0), point(side, 0), point(0, side), point(side, side)]
     }
 
     /// Corners of the cell's children that are not its own: the centre and the middles of its sides.

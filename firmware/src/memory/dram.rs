@@ -54,6 +54,17 @@ impl MemoryPort for Lines<'_> {
     }
 }
 
+impl CardMemory for Lines<'_> {
+    fn lines(&self) -> u32 {
+        u32::try_from(self.0.len()).unwrap_or(u32::MAX)
+    }
+
+    fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]> {
+        let first = first.0 as usize;
+        self.0.get(first..first.checked_add(count as usize)?)
+    }
+}
+
 impl CardMemory for Dram<'_> {
     fn lines(&self) -> u32 {
         u32::try_from(self.lines.len()).unwrap_or(u32::MAX)

@@ -98,11 +98,19 @@ impl BvhLeaf<'_> {
     /// Vertex indices of triangle `slot`, below [`LEAF_TRIANGLES`].
     #[inline(always)]
     pub fn vertices_of(&self, slot: usize) -> [usize; 3] {
-        [0, 1, 2].map(|corner| {
-            let vertex = read_u32(self.0, CORNERS + 4 * corner) >> (4 * (slot % LEAF_TRIANGLES)) & 15;
-            // Above the maximum in unsound images only.
-            (vertex as usize).min(LEAF_VERTICES - 1)
-        })
+        [self.vertex_of(slot, 0), self.vertex_of(slot, 1), self.vertex_of(slot, 2)]
+    }
+
+    #[inline(always)]
+    fn vertex_of(&self, slot: usize, corner: usize) -> usize {
+        let vertex = read_u32(self.0, CORNERS + 4 * corner) >> (4 * (slot % LEAF_TRIANGLES)) & 15;
+        // Above the maximum in unsound images only.
+        (vertex as usize).min(LEAF_VERTICES - 1)
+    }
+
+    #[inline(always)]
+    fn vertex(&self, vertex: usize) -> [f32; 3] {
+        [self.coordinate(vertex, 0), self.coordinate(vertex, 1), self.coordinate(vertex, 2)]
     }
 
     /// One coordinate of a vertex, metres.
@@ -128,11 +136,11 @@ impl BvhLeaf<'_> {
     #[inline(always)]
     pub fn triangle(&self, slot: usize) -> Triangle {
         let at = self.material_of(slot);
-        let [low, middle, high] = [0, 1, 2].map(|byte| u32::from(self.byte(at + byte)));
-        let vertex = |vertex| [0, 1, 2].map(|axis| self.coordinate(vertex, axis));
-        let material = low | middle << 8 | high << 16;
+        let [low, middle, high] = [self.byte(at), self.byte(at + 1), self.byte(at + 2)];
+        let material = u32::from(low) | u32::from(middle) << 8 | u32::from(high) << 16;
+        let [a, b, c] = self.vertices_of(slot);
         Triangle {
-            vertices: self.vertices_of(slot).map(vertex),
+            vertices: [self.vertex(a), self.vertex(b), self.vertex(c)],
             material: material & !CUT_OUT,
             cut_out: material & CUT_OUT != 0,
         }

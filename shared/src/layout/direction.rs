@@ -9,6 +9,7 @@ const DIRECTION_STEPS: f32 = 127.0;
 const NORMAL_STEPS: f32 = 7.0;
 
 /// Octahedral code of a unit vector in two bytes; error at most 1 degree.
+#[inline]
 pub fn encode_direction(vector: [f32; 3]) -> [u8; 2] {
     let [u, v] = unfold(vector);
     [quantise(u, DIRECTION_STEPS), quantise(v, DIRECTION_STEPS)]
@@ -22,6 +23,7 @@ pub fn decode_direction(bytes: [u8; 2]) -> [f32; 3] {
 }
 
 /// Octahedral code of a unit normal in one byte; error at most 16 degrees: enough to distinguish adjacent surfaces.
+#[inline]
 pub fn encode_normal(vector: [f32; 3]) -> u8 {
     let [u, v] = unfold(vector);
     quantise(u, NORMAL_STEPS) << 4 | quantise(v, NORMAL_STEPS)

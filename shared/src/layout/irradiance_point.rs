@@ -32,6 +32,7 @@ const EXPONENT_BIAS: i32 = 143;
 impl IrradiancePoint {
     /// The point's bytes, rounded to nearest. Negative and NaN components are stored as 0, components above `f32::MAX`
     /// as `f32::MAX`.
+    #[inline]
     pub fn to_content(&self) -> [u8; PHOTON_CONTENT_BYTES] {
         let irradiance = self.irradiance.map(|c| if c > 0.0 { c.min(f32::MAX) } else { 0.0 });
         let largest = irradiance.into_iter().fold(0.0, f32::max);

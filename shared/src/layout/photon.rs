@@ -78,6 +78,7 @@ pub fn disc_fraction(code: u8) -> f32 {
 /// Code of a disc fraction, dithered: `dither` in [0, 1) chooses between the two neighbouring codes such that the mean
 /// of `1 / disc_fraction(code)`, the factor of gathers, is `1 / fraction`. Fractions out of range take the first or
 /// last code.
+#[inline]
 pub fn encode_disc(fraction: f32, dither: f32) -> u8 {
     let upper = DISC_FRACTIONS.partition_point(|&other| other < fraction).min(DISC_CODES - 1) as u8;
     let lower = upper.saturating_sub(1);
@@ -185,6 +186,7 @@ impl Rgbe {
     ///
     /// The random bits of `dither` choose between the two neighbours of each component, so that the mean over many
     /// encodings is the colour: rounding to nearest would have the same bias for all photons of one light.
+    #[inline]
     pub fn encode(colour: [f32; 3], dither: u32) -> Self {
         let colour = colour.map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 });
         let largest = colour.into_iter().fold(0.0_f32, |a, b| if b > a { b } else { a });

@@ -36,13 +36,17 @@ impl PhotonGrid {
     }
 
     /// The grid point nearest to a position, metres; positions outside the grid are clamped to it.
+    #[inline]
     pub fn nearest(&self, place: [f32; 3]) -> [u32; 3] {
         let [x, y, z] = place;
         let [a, b, c] = self.origin;
-        [(x, a), (y, b), (z, c)].map(|(coordinate, origin)| {
-            let relative = f64::from(coordinate) / f64::from(self.cell) - f64::from(origin);
-            ((relative + 0.5) as u32).min(GRID_MASK)
-        })
+        [self.nearest_on_axis(x, a), self.nearest_on_axis(y, b), self.nearest_on_axis(z, c)]
+    }
+
+    #[inline]
+    fn nearest_on_axis(&self, coordinate: f32, origin: i32) -> u32 {
+        let relative = f64::from(coordinate) / f64::from(self.cell) - f64::from(origin);
+        ((relative + 0.5) as u32).min(GRID_MASK)
     }
 
     /// Position of a grid point, metres.

@@ -74,16 +74,17 @@ impl<'a> PhotonLeaf<'a> {
         let photons = ((header >> AXES_BITS) as u32 & ((1 << COUNT_BITS) - 1)).min(LEAF_PHOTONS as u32);
         let mut bit = AXES_BITS + COUNT_BITS;
         let mut first = HEADER_BYTES as u32;
-        let axes = [0, 1, 2].map(|axis| {
+        let mut axes = [LeafAxis { corner: 0, first: 0, mask: 0 }; 3];
+        // A loop: compilers may leave `map` as a call.
+        for (axis, read) in (0..).zip(&mut axes) {
             let varies = (header >> axis) as u32 & 1;
             let rounding = varies * CORNER_ROUNDING;
             let bits = GRID_BITS - rounding;
             let corner = ((header >> bit) as u32 & (GRID_MASK >> rounding)) << rounding;
-            let read = LeafAxis { corner, first, mask: (varies as u16).wrapping_neg() };
+            *read = LeafAxis { corner, first, mask: (varies as u16).wrapping_neg() };
             bit += bits;
             first += varies * 2 * photons;
-            read
-        });
+        }
         Self { line, axes, photons }
     }
 
@@ -96,18 +97,24 @@ impl<'a> PhotonLeaf<'a> {
     /// Coordinates of all photons, by axis.
     #[inline(always)]
     pub fn coordinates(&self) -> [LeafCoordinates<'a>; 3] {
+        let [x, y, z] = self.axes;
+        [self.coordinates_of(x), self.coordinates_of(y), self.coordinates_of(z)]
+    }
+
+    #[inline(always)]
+    fn coordinates_of(&self, axis: LeafAxis) -> LeafCoordinates<'a> {
         const NONE: &[[u8; 2]; LEAF_LANES] = &[[0; 2]; LEAF_LANES];
-        self.axes.map(|LeafAxis { corner, first, mask }| {
-            // Never out of range: with the maximum number of photons, the lanes of the third axis end within the line.
-            let bytes = self.line.get(first as usize..).unwrap_or_default();
-            LeafCoordinates { corner, offsets: bytes.as_chunks().0.first_chunk().unwrap_or(NONE), mask }
-        })
+        let LeafAxis { corner, first, mask } = axis;
+        // Never out of range: with the maximum number of photons, the lanes of the third axis end within the line.
+        let bytes = self.line.get(first as usize..).unwrap_or_default();
+        LeafCoordinates { corner, offsets: bytes.as_chunks().0.first_chunk().unwrap_or(NONE), mask }
     }
 
     /// Grid point of photon `index`.
     #[inline(always)]
     pub fn point(&self, index: u32) -> [u32; 3] {
-        self.coordinates().map(|axis| axis.coordinate(index))
+        let [x, y, z] = self.coordinates();
+        [x.coordinate(index), y.coordinate(index), z.coordinate(index)]
     }
 
     /// Contents of the photons, in reverse: the first photon's is the last element.

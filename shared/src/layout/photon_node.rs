@@ -47,16 +47,19 @@ impl<'a> PhotonNode<'a> {
     /// Boxes of the children, by axis.
     #[inline(always)]
     pub fn coordinates(&self) -> [NodeCoordinates<'a>; 3] {
-        [0, 1, 2].map(|axis| {
-            let corner = read_u32(self.0, 4 * axis);
-            let [lower, upper] = WideNode(self.0).sides(axis);
-            NodeCoordinates {
-                corner: corner & GRID_MASK,
-                exponent: (corner >> COORDINATE_BITS).min(MAX_EXPONENT),
-                lower,
-                upper,
-            }
-        })
+        [self.coordinates_of(0), self.coordinates_of(1), self.coordinates_of(2)]
+    }
+
+    #[inline(always)]
+    fn coordinates_of(&self, axis: usize) -> NodeCoordinates<'a> {
+        let corner = read_u32(self.0, 4 * axis);
+        let [lower, upper] = WideNode(self.0).sides(axis);
+        NodeCoordinates {
+            corner: corner & GRID_MASK,
+            exponent: (corner >> COORDINATE_BITS).min(MAX_EXPONENT),
+            lower,
+            upper,
+        }
     }
 
     /// The line of a node; `None` if there are no children or too many.

@@ -167,6 +167,7 @@ impl PixelSums {
     }
 
     /// Reads sums; `None` if `bytes` is not of a length of [`record_bytes`].
+    #[inline]
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let has_layers = bytes.len() == LAYERED_PIXEL_BYTES;
         if bytes.len() != record_bytes(has_layers) {
@@ -254,6 +255,7 @@ impl PixelSums {
     }
 
     /// Values of the pixel, means over the samples.
+    #[inline]
     pub fn pixel(&self, count: SampleCount, scale: &SumScale) -> Pixel {
         let per_sample = 1.0 / f64::from(count.samples.max(1));
         let normal = per_sample / f64::from(NORMAL_STEPS);

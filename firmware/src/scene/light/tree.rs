@@ -164,11 +164,17 @@ impl Choice {
     const NONE: Self = Self { options: [None; LIGHT_CHILDREN] };
 
     fn new(children: &Children, receiver: &Receiver) -> Self {
-        let estimates = children.map(|child| child.and_then(|child| Estimate::new(&child, receiver)));
+        let mut estimates = [None; LIGHT_CHILDREN];
+        for (estimate, child) in estimates.iter_mut().zip(children) {
+            *estimate = child.as_ref().and_then(|child| Estimate::new(child, receiver));
+        }
         // Relative to the nearest child: squared distances may overflow or underflow.
         let nearest = estimates.iter().flatten().map(|estimate| estimate.distance_squared);
         let nearest = nearest.fold(f32::INFINITY, crate::vector::min);
-        let weights = estimates.map(|estimate| estimate.map_or(0.0, |estimate| estimate.weight(nearest)));
+        let mut weights = [0.0; LIGHT_CHILDREN];
+        for (weight, estimate) in weights.iter_mut().zip(&estimates) {
+            *weight = estimate.as_ref().map_or(0.0, |estimate| estimate.weight(nearest));
+        }
         let total: f32 = weights.iter().sum();
         let count = estimates.iter().flatten().count() as f32;
         let mut options = [None; LIGHT_CHILDREN];
