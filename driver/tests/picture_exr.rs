@@ -26,8 +26,12 @@ fn value(x: u32, y: u32) -> PixelValue {
 }
 
 /// Units in which the values of these tests have sums, with room for a dazzling light.
-const FORMAT: SumFormat =
-    SumFormat { samples: 1, layers: false, scale: SumScale { radiance: 1.0, depth: 1.0 / 1024.0 } };
+const FORMAT: SumFormat = SumFormat {
+    samples: 1,
+    probes: 0,
+    layers: false,
+    scale: SumScale { radiance: 1.0, depth: 1.0 / 1024.0 },
+};
 
 fn write_pixel(film: &mut Film, x: u32, y: u32, pixel: PixelValue, layers: PixelLayers) {
     let sums = film.format().sums(&FilmPixel { pixel, layers });

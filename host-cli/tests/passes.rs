@@ -10,7 +10,7 @@ use serde_json::Value;
 use support::{Outcome, Room, shipped};
 
 /// Options without which a pilot would choose samples and rays.
-const STATED: [&str; 10] = [
+const STATED: [&str; 12] = [
     "--size",
     "24x20",
     "--photons",
@@ -20,6 +20,8 @@ const STATED: [&str; 10] = [
     "--shadow-rays",
     "1",
     "--irradiance-cache",
+    "off",
+    "--adaptive",
     "off",
 ];
 

@@ -241,7 +241,7 @@ fn nor_do_they_with_adaptive_sampling() {
                 (s.picture.width, s.picture.height) = (23, 19);
                 (s.photons.count, s.photons.caustic_photons) = (3000, Some(500));
                 (s.integrator.gather_rays, s.integrator.irradiance_error) = (4, irradiance_error);
-                (s.integrator.samples, s.integrator.adaptive_threshold) = (6, Some(0.3));
+                (s.integrator.samples, s.integrator.adaptive_threshold) = (7, Some(0.03));
             })
         };
         let adaptive = render_or_panic(&scene, &with(settings()));

@@ -8,6 +8,7 @@ pub mod memory_model;
 mod names;
 mod tile_lines;
 pub mod trace;
+mod traced;
 pub mod whole_frame;
 
 use std::sync::Arc;
@@ -32,7 +33,8 @@ pub use self::measured::Measured;
 use self::memory_model::{CacheSettings, CacheSpec, MeasuredMemory, MemoryTraffic};
 pub use self::tile_lines::TileLines;
 use self::tile_lines::TileMeter;
-use self::trace::{TraceFile, Traced};
+use self::trace::TraceFile;
+use self::traced::Traced;
 use crate::choice::choices;
 use crate::link::{LoopbackPort, loopback};
 

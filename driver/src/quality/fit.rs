@@ -153,7 +153,7 @@ impl Fit {
     }
 
     /// Threshold of adaptive sampling by which each pixel has the number of samples that it is worth, `n = w s sqrt(1 / c)` with `s` its deviation
-    /// relative to the root of its radiance; `None` for probes alone.
+    /// relative to the root of its radiance; `None` where all samples are probes.
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);

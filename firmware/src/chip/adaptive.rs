@@ -10,7 +10,8 @@
 //! the number of samples for an equal error is proportional to `s`, and noise shows by about the inverse root of the light under a tone curve.
 //!
 //! An estimate whose own samples choose their number is biased (Kirk, Arvo 1991, *Unbiased sampling techniques for image synthesis*). Probes
-//! therefore have a fixed weight, half of a sample's, and the expectation of the other samples does not depend on `k`.
+//! therefore have a fixed weight, half of a sample's, and the other paths have patterns of their own ([`PixelSample::stratified`](crate::render::PixelSample::stratified)), so that
+//! their expectation depends neither on `k` nor on the probes.
 //!
 //! Samples stay what frames are divided into: a path is a function of pixel, sample and `k`, and `k` one of the pixel's probes. A frame of later samples
 //! looks at the probes again.
@@ -89,6 +90,9 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::chip::test_frame::frame;
+    use crate::render::PixelSample;
+    use crate::sampler::Dimension;
 
     #[test]
     fn paths_of_all_samples_are_the_first_of_the_pixel() {
@@ -98,6 +102,54 @@ mod tests {
                 .flat_map(|sample| (0..paths.of_sample(sample)).map(move |path| paths.index(sample, path)));
             let indices: Vec<u32> = indices.collect();
             assert!(indices.iter().copied().eq(0..indices.len() as u32), "{paths:?} {indices:?}");
+        }
+    }
+
+    /// Estimate of the share of a pixel that is lit, by its left edge up to `coverage`; and its number of paths.
+    fn lit_share(frame: &FrameParameters, pixel: u32, coverage: f32) -> (f64, u32) {
+        let mut probes = Probes::NONE;
+        let [mut sum, mut weights] = [0.0, 0.0];
+        let mut count = 0;
+        let mut paths = Paths::ONE;
+        for sample in 0..frame.samples {
+            for path in 0..paths.of_sample(sample) {
+                let at = PixelSample { x: pixel, y: 0, sample: paths.index(sample, path) };
+                let (pattern, index) = at.stratified(frame, Dimension::Pixel);
+                let light = if pattern.point(index)[0] < coverage { 1.0 } else { 0.0 };
+                let weight = paths.weight(frame, sample);
+                sum += f64::from(light * weight);
+                weights += f64::from(weight);
+                count += 1;
+                if sample < PROBES {
+                    probes.add(Vec3::splat(light));
+                }
+            }
+            if sample + 1 == PROBES {
+                paths = probes.paths(frame.adaptive_threshold.unwrap());
+            }
+        }
+        (sum / weights, count)
+    }
+
+    /// Of points of one pattern those after the probes lie where the probes do not: an edge at an eighth of the pixel would be a third too bright.
+    #[test]
+    fn the_choice_of_the_number_of_paths_has_no_bias() {
+        const PIXELS: u32 = 20_000;
+        for samples in [5, 8, 12, 24] {
+            let frame = FrameParameters { samples, adaptive_threshold: Some(0.05), ..frame() };
+            for coverage in [0.0625, 0.125, 0.3, 0.5, 0.875] {
+                let shares: Vec<(f64, u32)> =
+                    (0..PIXELS).map(|pixel| lit_share(&frame, pixel, coverage)).collect();
+                let number = f64::from(PIXELS);
+                let mean = shares.iter().map(|(share, _)| share).sum::<f64>() / number;
+                let variance = shares.iter().map(|(share, _)| (share - mean).powi(2)).sum::<f64>() / number;
+                let error = (variance / number).sqrt();
+                assert!(
+                    (mean - f64::from(coverage)).abs() <= 4.0 * error,
+                    "{samples} {coverage}: {mean} {error}"
+                );
+                assert!(shares.iter().any(|&(_, count)| count > samples), "{samples} {coverage}");
+            }
         }
     }
 

@@ -4,8 +4,8 @@
 //! looked at once. Those with gather rays are found by it. They are completed when no gather of the block waits, and every path is
 //! looked at again, as no chip has room to keep them.
 //!
-//! Probes ([`super::adaptive`]) are looked at here as well. Those of a pixel without gather rays are its first samples, or come before them in a frame of later
-//! samples; those of the others have a pass of their own.
+//! Probes ([`super::adaptive`]) are looked at here as well: of a pixel without gather rays as its first samples or, in a frame that begins later, before them; of
+//! others in a pass of their own.
 
 use glam::Vec3;
 use photoncard_shared::message::{Fault, FrameParameters, PROBES};
@@ -118,7 +118,7 @@ impl<K: ChipKind> Flight<K> {
 
     /// Sets the number of a pixel's paths by its probes.
     fn end_probes(&mut self, frame: &FrameParameters, pixel: u32, probes: &Probes) {
-        if let Some(threshold) = frame.adaptive_threshold {
+        if let Some(threshold) = frame.adaptive_threshold.filter(|_| adaptive::needs_probes(frame)) {
             self.set_paths(pixel, probes.paths(threshold));
         }
     }

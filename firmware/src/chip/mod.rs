@@ -27,6 +27,8 @@ mod points;
 mod position;
 mod records;
 mod stored_point;
+#[cfg(test)]
+mod test_frame;
 
 use core::ops::Range;
 

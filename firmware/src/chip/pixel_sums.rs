@@ -118,45 +118,15 @@ impl<C: Capacity> PixelSums<C> {
 mod tests {
     use std::vec::Vec;
 
-    use photoncard_shared::message::Camera;
-
     use super::*;
+    use crate::chip::test_frame::frame;
     use crate::kind::Entries;
-
-    fn frame(layers: bool) -> FrameParameters {
-        let camera = Camera { origin: [0.0; 3], forward: [0.0; 3], right: [0.0; 3], up: [0.0; 3] };
-        FrameParameters {
-            width: 8,
-            height: 8,
-            camera,
-            seed: 0,
-            first_sample: 0,
-            samples: 1,
-            planned_samples: 1,
-            gather_rays: 1,
-            shadow_rays: 1,
-            neighbors: 2,
-            max_distance: 1.0,
-            sampling: Default::default(),
-            irradiance_error: None,
-            bins: 1,
-            drain: Default::default(),
-            queue: 1,
-            radiance: Default::default(),
-            caustics: None,
-            layers,
-            filter: Default::default(),
-            in_flight: 3,
-            keep_records: false,
-            adaptive_threshold: None,
-        }
-    }
 
     /// Tiles begin and end in many orders; each pixel keeps its own light, and all places are used again.
     #[test]
     fn every_pixel_of_every_tile_in_flight_has_a_sum_of_its_own() {
         for layers in [false, true] {
-            let frame = &frame(layers);
+            let frame = &FrameParameters { layers, ..frame() };
             let mut sums = PixelSums::<Entries<24>>::new();
             let places = PixelSums::<Entries<24>>::places(frame).get() as u16;
             let mut held: [Vec<f32>; 3] = Default::default();

@@ -74,7 +74,13 @@ impl<K: ChipKind> Flight<K> {
 
     /// True if the pixel of the next eye ray has a sum, or there is room for one.
     pub(super) fn has_room(&self, frame: &FrameParameters, shared: &Shared<K>) -> bool {
-        self.sum(self.position.first + self.position.index).is_some() || shared.sums.has_room(frame)
+        shared.sums.has_room(frame) || self.next_pixel(frame).is_none_or(|pixel| self.sum(pixel).is_some())
+    }
+
+    /// Next pixel of the stripe with gather rays of its own and the present path; `None` after the last.
+    fn next_pixel(&self, frame: &FrameParameters) -> Option<u32> {
+        let first = self.position.first;
+        self.first_with_path(frame, first + self.position.index..first + self.stripe())
     }
 
     /// Looks at the present path of the next pixel with gather rays.
@@ -88,7 +94,7 @@ impl<K: ChipKind> Flight<K> {
             shared.points.clear();
         }
         let [first, stripe] = [self.position.first, self.stripe()];
-        let next = self.first_with_path(job.frame, first + self.position.index..first + stripe);
+        let next = self.next_pixel(job.frame);
         self.position.index = next.map_or(stripe, |pixel| pixel - first);
         if let Some(pixel) = next {
             self.store_point(job, shared, (flight, pixel))?;

@@ -23,7 +23,7 @@ use photoncard_shared::message::Fault;
 
 use super::{Context, GatherPoint, PixelSample, Purpose, SHORTER};
 use crate::memory::{MemoryPort, Stage};
-use crate::sampler::{Dimension, Pattern};
+use crate::sampler::Dimension;
 use crate::scene::light::{
     LightChoices, LightSample, Receiver, emitter_density, environment_density, environment_radiance,
     sample_light,
@@ -45,13 +45,13 @@ pub fn reflected<M: MemoryPort>(
     }
     context.memory.enter(Stage::Shadow);
     let frame = context.frame;
-    let pattern = Pattern::new(frame.seed, pixel.x, pixel.y, 0, Dimension::Emitter);
+    let (pattern, sample) = pixel.stratified(frame, Dimension::Emitter);
     let receiver = Receiver::new(&point.surface);
     let mut choices = LightChoices::new(receiver);
     let mut sum = Vec3::ZERO;
     let mut rays = ShadowRays::new();
     for index in 0..frame.shadow_rays {
-        let index = pixel.sample.wrapping_mul(frame.shadow_rays).wrapping_add(index);
+        let index = sample.wrapping_mul(frame.shadow_rays).wrapping_add(index);
         let (place, dither) = (pattern.point(index), pattern.dither(index));
         let light = sample_light(context.scene, context.memory, &mut choices, place, dither)?;
         if let Some(light) = light

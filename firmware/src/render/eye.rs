@@ -7,7 +7,7 @@ use super::pixel_filter::place;
 use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
 use super::{Context, PixelSample};
 use crate::memory::{MemoryPort, Stage};
-use crate::sampler::{Dimension, Pattern};
+use crate::sampler::Dimension;
 use crate::scene::light::environment_radiance;
 use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
 use crate::vector::unit;
@@ -15,9 +15,9 @@ use crate::vector::unit;
 /// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over the pixel filter,
 /// which may reach beyond the pixel and the picture.
 pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
-    let PixelSample { x, y, sample } = pixel;
-    let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Pixel);
-    let [jitter_x, jitter_y] = pattern.point(sample);
+    let PixelSample { x, y, .. } = pixel;
+    let (pattern, index) = pixel.stratified(context.frame, Dimension::Pixel);
+    let [jitter_x, jitter_y] = pattern.point(index);
     let filter = context.frame.filter;
     [x as f32 + place(filter, jitter_x), y as f32 + place(filter, jitter_y)]
 }
@@ -66,15 +66,14 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     context.counters.eye_rays += 1;
     let film = film_position(context, pixel);
     let ray = eye_ray(context, film);
-    let PixelSample { x, y, sample } = pixel;
-    let pattern = Pattern::new(context.frame.seed, x, y, 0, Dimension::Specular);
+    let (pattern, index) = pixel.stratified(context.frame, Dimension::Specular);
     // The first choices are stratified over all samples of a pixel.
-    let first = || pattern.point(sample);
+    let first = || pattern.point(index);
     let first_layer = surface_choice(0, 0);
     let random = |choice| match choice {
         0 => first()[0],
         _ if choice == first_layer => first()[1],
-        _ => pattern.choice(sample, choice),
+        _ => pattern.choice(index, choice),
     };
     let mut path = SpecularPath::new(ray, Carried::Radiance, Passes::Specular);
     let Some(mut hit) = closest_hit(context.scene, context.memory, &ray)? else {

@@ -12,9 +12,10 @@ pub mod specular_path;
 pub use point::{GatherPoint, Purpose};
 
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::FrameParameters;
+use photoncard_shared::message::{FrameParameters, PROBES};
 
 use crate::gather::GatherRequest;
+use crate::sampler::{Dimension, Pattern};
 use crate::scene::SceneImage;
 
 /// Length of a shadow ray over the distance of its light: it ends before the emitter's surface, whatever the rounding.
@@ -69,13 +70,28 @@ pub trait GatherOutlet {
     fn take(&mut self, pixel: u32, request: GatherRequest);
 }
 
-/// One sample of one pixel, on which random numbers depend.
+/// One sample or path of one pixel, on which random numbers depend.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelSample {
     /// Column of the pixel in the whole picture.
     pub x: u32,
     /// Row of the pixel in the whole picture.
     pub y: u32,
-    /// Index of the sample in the pixel.
+    /// Index of the sample or path in the pixel.
     pub sample: u32,
+}
+
+impl PixelSample {
+    /// Pattern that is stratified over the pixel's samples, and the index of this one in it. With adaptive sampling probes and other paths have patterns of
+    /// their own: in one pattern the points after the probes fill the strata that these have left, and their mean would depend on what the probes
+    /// have found.
+    #[inline(always)]
+    pub fn stratified(self, frame: &FrameParameters, dimension: Dimension) -> (Pattern, u32) {
+        let Self { x, y, sample } = self;
+        let pattern = |number| Pattern::new(frame.seed, x, y, number, dimension);
+        match sample.checked_sub(PROBES) {
+            Some(index) if frame.adaptive_threshold.is_some() => (pattern(1), index),
+            _ => (pattern(0), sample),
+        }
+    }
 }

@@ -36,7 +36,7 @@ pub(crate) struct IntegratorOptions {
     /// Maximum relative error of interpolated irradiance [default: by --quality, 0.025 for paper]
     #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) ic_error: Option<f32>,
-    /// Adaptive sampling: several paths for each sample of pixels whose first four deviate by more than this, over the root of their radiance; or off
+    /// Adaptive sampling: after its first four samples a pixel has s / (THRESHOLD sqrt(L)) paths a sample, 1 to 16, by their deviation s and mean L; or off
     /// [default: by --quality, for the scene; off where all other settings of samples and rays are stated]
     #[arg(long, value_name = "THRESHOLD|off", value_parser = adaptive, allow_negative_numbers = true, hide_short_help = true)]
     adaptive: Option<Adaptive>,

@@ -59,7 +59,6 @@ pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitte
         ("photons", is_fitted && !stated.photons),
         ("gather-rays", is_fitted && !stated.gather_rays),
         ("shadow-rays", is_fitted && !stated.shadow_rays),
-        ("adaptive", is_fitted && !stated.adaptive),
         (
             "ic-error",
             is_fitted && !stated.cache && options.samples.aim().is_some_and(|aim| aim.noise.is_some()),
@@ -69,7 +68,13 @@ pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitte
     let valued =
         needed.filter_map(|(name, _)| Some((name, pixels.get(name).filter(|value| !value.is_null())?)));
     let words = valued.map(|(name, value)| format!("--{name} {value}"));
-    words.collect::<Vec<_>>().join(" ")
+    let adaptive =
+        (is_fitted && !stated.adaptive).then(|| match pixels.get("adaptive").and_then(Value::as_f64) {
+            // In the digits of the 32-bit number.
+            Some(threshold) => format!("--adaptive {}", threshold as f32),
+            None => "--adaptive off".to_owned(),
+        });
+    words.chain(adaptive).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
