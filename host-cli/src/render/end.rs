@@ -68,12 +68,13 @@ pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitte
     let valued =
         needed.filter_map(|(name, _)| Some((name, pixels.get(name).filter(|value| !value.is_null())?)));
     let words = valued.map(|(name, value)| format!("--{name} {value}"));
-    let adaptive =
-        (is_fitted && !stated.adaptive).then(|| match pixels.get("adaptive").and_then(Value::as_f64) {
+    let adaptive = (is_fitted && !stated.adaptive).then(|| {
+        match pixels.get("adaptive").and_then(serde_json::Value::as_f64) {
             // In the digits of the 32-bit number.
             Some(threshold) => format!("--adaptive {}", threshold as f32),
             None => "--adaptive off".to_owned(),
-        });
+        }
+    });
     words.chain(adaptive).collect::<Vec<_>>().join(" ")
 }
 
