@@ -10,7 +10,7 @@ use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use super::trace::TraceFile;
 
 /// Memory that records its reads in a trace, if it has one.
-pub struct Traced<M> {
+pub(super) struct Traced<M> {
     memory: M,
     trace: Option<TraceFile>,
     stage: Stage,
@@ -20,7 +20,7 @@ pub struct Traced<M> {
 
 impl<M> Traced<M> {
     /// Memory that records the reads of `memory` in `trace`.
-    pub fn new(memory: M, trace: Option<TraceFile>) -> Self {
+    pub(super) fn new(memory: M, trace: Option<TraceFile>) -> Self {
         Self { memory, trace, stage: Stage::Begin, in_tiles: false }
     }
 }

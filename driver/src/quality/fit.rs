@@ -89,6 +89,9 @@ const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
 const COST_OF_SHADOW_RAY: f64 = 0.4;
 /// CPU time of a gather ray with its gather, likewise.
 const COST_OF_GATHER_RAY: f64 = 1.2;
+/// Threshold of adaptive sampling over that of the model: the number of paths is an estimate by four probes, which repeat work and do not see the noise of
+/// gather rays, so that paths beyond one a sample are worth less than the model says.
+const FACTOR_OF_THRESHOLD: f64 = 2.0;
 /// CPU time of tracing and storing a photon, likewise.
 const COST_OF_PHOTON: f64 = 2.5;
 /// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles may miss what gathers.
@@ -157,7 +160,7 @@ impl Fit {
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
-        let threshold = two_digits(f64::from(samples) * cost.sqrt() * self.unit_threshold);
+        let threshold = two_digits(FACTOR_OF_THRESHOLD * f64::from(samples) * cost.sqrt() * self.unit_threshold);
         (samples > PROBES && threshold.is_finite() && threshold > 0.0).then_some(threshold)
     }
 }
