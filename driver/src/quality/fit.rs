@@ -160,7 +160,8 @@ impl Fit {
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
-        let threshold = two_digits(FACTOR_OF_THRESHOLD * f64::from(samples) * cost.sqrt() * self.unit_threshold);
+        let threshold =
+            two_digits(FACTOR_OF_THRESHOLD * f64::from(samples) * cost.sqrt() * self.unit_threshold);
         (samples > PROBES && threshold.is_finite() && threshold > 0.0).then_some(threshold)
     }
 }
