@@ -12,7 +12,7 @@ pub struct SumFormat {
     pub layers: bool,
     /// Number of samples in each sum.
     pub samples: u32,
-    /// Number of those of them that are probes of adaptive sampling, whose light counts by half; 0 without it.
+    /// Number of probes among the samples, whose light counts by half; 0 without adaptive sampling.
     pub probes: u32,
     /// Units of the sums.
     pub scale: SumScale,

@@ -24,7 +24,7 @@ mod self_test;
 pub use self::fault::{Fault, FaultCode, Parameter};
 pub use self::pixel::{
     ALBEDO_STEPS, DEPTH_STEPS, LAYERED_PIXEL_BYTES, LayerSums, NORMAL_STEPS, PIXEL_BYTES, PIXELS_BYTES,
-    PROBES, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, record_bytes,
+    PROBES, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, WEIGHT_OF_PROBE, record_bytes,
 };
 pub use self::self_test::{
     CASES_PER_COMMAND, MemoryPattern, MemoryTest, OPERAND_BYTES, RESULT_BYTES, RESULTS, WORDS_PER_LINE,
@@ -134,8 +134,8 @@ pub const MAX_PATHS: u32 = 16;
 impl FrameParameters {
     /// Maximum number of paths that a pixel has, probes of earlier samples included.
     pub fn max_paths(&self) -> u64 {
-        let of_sample = if self.adaptive_threshold.is_some() { MAX_PATHS } else { 1 };
-        let probes = if self.adaptive_threshold.is_some() { PROBES } else { 0 };
+        let (of_sample, probes) =
+            if self.adaptive_threshold.is_some() { (MAX_PATHS, PROBES) } else { (1, 0) };
         u64::from(self.samples) * u64::from(of_sample) + u64::from(probes)
     }
 }

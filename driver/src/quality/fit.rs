@@ -26,7 +26,7 @@ pub struct Fit {
     pub interpolates: bool,
     /// Maximum error of interpolated irradiance; infinite where the quality's own is small enough.
     pub max_irradiance_error: f32,
-    /// Threshold of adaptive sampling for pixels of one sample that takes the time of 1, W^(1/2)/(sr^(1/2) m).
+    /// Threshold of adaptive sampling by the model for one sample of cost 1, W^(1/2)/(sr^(1/2) m).
     pub unit_threshold: f64,
     /// Noise of the pilot, from which the settings follow.
     pub measured: Measured,
@@ -89,11 +89,11 @@ const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
 const COST_OF_SHADOW_RAY: f64 = 0.4;
 /// CPU time of a gather ray with its gather, likewise.
 const COST_OF_GATHER_RAY: f64 = 1.2;
+/// CPU time of tracing and storing a photon, likewise.
+const COST_OF_PHOTON: f64 = 2.5;
 /// Threshold of adaptive sampling over that of the model: the number of paths is an estimate by four probes, which repeat work and do not see the noise of
 /// gather rays, so that paths beyond one a sample are worth less than the model says.
 const FACTOR_OF_THRESHOLD: f64 = 2.0;
-/// CPU time of tracing and storing a photon, likewise.
-const COST_OF_PHOTON: f64 = 2.5;
 /// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles may miss what gathers.
 const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
 /// Weight of the variance of gather rays where several records are interpolated.

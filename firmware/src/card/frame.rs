@@ -12,7 +12,7 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
     let camera = &frame.camera;
     let camera = [camera.origin, camera.forward, camera.right, camera.up];
     let within = |value: u32, most: u32| (1..=most).contains(&value);
-    let is_length = |distance: f32| distance.is_finite() && distance > 0.0;
+    let is_positive = |value: f32| value.is_finite() && value > 0.0;
     let neighbors = |count: u32| count >= 2 && within(count, budget.neighbors);
     let last_sample = frame.first_sample.saturating_add(frame.samples);
     let checks = [
@@ -22,11 +22,11 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
         (Parameter::FirstSample, frame.first_sample < budget.samples),
         (Parameter::Samples, frame.samples > 0 && last_sample <= budget.samples),
         (Parameter::PlannedSamples, within(frame.planned_samples, budget.samples)),
-        (Parameter::AdaptiveThreshold, frame.adaptive_threshold.is_none_or(is_length)),
+        (Parameter::AdaptiveThreshold, frame.adaptive_threshold.is_none_or(is_positive)),
         (Parameter::GatherRays, frame.gather_rays <= budget.gather_rays),
         (Parameter::ShadowRays, frame.shadow_rays <= budget.shadow_rays),
         (Parameter::Neighbors, neighbors(frame.neighbors)),
-        (Parameter::MaxDistance, is_length(frame.max_distance)),
+        (Parameter::MaxDistance, is_positive(frame.max_distance)),
         (Parameter::IrradianceError, frame.irradiance_error.is_none_or(is_irradiance_error)),
         (Parameter::Bins, within(frame.bins, MAX_BINS)),
         (Parameter::Queue, frame.queue >= 1),
@@ -34,7 +34,9 @@ pub(super) fn check_frame(budget: &Budget, header: &Header, frame: &FrameParamet
         (Parameter::Radiance, frame.radiance == Radiance::Density || has_irradiance(header)),
         (
             Parameter::Caustics,
-            frame.caustics.is_none_or(|gather| neighbors(gather.neighbors) && is_length(gather.max_distance)),
+            frame
+                .caustics
+                .is_none_or(|gather| neighbors(gather.neighbors) && is_positive(gather.max_distance)),
         ),
     ];
     match checks.iter().find(|(_, holds)| !holds) {

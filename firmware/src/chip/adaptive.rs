@@ -10,17 +10,14 @@
 //! the number of samples for an equal error is proportional to `s`, and noise shows by about the inverse root of the light under a tone curve.
 //!
 //! An estimate whose own samples choose their number is biased (Kirk, Arvo 1991, *Unbiased sampling techniques for image synthesis*). Probes
-//! therefore have a fixed weight, half of a sample's, and the other paths have patterns of their own ([`PixelSample::stratified`](crate::render::PixelSample::stratified)), so that
-//! their expectation depends neither on `k` nor on the probes.
+//! therefore have a fixed weight, half of a sample's, and later paths have patterns of their own
+//! ([`PixelSample::stratified`](crate::render::PixelSample::stratified)): the expectation of later paths depends neither on `k` nor on the probes.
 //!
-//! Samples stay what frames are divided into: a path is a function of pixel, sample and `k`, and `k` one of the pixel's probes. A frame of later samples
-//! looks at the probes again.
+//! Frames are divided by samples, with adaptive sampling or without: a path is a function of pixel, sample and `k`, and `k` is a function of the pixel's probes. A
+//! frame of later samples looks at the probes again.
 
 use glam::Vec3;
-use photoncard_shared::message::{FrameParameters, MAX_PATHS, PROBES};
-
-/// Weight of a probe, in samples.
-const WEIGHT_OF_PROBE: f32 = 0.5;
+use photoncard_shared::message::{FrameParameters, MAX_PATHS, PROBES, WEIGHT_OF_PROBE};
 
 /// True if the frame has samples whose number of paths the probes choose.
 pub(super) fn needs_probes(frame: &FrameParameters) -> bool {
@@ -131,7 +128,8 @@ mod tests {
         (sum / weights, count)
     }
 
-    /// Of points of one pattern those after the probes lie where the probes do not: an edge at an eighth of the pixel would be a third too bright.
+    /// Points after the probes in one stratified pattern lie in the strata that the probes left: an edge at an eighth of the pixel would be a third too
+    /// bright.
     #[test]
     fn the_choice_of_the_number_of_paths_has_no_bias() {
         const PIXELS: u32 = 20_000;

@@ -27,9 +27,9 @@ use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
 /// Use of the light of a path.
 #[derive(Clone, Copy)]
 enum Use {
-    /// A term of the pixel, with its weight. Direct light of a path with gather rays is left to these.
+    /// Term of the pixel's sum, with the path's weight. Direct light of a path with gather rays is added by [`Pass::Direct`].
     Term(f32),
-    /// Choice of the number of paths alone: direct light of all paths is that of shadow rays.
+    /// Choice of the number of paths alone, with direct light by shadow rays on every path.
     Probe,
 }
 

@@ -68,7 +68,7 @@ pub(super) enum Pass {
     CompletePlain,
     /// The passes of the pixels with gather rays have not begun.
     NextPixels,
-    /// Probes of the pixels with gather rays.
+    /// Probes of the pixels with gather rays; skipped without adaptive sampling.
     Probe,
     /// Eye rays of one path of each pixel of a stripe.
     Eye,
@@ -86,9 +86,9 @@ pub(super) enum Pass {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Position {
     pub(super) pass: Pass,
-    /// Sample of the frame's.
+    /// Number of the present sample in the frame.
     sample: u32,
-    /// Path of the sample.
+    /// Number of the present path in the sample.
     pub(super) path: u32,
     /// Direction bin.
     pub(super) bin: u32,

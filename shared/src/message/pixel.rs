@@ -11,15 +11,17 @@ pub const NORMAL_STEPS: u32 = 1 << 18;
 /// Fractions of the depth unit in a sum of depths.
 pub const DEPTH_STEPS: u32 = 1 << 16;
 /// Number of a pixel's first samples, its probes, in a frame with adaptive sampling: the number of paths of each later sample is chosen by their
-/// variance. The light of a probe counts by half.
+/// variance.
 pub const PROBES: u32 = 4;
+/// Weight of a probe's light, in samples: fixed, so that the choice of the number of paths has no bias.
+pub const WEIGHT_OF_PROBE: f32 = 0.5;
 
 /// Number of samples in a sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleCount {
-    /// All samples.
+    /// Number of all samples.
     pub samples: u32,
-    /// Those of them that are probes, [`PROBES`] at most; 0 without adaptive sampling.
+    /// Number of probes among the samples, at most [`PROBES`]; 0 without adaptive sampling.
     pub probes: u32,
 }
 
@@ -32,7 +34,7 @@ impl SampleCount {
 
     /// Weight of the light of all samples, where a sample that is no probe has 1; 1/2 for none.
     pub fn weight_of_light(self) -> f64 {
-        (f64::from(self.samples) - 0.5 * f64::from(self.probes)).max(0.5)
+        (f64::from(self.samples) - f64::from(1.0 - WEIGHT_OF_PROBE) * f64::from(self.probes)).max(0.5)
     }
 }
 
