@@ -28,6 +28,8 @@ pub struct Fit {
     pub max_irradiance_error: f32,
     /// Threshold of adaptive sampling by the model for one sample of cost 1, W^(1/2)/(sr^(1/2) m).
     pub unit_threshold: f64,
+    /// Threshold of adaptive sampling by which the later samples of the pilot's pixels have 1.1 paths on average, W^(1/2)/(sr^(1/2) m).
+    pub spent_threshold: f64,
     /// Noise of the pilot, from which the settings follow.
     pub measured: Measured,
 }
@@ -91,9 +93,10 @@ const COST_OF_SHADOW_RAY: f64 = 0.4;
 const COST_OF_GATHER_RAY: f64 = 1.2;
 /// CPU time of tracing and storing a photon, likewise.
 const COST_OF_PHOTON: f64 = 2.5;
-/// Threshold of adaptive sampling over that of the model: the number of paths is an estimate by four probes, which repeat work and do not see the noise of
-/// gather rays, so that paths beyond one a sample are worth less than the model says.
-const FACTOR_OF_THRESHOLD: f64 = 2.0;
+/// Bounds of the threshold of adaptive sampling, over that of the model.
+const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 2.0];
+/// Thresholds of adaptive sampling among which the pilot chooses.
+const THRESHOLDS: [f64; 2] = [1e-9, 1e9];
 /// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles may miss what gathers.
 const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
 /// Weight of the variance of gather rays where several records are interpolated.
@@ -155,13 +158,15 @@ impl Fit {
         }
     }
 
-    /// Threshold of adaptive sampling by which each pixel has the number of samples that it is worth, `n = w s sqrt(1 / c)` with `s` its deviation
-    /// relative to the root of its radiance; `None` where all samples are probes.
+    /// Threshold of adaptive sampling: [`Self::spent_threshold`], at most a factor of 2 from that by which each pixel has the number of samples that it is
+    /// worth, `n = w s sqrt(1 / c)` with `s` its deviation relative to the root of its radiance; `None` where all samples are probes.
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
-        let threshold =
-            two_digits(FACTOR_OF_THRESHOLD * f64::from(samples) * cost.sqrt() * self.unit_threshold);
+        let of_model = f64::from(samples) * cost.sqrt() * self.unit_threshold;
+        let [low, high] = FACTORS_OF_THRESHOLD.map(|factor| factor * of_model);
+        // The bounds, if they are numbers, are in order.
+        let threshold = two_digits(self.spent_threshold.max(low).min(high));
         (samples > PROBES && threshold.is_finite() && threshold > 0.0).then_some(threshold)
     }
 }
@@ -203,8 +208,9 @@ impl Level {
     /// With `n` of something, samples or rays or photons, a pixel takes the time `c n` and has the variance `v / n`. The sum of
     /// `c n + w^2 v / n` is the least for `n = w sqrt(v / c)`, `w` the worth of accuracy.
     fn fit(&self, variances: &Variances, of: &Pictured) -> Fit {
-        let Variances { place, shadow_ray, gather_ray, photon, lambertian, gather_rays_per_ray, level } =
-            *variances;
+        let Variances {
+            place, shadow_ray, gather_ray, photon, lambertian, gather_rays_per_ray, level, ..
+        } = *variances;
         let number = |variance: f64, cost: f64| self.worth * (variance / cost).sqrt();
         let samples = within(number(place, 1.0), &self.samples, 4);
         let shadow_rays = number(shadow_ray, COST_OF_SHADOW_RAY) / f64::from(samples);
@@ -221,6 +227,7 @@ impl Level {
             interpolates,
             max_irradiance_error: f32::INFINITY,
             unit_threshold: level.sqrt() / self.worth,
+            spent_threshold: variances.deviations.threshold(THRESHOLDS),
             measured: Measured {
                 place: place.sqrt(),
                 shadow_ray: shadow_ray.sqrt(),
@@ -256,6 +263,7 @@ fn rounded(number: f64, bounds: &RangeInclusive<usize>) -> usize {
 
 #[cfg(test)]
 mod tests {
+    use super::super::paths::Deviations;
     use super::*;
 
     const VARIANCES: Variances = Variances {
@@ -266,6 +274,7 @@ mod tests {
         lambertian: 1.0,
         gather_rays_per_ray: 0.2,
         level: 4.0,
+        deviations: Deviations::NONE,
     };
     const PICTURED: Pictured = Pictured { pixels: 65_536.0, is_cached: true };
 
@@ -370,6 +379,24 @@ mod tests {
         let photons = applied(Stated { photons: true, ..Stated::default() });
         assert_eq!(photons.photons.count, initial.photons.count);
         assert_eq!(photons.integrator.shadow_rays, 6);
+    }
+
+    #[test]
+    fn the_threshold_spends_what_the_pilot_measured_near_that_of_the_model() {
+        let fit = good(VARIANCES);
+        let threshold = |spent_threshold, samples| {
+            let integrator = Integrator { samples, shadow_rays: 5, ..Quality::Good.settings().integrator };
+            Fit { spent_threshold, ..fit }.adaptive_threshold(&integrator)
+        };
+        // 24 samples of cost 3, median radiance 4, worth 400.
+        let of_model = 24.0 * 12.0_f64.sqrt() / 400.0;
+        for (spent, expected) in
+            [(0.0, 0.5 * of_model), (0.9 * of_model, 0.9 * of_model), (1e9, 2.0 * of_model)]
+        {
+            let found = f64::from(threshold(spent, 24).unwrap());
+            assert!((found / expected - 1.0).abs() < 0.05, "{spent}: {found} {expected}");
+        }
+        assert_eq!(threshold(0.9 * of_model, PROBES), None);
     }
 
     #[test]

@@ -5,6 +5,7 @@
 mod fit;
 mod kept;
 mod level;
+mod paths;
 mod pilot;
 mod spread;
 

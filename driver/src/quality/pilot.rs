@@ -6,6 +6,7 @@ use photoncard_firmware::sampler::hash;
 use photoncard_shared::message::{CausticGather, FrameParameters, PixelLayers, Tile};
 use rayon::ThreadPool;
 
+use super::paths::Deviations;
 use super::spread::Levels;
 use crate::emulator::THREAD_STACK;
 use crate::emulator::direct::{RenderedTile, render_tiles_apart};
@@ -34,7 +35,7 @@ const SHADOW_RAYS: [u32; 2] = [1, 4];
 const GATHER_RAYS: [u32; 2] = [8, 32];
 
 /// Variances and errors that the settings follow from, relative to the radiance of the pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Variances {
     /// Variance of a sample by its place: by edges and textures in a pixel. A lower bound: strata make that of several rays less than `v / n`.
     pub(super) place: f64,
@@ -51,6 +52,8 @@ pub(super) struct Variances {
     pub(super) gather_rays_per_ray: f64,
     /// Radiance of the median pixel, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
+    /// Deviations of a sample with four shadow rays, without gather rays: what the probes of adaptive sampling see.
+    pub(super) deviations: Deviations,
 }
 
 /// Renders the pilots of a picture.
@@ -108,6 +111,7 @@ pub(super) fn measure(
         lambertian: best[0].lambertian,
         gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
         level: level_of(&best),
+        deviations: deviations([&by_few_gather_rays, &best]),
     })
 }
 
@@ -139,6 +143,16 @@ fn level_of(best: &[Pixels; 2]) -> f64 {
     let [first, second] = best;
     Levels::new((0..first.direct.len()).map(|pixel| 0.5 * (first.radiance(pixel) + second.radiance(pixel))))
         .median()
+}
+
+/// Deviations of the pixels in pairs by an equal number of shadow rays.
+fn deviations(pairs: [&[Pixels; 2]; 2]) -> Deviations {
+    let [[a, b], [c, d]] = pairs;
+    let renders = [a, b, c, d];
+    Deviations::new((0..a.direct.len()).map(|pixel| {
+        let radiances = renders.map(|pixels| pixels.radiance(pixel));
+        (renders.map(|pixels| pixels.direct[pixel]), radiances.iter().sum::<f64>() / radiances.len() as f64)
+    }))
 }
 
 /// Mean squared error of tiles by a map of one photon, from the difference of two maps whose errors are independent.
