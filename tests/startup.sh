@@ -41,4 +41,4 @@ measure() {
 median() { sort -n | sed -n "$(((runs + 1) / 2))p"; }
 
 measure start "$program" --version
-measure "render of 16x16" "$program" render scenes/furnace.gltf --quality draft --size 16x16 --quiet -o "$files/furnace.exr"
+measure "render of 16x16" "$program" render scenes/furnace.gltf --quality draft --spp 4 --size 16x16 --quiet -o "$files/furnace.exr"

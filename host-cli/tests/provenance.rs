@@ -16,7 +16,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--camera-at", "0,1.25, 2"], "camera-at", json!([0.0, 1.25, 2.0])),
         (&["--look-at", "-0.5,0.5,0"], "look-at", json!([-0.5, 0.5, 0.0])),
         (&["--fov", "12.5"], "fov", json!(12.5)),
-        (&["--quality", "draft"], "spp", json!(4)),
+        (&["--quality", "draft"], "spp", json!(8)),
         (&["--filter", "gaussian"], "filter", json!("gaussian")),
         (&["--aov", "direct"], "aov", json!("direct,indirect,caustic,gathers")),
         (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),

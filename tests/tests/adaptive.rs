@@ -13,14 +13,14 @@ fn room() -> Scene {
     gltf::load(path.as_ref()).expect("a shipped scene loads")
 }
 
-fn settings(seed: u32, adaptive_threshold: Option<f32>) -> RenderSettings {
+fn settings(seed: u32, adaptive_threshold: Option<f32>, gather_rays: u32) -> RenderSettings {
     RenderSettings {
         picture: Picture { width: 12, height: 12, filter: Filter::Box, ..Picture::default() },
         photons: PhotonMaps { count: 100, ..PhotonMaps::default() },
         integrator: Integrator {
             seed,
             samples: SAMPLES,
-            gather_rays: 0,
+            gather_rays,
             shadow_rays: 1,
             adaptive_threshold,
             ..Integrator::default()
@@ -30,10 +30,10 @@ fn settings(seed: u32, adaptive_threshold: Option<f32>) -> RenderSettings {
 }
 
 /// Mean over the seeds of the picture's mean, its standard error, and the mean variance of a pixel.
-fn moments(threshold: Option<f32>) -> [f64; 3] {
+fn moments(threshold: Option<f32>, gather_rays: u32) -> [f64; 3] {
     let scene = room();
     let radiances = |seed| -> Vec<f64> {
-        let Rendering { film, .. } = render_or_panic(&scene, &settings(seed, threshold));
+        let Rendering { film, .. } = render_or_panic(&scene, &settings(seed, threshold, gather_rays));
         film.pixels()
             .map(|pixel| pixel.radiance.iter().map(|&light| f64::from(light)).sum::<f64>() / 3.0)
             .collect()
@@ -62,12 +62,32 @@ fn mean_and_variance(values: &[f64]) -> [f64; 3] {
 /// be too dark: bright probes bring more paths, and count less.
 #[test]
 fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
-    let [even, even_error, even_variance] = moments(None);
-    let [adaptive, error, variance] = moments(Some(0.02));
+    let [even, even_error, even_variance] = moments(None, 0);
+    let [adaptive, error, variance] = moments(Some(0.02), 0);
     let allowed = 4.0 * even_error.hypot(error);
     assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");
     assert!(allowed < 0.08 * even, "the comparison tells little apart: {allowed} of {even}");
     assert!(variance < 0.75 * even_variance, "{variance} of {even_variance}");
+}
+
+/// Paths of a Lambertian surface share the gather rays of their sample: with sixteen each has one, with one all sixteen.
+#[test]
+fn paths_that_share_gather_rays_have_the_mean_of_samples_with_rays_of_their_own() {
+    let [even, even_error, _] = moments(None, 16);
+    let [adaptive, error, _] = moments(Some(0.005), 16);
+    let allowed = 4.0 * even_error.hypot(error);
+    assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");
+    assert!(allowed < 0.08 * even, "the comparison tells little apart: {allowed} of {even}");
+}
+
+/// Gather rays of a picture of Lambertian surfaces are as many with several paths a sample as with one, but for one of each path at least.
+#[test]
+fn paths_divide_the_gather_rays_of_their_sample() {
+    let scene = room();
+    let rays = |threshold| render_or_panic(&scene, &settings(1, threshold, 16)).statistics.rays;
+    let [even, adaptive] = [None, Some(0.02)].map(rays);
+    assert!(adaptive.eye > 2 * even.eye, "{adaptive:?} {even:?}");
+    assert!(adaptive.gather < even.gather * 5 / 4, "{adaptive:?} {even:?}");
 }
 
 /// Light of equal samples has no noise: every sample has one path.
@@ -75,7 +95,7 @@ fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
 fn pixels_without_noise_have_one_path_a_sample() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/furnace.gltf");
     let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
-    let settings = settings(0, Some(0.1)).with(|s| s.integrator.shadow_rays = 0);
+    let settings = settings(0, Some(0.1), 0).with(|s| s.integrator.shadow_rays = 0);
     let rendering = render_or_panic(&scene, &settings);
     assert_eq!(rendering.statistics.rays.eye, 12 * 12 * u64::from(SAMPLES));
 }

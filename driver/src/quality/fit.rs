@@ -6,7 +6,7 @@ use photoncard_shared::message::PROBES;
 use serde::Serialize;
 
 use super::level::{Level, Quality};
-use super::pilot::{Variances, measure};
+use super::pilot::{SHADOW_RAYS as PILOT_SHADOW_RAYS, Variances, measure};
 use crate::pack::PackedScene;
 use crate::render::{Integrator, Observer, RenderError, RenderSettings};
 use crate::scene::Scene;
@@ -28,8 +28,9 @@ pub struct Fit {
     pub max_irradiance_error: f32,
     /// Threshold of adaptive sampling by the model for one sample of cost 1, W^(1/2)/(sr^(1/2) m).
     pub unit_threshold: f64,
-    /// Threshold of adaptive sampling by which the later samples of the pilot's pixels have 1.1 paths on average, W^(1/2)/(sr^(1/2) m).
-    pub spent_threshold: f64,
+    /// Threshold of adaptive sampling by which the later samples of the pilot's pixels have 1.1 paths on average, with four shadow rays, W^(1/2)/(sr^(1/2) m);
+    /// `None` where these paths lower the variance of direct light by less than half.
+    pub spent_threshold: Option<f64>,
     /// Noise of the pilot, from which the settings follow.
     pub measured: Measured,
 }
@@ -83,6 +84,15 @@ pub struct Measured {
     pub gather_rays_per_ray: f64,
 }
 
+impl Measured {
+    /// Deviation of a sample by its place and some shadow rays, over that by the pilot's; 1 without noise.
+    fn deviation_by(&self, shadow_rays: u32) -> f64 {
+        let variance = |rays: u32| self.place.powi(2) + self.shadow_ray.powi(2) / f64::from(rays.max(1));
+        let ratio = (variance(shadow_rays) / variance(PILOT_SHADOW_RAYS[1])).sqrt();
+        if ratio.is_finite() { ratio } else { 1.0 }
+    }
+}
+
 /// Share of samples with a Lambertian part below which nothing is interpolated.
 const FEW_LAMBERTIAN: f64 = 0.05;
 /// Number of shadow rays of a sample.
@@ -94,9 +104,7 @@ const COST_OF_GATHER_RAY: f64 = 1.2;
 /// CPU time of tracing and storing a photon, likewise.
 const COST_OF_PHOTON: f64 = 2.5;
 /// Bounds of the threshold of adaptive sampling, over that of the model.
-const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 2.0];
-/// Thresholds of adaptive sampling among which the pilot chooses.
-const THRESHOLDS: [f64; 2] = [1e-9, 1e9];
+const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 8.0];
 /// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles may miss what gathers.
 const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
 /// Weight of the variance of gather rays where several records are interpolated.
@@ -158,15 +166,17 @@ impl Fit {
         }
     }
 
-    /// Threshold of adaptive sampling: [`Self::spent_threshold`], at most a factor of 2 from that by which each pixel has the number of samples that it is
-    /// worth, `n = w s sqrt(1 / c)` with `s` its deviation relative to the root of its radiance; `None` where all samples are probes.
+    /// Threshold of adaptive sampling: [`Self::spent_threshold`] for the picture's shadow rays, within [`FACTORS_OF_THRESHOLD`] of that by which each pixel has the
+    /// number of samples that it is worth, `n = w s sqrt(1 / c)` with `s` its deviation relative to the root of its radiance; `None` where all samples are probes,
+    /// or noise is even.
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
         let of_model = f64::from(samples) * cost.sqrt() * self.unit_threshold;
         let [low, high] = FACTORS_OF_THRESHOLD.map(|factor| factor * of_model);
+        let spent = self.spent_threshold? * self.measured.deviation_by(integrator.shadow_rays);
         // The bounds, if they are numbers, are in order.
-        let threshold = two_digits(self.spent_threshold.max(low).min(high));
+        let threshold = two_digits(spent.max(low).min(high));
         (samples > PROBES && threshold.is_finite() && threshold > 0.0).then_some(threshold)
     }
 }
@@ -227,7 +237,7 @@ impl Level {
             interpolates,
             max_irradiance_error: f32::INFINITY,
             unit_threshold: level.sqrt() / self.worth,
-            spent_threshold: variances.deviations.threshold(THRESHOLDS),
+            spent_threshold: variances.deviations.worthy_threshold(),
             measured: Measured {
                 place: place.sqrt(),
                 shadow_ray: shadow_ray.sqrt(),
@@ -278,8 +288,8 @@ mod tests {
     };
     const PICTURED: Pictured = Pictured { pixels: 65_536.0, is_cached: true };
 
-    fn good(variances: Variances) -> Fit {
-        Quality::Good.level().unwrap().fit(&variances, &PICTURED)
+    fn good(variances: &Variances) -> Fit {
+        Quality::Good.level().unwrap().fit(variances, &PICTURED)
     }
 
     /// Time and weighted variance of a pixel.
@@ -299,7 +309,7 @@ mod tests {
 
     #[test]
     fn other_settings_cost_more_than_they_are_worth() {
-        let fit = good(VARIANCES);
+        let fit = good(&VARIANCES);
         let chosen = [fit.samples, fit.shadow_rays, fit.gather_rays, fit.photons as u32].map(f64::from);
         assert_eq!(chosen, [24.0, 6.0, 200.0, 280_000.0]);
         for (index, factor) in (0..4).flat_map(|index| [(index, 0.7), (index, 1.4)]) {
@@ -318,16 +328,16 @@ mod tests {
         let all = |value| {
             let values =
                 Variances { place: value, shadow_ray: value, gather_ray: value, photon: value, ..VARIANCES };
-            let fit = good(values);
+            let fit = good(&values);
             (fit.samples, fit.shadow_rays, fit.gather_rays, fit.photons)
         };
         assert_eq!(all(0.0), (24, 1, 128, 200_000));
         for endless in [1e12, f64::INFINITY] {
             assert_eq!(all(endless), (48, 16, 1024, 1_000_000));
         }
-        assert_eq!(good(Variances { photon: f64::NAN, ..VARIANCES }).photons, 1_000_000);
+        assert_eq!(good(&Variances { photon: f64::NAN, ..VARIANCES }).photons, 1_000_000);
         assert_eq!(
-            good(Variances { gather_ray: 0.0, gather_rays_per_ray: 0.0, ..VARIANCES }).gather_rays,
+            good(&Variances { gather_ray: 0.0, gather_rays_per_ray: 0.0, ..VARIANCES }).gather_rays,
             128
         );
     }
@@ -337,13 +347,13 @@ mod tests {
     fn pixels_without_records_take_more_rays_for_equal_costs() {
         let level = Quality::Good.level().unwrap();
         let alone = level.fit(&VARIANCES, &Pictured { is_cached: false, ..PICTURED });
-        assert!(!alone.interpolates && alone.gather_rays > good(VARIANCES).gather_rays);
-        assert_eq!(alone.gather_rays, good(Variances { lambertian: 0.0, ..VARIANCES }).gather_rays);
+        assert!(!alone.interpolates && alone.gather_rays > good(&VARIANCES).gather_rays);
+        assert_eq!(alone.gather_rays, good(&Variances { lambertian: 0.0, ..VARIANCES }).gather_rays);
     }
 
     #[test]
     fn little_noise_takes_the_photons_and_rays_of_records_that_keep_their_errors_below_it() {
-        let fit = good(VARIANCES);
+        let fit = good(&VARIANCES);
         assert_eq!(Fit { max_irradiance_error: f32::INFINITY, ..fit.for_noise(1.0) }, fit);
         for noise in [0.02, 0.01, 0.005] {
             let Fit { photons, gather_rays, interpolates, .. } = fit.for_noise(noise);
@@ -367,7 +377,7 @@ mod tests {
 
     #[test]
     fn a_fit_changes_what_is_not_stated() {
-        let fit = Fit { interpolates: false, ..good(VARIANCES) };
+        let fit = Fit { interpolates: false, ..good(&VARIANCES) };
         let initial = Quality::Good.settings();
         let applied = |stated| initial.clone().with(|settings| fit.apply(settings, stated));
         assert_eq!(applied(Stated::ALL), initial);
@@ -383,25 +393,35 @@ mod tests {
 
     #[test]
     fn the_threshold_spends_what_the_pilot_measured_near_that_of_the_model() {
-        let fit = good(VARIANCES);
-        let threshold = |spent_threshold, samples| {
-            let integrator = Integrator { samples, shadow_rays: 5, ..Quality::Good.settings().integrator };
-            Fit { spent_threshold, ..fit }.adaptive_threshold(&integrator)
+        let fit = good(&VARIANCES);
+        let threshold = |spent, samples| {
+            let integrator = Integrator { samples, shadow_rays: 4, ..Quality::Good.settings().integrator };
+            Fit { spent_threshold: spent, ..fit }.adaptive_threshold(&integrator)
         };
-        // 24 samples of cost 3, median radiance 4, worth 400.
-        let of_model = 24.0 * 12.0_f64.sqrt() / 400.0;
-        for (spent, expected) in
-            [(0.0, 0.5 * of_model), (0.9 * of_model, 0.9 * of_model), (1e9, 2.0 * of_model)]
-        {
-            let found = f64::from(threshold(spent, 24).unwrap());
-            assert!((found / expected - 1.0).abs() < 0.05, "{spent}: {found} {expected}");
+        // 24 samples of cost 2.6, median radiance 4, worth 400.
+        let of_model = 24.0 * (4.0 * 2.6_f64).sqrt() / 400.0;
+        for (spent, expected) in [(0.0, 0.5), (0.9, 0.9), (7.0, 7.0), (1e9, 8.0)] {
+            let found = f64::from(threshold(Some(spent * of_model), 24).unwrap());
+            assert!((found / (expected * of_model) - 1.0).abs() < 0.05, "{spent}: {found} {expected}");
         }
-        assert_eq!(threshold(0.9 * of_model, PROBES), None);
+        assert_eq!([threshold(Some(of_model), PROBES), threshold(None, 24)], [None; 2]);
+    }
+
+    #[test]
+    fn a_shadow_ray_alone_has_twice_the_deviation_of_four() {
+        let Measured { place, .. } = good(&VARIANCES).measured;
+        let by_rays = Measured { place: 0.0, ..good(&VARIANCES).measured };
+        assert!(
+            (by_rays.deviation_by(1) - 2.0).abs() < 1e-9 && (by_rays.deviation_by(16) - 0.5).abs() < 1e-9
+        );
+        let by_place = Measured { place, shadow_ray: 0.0, ..by_rays };
+        assert_eq!([1, 16].map(|rays| by_place.deviation_by(rays)), [1.0; 2]);
+        assert_eq!(Measured { shadow_ray: 0.0, ..by_rays }.deviation_by(1), 1.0);
     }
 
     #[test]
     fn samples_of_a_stated_number_share_the_rays_of_a_pixel() {
-        let fit = good(VARIANCES);
+        let fit = good(&VARIANCES);
         for (samples, shadow_rays) in [(1, 16), (64, 3), (1000, 1)] {
             let mut settings = Quality::Good.settings();
             settings.integrator.samples = samples;

@@ -20,7 +20,7 @@ pub enum Quality {
 }
 
 choices!(Quality {
-    Draft = "draft": "A look at the scene: visible noise, 4 to 16 samples a pixel",
+    Draft = "draft": "A look at the scene: visible noise, 8 to 16 samples a pixel",
     Good = "good": "A picture to show: without visible noise in a room, 24 to 48 samples a pixel",
     Final = "final": "A picture to keep: 64 to 256 samples a pixel",
     Paper = "paper": "The dissertation's nominal values, for studies: one sample a pixel, a hundred gather rays, no cache",
@@ -51,7 +51,7 @@ impl Quality {
         Some(match self {
             Self::Draft => Level {
                 worth: 50.0,
-                samples: 4..=16,
+                samples: 8..=16,
                 gather_rays: 32..=128,
                 photons: 100_000..=400_000,
                 caustic_photons: 50_000,

@@ -5,8 +5,13 @@ use photoncard_shared::message::MAX_PATHS;
 /// Mean number of paths of a later sample beyond one that adaptive sampling takes. Time times variance is about the least in rooms, halls and single objects: with
 /// 0.25 it is 1.2 times as great in halls and Cornell boxes, and a fifth smaller where few pixels have nearly all noise.
 const EXTRA_PATHS: f64 = 0.1;
+/// Minimum gain by these paths, [`Deviations::gain`], for which adaptive sampling is on. Deviations by four samples make even noise seem uneven: it seems to gain 1.5 to 2 in
+/// Cornell boxes and halls, where time times variance hardly changes, and 2.2 to 4 in scenes where it falls to a half or less.
+const MIN_GAIN: f64 = 2.0;
+/// Thresholds among which one is chosen.
+const THRESHOLDS: [f64; 2] = [1e-9, 1e9];
 /// Halvings of the interval of the threshold's logarithm.
-const STEPS: u32 = 40;
+const STEPS: u32 = 60;
 
 /// Deviations of a sample of some pixels: their standard deviations over the roots of their radiances, W^(1/2)/(sr^(1/2) m).
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,13 +35,28 @@ impl Deviations {
 
     /// Mean number of paths of a later sample beyond one.
     fn extra_paths(&self, threshold: f64) -> f64 {
-        let extra = |deviation: &f64| (deviation / threshold).round().clamp(1.0, MAX_PATHS.into()) - 1.0;
+        let extra = |deviation: &f64| paths(*deviation, threshold) - 1.0;
         self.0.iter().map(extra).sum::<f64>() / self.0.len().max(1) as f64
     }
 
-    /// Threshold within bounds by which later samples have [`EXTRA_PATHS`] beyond one, or the nearest one.
-    pub(super) fn threshold(&self, bounds: [f64; 2]) -> f64 {
-        let [mut low, mut high] = bounds;
+    /// Variance of all pixels with one path a sample, over that with the paths by a threshold; 1 without variance.
+    fn gain(&self, threshold: f64) -> f64 {
+        let variance = |paths: &dyn Fn(f64) -> f64| -> f64 {
+            self.0.iter().map(|deviation| deviation.powi(2) / paths(*deviation)).sum()
+        };
+        let gain = variance(&|_| 1.0) / variance(&|deviation| paths(deviation, threshold));
+        if gain.is_finite() { gain } else { 1.0 }
+    }
+
+    /// Threshold by which later samples have [`EXTRA_PATHS`] beyond one; `None` where they gain less than [`MIN_GAIN`].
+    pub(super) fn worthy_threshold(&self) -> Option<f64> {
+        let threshold = self.threshold();
+        (self.gain(threshold) >= MIN_GAIN).then_some(threshold)
+    }
+
+    /// Threshold by which later samples have [`EXTRA_PATHS`] beyond one, or the nearest of [`THRESHOLDS`].
+    fn threshold(&self) -> f64 {
+        let [mut low, mut high] = THRESHOLDS;
         for _ in 0..STEPS {
             let middle = (low * high).sqrt();
             if self.extra_paths(middle) > EXTRA_PATHS {
@@ -47,6 +67,11 @@ impl Deviations {
         }
         high
     }
+}
+
+/// Number of paths of a later sample of a pixel.
+fn paths(deviation: f64, threshold: f64) -> f64 {
+    (deviation / threshold).round().clamp(1.0, MAX_PATHS.into())
 }
 
 #[cfg(test)]
@@ -61,25 +86,25 @@ mod tests {
 
     #[test]
     fn the_threshold_spends_the_paths_that_are_worth_it() {
-        let even = Deviations::new([([1.0, 3.0], 2.0); 10]);
-        // Deviation 1; all pixels have two paths below 1 / 1.5.
-        assert!((even.threshold([1e-3, 1e3]) - 2.0 / 3.0).abs() < 1e-3);
         // Ten of the 1,000 pixels have eleven paths, the others one.
-        let threshold = spots().threshold([1e-3, 1e3]);
+        let threshold = spots().threshold();
         assert!((spots().0[0] / threshold - 11.5).abs() < 0.01, "{threshold}");
         assert!(
             spots().extra_paths(threshold) <= EXTRA_PATHS
                 && spots().extra_paths(0.99 * threshold) > EXTRA_PATHS
         );
+        assert!(spots().gain(threshold) > 5.0 && spots().worthy_threshold() == Some(threshold));
     }
 
     #[test]
-    fn the_threshold_is_within_bounds() {
-        assert_eq!(spots().threshold([10.0, 20.0]), spots().threshold([10.0, 20.0]).clamp(10.0, 10.001));
-        let least = Deviations::new([([1.0, 1.0], 1.0); 10]).threshold([0.5, 2.0]);
-        assert!((least - 0.5).abs() < 1e-6, "{least}");
-        let most = Deviations::new([([0.0, 99.0], 1.0); 10]).threshold([0.5, 2.0]);
-        assert!((most - 2.0).abs() < 1e-6, "{most}");
+    fn even_noise_has_one_path_a_sample() {
+        let even = Deviations::new([([1.0, 3.0], 2.0); 10]);
+        // Deviation 1: with more than one path every pixel has two.
+        assert!((even.threshold() - 2.0 / 3.0).abs() < 1e-6);
+        assert_eq!(
+            [even.worthy_threshold(), Deviations::new([([1.0; 4], 1.0); 10]).worthy_threshold()],
+            [None; 2]
+        );
     }
 
     #[test]

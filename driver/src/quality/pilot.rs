@@ -31,7 +31,7 @@ const PHOTON_SEED: u32 = 0x5eed_0003;
 /// Minimum side of the picture, pixels: tiles of smaller ones would overlap.
 const MIN_SIDE: u32 = SPREAD.cells * SPREAD.side;
 /// Numbers of rays that are compared.
-const SHADOW_RAYS: [u32; 2] = [1, 4];
+pub(super) const SHADOW_RAYS: [u32; 2] = [1, 4];
 const GATHER_RAYS: [u32; 2] = [8, 32];
 
 /// Variances and errors that the settings follow from, relative to the radiance of the pixels.
@@ -52,7 +52,7 @@ pub(super) struct Variances {
     pub(super) gather_rays_per_ray: f64,
     /// Radiance of the median pixel, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
-    /// Deviations of a sample with four shadow rays, without gather rays: what the probes of adaptive sampling see.
+    /// Deviations of a sample with the greater of [`SHADOW_RAYS`], without gather rays: what the probes of adaptive sampling see.
     pub(super) deviations: Deviations,
 }
 

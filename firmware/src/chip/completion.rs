@@ -132,6 +132,7 @@ impl<K: ChipKind> Flight<K> {
         (as_what, completion): (Use, &mut Completion),
     ) -> Result<bool, Fault> {
         let at = self.path(pixel, completion.sample, completion.path);
+        let paths = self.paths(pixel).of_sample(completion.sample);
         let context = &mut job.context(&mut self.counters);
         let has_rays = match eye::view(context, at)? {
             Sight::Background(radiance) => {
@@ -143,7 +144,7 @@ impl<K: ChipKind> Flight<K> {
                 if completion.path == 0 && matches!(as_what, Use::Term(_)) {
                     completion.view.add(&context.scene.header, &view);
                 }
-                light_path(context, &self.cache, shared, (at, &view), (as_what, completion))?
+                light_path(context, &self.cache, shared, (at, &view, paths), (as_what, completion))?
             }
         };
         completion.end_light(context.scene.header.radiance_unit);
@@ -178,13 +179,13 @@ impl Completion {
     }
 }
 
-/// Adds emission and interpolated irradiance of a path and, of a probe or without gather rays, its light by shadow rays and caustics. Returns whether
+/// Adds emission and interpolated irradiance of one of `paths` paths of a sample and, of a probe or without gather rays, its light by shadow rays and caustics. Returns whether
 /// it has gather rays.
 fn light_path<K: ChipKind, M: MemoryPort>(
     context: &mut Context<M>,
     cache: &IrradianceCache<K::IrradianceRecords>,
     shared: &mut Shared<K>,
-    (at, view): (PixelSample, &View),
+    (at, view, paths): (PixelSample, &View, u32),
     (as_what, completion): (Use, &mut Completion),
 ) -> Result<bool, Fault> {
     let frame = context.frame;
@@ -204,7 +205,7 @@ fn light_path<K: ChipKind, M: MemoryPort>(
         completion.add(frame, as_what, Component::Indirect, reflected * per_unit);
     }
     let purpose = if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample };
-    let mut point = pixel_point(frame, at, view, purpose);
+    let mut point = pixel_point(frame, at, view, (purpose, paths));
     let has_rays = point.rays > 0;
     if has_rays && is_term {
         if purpose == Purpose::Sample && completion.path == 0 {

@@ -20,21 +20,20 @@ use crate::render::{
 };
 use crate::scene::Seen;
 
-/// The gather point of a sample, its directions not yet chosen.
+/// The gather point of one of `paths` paths of a sample, its directions not yet chosen.
 pub(super) fn pixel_point(
     frame: &FrameParameters,
     at: PixelSample,
     view: &View,
-    purpose: Purpose,
+    (purpose, paths): (Purpose, u32),
 ) -> GatherPoint {
     let pattern = pattern(frame, at);
     // With the cache, gather rays are a pixel's in number, without it a sample's.
     let is_of_pixel = allowed_error(frame).is_some();
-    let rays = if is_of_pixel {
-        frame.gather_rays.div_ceil(frame.planned_samples.max(1))
-    } else {
-        frame.gather_rays
-    };
+    let samples = if is_of_pixel { frame.planned_samples.max(1) } else { 1 };
+    // Paths are for noise that probes see: that of direct light, and of highlights, which gather rays bring as well.
+    let sharing = if view.surface.reflection.is_lambertian() { paths } else { 1 };
+    let rays = frame.gather_rays.div_ceil(samples).div_ceil(sharing);
     if purpose == Purpose::Lobe {
         GatherPoint::lobe(view.surface, pattern, rays)
     } else {
@@ -53,17 +52,17 @@ pub(super) fn seen_sample(at: PixelSample, view: &View) -> SeenSample<'_> {
     SeenSample { pixel: [at.x, at.y], film: view.film, surface: &view.surface }
 }
 
-/// The gather point of a sample by geometry alone, its directions not yet chosen.
+/// The gather point of one of `paths` paths of a sample by geometry alone, its directions not yet chosen.
 fn gather_point<M, R: Capacity>(
     context: &Context<M>,
     cache: &IrradianceCache<R>,
-    at: PixelSample,
-    view: &View,
+    (at, view): (PixelSample, &View),
+    paths: u32,
 ) -> GatherPoint {
     let allowed = allowed_error_at(context.frame, view);
     let is_interpolated = allowed.is_some_and(|allowed| cache.covers(&seen_sample(at, view), allowed));
     let purpose = if is_interpolated { Purpose::Lobe } else { Purpose::Sample };
-    pixel_point(context.frame, at, view, purpose)
+    pixel_point(context.frame, at, view, (purpose, paths))
 }
 
 impl<K: ChipKind> Flight<K> {
@@ -131,9 +130,10 @@ impl<K: ChipKind> Flight<K> {
     ) -> Result<(), Fault> {
         let (at, _) = self.present_path(job.frame, pixel);
         let frame = job.frame;
+        let paths = self.paths(pixel).of_sample(self.position.sample_of(frame));
         let context = &mut job.context(&mut self.counters);
         if let Some(view) = eye::view(context, at)?.surface() {
-            let mut point = gather_point(context, &self.cache, at, &view);
+            let mut point = gather_point(context, &self.cache, (at, &view), paths);
             if point.rays > 0 {
                 point.choose_directions(context, shared.gathers.candidates())?;
                 if self.sum(pixel).is_none() {
