@@ -58,7 +58,7 @@ fn tiny() -> Scale {
         side: 32,
         photons: 1000,
         neighbors: 5,
-        gather_rays: 4,
+        gather_rays: 8,
         shadow_rays: 1,
         least_tiles: 2,
         quality_tiles: 2,

@@ -35,7 +35,7 @@ fn frame() -> FrameParameters {
     let settings = RenderSettings {
         picture: Picture { width: 8, height: 8, ..Picture::default() },
         photons: PhotonMaps { neighbors: 20, ..PhotonMaps::default() },
-        integrator: Integrator { gather_rays: 4, ..Integrator::default() },
+        integrator: Integrator { gather_rays: 8, ..Integrator::default() },
         ..RenderSettings::default()
     };
     settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None)

@@ -181,7 +181,7 @@ proptest! {
             (s.picture.width, s.picture.height) = (19, 17);
             s.photons.count = 3000;
             s.photons.caustic_photons = Some(500);
-            s.integrator.gather_rays = 5;
+            s.integrator.gather_rays = 8;
             s.integrator.irradiance_error = irradiance_error;
             if is_adaptive {
                 (s.integrator.samples, s.integrator.adaptive_threshold) = (5, Some(0.5));
@@ -240,7 +240,7 @@ fn nor_do_they_with_adaptive_sampling() {
             settings.with(|s| {
                 (s.picture.width, s.picture.height) = (23, 19);
                 (s.photons.count, s.photons.caustic_photons) = (3000, Some(500));
-                (s.integrator.gather_rays, s.integrator.irradiance_error) = (4, irradiance_error);
+                (s.integrator.gather_rays, s.integrator.irradiance_error) = (8, irradiance_error);
                 (s.integrator.samples, s.integrator.adaptive_threshold) = (7, Some(0.03));
             })
         };

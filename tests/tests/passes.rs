@@ -21,7 +21,7 @@ fn settings() -> RenderSettings {
         s.photons.neighbors = 20;
         s.photons.caustic_photons = Some(500);
         s.photons.caustic_neighbors = 20;
-        s.integrator.gather_rays = 4;
+        s.integrator.gather_rays = 8;
         s.integrator.shadow_rays = 2;
         s.schedule.tile = Some(8);
     })

@@ -101,7 +101,7 @@ fn settings() -> RenderSettings {
         picture: Picture { width: 64, height: 64, ..Picture::default() },
         photons: PhotonMaps { count: 20_000, ..PhotonMaps::default() },
         integrator: Integrator {
-            gather_rays: gather_rays.unwrap_or(Ok(4)).expect("a number of gather rays"),
+            gather_rays: gather_rays.unwrap_or(Ok(8)).expect("a number of gather rays"),
             irradiance_error: None,
             ..Integrator::default()
         },
@@ -186,7 +186,7 @@ fn renders_everything(name: &str, address: &CardAddress) {
         s.picture.height = 20;
         s.photons.count = 3000;
         s.photons.caustic_photons = Some(1000);
-        s.integrator.gather_rays = 2;
+        s.integrator.gather_rays = 8;
         s.integrator.shadow_rays = 3;
         s.integrator.samples = 2;
     });

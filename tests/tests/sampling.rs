@@ -7,6 +7,22 @@ use photoncard_tests::mapped::{IndirectLight, MappedScene};
 
 /// Checks the mean of many seeds against a gather of 10,000 rays, within the standard error of both.
 fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
+    with_light_of(scene, camera, assignments, |light| {
+        let reference = light.radiance(Sampling::Reflection, 10_000, 1);
+        let reference: Vec<DVec3> = reference.into_iter().map(Vec3::as_dvec3).collect();
+        for sampling in [Sampling::Reflection, Sampling::Photon, Sampling::Product, Sampling::Mixture] {
+            check_sampling(light, sampling, &reference);
+        }
+    });
+}
+
+/// Calls a function with the indirect light at points that a camera of a shipped scene sees.
+fn with_light_of(
+    scene: &str,
+    camera: Option<&str>,
+    assignments: &[&str],
+    check: impl FnOnce(&IndirectLight),
+) {
     let path = format!("{}/../scenes/{scene}", env!("CARGO_MANIFEST_DIR"));
     let mut scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
     assignments.iter().for_each(|assignment| scene.apply(assignment).expect("a material of the scene"));
@@ -16,12 +32,7 @@ fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
         ..RenderSettings::default()
     };
     let mapped = MappedScene::new(scene, &settings);
-    let light = IndirectLight::new(&mapped, &settings, 4);
-    let reference: Vec<DVec3> =
-        light.radiance(Sampling::Reflection, 10_000, 1).into_iter().map(Vec3::as_dvec3).collect();
-    for sampling in [Sampling::Reflection, Sampling::Photon, Sampling::Product, Sampling::Mixture] {
-        check_sampling(&light, sampling, &reference);
-    }
+    check(&IndirectLight::new(&mapped, &settings, 4));
 }
 
 fn check_sampling(light: &IndirectLight, sampling: Sampling, reference: &[DVec3]) {
@@ -68,4 +79,15 @@ fn so_have_glossy_floors() {
 #[test]
 fn so_has_the_atrium() {
     check("atrium.glb", None, &[]);
+}
+
+#[test]
+fn fewer_than_eight_rays_follow_the_reflection_by_every_sampling() {
+    with_light_of("cornell-glossy.gltf", Some("floor"), &[], |light| {
+        for sampling in [Sampling::Photon, Sampling::Product, Sampling::Mixture] {
+            let is_of_reflection =
+                |rays| light.radiance(sampling, rays, 1) == light.radiance(Sampling::Reflection, rays, 1);
+            assert_eq!([1, 7, 8].map(is_of_reflection), [true, true, false], "{sampling:?}");
+        }
+    });
 }

@@ -39,6 +39,10 @@ pub enum Purpose {
     Record,
 }
 
+/// Minimum number of gather rays for which photons are searched for a direction table. The search costs as much as a gather ray; fewer rays spread over the cells
+/// too thinly to gain by it: `docs/techniques.md`.
+const MIN_RAYS_OF_SEARCH: u32 = 8;
+
 impl GatherPoint {
     /// A point for all light that a sample reflects.
     pub fn sample(surface: Surface, pattern: Pattern, rays: u32) -> Self {
@@ -87,7 +91,7 @@ impl GatherPoint {
         Reflector { normal, outgoing, reflection }
     }
 
-    /// Chooses the directions; samplings by photons search those nearest to the point.
+    /// Chooses the directions: by the reflection for few rays, else by the frame's sampling, which may search the nearest photons.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -101,7 +105,7 @@ impl GatherPoint {
         }
         let reflector = self.reflector();
         let sampling = context.frame.sampling;
-        self.directions = if sampling == Sampling::Reflection {
+        self.directions = if sampling == Sampling::Reflection || self.rays < MIN_RAYS_OF_SEARCH {
             DirectionTable::of_reflection(&reflector)
         } else {
             context.counters.tables += 1;

@@ -15,7 +15,7 @@ const SMALL: [(&str, &str); 6] = [
     ("--quality", "paper"),
     ("--size", "8x8"),
     ("--photons", "200"),
-    ("--gather-rays", "4"),
+    ("--gather-rays", "8"),
     ("--neighbors", "5"),
     ("--shadow-rays", "1"),
 ];

@@ -80,7 +80,7 @@ fn settings() -> RenderSettings {
         settings.picture = Picture { width: 20, height: 17, ..Picture::default() };
         settings.photons =
             PhotonMaps { count: 60, neighbors: 8, caustic_photons: Some(30), ..PhotonMaps::default() };
-        settings.integrator = Integrator { gather_rays: 4, shadow_rays: 1, ..Integrator::default() };
+        settings.integrator = Integrator { gather_rays: 8, shadow_rays: 1, ..Integrator::default() };
     })
 }
 

@@ -63,7 +63,7 @@ fn frame(choice: u8) -> FrameParameters {
     let is_set = |bit: u8| choice >> bit & 1 != 0;
     FrameParameters {
         neighbors: 20,
-        gather_rays: 4,
+        gather_rays: 8,
         shadow_rays: 2,
         samples: 1 + u32::from(is_set(0)),
         sampling: [Sampling::Reflection, Sampling::Photon, Sampling::Product, Sampling::Mixture]

@@ -81,7 +81,7 @@ fn use_scene(mut scene: Scene, number: u64) {
     let settings = RenderSettings {
         picture: Picture { width: 4, height: 4, ..Picture::default() },
         photons: PhotonMaps { count: 200, neighbors: 10, caustic_photons: Some(50), ..PhotonMaps::default() },
-        integrator: Integrator { gather_rays: 2, shadow_rays: 1, samples: 1, ..Integrator::default() },
+        integrator: Integrator { gather_rays: 8, shadow_rays: 1, samples: 1, ..Integrator::default() },
         ..RenderSettings::default()
     };
     told(render(&scene, &settings, &Unobserved));
