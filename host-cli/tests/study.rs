@@ -69,7 +69,7 @@ const SWEEP: [&str; 15] = [
     "--neighbors",
     "5",
     "--gather-rays",
-    "4",
+    "8",
     "--tile",
     "4",
     "--quiet",
@@ -120,7 +120,7 @@ fn a_sweep_measures_every_combination_of_a_scene_of_ones_own() {
 fn a_sweep_of_all_tiles_counts_what_a_render_counts() {
     let room = room_with_a_scene();
     let options =
-        ["--size", "16x16", "--photons", "200", "--neighbors", "5", "--gather-rays", "4", "--tile", "4"];
+        ["--size", "16x16", "--photons", "200", "--neighbors", "5", "--gather-rays", "8", "--tile", "4"];
     let render = [
         "--quality",
         "paper",

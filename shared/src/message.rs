@@ -162,7 +162,7 @@ pub struct CausticGather {
     pub max_distance: f32,
 }
 
-/// Importance sampling of final gather rays. The expectation of the picture does not depend on it.
+/// Importance sampling of final gather rays. The expectation of the picture does not depend on it. Points of fewer than eight rays have that of the reflection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sampling {
     /// By the reflection function and the cosine.

@@ -58,7 +58,7 @@ fn a_lesser_error_is_interpolated_from_more_records() {
         mapped
             .frame(&settings().with(|s| {
                 s.integrator.irradiance_error = Some(error);
-                s.integrator.gather_rays = 4;
+                s.integrator.gather_rays = 8;
             }))
             .counters
     });

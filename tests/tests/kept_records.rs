@@ -41,7 +41,7 @@ impl World {
             (s.picture.width, s.picture.height) = (24, 20);
             (s.photons.count, s.photons.neighbors) = (2000, 20);
             (s.photons.caustic_photons, s.photons.caustic_neighbors) = (Some(500), 20);
-            (s.integrator.gather_rays, s.integrator.shadow_rays) = (4, 2);
+            (s.integrator.gather_rays, s.integrator.shadow_rays) = (8, 2);
             (s.integrator.irradiance_error, s.integrator.planned_samples) = (Some(0.1), Some(4));
             s.schedule.keep_records = true;
         });
@@ -176,7 +176,7 @@ fn records_of_another_frame_are_not_used() {
         let others = [
             FrameParameters { seed: 1, ..base },
             FrameParameters { camera, ..base },
-            FrameParameters { gather_rays: 5, ..base },
+            FrameParameters { gather_rays: 9, ..base },
             FrameParameters { irradiance_error: Some(0.11), ..base },
             FrameParameters { neighbors: 21, ..base },
             FrameParameters { planned_samples: 5, ..base },

@@ -203,7 +203,7 @@ fn keeps_irradiance_records(name: &str, address: &CardAddress) {
     let settings = settings().with(|s| {
         (s.picture.width, s.picture.height) = (24, 20);
         (s.photons.count, s.photons.caustic_photons) = (3000, Some(1000));
-        (s.integrator.gather_rays, s.integrator.shadow_rays, s.integrator.samples) = (2, 1, 2);
+        (s.integrator.gather_rays, s.integrator.shadow_rays, s.integrator.samples) = (8, 1, 2);
         (s.integrator.irradiance_error, s.integrator.planned_samples) = (Some(0.1), Some(2));
     });
     let expected = render_or_panic(&scene, &settings);

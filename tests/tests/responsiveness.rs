@@ -119,7 +119,7 @@ fn a_card_looks_at_its_link_however_many_samples_a_pixel_has() {
         let settings = RenderSettings {
             picture: Picture { width: 8, height: 8, ..Picture::default() },
             photons: PhotonMaps { neighbors: 20, ..PhotonMaps::default() },
-            integrator: Integrator { gather_rays: 2, ..Integrator::default() },
+            integrator: Integrator { gather_rays: 8, ..Integrator::default() },
             ..RenderSettings::default()
         };
         let frame = settings.frame(&camera(Vec3::new(0.0, 0.0, 0.5), Vec3::NEG_Z), 0.5, None);

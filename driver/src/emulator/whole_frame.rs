@@ -216,7 +216,7 @@ impl Frame {
         Ok(all)
     }
 
-    /// Takes over the sums and gathers of tiles. Only the gathers of glossy lobes beside an irradiance cache can exceed
+    /// Takes over the sums and gathers of tiles. Only the gathers of glossy lobes beside an irradiance cache, and of several paths a sample, can exceed
     /// the room that is reserved.
     fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), FrameError> {
         for CastTile { tile, waiting } in tiles {

@@ -28,8 +28,8 @@ pub struct Fit {
     pub max_irradiance_error: f32,
     /// Threshold of adaptive sampling by the model for one sample of cost 1, W^(1/2)/(sr^(1/2) m).
     pub unit_threshold: f64,
-    /// Threshold of adaptive sampling by which the later samples of the pilot's pixels have 1.1 paths on average, with four shadow rays, W^(1/2)/(sr^(1/2) m);
-    /// `None` where these paths lower the variance of direct light by less than half.
+    /// Threshold of adaptive sampling by which the later samples of the pilot's pixels have a stated mean number of paths, with the pilot's shadow rays,
+    /// W^(1/2)/(sr^(1/2) m); `None` where these paths lower the variance of direct light too little.
     pub spent_threshold: Option<f64>,
     /// Noise of the pilot, from which the settings follow.
     pub measured: Measured,
@@ -87,7 +87,8 @@ pub struct Measured {
 impl Measured {
     /// Deviation of a sample by its place and some shadow rays, over that by the pilot's; 1 without noise.
     fn deviation_by(&self, shadow_rays: u32) -> f64 {
-        let variance = |rays: u32| self.place.powi(2) + self.shadow_ray.powi(2) / f64::from(rays.max(1));
+        let of_rays = |rays: u32| if rays == 0 { 0.0 } else { self.shadow_ray.powi(2) / f64::from(rays) };
+        let variance = |rays: u32| self.place.powi(2) + of_rays(rays);
         let ratio = (variance(shadow_rays) / variance(PILOT_SHADOW_RAYS[1])).sqrt();
         if ratio.is_finite() { ratio } else { 1.0 }
     }
@@ -415,7 +416,8 @@ mod tests {
             (by_rays.deviation_by(1) - 2.0).abs() < 1e-9 && (by_rays.deviation_by(16) - 0.5).abs() < 1e-9
         );
         let by_place = Measured { place, shadow_ray: 0.0, ..by_rays };
-        assert_eq!([1, 16].map(|rays| by_place.deviation_by(rays)), [1.0; 2]);
+        assert_eq!([0, 1, 16].map(|rays| by_place.deviation_by(rays)), [1.0; 3]);
+        assert_eq!(by_rays.deviation_by(0), 0.0);
         assert_eq!(Measured { shadow_ray: 0.0, ..by_rays }.deviation_by(1), 1.0);
     }
 

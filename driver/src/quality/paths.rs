@@ -5,8 +5,8 @@ use photoncard_shared::message::MAX_PATHS;
 /// Mean number of paths of a later sample beyond one that adaptive sampling takes. Time times variance is about the least in rooms, halls and single objects: with
 /// 0.25 it is 1.2 times as great in halls and Cornell boxes, and a fifth smaller where few pixels have nearly all noise.
 const EXTRA_PATHS: f64 = 0.1;
-/// Minimum gain by these paths, [`Deviations::gain`], for which adaptive sampling is on. Deviations by four samples make even noise seem uneven: it seems to gain 1.5 to 2 in
-/// Cornell boxes and halls, where time times variance hardly changes, and 2.2 to 4 in scenes where it falls to a half or less.
+/// Minimum gain by these paths, [`Deviations::gain`], for which adaptive sampling is on. Deviations by two samples make even noise seem uneven, with a gain of 1.3 to 1.5.
+/// It is 1.5 to 2.2 in Cornell boxes and halls, where time times variance hardly changes, and 2.2 to 4 in scenes where it falls to a half or less.
 const MIN_GAIN: f64 = 2.0;
 /// Thresholds among which one is chosen.
 const THRESHOLDS: [f64; 2] = [1e-9, 1e9];
@@ -76,6 +76,8 @@ fn paths(deviation: f64, threshold: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use photoncard_firmware::sampler::hash;
+
     use super::*;
 
     /// One pixel of a hundred has 900 times the variance of the others.
@@ -94,6 +96,15 @@ mod tests {
                 && spots().extra_paths(0.99 * threshold) > EXTRA_PATHS
         );
         assert!(spots().gain(threshold) > 5.0 && spots().worthy_threshold() == Some(threshold));
+    }
+
+    #[test]
+    fn deviations_by_two_samples_of_even_noise_are_no_gain() {
+        let light = |sample: u32| f64::from(hash(sample)) / f64::from(u32::MAX);
+        let noisy = Deviations::new((0..1000).map(|pixel| ([light(2 * pixel), light(2 * pixel + 1)], 0.5)));
+        let gain = noisy.gain(noisy.threshold());
+        assert!(gain > 1.2 && gain < 1.4, "{gain}");
+        assert_eq!(noisy.worthy_threshold(), None);
     }
 
     #[test]

@@ -52,7 +52,7 @@ pub(super) struct Variances {
     pub(super) gather_rays_per_ray: f64,
     /// Radiance of the median pixel, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
-    /// Deviations of a sample with the greater of [`SHADOW_RAYS`], without gather rays: what the probes of adaptive sampling see.
+    /// Deviations of the direct light of a sample with the greater numbers of [`SHADOW_RAYS`] and [`GATHER_RAYS`].
     pub(super) deviations: Deviations,
 }
 
@@ -111,7 +111,7 @@ pub(super) fn measure(
         lambertian: best[0].lambertian,
         gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
         level: level_of(&best),
-        deviations: deviations([&by_few_gather_rays, &best]),
+        deviations: deviations(&best),
     })
 }
 
@@ -145,13 +145,12 @@ fn level_of(best: &[Pixels; 2]) -> f64 {
         .median()
 }
 
-/// Deviations of the pixels in pairs by an equal number of shadow rays.
-fn deviations(pairs: [&[Pixels; 2]; 2]) -> Deviations {
-    let [[a, b], [c, d]] = pairs;
-    let renders = [a, b, c, d];
-    Deviations::new((0..a.direct.len()).map(|pixel| {
-        let radiances = renders.map(|pixels| pixels.radiance(pixel));
-        (renders.map(|pixels| pixels.direct[pixel]), radiances.iter().sum::<f64>() / radiances.len() as f64)
+/// Deviations of the pixels of a pair.
+fn deviations(pair: &[Pixels; 2]) -> Deviations {
+    let renders = pair.each_ref();
+    Deviations::new((0..pair[0].direct.len()).map(|pixel| {
+        let [first, second] = renders.map(|pixels| pixels.radiance(pixel));
+        (renders.map(|pixels| pixels.direct[pixel]), 0.5 * (first + second))
     }))
 }
 

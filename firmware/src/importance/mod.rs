@@ -12,6 +12,8 @@
 //! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | that flux, reflected | the part of the lobe that is narrower than a cell |
 //! | mixture | the mean of reflection and photon | half the lobe's albedo |
 //!
+//! Points of few rays have the table of the reflection by every sampling ([`GatherPoint::choose_directions`](crate::render::GatherPoint::choose_directions)).
+//!
 //! Table entries are the direction bins of generative reordering as well: see [`DirectionTable::bin`].
 
 mod hemisphere;

@@ -27,7 +27,7 @@ pub(crate) struct IntegratorOptions {
     /// With --resume this number, and photons and rays that are not stated, are those of the kept samples.
     #[arg(long, value_name = "SPP", allow_negative_numbers = true, hide_short_help = true)]
     pub(super) planned_spp: Option<u32>,
-    /// Sampling density of the directions of gather rays; it never changes the picture's expected value
+    /// Sampling density of the directions of gather rays; it never changes the picture's expected value. Points of fewer than eight rays have that of brdf
     #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>(), hide_short_help = true)]
     pub(super) sampling: Sampling,
     /// Gather the indirect light of Lambertian surfaces at sparse points, and interpolate between them [default: by --quality]

@@ -64,10 +64,14 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
         Some(error) => (format!("irradiance interpolated to within {error}"), "a pixel and a record"),
         None => ("no irradiance interpolated".to_owned(), "a sample"),
     };
+    let paths = match integrator.adaptive_threshold {
+        Some(threshold) => format!(", more paths by the threshold {threshold}"),
+        None => String::new(),
+    };
     let (planned, samples) =
         if are_planned { ("planned for ", integrator.planned()) } else { ("", integrator.samples) };
     format!(
-        "{planned}{} a pixel; {} a sample, {} {of}; {interpolated}; {} photons, {} a gather",
+        "{planned}{} a pixel{paths}; {} a sample, {} {of}; {interpolated}; {} photons, {} a gather",
         counted(samples as usize, "sample"),
         counted(integrator.shadow_rays as usize, "shadow ray"),
         counted(integrator.gather_rays as usize, "gather ray"),

@@ -169,7 +169,7 @@ fn run_command(settings: &Settings, inputs: &Inputs, number: u64, report: &mut R
 
 /// Minimal render.
 fn render<'c>(command: &'c mut Command, scene: &Path, folder: &Path) -> &'c mut Command {
-    let options = "--size 4x4 --photons 200 --neighbors 10 --caustic-photons 50 --gather-rays 2 --shadow-rays 1 --spp 1 --quiet";
+    let options = "--size 4x4 --photons 200 --neighbors 10 --caustic-photons 50 --gather-rays 8 --shadow-rays 1 --spp 1 --quiet";
     command.arg("render").arg(scene).arg("-o").arg(folder.join("out.exr")).args(options.split(' '))
 }
 
