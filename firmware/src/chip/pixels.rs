@@ -32,7 +32,7 @@ pub(super) fn pixel_point(
     let is_of_pixel = allowed_error(frame).is_some();
     let samples = if is_of_pixel { frame.planned_samples.max(1) } else { 1 };
     // Paths are for noise that probes see: that of direct light, and of highlights, which gather rays bring as well.
-    let sharing = if view.surface.reflection.is_lambertian() { paths } else { 1 };
+    let sharing = if view.surface.reflection.is_lambertian() { paths.max(1) } else { 1 };
     let rays = frame.gather_rays.div_ceil(samples).div_ceil(sharing);
     if purpose == Purpose::Lobe {
         GatherPoint::lobe(view.surface, pattern, rays)
