@@ -58,26 +58,27 @@ fn mean_and_variance(values: &[f64]) -> [f64; 3] {
     [number, mean, values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (number - 1.0)]
 }
 
+/// Checks that two means are equal within four standard errors, which are small.
+fn check_means([even, even_error, _]: [f64; 3], [adaptive, error, _]: [f64; 3]) {
+    let allowed = 4.0 * even_error.hypot(error);
+    assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");
+    assert!(allowed < 0.08 * even, "the comparison tells little apart: {allowed} of {even}");
+}
+
 /// Most pixels see an edge of the lamp, of a box or of a shadow. A mean over all paths, of which the probes choose the number, would
 /// be too dark: bright probes bring more paths, and count less.
 #[test]
 fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
-    let [even, even_error, even_variance] = moments(None, 0);
-    let [adaptive, error, variance] = moments(Some(0.02), 0);
-    let allowed = 4.0 * even_error.hypot(error);
-    assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");
-    assert!(allowed < 0.08 * even, "the comparison tells little apart: {allowed} of {even}");
+    let [even, adaptive] = [None, Some(0.02)].map(|threshold| moments(threshold, 0));
+    check_means(even, adaptive);
+    let [even_variance, variance] = [even[2], adaptive[2]];
     assert!(variance < 0.75 * even_variance, "{variance} of {even_variance}");
 }
 
 /// Paths of a Lambertian surface share the gather rays of their sample: with sixteen each has one, with one all sixteen.
 #[test]
 fn paths_that_share_gather_rays_have_the_mean_of_samples_with_rays_of_their_own() {
-    let [even, even_error, _] = moments(None, 16);
-    let [adaptive, error, _] = moments(Some(0.005), 16);
-    let allowed = 4.0 * even_error.hypot(error);
-    assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");
-    assert!(allowed < 0.08 * even, "the comparison tells little apart: {allowed} of {even}");
+    check_means(moments(None, 16), moments(Some(0.005), 16));
 }
 
 /// Gather rays of a picture of Lambertian surfaces are as many with several paths a sample as with one, but for one of each path at least.

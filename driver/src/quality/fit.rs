@@ -28,8 +28,8 @@ pub struct Fit {
     pub max_irradiance_error: f32,
     /// Threshold of adaptive sampling by the model for one sample of cost 1, W^(1/2)/(sr^(1/2) m).
     pub unit_threshold: f64,
-    /// Threshold of adaptive sampling by which the later samples of the pilot's pixels have a stated mean number of paths, with the pilot's shadow rays,
-    /// W^(1/2)/(sr^(1/2) m); `None` where these paths lower the variance of direct light too little.
+    /// Threshold of adaptive sampling by which the later samples of the pilot's pixels, with the pilot's shadow rays, have a tenth of a path beyond one on average,
+    /// W^(1/2)/(sr^(1/2) m); `None` where these paths lower the variance of direct light by less than half.
     pub spent_threshold: Option<f64>,
     /// Noise of the pilot, from which the settings follow.
     pub measured: Measured,

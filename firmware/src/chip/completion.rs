@@ -205,7 +205,7 @@ fn light_path<K: ChipKind, M: MemoryPort>(
         completion.add(frame, as_what, Component::Indirect, reflected * per_unit);
     }
     let purpose = if interpolated.is_some() { Purpose::Lobe } else { Purpose::Sample };
-    let mut point = pixel_point(frame, at, view, (purpose, paths));
+    let mut point = pixel_point(frame, at, view, purpose, paths);
     let has_rays = point.rays > 0;
     if has_rays && is_term {
         if purpose == Purpose::Sample && completion.path == 0 {

@@ -25,7 +25,8 @@ pub(super) fn pixel_point(
     frame: &FrameParameters,
     at: PixelSample,
     view: &View,
-    (purpose, paths): (Purpose, u32),
+    purpose: Purpose,
+    paths: u32,
 ) -> GatherPoint {
     let pattern = pattern(frame, at);
     // With the cache, gather rays are a pixel's in number, without it a sample's.
@@ -56,13 +57,14 @@ pub(super) fn seen_sample(at: PixelSample, view: &View) -> SeenSample<'_> {
 fn gather_point<M, R: Capacity>(
     context: &Context<M>,
     cache: &IrradianceCache<R>,
-    (at, view): (PixelSample, &View),
+    at: PixelSample,
+    view: &View,
     paths: u32,
 ) -> GatherPoint {
     let allowed = allowed_error_at(context.frame, view);
     let is_interpolated = allowed.is_some_and(|allowed| cache.covers(&seen_sample(at, view), allowed));
     let purpose = if is_interpolated { Purpose::Lobe } else { Purpose::Sample };
-    pixel_point(context.frame, at, view, (purpose, paths))
+    pixel_point(context.frame, at, view, purpose, paths)
 }
 
 impl<K: ChipKind> Flight<K> {
@@ -133,7 +135,7 @@ impl<K: ChipKind> Flight<K> {
         let paths = self.paths(pixel).of_sample(self.position.sample_of(frame));
         let context = &mut job.context(&mut self.counters);
         if let Some(view) = eye::view(context, at)?.surface() {
-            let mut point = gather_point(context, &self.cache, (at, &view), paths);
+            let mut point = gather_point(context, &self.cache, at, &view, paths);
             if point.rays > 0 {
                 point.choose_directions(context, shared.gathers.candidates())?;
                 if self.sum(pixel).is_none() {
