@@ -56,7 +56,9 @@ pub use material::{
     BLENDS, COMPENSATED, DOUBLE_SIDED, HAS_ATTRIBUTES, MAX_PHONG_EXPONENT, Material, NARROW_LOBE, NO_TEXTURE,
     Reflectance, THIN_WALLED,
 };
-pub use photon::{DISC_CODES, FULL_DISC, PHOTON_CONTENT_BYTES, Photon, Rgbe, disc_fraction, encode_disc};
+pub use photon::{
+    DISC_CODES, FULL_DISC, PHOTON_CONTENT_BYTES, Photon, Rgbe, disc_fraction, encode_disc, is_of_region,
+};
 pub use photon_grid::{GRID_BITS, PhotonGrid, power_of_two_above};
 pub use photon_leaf::{LEAF_LANES, LEAF_PHOTONS, LeafCoordinates, PhotonLeaf, leaf_capacity};
 pub use photon_node::{GridBox, NodeCoordinates, PhotonNode};

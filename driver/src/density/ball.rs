@@ -150,7 +150,8 @@ pub(super) fn for_each_near(
     Ok(true)
 }
 
-fn line<'a>(
+/// Line `index` of a section.
+pub(super) fn line<'a>(
     scene: &SceneImage,
     memory: Lines<'a>,
     kind: SectionKind,

@@ -10,7 +10,7 @@ use photoncard_firmware::simd::LANES;
 use super::lanes::Lane;
 
 /// Number of batches of sixteen chords.
-pub(super) const BATCHES: usize = 8;
+pub(super) const BATCHES: usize = 12;
 /// Number of chords through a ball.
 pub(super) const CHORDS: usize = BATCHES * LANES;
 

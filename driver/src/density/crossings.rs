@@ -1,8 +1,8 @@
 //! Crossings of chords and triangles, and which of them lie outside all solids.
 //!
-//! All crossings of a chord count, not only the first, except those inside a solid. The *depth* of a point is the number of
-//! solids that contain it. It follows from the front and back faces that are crossed on a path from a reference point
-//! outside all solids, a little above the photon.
+//! All crossings of a chord count, not only the first, except those inside a solid and those without light below others
+//! ([`super::evidence`]). The *depth* of a point is the number of solids that contain it. It follows from the front and back faces that
+//! are crossed on a path from a reference point outside all solids, a little above the photon.
 
 use std::cmp::Reverse;
 
@@ -125,10 +125,16 @@ impl Crossings {
         self.depths[chord / LANES][chord % LANES] = depth;
     }
 
-    /// Collects the crossings outside all solids, by chords and from the top down.
-    pub(super) fn open_surfaces(&mut self, chords: &Chords, surfaces: &mut OpenSurfaces) {
+    /// Collects the crossings outside all solids, by chords. Those below another one of their chord are put into `covered`.
+    pub(super) fn open_surfaces(
+        &mut self,
+        chords: &Chords,
+        surfaces: &mut OpenSurfaces,
+        covered: &mut Vec<Covered>,
+    ) {
         surfaces.clear();
-        run(OpenAll { crossings: self, chords, surfaces });
+        covered.clear();
+        run(OpenAll { crossings: self, chords, surfaces, covered });
     }
 }
 
@@ -212,6 +218,7 @@ struct OpenAll<'a> {
     crossings: &'a mut Crossings,
     chords: &'a Chords,
     surfaces: &'a mut OpenSurfaces,
+    covered: &'a mut Vec<Covered>,
 }
 
 impl Kernel for OpenAll<'_> {
@@ -219,13 +226,14 @@ impl Kernel for OpenAll<'_> {
 
     #[inline(always)]
     fn run(self, isa: impl Isa) {
-        let Crossings { layers, depths, height, levels } = self.crossings;
+        let Self { crossings, chords, surfaces, covered } = self;
+        let Crossings { layers, depths, height, levels } = crossings;
         // The sum is never -0.0.
         let reference = key(*height + 0.0, false) >> 1;
-        for (batch, (layers, depths)) in self.chords.batches.iter().zip(layers.iter().zip(depths)) {
+        for (batch, (layers, depths)) in chords.batches.iter().zip(layers.iter().zip(depths)) {
             sort(isa, layers, levels);
             open(isa, levels, depths, reference);
-            collect(batch, levels, self.surfaces);
+            collect(batch, levels, surfaces, covered);
         }
     }
 }
@@ -253,16 +261,39 @@ fn open(isa: impl Isa, levels: &mut [Level], depths: &mut [i32; LANES], referenc
     }
 }
 
-/// Appends the crossings outside all solids to the surfaces.
+/// Crossing below another one of its chord.
+pub(super) struct Covered {
+    pub(super) place: [f32; 3],
+    pub(super) slope: f32,
+    /// Code of the normal.
+    pub(super) normal: u8,
+    /// Distance of the crossing above.
+    pub(super) gap: f32,
+    /// Heights nearer to it than to the crossings above and below.
+    pub(super) heights: [f32; 2],
+}
+
+/// Appends the crossings outside all solids to the surfaces, those below others to `covered`.
 #[inline(always)]
-fn collect(batch: &Batch, levels: &[Level], surfaces: &mut OpenSurfaces) {
+fn collect(batch: &Batch, levels: &[Level], surfaces: &mut OpenSurfaces, covered: &mut Vec<Covered>) {
     let mut left = levels.iter().fold(0, |open, level| open | level.open);
     while left != 0 {
         let lane = left.trailing_zeros() as usize % LANES;
         left &= left - 1;
-        for level in levels.iter().filter(|level| level.open >> lane & 1 != 0) {
+        for (index, level) in levels.iter().enumerate().filter(|(_, level)| level.open >> lane & 1 != 0) {
             let place = [batch.x[lane], batch.y[lane], height(level.keys[lane])];
-            surfaces.push(place, f32::from_bits(level.slopes[lane]), level.faces[lane] as u8);
+            let (slope, normal) = (f32::from_bits(level.slopes[lane]), level.faces[lane] as u8);
+            match index.checked_sub(1) {
+                None => surfaces.push(place, slope, normal),
+                Some(above) => {
+                    let [.., at] = place;
+                    let above = height(levels[above].keys[lane]);
+                    let below = levels.get(index + 1).map_or(0, |level| level.keys[lane]);
+                    let below = if below != 0 { height(below) } else { -1.0 };
+                    let heights = [0.5 * (at + below), 0.5 * (at + above)];
+                    covered.push(Covered { place, slope, normal, gap: above - at, heights });
+                }
+            }
         }
     }
 }

@@ -11,7 +11,7 @@
 //! them. The photons of other leaves share the search for the radius, the query for triangles and the chords.
 
 use glam::Vec3;
-use photoncard_firmware::photon::MIN_NORMAL_COSINE;
+use photoncard_firmware::photon::{MIN_NORMAL_COSINE, VisibleRegion};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{Ray, is_there, magnitude, offset_origin};
 use photoncard_firmware::simd::{LANES, run};
@@ -22,11 +22,12 @@ use rayon::prelude::*;
 
 use super::ball::Ball;
 use super::chords::{CHORDS, ChordFrame, Chords};
-use super::crossings::{Crossings, Layer};
+use super::crossings::{Covered, Crossings, Layer};
+use super::evidence::Evidence;
 use super::rays::{Met, all_on_way, first_triangle};
-use super::search::Searcher;
+use super::search::{GatherDistances, Searcher};
 use super::sides::SideTable;
-use super::surfaces::{FractionWithin, OpenSurfaces, SameSurfaces};
+use super::surfaces::{Areas, AreasWithin, FractionWithin, OpenSurfaces, SameSurfaces, SeenRegion};
 use super::surroundings::{PlainWall, Surroundings};
 use crate::pack::CardImage;
 use crate::photon::PhotonError;
@@ -37,15 +38,34 @@ const LEAVES_PER_TASK: usize = 64;
 const MIN_SHARED_COSINE: f32 = 0.85;
 /// Height of the reference point above a photon, in radii, if no surface is nearer.
 const OPEN_HEIGHT: f32 = 0.1;
+/// Radius of the sphere in which nothing must be hidden for a gather of all photons, over that of a photon's gather: the gather's point
+/// lies beside the photon.
+const MARGIN: f32 = 1.15;
+/// Greatest difference of the hidden shares of area and light in that sphere for which a gather takes all photons.
+const MAX_DIFFERENCE: f32 = 0.06;
+/// Radius of gathers over that of a disc with as many photons as a leaf, estimated by the greatest distance from its middle.
+const BY_SPREAD: f32 = 1.2;
+/// Maximum distance at which a photon shows that a surface has light, over the radius of a gather.
+const EVIDENT: f32 = 0.7;
 /// Distance behind a hit at which a ray continues, in radii of the ball.
 const STEP: f32 = 1e-5;
+
+/// Fraction of a photon's disc, or of the region that it sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Fraction {
+    fraction: f32,
+    is_of_region: bool,
+}
+
+/// Fraction of a photon on a plain wall.
+const WHOLE: Fraction = Fraction { fraction: 1.0, is_of_region: false };
 
 /// Encoded disc fractions of a leaf's photons.
 type Codes = [u8; LEAF_PHOTONS];
 /// Photons of one leaf.
 type DiscPhotons = heapless::Vec<DiscPhoton, LEAF_PHOTONS>;
 
-/// Measures the disc fraction of every photon for gathers of `neighbors` photons within `max_distance`, and writes it into
+/// Measures the disc fraction of every photon for gathers of `neighbors` photons at some distances, and writes it into
 /// the image. `go_on` is called before each task.
 ///
 /// # Errors
@@ -53,7 +73,7 @@ type DiscPhotons = heapless::Vec<DiscPhoton, LEAF_PHOTONS>;
 pub(crate) fn measure_discs(
     image: &mut CardImage,
     neighbors: u32,
-    max_distance: f32,
+    distances: GatherDistances,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<(), PhotonError> {
     let leaves = image.section(SectionKind::PhotonLeaves).len();
@@ -62,7 +82,7 @@ pub(crate) fn measure_discs(
     let measured: Result<Vec<Vec<(usize, Codes)>>, PhotonError> = (0..leaves.div_ceil(LEAVES_PER_TASK))
         .into_par_iter()
         .map_init(
-            || Meter::new(image, (&sides, &same), neighbors, max_distance),
+            || Meter::new(image, (&sides, &same), neighbors, distances),
             |meter, task| {
                 if !go_on() {
                     return Err(PhotonError::Stopped);
@@ -88,12 +108,20 @@ struct Meter<'a> {
     sides: &'a SideTable,
     same: &'a SameSurfaces,
     searcher: Searcher<'a>,
+    /// Radius of most gathers, metres.
+    usual: f32,
     surroundings: Surroundings,
+    evidence: Evidence,
+    /// True if [`Self::evidence`] is of the present ball.
+    has_evidence: bool,
     /// True if [`Self::surroundings`] holds all triangles of the ball.
     is_complete: bool,
     chords: Chords,
     crossings: Crossings,
+    covered: Vec<Covered>,
     surfaces: OpenSurfaces,
+    /// Photons in the ball, as points with their powers.
+    lights: OpenSurfaces,
 }
 
 /// A photon whose disc is measured.
@@ -126,19 +154,24 @@ impl<'a> Meter<'a> {
         image: &'a CardImage,
         (sides, same): (&'a SideTable, &'a SameSurfaces),
         neighbors: u32,
-        max_distance: f32,
+        distances: GatherDistances,
     ) -> Self {
-        let searcher = Searcher::new(image, neighbors, max_distance);
+        let searcher = Searcher::new(image, neighbors, distances.greatest);
         Self {
             image,
             sides,
             same,
             searcher,
+            usual: distances.usual,
             surroundings: Surroundings::default(),
+            evidence: Evidence::default(),
+            has_evidence: false,
             is_complete: false,
             chords: Chords::new(),
             crossings: Crossings::new(),
+            covered: Vec::new(),
             surfaces: OpenSurfaces::default(),
+            lights: OpenSurfaces::default(),
         }
     }
 
@@ -166,9 +199,9 @@ impl<'a> Meter<'a> {
     }
 
     /// Disc fractions of the photons of a leaf.
-    fn measure(&mut self, mut photons: DiscPhotons) -> Result<[f32; LEAF_PHOTONS], Fault> {
-        let mut fractions = [1.0; LEAF_PHOTONS];
-        if self.is_plain(&photons, self.searcher.max_distance())? {
+    fn measure(&mut self, mut photons: DiscPhotons) -> Result<[Fraction; LEAF_PHOTONS], Fault> {
+        let mut fractions = [WHOLE; LEAF_PHOTONS];
+        if self.are_usual(&photons) && self.is_plain(&photons, self.usual)? {
             return Ok(fractions);
         }
         while let Some(middle) = middle(&photons) {
@@ -182,6 +215,13 @@ impl<'a> Meter<'a> {
         Ok(fractions)
     }
 
+    /// True if gathers at the photons of a leaf, by their own density, have less than the usual radius.
+    fn are_usual(&self, photons: &[DiscPhoton]) -> bool {
+        let share = self.searcher.neighbors() as f32 / photons.len() as f32;
+        let spread = middle(photons).map_or(0.0, |middle| spread(photons, middle));
+        BY_SPREAD * spread * share.sqrt() <= self.usual
+    }
+
     /// True if the spheres around `photons` contain no surface but the plane that all of them lie on.
     fn is_plain(&mut self, photons: &[DiscPhoton], radius: f32) -> Result<bool, Fault> {
         let Some(middle) = middle(photons) else { return Ok(true) };
@@ -192,7 +232,7 @@ impl<'a> Meter<'a> {
             photons.iter().map(|photon| photon.position).collect();
         let lift = self.lift(radius);
         let wall = PlainWall { normal: middle.normal, lift, places: &places };
-        let outer = 1.001 * (radius + spread(photons, middle)) + lift;
+        let outer = 1.001 * (MARGIN * radius + spread(photons, middle)) + lift;
         let ball = Ball { centre: middle.position, radius: outer };
         let Searcher { scene, memory, .. } = &self.searcher;
         self.surroundings.is_plain(scene, *memory, self.sides, ball, wall)
@@ -204,10 +244,10 @@ impl<'a> Meter<'a> {
         mut photons: DiscPhotons,
         middle: DiscPhoton,
         radius: f32,
-        fractions: &mut [f32; LEAF_PHOTONS],
+        fractions: &mut [Fraction; LEAF_PHOTONS],
     ) -> Result<(), Fault> {
         let spread = spread(&photons, middle);
-        let outer = radius + spread;
+        let outer = MARGIN * radius + spread;
         // The paths from the reference point lie in the ball as well. Double precision: the squares of no two lengths
         // overflow.
         let [across, along] = [outer, spread + OPEN_HEIGHT * radius].map(f64::from);
@@ -216,6 +256,7 @@ impl<'a> Meter<'a> {
         let cluster = Cluster { ball, radius, outer };
         let Searcher { scene, memory, .. } = &self.searcher;
         self.is_complete = self.surroundings.find(scene, *memory, self.sides, ball)?;
+        self.has_evidence = false;
         while let Some(nearest) = nearest(&photons, middle.position) {
             let frame = self.frame(&nearest, &cluster)?;
             let [.., along] = frame.axes;
@@ -233,7 +274,7 @@ impl<'a> Meter<'a> {
         group: &[DiscPhoton],
         frame: &ChordFrame,
         cluster: &Cluster,
-        fractions: &mut [f32; LEAF_PHOTONS],
+        fractions: &mut [Fraction; LEAF_PHOTONS],
     ) -> Result<(), Fault> {
         let Cluster { ball, radius, outer } = *cluster;
         let chords = self.chords.scaled(outer / ball.radius);
@@ -245,19 +286,94 @@ impl<'a> Meter<'a> {
         if self.sides.has_cut_outs {
             self.leave_out_cut_outs(frame, &chords, ball)?;
         }
-        self.crossings.open_surfaces(&chords, &mut self.surfaces);
         let lift = self.lift(radius) / ball.radius;
+        self.crossings.open_surfaces(&chords, &mut self.surfaces, &mut self.covered);
+        self.add_covered(group.first().map_or(ball.centre, |photon| photon.position), frame, cluster)?;
+        let hides = self.hides(group, frame, cluster, &chords)?;
+        if hides {
+            self.find_evidence(ball)?;
+            self.evidence.powers(ball, frame, &mut self.lights);
+        }
         let mut chosen = None;
         for photon in group {
             if chosen.replace(photon.normal) != Some(photon.normal) {
                 self.surfaces.choose(photon.normal, self.same);
+                self.lights.choose(photon.normal, self.same);
             }
+            let (surfaces, lights, chords) = (&self.surfaces, &self.lights, &chords);
             let centre = frame.along((photon.position - ball.centre) / ball.radius);
-            let radius = radius / ball.radius;
-            let within = FractionWithin { chords: &chords, surfaces: &self.surfaces, centre, radius, lift };
-            fractions[photon.photon] = run(within);
+            let [radius, outer_radius] = [radius, MARGIN * radius].map(|radius| radius / ball.radius);
+            fractions[photon.photon] = if hides {
+                let region = &self.region(photon, frame, cluster)?;
+                let areas = AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift };
+                let powers = AreasWithin { surfaces: lights, ..areas };
+                Fraction::new(&run(areas), &run(powers))
+            } else {
+                let fraction = run(FractionWithin { chords, surfaces, centre, radius, lift });
+                Fraction { fraction, is_of_region: false }
+            };
         }
         Ok(())
+    }
+
+    /// Adds surfaces below others where photons show that they have light. One within the grid's error below another is the same.
+    fn add_covered(&mut self, photon: Vec3, frame: &ChordFrame, cluster: &Cluster) -> Result<(), Fault> {
+        if self.covered.is_empty() {
+            return Ok(());
+        }
+        let Cluster { ball, radius, .. } = *cluster;
+        let lift = self.lift(radius) / ball.radius;
+        self.find_evidence(ball)?;
+        let Self { evidence, covered, surfaces, .. } = self;
+        evidence.choose(ball, frame, (photon, EVIDENT * radius));
+        for crossing in covered.iter().filter(|crossing| crossing.gap > 2.0 * lift) {
+            let [x, y, _] = crossing.place;
+            if evidence.is_near([x, y], crossing.heights) {
+                surfaces.push(crossing.place, crossing.slope, crossing.normal);
+            }
+        }
+        Ok(())
+    }
+
+    /// Finds the photons in the ball of a cluster, once.
+    fn find_evidence(&mut self, ball: Ball) -> Result<(), Fault> {
+        let Searcher { scene, memory, .. } = &self.searcher;
+        if !std::mem::replace(&mut self.has_evidence, true) {
+            self.evidence.find(scene, *memory, ball)?;
+        }
+        Ok(())
+    }
+
+    /// True if the first photon of a group does not see all of its surface in the ball.
+    fn hides(
+        &mut self,
+        group: &[DiscPhoton],
+        frame: &ChordFrame,
+        cluster: &Cluster,
+        chords: &Chords,
+    ) -> Result<bool, Fault> {
+        let Some(first) = group.first() else { return Ok(false) };
+        self.surfaces.choose(first.normal, self.same);
+        let region = self.region(first, frame, cluster)?;
+        let ball = cluster.ball;
+        let centre = frame.along((first.position - ball.centre) / ball.radius);
+        let lift = self.lift(cluster.radius) / ball.radius;
+        let surfaces = &self.surfaces;
+        let all = AreasWithin { chords, surfaces, region: &region, centre, radius: 2.0, outer_radius: 2.0, lift };
+        Ok(run(all).hidden > 0.0)
+    }
+
+    /// Region that a photon sees, in the ball's coordinates.
+    fn region(&self, photon: &DiscPhoton, frame: &ChordFrame, cluster: &Cluster) -> Result<SeenRegion, Fault> {
+        let Cluster { ball, radius, .. } = *cluster;
+        let Searcher { scene, memory, .. } = &self.searcher;
+        let at = (photon.position, photon.normal);
+        let region = VisibleRegion::new(scene, &mut memory.clone(), at, radius, 2.0 * MARGIN * radius)?;
+        Ok(SeenRegion {
+            axes: region.axes.map(|axis| frame.along(axis).to_array()),
+            inner: region.sectors.scaled(ball.radius),
+            outer: region.outer.scaled(ball.radius),
+        })
     }
 
     /// Removes crossings of triangles where these are cut out.
@@ -362,6 +478,16 @@ impl<'a> Meter<'a> {
     }
 }
 
+impl Fraction {
+    /// Fraction of a photon's disc, or of its region where light behind walls differs from that before them: by more than photons differ
+    /// by chance.
+    fn new(areas: &Areas, powers: &Areas) -> Self {
+        let chance = areas.hidden * (1.0 - areas.hidden) / powers.points.max(1.0);
+        let differs = (areas.hidden - powers.hidden).abs() > MAX_DIFFERENCE + 1.5 * chance.sqrt();
+        Self { fraction: if differs { areas.of_region } else { areas.fraction }, is_of_region: differs }
+    }
+}
+
 /// The photon nearest to the mean position: on a curved surface the mean itself lies off the surface.
 fn middle(photons: &[DiscPhoton]) -> Option<DiscPhoton> {
     nearest(photons, photons.iter().map(|photon| photon.position).sum::<Vec3>() / photons.len() as f32)
@@ -386,14 +512,14 @@ fn split_off(photons: &mut DiscPhotons, is_chosen: impl Fn(&DiscPhoton) -> bool)
 
 /// Encoded fractions of a leaf. The dithers of its photons are spread evenly (golden ratio), so that the rounding errors of
 /// neighbours cancel.
-fn codes(fractions: &[f32; LEAF_PHOTONS], leaf: usize) -> Codes {
+fn codes(fractions: &[Fraction; LEAF_PHOTONS], leaf: usize) -> Codes {
     const GOLDEN_RATIO: u32 = 0x9e37_79b9;
     let first = hash(leaf as u32);
     let mut photon = 0_u32;
-    fractions.map(|fraction| {
+    fractions.map(|Fraction { fraction, is_of_region }| {
         let dither = first.wrapping_add(photon.wrapping_mul(GOLDEN_RATIO));
         photon += 1;
-        encode_disc(fraction, (dither >> 8) as f32 * (1.0 / 16_777_216.0))
+        encode_disc(fraction, is_of_region, (dither >> 8) as f32 * (1.0 / 16_777_216.0))
     })
 }
 

@@ -1,6 +1,6 @@
 //! Preparation of the density estimate on the host.
 //!
-//! Both results depend on the image and the number of neighbours: the maximum distance of gathers, from the density of the
+//! Both results depend on the image and the number of neighbours: distances of gathers, from the density of the
 //! photons (`search`), and for every photon its disc fraction, the area of surface within the radius of a gather over the
 //! area of a flat disc (`disc`).
 
@@ -9,6 +9,7 @@ mod block;
 mod chords;
 mod crossings;
 mod disc;
+mod evidence;
 mod lanes;
 mod rays;
 mod search;
@@ -18,4 +19,4 @@ mod surfaces;
 mod surroundings;
 
 pub(crate) use self::disc::measure_discs;
-pub(crate) use self::search::{automatic_max_distance, caustic_max_distance};
+pub(crate) use self::search::{GatherDistances, caustic_max_distance, gather_distances};

@@ -15,8 +15,10 @@ use crate::photon::{ImportonGrid, Importons};
 
 /// Number of leaves that the automatic maximum distance is estimated from, one photon of each.
 const SAMPLED_LEAVES: usize = 2048;
-/// Share of the sampled photons whose k-th neighbour lies within the automatic maximum distance.
-const COVERED_SHARE: f64 = 0.95;
+/// Share of the sampled photons whose k-th neighbour lies within the usual distance.
+const USUAL_SHARE: f64 = 0.95;
+/// Automatic maximum distance over the greatest distance of a sampled photon's k-th neighbour: there may be greater ones.
+const BEYOND_SAMPLES: f32 = 1.5;
 
 /// Share of the sampled caustic photons whose k-th neighbour lies within the automatic maximum distance.
 const FOCUSED_SHARE: f64 = 0.8;
@@ -42,35 +44,42 @@ impl<'a> Searcher<'a> {
         Self { map, ..self }
     }
 
-    /// Maximum distance of gathers, metres.
-    pub(super) fn max_distance(&self) -> f32 {
-        self.max_distance
+    /// Number of photons of a gather.
+    pub(super) fn neighbors(&self) -> u32 {
+        self.neighbors
     }
 
     /// Radius of a gather at `position`, metres: the distance of the k-th photon, or the maximum distance.
     pub(super) fn radius(&mut self, position: Vec3) -> Result<f32, Fault> {
         let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
         gather(&self.scene, &mut self.memory, self.map, position, &mut nearest)?;
-        if !nearest.is_full() {
-            return Ok(self.max_distance);
-        }
-        let farthest = nearest.candidates().map(|candidate| candidate.distance_squared()).fold(0.0, f32::max);
-        Ok(farthest.sqrt())
+        Ok(nearest.radius())
     }
 }
 
-/// Automatic maximum distance of gathers, metres: the 95th percentile of the distance of the k-th neighbour,
-/// `k = neighbors`; with importons, among photons where there are any.
+/// Distances of the k-th neighbours of photons, metres.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GatherDistances {
+    /// Distance within which most photons have k neighbours.
+    pub(crate) usual: f32,
+    /// Maximum distance of gathers: all sampled photons have k neighbours within, so that the radius of a gather follows the density at its
+    /// point.
+    pub(crate) greatest: f32,
+}
+
+/// Distances of gathers, `k = neighbors`; with importons, among photons where there are any.
 ///
 /// # Errors
 /// If the image is malformed.
-pub(crate) fn automatic_max_distance(
+pub(crate) fn gather_distances(
     image: &CardImage,
     neighbors: u32,
     importons: Option<&Importons>,
-) -> Result<f32, Fault> {
+) -> Result<GatherDistances, Fault> {
     let importons = importons.map(|importons| &importons.indirect);
-    distance_within(image, (PhotonMap::Indirect, importons), neighbors, COVERED_SHARE)
+    let of_map = (PhotonMap::Indirect, importons);
+    let [usual, greatest] = distances_within(image, of_map, neighbors, [USUAL_SHARE, 1.0])?;
+    Ok(GatherDistances { usual, greatest: (BEYOND_SAMPLES * greatest).min(image.diagonal()) })
 }
 
 /// Maximum distance of gathers of caustics, metres: the 80th percentile of the distance of the k-th neighbour among caustic
@@ -84,16 +93,17 @@ pub(crate) fn caustic_max_distance(
     importons: Option<&Importons>,
 ) -> Result<f32, Fault> {
     let importons = importons.map(|importons| &importons.caustic);
-    distance_within(image, (PhotonMap::Caustics, importons), neighbors, FOCUSED_SHARE)
+    let [focused] = distances_within(image, (PhotonMap::Caustics, importons), neighbors, [FOCUSED_SHARE])?;
+    Ok(focused)
 }
 
-/// Distance within which the share `share` of a map's photons, of those at importons, have `neighbors` neighbours.
-fn distance_within(
+/// Distances within which some shares of a map's photons, of those at importons, have `neighbors` neighbours.
+fn distances_within<const N: usize>(
     image: &CardImage,
     (map, importons): (PhotonMap, Option<&ImportonGrid>),
     neighbors: u32,
-    share: f64,
-) -> Result<f32, Fault> {
+    shares: [f64; N],
+) -> Result<[f32; N], Fault> {
     let leaves = match map {
         PhotonMap::Indirect => image.section(SectionKind::PhotonLeaves),
         PhotonMap::Caustics => image.section(SectionKind::CausticLeaves),
@@ -121,7 +131,9 @@ fn distance_within(
     // A map of fewer photons than neighbours has no such distances, nor has a photon without importons.
     distances.retain(|&distance| distance < unlimited);
     distances.sort_by(f32::total_cmp);
-    let place = (distances.len() as f64 * share) as usize;
-    let covered = distances.get(place.min(distances.len().saturating_sub(1))).copied();
-    Ok(covered.unwrap_or_else(|| image.diagonal()).max(f32::MIN_POSITIVE.sqrt()))
+    Ok(shares.map(|share| {
+        let place = (distances.len() as f64 * share) as usize;
+        let covered = distances.get(place.min(distances.len().saturating_sub(1))).copied();
+        covered.unwrap_or_else(|| image.diagonal()).max(f32::MIN_POSITIVE.sqrt())
+    }))
 }

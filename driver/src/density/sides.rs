@@ -109,7 +109,8 @@ impl SideTable {
     }
 
     /// Marks double-sided triangles that form closed surfaces as solid: no light enters, unless they emit it themselves or
-    /// transmit it. A surface is closed if each of its edges is shared by exactly two triangles, in opposite directions.
+    /// transmit it. A surface is closed if at each of its edges it goes on with another triangle in the opposite direction. Where
+    /// meshes touch and more than two triangles share an edge, those bound a solid together that no other lies between.
     fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -139,7 +140,18 @@ impl SideTable {
                 [(_, false, one), (_, true, other)] => meshes.join(one as usize, other as usize),
                 // Of a triangle with two corners in one place: it is its own opposite.
                 [([from, to], ..)] if from == to => {}
-                _ => along.iter().for_each(|(.., sheet)| is_open[*sheet as usize] = true),
+                [(edge, ..), ..] => {
+                    let around = around_edge(edge, along.iter().map(|&(_, is_forward, sheet)| {
+                        (is_forward, sheet as usize, sheets[sheet as usize].1)
+                    }));
+                    for (sheet, other) in around {
+                        match other {
+                            Some(other) => meshes.join(sheet, other),
+                            None => is_open[sheet] = true,
+                        }
+                    }
+                }
+                [] => {}
             }
         }
         let mut is_mesh_open = vec![false; sheets.len()];
@@ -175,6 +187,34 @@ impl Sides {
             has_cut_outs: false,
         }
     }
+}
+
+/// Triangles around an edge, each with the one that bounds a solid together with it, by their angles; `None` where its back is open. A
+/// triangle is `true` if it has the edge in its direction, then its index and its corners.
+fn around_edge(
+    edge: [[u32; 3]; 2],
+    triangles: impl Iterator<Item = (bool, usize, [[u32; 3]; 3])>,
+) -> Vec<(usize, Option<usize>)> {
+    let place = |bits: [u32; 3]| glam::DVec3::from(bits.map(|bits| f64::from(f32::from_bits(bits))));
+    let [from, to] = edge.map(place);
+    let axis = (to - from).normalize_or_zero();
+    let (x, y) = axis.any_orthonormal_pair();
+    let mut around: Vec<(f64, bool, usize)> = triangles
+        .map(|(is_forward, index, corners)| {
+            let third = corners.into_iter().find(|corner| !edge.contains(corner));
+            let way = third.map_or(glam::DVec3::ZERO, |corner| place(corner) - from);
+            (libm::atan2(way.dot(y), way.dot(x)), is_forward, index)
+        })
+        .collect();
+    // A solid lies from a triangle against the edge's direction to one along it. At equal angles one ends before another begins.
+    around.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
+    let count = around.len();
+    let other = |index: usize| {
+        let (_, is_forward, _) = around[index];
+        let (_, is_other_forward, other) = around[if is_forward { index + count - 1 } else { index + 1 } % count];
+        (is_forward != is_other_forward).then_some(other)
+    };
+    (0..count).map(|index| (around[index].2, other(index))).collect()
 }
 
 fn edges_of<T: Copy>([a, b, c]: [T; 3]) -> [[T; 2]; 3] {

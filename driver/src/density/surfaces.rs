@@ -3,10 +3,10 @@
 use std::sync::OnceLock;
 
 use glam::Vec3;
-use photoncard_firmware::photon::SameSurface;
+use photoncard_firmware::photon::{SameSurface, Sectors};
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
 
-use super::chords::Chords;
+use super::chords::{Batch, Chords};
 use super::lanes::Lane;
 
 /// Number of codes of normals.
@@ -104,28 +104,156 @@ impl Kernel for FractionWithin<'_> {
     #[inline(always)]
     fn run(self, _: impl Isa) -> f32 {
         let Self { chords, surfaces, centre, radius, lift } = self;
-        let [p, q, r] = centre.to_array();
         let limit = radius * radius;
-        let mut within = [0.0; LANES];
+        let (mut disc, mut area) = ([0.0; LANES], [0.0; LANES]);
         for batch in &chords.batches {
-            for (lane, within) in within.iter_mut().enumerate() {
-                let (x, y) = (batch.x[lane] - p, batch.y[lane] - q);
-                *within += if x * x + y * y <= limit { 1.0 } else { 0.0 };
+            let near = within(&batch_ways(batch, centre), limit);
+            for lane in 0..LANES {
+                disc[lane] += near[lane];
             }
         }
-        let mut areas = [0.0; LANES];
         for lanes in &surfaces.places {
-            for (lane, area) in areas.iter_mut().enumerate() {
-                let [x, y, z] = [0, 1, 2].map(|axis: usize| lanes.places[axis][lane]);
-                let (x, y, z) = (x - p, y - q, z - r);
-                // The grid may move a photon off its plane; heights within that error count as 0, so that a plane has
-                // fraction 1.
-                let z = if z.abs() <= lift { 0.0 } else { z };
-                let is_near = x * x + y * y + z * z <= limit;
-                *area += if is_near { lanes.areas[lane] } else { 0.0 };
+            let near = within(&lanes.ways(centre, lift), limit);
+            for lane in 0..LANES {
+                area[lane] += near[lane] * lanes.areas[lane];
             }
         }
-        let (within, area) = (within.iter().sum::<f32>(), areas.iter().sum::<f32>());
-        if within > 0.0 { area / within } else { 1.0 }
+        share(area.iter().sum(), disc.iter().sum(), 1.0)
     }
+}
+
+/// Area of the chosen surface around a photon.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Areas {
+    /// Area within the photon's sphere over that of its disc.
+    pub(super) fraction: f32,
+    /// Area within a larger sphere that the photon cannot see, over the area there.
+    pub(super) hidden: f32,
+    /// Area of the visible region within the photon's sphere over that of the plane.
+    pub(super) of_region: f32,
+    /// Number of points within the larger sphere.
+    pub(super) points: f32,
+}
+
+/// Visible region of a photon, in a ball's coordinates: axes along those of the chords' frame, and sectors.
+pub(super) struct SeenRegion {
+    pub(super) axes: [[f32; 3]; 3],
+    pub(super) inner: Sectors,
+    pub(super) outer: Sectors,
+}
+
+/// Kernel that measures the area of the chosen surface around a photon.
+#[derive(Clone, Copy)]
+pub(super) struct AreasWithin<'a> {
+    pub(super) chords: &'a Chords,
+    pub(super) surfaces: &'a OpenSurfaces,
+    pub(super) region: &'a SeenRegion,
+    pub(super) centre: Vec3,
+    pub(super) radius: f32,
+    /// Radius of the larger sphere.
+    pub(super) outer_radius: f32,
+    /// Maximum error of heights.
+    pub(super) lift: f32,
+}
+
+impl Kernel for AreasWithin<'_> {
+    type Output = Areas;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Areas {
+        let Self { chords, surfaces, region, centre, radius, outer_radius, lift } = self;
+        let [limit, outer_limit] = [radius * radius, outer_radius * outer_radius];
+        let [mut disc, mut in_plane, mut all, mut seen, mut around, mut hidden] = [[0.0; LANES]; 6];
+        let mut points = [0.0; LANES];
+        for batch in &chords.batches {
+            let ways = batch_ways(batch, centre);
+            let near = within(&ways, limit);
+            let mut outside = [0; LANES];
+            region.inner.test(isa, along(&ways, &region.axes).each_ref(), &mut outside);
+            for lane in 0..LANES {
+                disc[lane] += near[lane];
+                in_plane[lane] += if outside[lane] == 0 { near[lane] } else { 0.0 };
+            }
+        }
+        for lanes in &surfaces.places {
+            let ways = lanes.ways(centre, lift);
+            let [near, nearby] = [limit, outer_limit].map(|limit| within(&ways, limit));
+            let ways = along(&ways, &region.axes);
+            let [mut outside, mut beyond] = [[0; LANES]; 2];
+            region.inner.test(isa, ways.each_ref(), &mut outside);
+            region.outer.test(isa, ways.each_ref(), &mut beyond);
+            for lane in 0..LANES {
+                let area = lanes.areas[lane];
+                all[lane] += area * near[lane];
+                seen[lane] += if outside[lane] == 0 { area * near[lane] } else { 0.0 };
+                around[lane] += area * nearby[lane];
+                points[lane] += if area > 0.0 { nearby[lane] } else { 0.0 };
+                hidden[lane] += if beyond[lane] == 0 { 0.0 } else { area * nearby[lane] };
+            }
+        }
+        let sum = |lanes: Lane| lanes.iter().sum::<f32>();
+        Areas {
+            fraction: share(sum(all), sum(disc), 1.0),
+            hidden: share(sum(hidden), sum(around), 0.0),
+            of_region: share(sum(seen), sum(in_plane), 1.0),
+            points: sum(points),
+        }
+    }
+}
+
+impl SurfaceLanes {
+    /// Ways to the points from a place. The grid may move a photon off its plane; heights within that error count as 0, so that a plane
+    /// has fraction 1.
+    #[inline(always)]
+    fn ways(&self, from: Vec3, lift: f32) -> [Lane; 3] {
+        let [p, q, r] = from.to_array();
+        let [x, y, z] = &self.places;
+        let mut ways = [[0.0; LANES]; 3];
+        for lane in 0..LANES {
+            let height = z[lane] - r;
+            (ways[0][lane], ways[1][lane]) = (x[lane] - p, y[lane] - q);
+            ways[2][lane] = if height.abs() <= lift { 0.0 } else { height };
+        }
+        ways
+    }
+}
+
+/// Ways across a batch of chords from a place.
+#[inline(always)]
+fn batch_ways(batch: &Batch, from: Vec3) -> [Lane; 3] {
+    let [p, q, _] = from.to_array();
+    let mut ways = [[0.0; LANES]; 3];
+    for lane in 0..LANES {
+        (ways[0][lane], ways[1][lane]) = (batch.x[lane] - p, batch.y[lane] - q);
+    }
+    ways
+}
+
+/// A part over the whole, or `without` where there is none.
+#[inline(always)]
+fn share(part: f32, whole: f32, without: f32) -> f32 {
+    if whole > 0.0 { part / whole } else { without }
+}
+
+/// 1 for points within a radius, by its square, else 0.
+#[inline(always)]
+fn within([x, y, z]: &[Lane; 3], limit: f32) -> Lane {
+    let mut within = [0.0; LANES];
+    for lane in 0..LANES {
+        let distance = x[lane] * x[lane] + y[lane] * y[lane] + z[lane] * z[lane];
+        within[lane] = if distance <= limit { 1.0 } else { 0.0 };
+    }
+    within
+}
+
+/// Components of vectors along three axes.
+#[inline(always)]
+fn along([x, y, z]: &[Lane; 3], axes: &[[f32; 3]; 3]) -> [Lane; 3] {
+    let mut along = [[0.0; LANES]; 3];
+    for (along, [a, b, c]) in along.iter_mut().zip(axes) {
+        for lane in 0..LANES {
+            along[lane] = a * x[lane] + b * y[lane] + c * z[lane];
+        }
+    }
+    along
 }

@@ -10,7 +10,7 @@ use glam::Vec3;
 use photoncard_firmware::gather::HilbertCode;
 use photoncard_firmware::kind::ReferenceCandidates;
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::photon::{NearestPhotons, PhotonMap, gather, reflected_radiance};
+use photoncard_firmware::photon::{GatherLimits, gathered_radiance};
 use photoncard_firmware::scene::{PartialReflection, SceneImage};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
@@ -70,22 +70,22 @@ struct Estimator<'a> {
     scene: SceneImage,
     memory: Lines<'a>,
     buffer: Box<ReferenceCandidates>,
-    neighbors: u32,
-    max_distance: f32,
+    limits: GatherLimits,
 }
 
 impl<'a> Estimator<'a> {
     fn new(image: &'a CardImage, neighbors: u32, max_distance: f32) -> Self {
         let (scene, memory) = image.view();
-        Self { scene, memory, buffer: Box::default(), neighbors, max_distance }
+        Self { scene, memory, buffer: Box::default(), limits: GatherLimits { neighbors, max_distance } }
     }
 
     fn point(&mut self, (point, normal): SurfacePoint) -> Result<StoredPhoton, Fault> {
         let position: Vec3 = self.scene.header.photon_grid.position(point).into();
-        let mut nearest = NearestPhotons::new(self.buffer.view(), self.neighbors, self.max_distance);
-        gather(&self.scene, &mut self.memory, PhotonMap::Indirect, position, &mut nearest)?;
         let diffuser = PartialReflection::diffuser(normal);
-        let irradiance = reflected_radiance(&nearest, position, &diffuser).radiance.to_array();
+        let Self { scene, memory, buffer, limits } = self;
+        let irradiance =
+            gathered_radiance((&*scene, memory), position, &diffuser, *limits, buffer.view(), &mut |_, _, _| {})?;
+        let irradiance = irradiance.to_array();
         Ok(StoredPhoton::at(point, IrradiancePoint { irradiance, normal }.to_content()))
     }
 }

@@ -25,7 +25,7 @@ pub use self::settings::{PhotonLayout, PhotonSettings, PhotonsFor};
 pub use self::size::PhotonMapSize;
 use self::store::store_caustics;
 pub use self::store::store_photons;
-use crate::density::{automatic_max_distance, caustic_max_distance, measure_discs};
+use crate::density::{GatherDistances, caustic_max_distance, gather_distances, measure_discs};
 use crate::pack::{CardImage, PackedScene};
 pub use crate::photon::Guiding;
 use crate::photon::{
@@ -131,15 +131,17 @@ pub(crate) fn map_traced(
     let mut image = store_photons(packed, photons, settings.neighbors)?;
     times.building = start.elapsed();
     let start = Instant::now();
-    let max_distance = match settings.max_distance {
+    let mut distances = gather_distances(&image, settings.neighbors, importons.as_ref())?;
+    if let Some(distance) = settings.max_distance {
         // A distance beyond the scene's diagonal has no further effect.
-        Some(distance) => distance.min(image.diagonal()),
-        None => automatic_max_distance(&image, settings.neighbors, importons.as_ref())?,
-    };
+        let greatest = distance.min(image.diagonal());
+        distances = GatherDistances { usual: distances.usual.min(greatest), greatest };
+    }
+    let max_distance = distances.greatest;
     if max_distance < MIN_CELLS * cell {
         return Err(PhotonError::TooWide { cell, max_distance });
     }
-    measure_discs(&mut image, settings.neighbors, max_distance, &|| progress(settings.photons))?;
+    measure_discs(&mut image, settings.neighbors, distances, &|| progress(settings.photons))?;
     times.measuring = start.elapsed();
     if settings.layout == PhotonLayout::Jensen {
         let start = Instant::now();

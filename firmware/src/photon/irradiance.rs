@@ -11,6 +11,7 @@ use photoncard_shared::layout::IrradiancePoint;
 use photoncard_shared::message::Fault;
 
 use super::collector::Collector;
+use super::region::All;
 use super::{Candidate, SameSurface, leaves};
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
@@ -69,7 +70,7 @@ impl<M: MemoryPort> Kernel for PointSearch<'_, M> {
         let mut tested = 0;
         // A scene without photons has no points, and the tree no root.
         if scene.header.section(SectionKind::IrradianceLeaves).records > 0 {
-            tested = leaves::gather(isa, scene, SECTIONS, memory, position, &mut nearest)?;
+            tested = leaves::gather(isa, scene, SECTIONS, memory, (position, &All), &mut nearest)?;
         }
         Ok(FoundIrradiance { irradiance: nearest.irradiance(), tested })
     }

@@ -8,6 +8,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{Photon, Record};
 use photoncard_shared::message::{Fault, FaultCode};
 
+use super::region::Filter;
 use super::{Candidate, NearestPhotons};
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
@@ -21,7 +22,7 @@ struct Deferred {
     distance_squared: f32,
 }
 
-/// Collects the photons nearest to `position` in `nearest`. Returns the number of photons tested, one for each visited
+/// Collects the photons nearest to `position` in `nearest`, those that `filter` takes. Returns the number of photons tested, one for each visited
 /// node.
 ///
 /// # Errors
@@ -31,7 +32,7 @@ pub(super) fn gather(
     isa: impl Isa,
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    position: Vec3,
+    (position, filter): (Vec3, &impl Filter),
     nearest: &mut NearestPhotons,
 ) -> Result<u32, Fault> {
     let photons = scene.header.section(SectionKind::Photons).records;
@@ -51,7 +52,7 @@ pub(super) fn gather(
             1 => y,
             _ => z,
         };
-        if distance_squared <= nearest.limit() {
+        if distance_squared <= nearest.limit() && filter.takes([x, y, z]) {
             nearest.insert(isa, Candidate::new(distance_squared, Photon::content(record)));
         }
         let left = 2 * node + 1;

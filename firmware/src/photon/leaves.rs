@@ -9,6 +9,7 @@ use photoncard_shared::layout::{
 use photoncard_shared::message::Fault;
 
 use super::collector::Collector;
+use super::region::Filter;
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::simd::{Isa, LANES};
@@ -16,8 +17,8 @@ use crate::wide_tree::{BEYOND, Descent, Order, Stack};
 
 const _: () = assert!(LEAF_LANES == LANES);
 
-/// Collects the photons or irradiance points nearest to `position` in `nearest`, from the tree with nodes and leaves in
-/// these two sections. Returns the number of photons tested.
+/// Collects the photons or irradiance points nearest to `position` in `nearest`, those that `filter` takes, from the tree with
+/// nodes and leaves in these two sections. Returns the number of photons tested.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -27,7 +28,7 @@ pub(super) fn gather(
     scene: &SceneImage,
     [nodes, leaves]: [SectionKind; 2],
     memory: &mut impl MemoryPort,
-    position: Vec3,
+    (position, filter): (Vec3, &impl Filter),
     nearest: &mut impl Collector,
 ) -> Result<u32, Fault> {
     let query = position.to_array();
@@ -39,7 +40,7 @@ pub(super) fn gather(
         match part {
             Child::Leaf(leaf) => {
                 let line = descent.leaf(memory, leaf)?;
-                tested += test_leaf(isa, grid, PhotonLeaf::read(line), query, nearest);
+                tested += test_leaf(isa, grid, PhotonLeaf::read(line), (query, filter), nearest);
             }
             Child::Node(node) => descent.enter(isa, memory, node, Order::NearestFirst, |line| {
                 distances_to_boxes(isa, grid, PhotonNode(line), query, nearest.limit())
@@ -89,7 +90,7 @@ fn test_leaf(
     isa: impl Isa,
     grid: &PhotonGrid,
     leaf: PhotonLeaf,
-    query: [f32; 3],
+    (query, filter): ([f32; 3], &impl Filter),
     nearest: &mut impl Collector,
 ) -> u32 {
     let photons = leaf.photons();
@@ -97,6 +98,7 @@ fn test_leaf(
     let [a, b, c] = grid.origin;
     let [p, q, r] = query;
     let mut distances = [0; LANES];
+    let [mut along_x, mut along_y, mut along_z] = [[0.0; LANES]; 3];
     for lane in 0..isa.lanes(photons as usize) {
         let to_photon = |axis: &LeafCoordinates, origin: i32, query: f32| {
             let offset = u16::from_le_bytes(axis.offsets.get(lane).copied().unwrap_or_default()) & axis.mask;
@@ -107,7 +109,13 @@ fn test_leaf(
         if let Some(distance) = distances.get_mut(lane) {
             *distance = (x * x + y * y + z * z).to_bits();
         }
+        for (ways, way) in [(&mut along_x, x), (&mut along_y, y), (&mut along_z, z)] {
+            if let Some(target) = ways.get_mut(lane) {
+                *target = way;
+            }
+        }
     }
+    filter.filter(isa, [&along_x, &along_y, &along_z], &mut distances);
     let mut contents = [0; LANES];
     for (content, bytes) in contents.iter_mut().zip(leaf.contents().iter().rev()) {
         *content = u64::from_le_bytes(*bytes);

@@ -7,6 +7,7 @@ mod kdtree;
 mod leaves;
 mod nearest;
 mod radiance;
+mod region;
 mod select;
 
 use glam::Vec3;
@@ -17,11 +18,13 @@ pub use candidates::{Candidate, CandidateBuffer, CandidateStorage, Candidates};
 pub use irradiance::{FoundIrradiance, PointSearch, nearest_irradiance};
 pub use nearest::NearestPhotons;
 pub use radiance::{
-    Estimate, LitBy, MIN_NORMAL_COSINE, Reflected, SameSurface, reflected_caustics, reflected_radiance,
+    Estimate, LitBy, MIN_NORMAL_COSINE, Reflected, SameSurface, Sight, reflected_caustics, reflected_radiance,
 };
+pub use region::{SECTORS, Sectors, VisibleRegion};
 
+use self::region::{All, Filter};
 use crate::memory::MemoryPort;
-use crate::scene::SceneImage;
+use crate::scene::{PartialReflection, SceneImage};
 use crate::simd::{self, Isa, Kernel};
 
 /// One of the two photon maps.
@@ -60,6 +63,68 @@ pub fn gather(
     simd::run(Search { scene, memory, map, position, nearest })
 }
 
+/// [`gather`] of the photons in the region that `position` sees.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(never)]
+pub fn gather_visible(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    map: PhotonMap,
+    (position, region): (Vec3, &VisibleRegion),
+    nearest: &mut NearestPhotons,
+) -> Result<u32, Fault> {
+    nearest.limit_to(region.sectors.reach_squared());
+    simd::run(VisibleSearch { scene, memory, map, position, region, nearest })
+}
+
+/// Parameters of a gather.
+#[derive(Clone, Copy, Debug)]
+pub struct GatherLimits {
+    /// Number of photons to find.
+    pub neighbors: u32,
+    /// Maximum distance of photons, metres.
+    pub max_distance: f32,
+}
+
+/// Maximum reach of a visible region, over the distance of the k-th of all photons: where most of these are hidden, photons that are
+/// not lie farther away.
+const MAX_REACH: f32 = 4.0;
+
+/// Radiance that the photons of the photon map reflect at a position, by those in the region that it sees where walls may hide others.
+/// `count` is called with the result of each search, of which there are one or two: the number of photons tested, the photons, their light.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(always)]
+pub fn gathered_radiance(
+    (scene, memory): (&SceneImage, &mut impl MemoryPort),
+    position: Vec3,
+    reflection: &PartialReflection,
+    GatherLimits { neighbors, max_distance }: GatherLimits,
+    mut candidates: Candidates,
+    count: &mut impl FnMut(u32, &NearestPhotons, &Reflected),
+) -> Result<Vec3, Fault> {
+    let mut nearest = NearestPhotons::new(candidates.reborrow(), neighbors, max_distance);
+    let tested = gather(scene, memory, PhotonMap::Indirect, position, &mut nearest)?;
+    let of_all = reflected_radiance(&nearest, position, None, reflection);
+    count(tested, &nearest, &of_all);
+    if of_all.sight == Sight::Free {
+        return Ok(of_all.radiance);
+    }
+    let radius = nearest.radius();
+    let reach = crate::vector::min(MAX_REACH * radius, max_distance);
+    let region = VisibleRegion::new(scene, memory, (position, reflection.normal()), radius, reach)?;
+    let mut nearest = NearestPhotons::new(candidates, neighbors, reach);
+    let tested = gather_visible(scene, memory, PhotonMap::Indirect, (position, &region), &mut nearest)?;
+    let of_region = reflected_radiance(&nearest, position, Some(&region.sectors), reflection);
+    count(tested, &nearest, &of_region);
+    // A photon that is visible, and sees all around it, vouches for the others.
+    let is_vouched = of_all.sight == Sight::Unknown && of_all.closest == of_region.closest;
+    Ok(if is_vouched { of_all } else { of_region }.radiance)
+}
+
 /// Kernel of [`gather`].
 pub struct Search<'s, 'n, M> {
     /// The scene, with its photon map.
@@ -80,15 +145,47 @@ impl<M: MemoryPort> Kernel for Search<'_, '_, M> {
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let Self { scene, memory, map, position, nearest } = self;
-        let has_leaves = scene.header.section(SectionKind::PhotonLeaves).records > 0;
-        let tested = if map == PhotonMap::Caustics || has_leaves {
-            leaves::gather(isa, scene, map.sections(), memory, position, nearest)?
-        } else {
-            kdtree::gather(isa, scene, memory, position, nearest)?
-        };
-        nearest.finish(isa);
-        Ok(tested)
+        search(isa, (scene, memory), map, (position, &All), nearest)
     }
+}
+
+/// Kernel of [`gather_visible`].
+struct VisibleSearch<'s, 'n, M> {
+    scene: &'s SceneImage,
+    memory: &'s mut M,
+    map: PhotonMap,
+    position: Vec3,
+    region: &'s VisibleRegion,
+    nearest: &'s mut NearestPhotons<'n>,
+}
+
+impl<M: MemoryPort> Kernel for VisibleSearch<'_, '_, M> {
+    type Output = Result<u32, Fault>;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Self::Output {
+        let Self { scene, memory, map, position, region, nearest } = self;
+        search(isa, (scene, memory), map, (position, region), nearest)
+    }
+}
+
+/// Collects the nearest photons of a map that a filter takes. Returns the number of photons tested.
+#[inline(always)]
+fn search<M: MemoryPort>(
+    isa: impl Isa,
+    (scene, memory): (&SceneImage, &mut M),
+    map: PhotonMap,
+    query: (Vec3, &impl Filter),
+    nearest: &mut NearestPhotons,
+) -> Result<u32, Fault> {
+    let has_leaves = scene.header.section(SectionKind::PhotonLeaves).records > 0;
+    let tested = if map == PhotonMap::Caustics || has_leaves {
+        leaves::gather(isa, scene, map.sections(), memory, query, nearest)?
+    } else {
+        kdtree::gather(isa, scene, memory, query, nearest)?
+    };
+    nearest.finish(isa);
+    Ok(tested)
 }
 
 /// Kernel of the selection of the nearest candidates alone: see [`NearestPhotons`].

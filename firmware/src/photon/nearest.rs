@@ -50,6 +50,11 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
+    /// Limits the search radius of an empty set, m^2: there are no photons beyond. The maximum distance stays.
+    pub(super) fn limit_to(&mut self, limit: f32) {
+        self.limit = if limit < self.limit { limit } else { self.limit };
+    }
+
     /// Squared search radius: photons beyond it cannot be among the nearest, m^2.
     #[inline(always)]
     pub fn limit(&self) -> f32 {
@@ -126,6 +131,13 @@ impl<'a> NearestPhotons<'a> {
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.length >= self.neighbors
+    }
+
+    /// After the search, the distance of the last photon asked for, or the maximum distance with fewer, metres.
+    pub fn radius(&self) -> f32 {
+        let (distances, _) = self.columns();
+        let farthest = distances.iter().copied().max().filter(|_| self.is_full());
+        libm::sqrtf(farthest.map_or(self.max_distance_squared, f32::from_bits))
     }
 
     /// Square of the maximum distance asked for, m^2.

@@ -10,19 +10,20 @@
 //! - `c` is the area of the surface whose photons are summed, over the disc's area: without it edges and corners would darken, and
 //!   stacked surfaces glow. The host measures it for each photon, with about the photon's own distance to its k-th neighbour. A
 //!   gather uses the c of the nearest photon of its surface, at a distance of about r / sqrt(k), where c has hardly changed.
+//!   Where walls hide photons, both are those of the region that the point sees ([`super::region`]).
 //!
 //! The remaining bias is blur: the radiance is a mean over the disc.
 
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::{decode_direction, decode_normal, disc_fraction};
+use photoncard_shared::layout::{decode_direction, decode_normal, disc_fraction, is_of_region};
 
-use super::{Candidate, NearestPhotons};
+use super::{Candidate, NearestPhotons, Sectors};
 use crate::fixed_point::ColourSum;
 use crate::scene::{DecodedLobe, PartialReflection, magnitude};
 use crate::simd::{self, Isa, Kernel};
-use crate::vector::{max, unit};
+use crate::vector::{max, min, unit};
 
 /// Minimum cosine between the normals of a photon and of the query that count as one surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
@@ -37,18 +38,39 @@ pub struct Reflected {
     pub radiance: Vec3,
     /// Number of photons' normals that were decoded.
     pub normals_decoded: u32,
+    /// Closest photon of the surface.
+    pub closest: Option<Candidate>,
+    /// What the closest photon says of the others.
+    pub sight: Sight,
 }
 
-/// Radiance of a gather at a position: the photons' power, reflected, over the area of their disc.
+/// Visibility of a gather's photons from its point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// All photons that matter are visible, or they are of a visible region.
+    Free,
+    /// Walls hide photons around the closest one.
+    Walled,
+    /// The closest photon is far away, or of another surface: it says nothing of the point.
+    Unknown,
+}
+
+/// Area within the distance of the closest photon, over the mean area of a photon, beyond which the photon's disc says too little about
+/// that of the point: on a wall one gather in 1,100 has its closest farther away.
+const APART: f32 = 7.0;
+
+/// Radiance of a gather at a position: the photons' power, reflected, over the area of their disc, or of the visible region that they
+/// were searched in.
 #[inline(always)]
 pub fn reflected_radiance(
     nearest: &NearestPhotons,
     position: Vec3,
+    region: Option<&Sectors>,
     reflection: &PartialReflection,
 ) -> Reflected {
     let lobe = reflection.decode_lobe();
     let normals = [Vec3::ZERO; 2];
-    simd::run(Estimate::<false> { nearest, position, reflection, lobe, lit_by: LitBy::All, normals })
+    simd::run(Estimate::<false> { nearest, position, region, reflection, lobe, lit_by: LitBy::All, normals })
 }
 
 /// [`reflected_radiance`] of caustics, by a lobe that was not decoded from the record; `normals` are the shading normal and the
@@ -62,9 +84,9 @@ pub fn reflected_caustics(
     normals: [Vec3; 2],
 ) -> Reflected {
     if normals[0] == normals[1] {
-        simd::run(Estimate::<false> { nearest, position, reflection, lobe, lit_by, normals })
+        simd::run(Estimate::<false> { nearest, position, region: None, reflection, lobe, lit_by, normals })
     } else {
-        simd::run(Estimate::<true> { nearest, position, reflection, lobe, lit_by, normals })
+        simd::run(Estimate::<true> { nearest, position, region: None, reflection, lobe, lit_by, normals })
     }
 }
 
@@ -87,6 +109,8 @@ pub struct Estimate<'a, 'n, const IS_SHADED: bool> {
     pub nearest: &'a NearestPhotons<'n>,
     /// Position of the gather, metres.
     pub position: Vec3,
+    /// Region in which the photons were searched; `None` for a sphere.
+    pub region: Option<&'a Sectors>,
     /// Reflection at the position.
     pub reflection: &'a PartialReflection,
     /// Its lobe.
@@ -102,7 +126,7 @@ impl<const IS_SHADED: bool> Kernel for Estimate<'_, '_, IS_SHADED> {
 
     #[inline(always)]
     fn run(self, _: impl Isa) -> Reflected {
-        let Self { nearest, position, reflection, lobe, lit_by, normals } = self;
+        let Self { nearest, position, region, reflection, lobe, lit_by, normals } = self;
         let (radius_squared, farthest) = if nearest.is_full() {
             let farthest = extreme(nearest, u32::max, |candidate, other| candidate.order() > other.order());
             (farthest.map_or(0.0, |farthest| farthest.distance_squared()), farthest)
@@ -112,12 +136,31 @@ impl<const IS_SHADED: bool> Kernel for Estimate<'_, '_, IS_SHADED> {
         let Some((closest, sums)) =
             sum(nearest, farthest, Sums::<IS_SHADED>::new((reflection, lobe), lit_by, normals))
         else {
-            return Reflected { radiance: Vec3::ZERO, normals_decoded: 0 };
+            let sight =
+                if region.is_none() && !nearest.is_empty() { Sight::Unknown } else { Sight::Free };
+            return Reflected { radiance: Vec3::ZERO, normals_decoded: 0, closest: None, sight };
         };
-        let fraction = disc_fraction(closest.disc());
         let least = MIN_RADIUS_SHARE * magnitude(&[position]);
-        let area = PI * max(radius_squared, max(least * least, f32::MIN_POSITIVE)) * fraction;
-        Reflected { radiance: sums.reflected() * (1.0 / area), normals_decoded: sums.normals_decoded }
+        let radius_squared = max(radius_squared, max(least * least, f32::MIN_POSITIVE));
+        let fraction = disc_fraction(closest.disc());
+        let in_disc = PI * radius_squared * fraction;
+        let is_of_region = is_of_region(closest.disc());
+        let area = region.map_or(in_disc, |region| {
+            let in_region = max(region.area(radius_squared), f32::MIN_POSITIVE);
+            if is_of_region { in_region * fraction } else { min(in_region, in_disc) }
+        });
+        let is_apart = closest.distance_squared() * nearest.len() as f32 > APART * radius_squared;
+        let sight = match region {
+            None if is_of_region => Sight::Walled,
+            None if is_apart => Sight::Unknown,
+            _ => Sight::Free,
+        };
+        Reflected {
+            radiance: sums.reflected() * (1.0 / area),
+            normals_decoded: sums.normals_decoded,
+            closest: Some(closest),
+            sight,
+        }
     }
 }
 

@@ -14,7 +14,9 @@ use super::{Context, GatherPoint, direct};
 use crate::gather::{GatherRequest, GatherTarget, HilbertCode};
 use crate::importance::GatherDirection;
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::{Candidates, NearestPhotons, PhotonMap, gather, nearest_irradiance, reflected_radiance};
+use crate::photon::{
+    Candidates, GatherLimits, NearestPhotons, Reflected, gathered_radiance, nearest_irradiance,
+};
 use crate::scene::light::environment_radiance;
 use crate::scene::{
     BUNDLE_RAYS, Hit, PartialReflection, Ray, Reflector, Surface, closest_hits, read_surface,
@@ -205,10 +207,14 @@ pub fn gathered<M: MemoryPort>(
             request.reflection.lambertian() * irradiance(context, position, request.reflection.normal())?
         );
     }
-    let nearest = nearest_photons(context, position, candidates)?;
-    let reflected = reflected_radiance(&nearest, position, &request.reflection);
-    count_reflection(context.counters, &request.reflection, &nearest, &reflected);
-    Ok(reflected.radiance)
+    let Context { scene, memory, frame, counters, .. } = context;
+    let limits = GatherLimits { neighbors: frame.neighbors, max_distance: frame.max_distance };
+    let reflection = &request.reflection;
+    let mut count = |tested: u32, nearest: &NearestPhotons, reflected: &Reflected| {
+        counters.count_gather(tested, nearest.taken(), nearest.selections(), nearest.len() as u32);
+        count_reflection(counters, reflection, nearest, reflected);
+    };
+    gathered_radiance((scene, *memory), position, reflection, limits, candidates, &mut count)
 }
 
 /// Precomputed irradiance of the nearest irradiance point of a surface, photon power units/m^2; 0 without one.
@@ -219,18 +225,4 @@ fn irradiance<M: MemoryPort>(context: &mut Context<M>, position: Vec3, normal: u
     context.counters.lookups += 1;
     context.counters.points_tested += u64::from(found.tested);
     Ok(found.irradiance)
-}
-
-/// The k nearest photons to a position, k from the frame parameters.
-#[inline(always)]
-fn nearest_photons<'a, M: MemoryPort>(
-    context: &mut Context<M>,
-    position: Vec3,
-    candidates: Candidates<'a>,
-) -> Result<NearestPhotons<'a>, Fault> {
-    let frame = context.frame;
-    let mut nearest = NearestPhotons::new(candidates, frame.neighbors, frame.max_distance);
-    let tested = gather(context.scene, context.memory, PhotonMap::Indirect, position, &mut nearest)?;
-    context.counters.count_gather(tested, nearest.taken(), nearest.selections(), nearest.len() as u32);
-    Ok(nearest)
 }

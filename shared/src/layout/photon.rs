@@ -16,8 +16,9 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 ///
 /// The *disc fraction* is the area of the surfaces whose photons a gather around this photon sums up, over the area
 /// `pi r^2` of a flat disc of the gather's radius: 1 on a plain wall, less at edges and in corners, more where surfaces
-/// are stacked. The density estimate divides by `pi r^2` times this fraction. It is stored as a code of
-/// [`disc_fraction`].
+/// are stacked. The density estimate divides by `pi r^2` times this fraction. Where walls hide parts of the disc from the photon
+/// ([`is_of_region`]), a gather counts photons of the region that its point sees alone, and divides by that region's area in the plane
+/// times the fraction. It is stored as a code of [`disc_fraction`].
 ///
 /// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it, but importance
 /// sampling, which asks for the directions of indirect light, leaves it out. In the caustic map the flag marks light of a surface or of
@@ -42,29 +43,52 @@ pub struct Photon {
 
 /// Number of codes of the disc fraction.
 pub const DISC_CODES: usize = 1 << 5;
-/// Code of a disc fraction of 1.
-pub const FULL_DISC: u8 = 22;
+/// Code of a disc fraction of 1 where all of the disc is visible.
+pub const FULL_DISC: u8 = 13;
+/// First code of the fractions of a visible region.
+const FIRST_REGION: u8 = 20;
+/// Code of a fraction of 1 of a visible region.
+const FULL_REGION: u8 = 25;
 
 const DISC_MASK: u8 = DISC_CODES as u8 - 1;
 const DISC_SHIFT: u32 = 10;
-/// Ratio of the fractions of consecutive codes: `4^(1/9)`.
-const DISC_STEP: f64 = 1.166_529_039_576_120_8;
+/// Ratio of the fractions of consecutive codes from 0.4 to 1: `4^(1/9)`.
+const FINE_STEP: f64 = 1.166_529_039_576_120_8;
+/// Ratio of the fractions of consecutive codes above 1, and of those of a region: `4^(1/6)`.
+const COARSE_STEP: f64 = 1.259_921_049_894_873_2;
+/// Ratio of the fractions of consecutive codes below 0.4.
+const SMALL_STEP: f64 = 1.4;
+/// Number of fine steps below 1.
+const FINE_STEPS: u8 = 6;
 const DISC_FRACTIONS: [f32; DISC_CODES] = disc_fractions();
 
-/// Geometric series from 0.034 to 4, so that the relative error of rounding is constant.
+/// Geometric series from 0.038 to 4 of a disc, and from 0.31 to 4 of a region: the relative error of rounding hardly varies.
 #[expect(clippy::indexing_slicing, reason = "computed when it is compiled")]
 const fn disc_fractions() -> [f32; DISC_CODES] {
     let mut fractions = [1.0; DISC_CODES];
-    let (mut code, mut above, mut below) = (0, 1.0, 1.0);
-    while code < DISC_CODES {
-        if FULL_DISC as usize + code < DISC_CODES {
-            fractions[FULL_DISC as usize + code] = above as f32;
-        }
-        if code <= FULL_DISC as usize {
-            fractions[FULL_DISC as usize - code] = below as f32;
-        }
-        (above, below) = (above * DISC_STEP, below / DISC_STEP);
+    let (mut code, mut fraction) = (FULL_DISC, 1.0);
+    while code > 0 {
+        fraction /= if FULL_DISC - code < FINE_STEPS { FINE_STEP } else { SMALL_STEP };
+        code -= 1;
+        fractions[code as usize] = fraction as f32;
+    }
+    (code, fraction) = (FULL_DISC, 1.0);
+    while code + 1 < FIRST_REGION {
+        fraction *= COARSE_STEP;
         code += 1;
+        fractions[code as usize] = fraction as f32;
+    }
+    (code, fraction) = (FULL_REGION, 1.0);
+    while code > FIRST_REGION {
+        fraction /= COARSE_STEP;
+        code -= 1;
+        fractions[code as usize] = fraction as f32;
+    }
+    (code, fraction) = (FULL_REGION, 1.0);
+    while code < DISC_MASK {
+        fraction *= COARSE_STEP;
+        code += 1;
+        fractions[code as usize] = fraction as f32;
     }
     fractions
 }
@@ -75,15 +99,23 @@ pub fn disc_fraction(code: u8) -> f32 {
     DISC_FRACTIONS.get((code & DISC_MASK) as usize).copied().unwrap_or(1.0)
 }
 
-/// Code of a disc fraction, dithered: `dither` in [0, 1) chooses between the two neighbouring codes such that the mean
-/// of `1 / disc_fraction(code)`, the factor of gathers, is `1 / fraction`. Fractions out of range take the first or
-/// last code.
+/// True if the fraction of a code is that of the region which the photon sees, as parts of its disc are hidden by walls.
+#[inline(always)]
+pub fn is_of_region(code: u8) -> bool {
+    code & DISC_MASK >= FIRST_REGION
+}
+
+/// Code of the disc fraction, or with `of_region` of the fraction of a visible region, dithered: `dither` in [0, 1) chooses between
+/// the two neighbouring codes such that the mean of `1 / disc_fraction(code)`, the factor of gathers, is `1 / fraction`. Fractions
+/// out of range take the first or last code.
 #[inline]
-pub fn encode_disc(fraction: f32, dither: f32) -> u8 {
-    let upper = DISC_FRACTIONS.partition_point(|&other| other < fraction).min(DISC_CODES - 1) as u8;
-    let lower = upper.saturating_sub(1);
+pub fn encode_disc(fraction: f32, of_region: bool, dither: f32) -> u8 {
+    let (first, end) = if of_region { (FIRST_REGION, DISC_CODES as u8) } else { (0, FIRST_REGION) };
+    let codes = DISC_FRACTIONS.get(first as usize..end as usize).unwrap_or_default();
+    let upper = first + codes.partition_point(|&other| other < fraction).min(codes.len() - 1) as u8;
+    let lower = upper.saturating_sub(1).max(first);
     let [at, lower_at, upper_at] = [fraction, disc_fraction(lower), disc_fraction(upper)].map(f32::recip);
-    // Below the first fraction both codes are 0; above the last one the left side is negative.
+    // Below the first fraction both codes are the first; above the last one the left side is negative.
     if at - upper_at > dither * (lower_at - upper_at) { lower } else { upper }
 }
 
@@ -226,6 +258,10 @@ fn power_of_two(exponent: i32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
     use super::*;
 
     #[test]
@@ -243,27 +279,38 @@ mod tests {
     }
 
     #[test]
-    fn disc_fractions_reach_from_a_thirtieth_to_four_and_a_whole_disc_is_one() {
-        assert_eq!(disc_fraction(FULL_DISC), 1.0);
-        assert!(disc_fraction(0) < 0.034 && (disc_fraction(DISC_MASK) - 4.0).abs() < 1e-6);
-        for code in 0..DISC_MASK {
-            let ratio = disc_fraction(code + 1) / disc_fraction(code);
-            assert!((ratio - DISC_STEP as f32).abs() < 1e-6, "{ratio}");
+    fn disc_fractions_ascend_from_a_thirtieth_to_four_and_a_whole_disc_is_one() {
+        assert_eq!([FULL_DISC, FULL_REGION].map(disc_fraction), [1.0; 2]);
+        for (codes, least) in [(0..FIRST_REGION, 0.038), (FIRST_REGION..DISC_CODES as u8, 0.315)] {
+            let fractions: Vec<f32> = codes.map(disc_fraction).collect();
+            assert!(fractions.is_sorted() && (fractions[0] - least).abs() < 1e-3, "{fractions:?}");
+            assert!((fractions[fractions.len() - 1] - 4.0).abs() < 1e-5);
+            for pair in fractions.windows(2) {
+                assert!(pair[1] / pair[0] < 1.001 * SMALL_STEP as f32, "{pair:?}");
+            }
         }
     }
 
     #[test]
     fn the_mean_reciprocal_of_dithered_disc_fractions_is_right() {
         let dithers = || (0..1000).map(|i| (i as f32 + 0.5) / 1000.0);
-        for fraction in [0.034, 0.1, 0.25, 0.51, 0.999, 1.0, 1.01, 1.7, 3.99] {
-            let mean = dithers().map(|d| 1.0 / disc_fraction(encode_disc(fraction, d))).sum::<f32>() / 1000.0;
-            assert!((mean * fraction - 1.0).abs() < 1e-3, "{fraction}: {mean}");
-        }
-        for dither in dithers() {
-            assert_eq!(encode_disc(1.0, dither), FULL_DISC);
-            assert_eq!(encode_disc(0.0, dither), 0);
-            assert_eq!(encode_disc(0.03, dither), 0);
-            assert_eq!(encode_disc(100.0, dither), DISC_MASK);
+        for of_region in [false, true] {
+            let codes = |fraction: f32| dithers().map(move |dither| encode_disc(fraction, of_region, dither));
+            for fraction in [0.04, 0.1, 0.25, 0.51, 0.999, 1.0, 1.01, 1.7, 3.99] {
+                if of_region && fraction < 0.32 {
+                    continue;
+                }
+                let mean = codes(fraction).map(|code| 1.0 / disc_fraction(code)).sum::<f32>() / 1000.0;
+                assert!((mean * fraction - 1.0).abs() < 1e-3, "{fraction}: {mean}");
+                assert!(codes(fraction).all(|code| is_of_region(code) == of_region));
+            }
+            let [whole, first, last] = match of_region {
+                true => [FULL_REGION, FIRST_REGION, DISC_MASK],
+                false => [FULL_DISC, 0, FIRST_REGION - 1],
+            };
+            assert!(codes(1.0).all(|code| code == whole));
+            assert!(codes(0.0).chain(codes(0.03)).all(|code| code == first));
+            assert!(codes(100.0).all(|code| code == last));
         }
     }
 

@@ -17,7 +17,9 @@ fn the_triangles_around_a_photon_are_what_rays_meet() {
         let image = store_photons(packed, photons, 20).expect("packs");
         let sides = SideTable::new(&image).expect("sound");
         let same = SameSurfaces::new();
-        let mut meter = Meter::new(&image, (&sides, &same), 20, f32::MAX.sqrt() * 0.5);
+        let greatest = f32::MAX.sqrt() * 0.5;
+        let distances = GatherDistances { usual: greatest, greatest };
+        let mut meter = Meter::new(&image, (&sides, &same), 20, distances);
         let grid = meter.searcher.scene.header.photon_grid;
         let (mut discs, mut cut, mut far, mut sums) = (0, 0, 0, [0.0; 2]);
         for line in image.section(SectionKind::PhotonLeaves) {
@@ -26,18 +28,18 @@ fn the_triangles_around_a_photon_are_what_rays_meet() {
             let normal = Photon::normal_of_flags(u16::from_le_bytes([low, high]));
             let place = DiscPhoton { photon: 0, position: grid.position(leaf.point(0)).into(), normal };
             let radius = meter.searcher.radius(place.position).expect("sound");
-            let ball = Ball { centre: place.position, radius: 1.1 * radius };
+            let ball = Ball { centre: place.position, radius: 1.1 * MARGIN * radius };
             let Meter { searcher, surroundings, .. } = &mut meter;
             if !surroundings.find(&searcher.scene, searcher.memory, &sides, ball).expect("sound") {
                 continue;
             }
-            let cluster = Cluster { ball, radius, outer: radius };
+            let cluster = Cluster { ball, radius, outer: MARGIN * radius };
             let [by_rays, by_list] = [false, true].map(|is_complete| {
                 meter.is_complete = is_complete;
                 let frame = meter.frame(&place, &cluster).expect("sound");
-                let mut fractions = [0.0; LEAF_PHOTONS];
+                let mut fractions = [WHOLE; LEAF_PHOTONS];
                 meter.measure_group(&[place], &frame, &cluster, &mut fractions).expect("sound");
-                fractions[0]
+                fractions[0].fraction
             });
             discs += 1;
             cut += u32::from((by_rays - 1.0).abs() > 0.01);

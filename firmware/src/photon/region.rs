@@ -1,0 +1,266 @@
+//! Visible region: the part of a gather's sphere that its point sees, for places where walls hide photons from it.
+//!
+//! A density estimate over a sphere counts photons behind a thin wall that stands on the surface, or in the next room. Rays along the
+//! surface, a little above it, measure the free distance in sixteen directions. They divide the disc into sectors, each of which ends
+//! before the straight line between the two ends of its border rays: no photon behind a plane wall is in a sector. The area of the
+//! estimate is that of the sectors, so that it agrees with the photons that are counted, whatever the rays have met.
+//!
+//! Photons far off the tangent plane belong to other surfaces, as the boards of a shelf: a region is the part of the sphere
+//! outside a cone about the normal.
+
+use core::f32::consts::PI;
+
+use glam::Vec3;
+use photoncard_shared::layout::decode_normal;
+use photoncard_shared::message::Fault;
+
+use super::MIN_NORMAL_COSINE;
+use crate::memory::MemoryPort;
+use crate::scene::{BUNDLE_RAYS, Hit, Ray, SceneImage, closest_hits, magnitude, offset_origin};
+use crate::simd::{HALF_LANES, Isa, LANES};
+use crate::vector::{max, max_component, min, tangents, unit};
+
+/// Number of sectors.
+pub const SECTORS: usize = BUNDLE_RAYS;
+
+/// Height of the rays over the surface, over the radius of a gather: lower things hide nothing.
+const HEIGHT: f32 = 0.03;
+/// Distance of the reference point from the surface over the radius of a gather, besides a cell of the photons' grid.
+const LIFT: f32 = 1e-3;
+/// Maximum tangent of the angle between the surface and the way to a photon.
+const MAX_SLOPE: f32 = 0.4;
+/// Radius of a sector over the lesser length of its border rays: the cosine of half its angle, and half a percent for rounding.
+const WITHIN: f32 = 0.976;
+/// Radius of a sector that holds all that may be visible, over the greater length of its border rays.
+const BEYOND: f32 = 1.02;
+/// `tan(pi / 8)`.
+const TAN_PI_8: f32 = 0.414_213_57;
+/// Cosines of the multiples of `pi / 8` up to `pi / 2`.
+const COSINES: [f32; 5] = [1.0, 0.923_879_5, 0.707_106_77, 0.382_683_43, 0.0];
+
+/// Region of a tangent plane in sectors about a point.
+#[derive(Clone, Copy, Debug)]
+pub struct Sectors {
+    /// Squared radius of each sector, m^2.
+    limits: [f32; SECTORS],
+    /// Square of the height that any photon of the surface may have, m^2.
+    lift_squared: f32,
+}
+
+/// Sectors about a point, and the frame that they lie in.
+#[derive(Clone, Copy, Debug)]
+pub struct VisibleRegion {
+    /// Two tangents and the normal.
+    pub axes: [Vec3; 3],
+    /// Region that is visible throughout.
+    pub sectors: Sectors,
+    /// Region outside which nothing is visible.
+    pub outer: Sectors,
+}
+
+impl Sectors {
+    /// The sectors in units of `unit` metres.
+    #[must_use]
+    pub fn scaled(&self, unit: f32) -> Self {
+        let per_unit = 1.0 / (unit * unit);
+        Self { limits: self.limits.map(|limit| limit * per_unit), lift_squared: self.lift_squared * per_unit }
+    }
+
+    /// Area within a radius, by its square.
+    pub fn area(&self, radius_squared: f32) -> f32 {
+        let squares: f32 = self.limits.iter().map(|limit| min(*limit, radius_squared)).sum();
+        squares * (PI / SECTORS as f32)
+    }
+
+    /// Square of the greatest distance of a point in the region.
+    pub(super) fn reach_squared(&self) -> f32 {
+        let greatest = self.limits.iter().copied().fold(0.0, max);
+        greatest * (1.0 + MAX_SLOPE * MAX_SLOPE) + self.lift_squared
+    }
+
+    /// Sets `outside` to 1 for the points outside the region, given along the axes from its centre, else to 0.
+    #[inline(always)]
+    pub fn test(&self, isa: impl Isa, [u, v, w]: [&[f32; LANES]; 3], outside: &mut [u32; LANES]) {
+        let mut indices = [0; LANES];
+        for (index, (&u, &v)) in indices.iter_mut().zip(u.iter().zip(v)) {
+            *index = sector(u, v);
+        }
+        let (halves, _) = indices.as_chunks::<HALF_LANES>();
+        let mut limits = [0.0; LANES];
+        for (limits, half) in limits.as_chunks_mut().0.iter_mut().zip(halves) {
+            *limits = isa.permute(&self.limits, half);
+        }
+        let points = u.iter().zip(v).zip(w);
+        for ((outside, limit), ((u, v), w)) in outside.iter_mut().zip(limits).zip(points) {
+            let across = u * u + v * v;
+            let most = MAX_SLOPE * MAX_SLOPE * across + self.lift_squared;
+            *outside = if (across <= limit) & (w * w <= most) { 0 } else { 1 };
+        }
+    }
+
+    /// True for a point in the region.
+    #[inline(always)]
+    fn holds(&self, [u, v, w]: [f32; 3]) -> bool {
+        let across = u * u + v * v;
+        let limit = self.limits.get(sector(u, v) as usize % SECTORS).copied().unwrap_or(0.0);
+        across <= limit && w * w <= MAX_SLOPE * MAX_SLOPE * across + self.lift_squared
+    }
+}
+
+/// Number of the sector of a direction: bits 0 and 1 count from the first axis to the second, bits 2 and 3 are the signs.
+#[inline(always)]
+fn sector(u: f32, v: f32) -> u32 {
+    let (a, b) = (max(u, -u), max(v, -v));
+    let steps = u32::from(b > TAN_PI_8 * a) + u32::from(b > a) + u32::from(TAN_PI_8 * b > a);
+    steps | u32::from(u < 0.0) << 2 | u32::from(v < 0.0) << 3
+}
+
+/// Numbers of the two rays along the borders of a sector, counted around the normal.
+fn borders(sector: usize) -> [usize; 2] {
+    let steps = sector % 4;
+    let ray = |steps: usize| match sector / 4 {
+        0 => steps,
+        1 => SECTORS / 2 - steps,
+        2 => (SECTORS - steps) % SECTORS,
+        _ => SECTORS / 2 + steps,
+    };
+    [ray(steps), ray(steps + 1)]
+}
+
+/// Cosine and sine of the azimuth of a ray.
+fn azimuth(ray: usize) -> [f32; 2] {
+    let (quarter, steps) = (ray / 4, ray % 4);
+    let [c, s] = [steps, 4 - steps].map(|steps| COSINES.get(steps).copied().unwrap_or(0.0));
+    match quarter {
+        0 => [c, s],
+        1 => [-s, c],
+        2 => [-c, -s],
+        _ => [s, -c],
+    }
+}
+
+impl VisibleRegion {
+    /// The region that a point sees on a surface whose normal has the code `normal`, within `reach` metres, for gathers of about the
+    /// radius `radius`. It depends on the scene alone.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    #[inline(never)]
+    pub fn new(
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        (position, normal): (Vec3, u8),
+        radius: f32,
+        reach: f32,
+    ) -> Result<Self, Fault> {
+        let coded = unit(decode_normal(normal).into());
+        let lift = LIFT * radius + scene.header.photon_grid.cell;
+        let most = magnitude(&[position]);
+        let above = offset_origin(position, coded, most) + coded * lift;
+        let height = HEIGHT * radius;
+        let (free, normal) = Self::free_height(scene, memory, (above, coded), [2.0 * height, radius])?;
+        let origin = offset_origin(position, normal, most) + normal * (lift + 0.5 * free);
+        let (tangent, bitangent) = tangents(normal);
+        let rays: [Ray; SECTORS] = core::array::from_fn(|ray| {
+            let [cosine, sine] = azimuth(ray);
+            let direction = tangent * cosine + bitangent * sine;
+            Ray { origin, direction, max_distance: reach }
+        });
+        let mut hits = [None; BUNDLE_RAYS];
+        closest_hits(scene, memory, &rays, &mut hits)?;
+        let lengths =
+            hits.each_ref().map(|hit| hit.as_ref().map_or(f32::INFINITY, |hit| hit.intersection.distance));
+        let limits = |choose: fn(f32, f32) -> f32, share: f32| {
+            core::array::from_fn(|sector| {
+                let [first, second] =
+                    borders(sector).map(|ray| lengths.get(ray).copied().unwrap_or(f32::INFINITY));
+                let limit = choose(first, second) * share;
+                limit * limit
+            })
+        };
+        let lift_squared = 4.0 * lift * lift;
+        Ok(Self {
+            axes: [tangent, bitangent, normal],
+            sectors: Sectors { limits: limits(min, WITHIN), lift_squared },
+            outer: Sectors { limits: limits(max, BEYOND), lift_squared },
+        })
+    }
+
+    /// Free height over a point above a surface, up to the first of two distances, and the normal of the triangle below, which the
+    /// coded normal tells apart from others; the coded normal without a triangle within the second distance.
+    fn free_height(
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        (above, coded): (Vec3, Vec3),
+        [up, down]: [f32; 2],
+    ) -> Result<(f32, Vec3), Fault> {
+        let ray = |direction: Vec3, max_distance: f32| Ray { origin: above, direction, max_distance };
+        let mut hits = [None; BUNDLE_RAYS];
+        closest_hits(scene, memory, &[ray(coded, up), ray(-coded, down)], &mut hits)?;
+        let [ceiling, ground, ..] = &hits;
+        let free = ceiling.as_ref().map_or(up, |hit| min(hit.intersection.distance, up));
+        let found = ground.as_ref().map(|hit| normal_of(hit, coded));
+        let is_surface = |normal: &Vec3| normal.dot(coded) >= MIN_NORMAL_COSINE;
+        Ok((free, found.filter(is_surface).unwrap_or(coded)))
+    }
+}
+
+/// Unit normal of a triangle on the side of `towards`; zero for one without area.
+fn normal_of(hit: &Hit, towards: Vec3) -> Vec3 {
+    let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
+    let (b, c) = (b - a, c - a);
+    // Without the triangle's size: its square must not overflow.
+    let size = max(max_component(b.abs()), max_component(c.abs()));
+    let normal = if size > 0.0 { unit((b * (1.0 / size)).cross(c * (1.0 / size))) } else { Vec3::ZERO };
+    if normal.dot(towards) < 0.0 { -normal } else { normal }
+}
+
+/// Photons that a search takes, by their places.
+pub(super) trait Filter {
+    /// Sets the distances of photons that are not taken to `u32::MAX`, by the ways from the photons to the query.
+    fn filter(&self, isa: impl Isa, ways: [&[f32; LANES]; 3], distances: &mut [u32; LANES]);
+
+    /// True for a photon that is taken, by the way from it to the query.
+    fn takes(&self, way: [f32; 3]) -> bool;
+}
+
+/// All photons.
+pub(super) struct All;
+
+impl Filter for All {
+    #[inline(always)]
+    fn filter(&self, _: impl Isa, _: [&[f32; LANES]; 3], _: &mut [u32; LANES]) {}
+
+    #[inline(always)]
+    fn takes(&self, _: [f32; 3]) -> bool {
+        true
+    }
+}
+
+impl Filter for VisibleRegion {
+    #[inline(always)]
+    fn filter(&self, isa: impl Isa, [x, y, z]: [&[f32; LANES]; 3], distances: &mut [u32; LANES]) {
+        let mut along = [[0.0; LANES]; 3];
+        for (along, axis) in along.iter_mut().zip(self.axes) {
+            let [a, b, c] = axis.to_array();
+            for (along, ((x, y), z)) in along.iter_mut().zip(x.iter().zip(*y).zip(*z)) {
+                *along = -(x * a + y * b + z * c);
+            }
+        }
+        let [u, v, w] = &along;
+        let mut outside = [0; LANES];
+        self.sectors.test(isa, [u, v, w], &mut outside);
+        for (distance, outside) in distances.iter_mut().zip(outside) {
+            *distance = if outside == 0 { *distance } else { u32::MAX };
+        }
+    }
+
+    #[inline(always)]
+    fn takes(&self, [x, y, z]: [f32; 3]) -> bool {
+        let along = self.axes.map(|axis| {
+            let [a, b, c] = axis.to_array();
+            -(x * a + y * b + z * c)
+        });
+        self.sectors.holds(along)
+    }
+}
