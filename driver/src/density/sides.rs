@@ -141,9 +141,12 @@ impl SideTable {
                 // Of a triangle with two corners in one place: it is its own opposite.
                 [([from, to], ..)] if from == to => {}
                 [(edge, ..), ..] => {
-                    let around = around_edge(edge, along.iter().map(|&(_, is_forward, sheet)| {
-                        (is_forward, sheet as usize, sheets[sheet as usize].1)
-                    }));
+                    let around = around_edge(
+                        edge,
+                        along.iter().map(|&(_, is_forward, sheet)| {
+                            (is_forward, sheet as usize, sheets[sheet as usize].1)
+                        }),
+                    );
                     for (sheet, other) in around {
                         match other {
                             Some(other) => meshes.join(sheet, other),
@@ -211,7 +214,8 @@ fn around_edge(
     let count = around.len();
     let other = |index: usize| {
         let (_, is_forward, _) = around[index];
-        let (_, is_other_forward, other) = around[if is_forward { index + count - 1 } else { index + 1 } % count];
+        let (_, is_other_forward, other) =
+            around[if is_forward { index + count - 1 } else { index + 1 } % count];
         (is_forward != is_other_forward).then_some(other)
     };
     (0..count).map(|index| (around[index].2, other(index))).collect()

@@ -83,8 +83,14 @@ impl<'a> Estimator<'a> {
         let position: Vec3 = self.scene.header.photon_grid.position(point).into();
         let diffuser = PartialReflection::diffuser(normal);
         let Self { scene, memory, buffer, limits } = self;
-        let irradiance =
-            gathered_radiance((&*scene, memory), position, &diffuser, *limits, buffer.view(), &mut |_, _, _| {})?;
+        let irradiance = gathered_radiance(
+            (&*scene, memory),
+            position,
+            &diffuser,
+            *limits,
+            buffer.view(),
+            &mut |_, _, _| {},
+        )?;
         let irradiance = irradiance.to_array();
         Ok(StoredPhoton::at(point, IrradiancePoint { irradiance, normal }.to_content()))
     }

@@ -136,8 +136,7 @@ impl<const IS_SHADED: bool> Kernel for Estimate<'_, '_, IS_SHADED> {
         let Some((closest, sums)) =
             sum(nearest, farthest, Sums::<IS_SHADED>::new((reflection, lobe), lit_by, normals))
         else {
-            let sight =
-                if region.is_none() && !nearest.is_empty() { Sight::Unknown } else { Sight::Free };
+            let sight = if region.is_none() && !nearest.is_empty() { Sight::Unknown } else { Sight::Free };
             return Reflected { radiance: Vec3::ZERO, normals_decoded: 0, closest: None, sight };
         };
         let least = MIN_RADIUS_SHARE * magnitude(&[position]);
