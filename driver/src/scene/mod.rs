@@ -6,6 +6,7 @@
 mod blender;
 mod camera;
 mod checksum;
+mod coplanar;
 mod environment;
 mod fixed;
 pub mod gltf;

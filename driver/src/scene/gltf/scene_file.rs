@@ -184,6 +184,7 @@ impl SceneFile {
             scene.cameras.push(self.framed(&scene, moment)?);
             notices.framed = true;
         }
+        scene.lift_lamps();
         notices.solid_glass = solid_glass::make_solid(document, &mut scene)?;
         scene.notices = notices.finish(document);
         Ok(scene)
