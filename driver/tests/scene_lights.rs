@@ -269,3 +269,38 @@ fn the_unit_of_radiance_is_not_far_below_the_brightest_texel_of_the_environment(
     let unit = PackedScene::new(&scene).unwrap().view().0.header.radiance_unit;
     assert!(unit >= brightest / 4096.0, "{unit}");
 }
+
+/// A panel in the plane of a wall, which is emissive or not, beside a second copy of the wall.
+fn panel_in_a_wall(emission: f32) -> Scene {
+    load_changed(|json| {
+        let mut wall = json["materials"][0].clone();
+        wall.as_object_mut().unwrap().remove("emissiveFactor");
+        json["materials"][0]["emissiveFactor"] = json!([emission, emission, emission]);
+        let wall = push(json, "materials", wall);
+        let mut mesh = json["meshes"][0].clone();
+        mesh["primitives"][0]["material"] = json!(wall);
+        let mesh = push(json, "meshes", mesh);
+        for place in [[0.0, 0.0, 0.0], [5.0, 0.0, 0.0]] {
+            let node = push(json, "nodes", json!({"mesh": mesh, "translation": place}));
+            push(&mut json["scenes"][0], "nodes", json!(node));
+        }
+        let lamp = json!({"type": "directional", "intensity": 1.0});
+        json["extensions"] = json!({"KHR_lights_punctual": {"lights": [lamp]}});
+        let node = json!({"extensions": {"KHR_lights_punctual": {"light": 0}}});
+        let node = push(json, "nodes", node);
+        push(&mut json["scenes"][0], "nodes", json!(node));
+        json["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_lights_punctual"));
+    })
+    .unwrap()
+}
+
+#[test]
+fn a_lamp_in_the_plane_of_a_wall_is_in_front_of_it() {
+    let heights = |scene: &Scene| -> Vec<f32> {
+        scene.triangles.iter().flat_map(|triangle| triangle.vertices).map(|vertex| vertex.z).collect()
+    };
+    let lit = heights(&panel_in_a_wall(1.0));
+    assert!(lit[..3].iter().all(|height| (1e-5..1e-3).contains(height)), "{lit:?}");
+    assert!(lit[3..].iter().all(|height| *height == 0.0), "{lit:?}");
+    assert_eq!(heights(&panel_in_a_wall(0.0)), [0.0; 9]);
+}

@@ -26,8 +26,8 @@ pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(),
     lines.extend(geometry(&scene).map(|row| format!("  {row}")));
     lines.extend(scene.generator.iter().map(|generator| format!("  written by  {generator}")));
     for (heading, rows) in [
-        ("Cameras", scene.cameras.iter().map(camera).collect::<Vec<_>>()),
-        ("Punctual lights", scene.lights.iter().map(light).collect()),
+        ("Cameras", scene.cameras.iter().map(|item| camera(item, &scene)).collect::<Vec<_>>()),
+        ("Punctual lights", scene.lights.iter().map(|item| light(item, &scene)).collect()),
         ("Animations", animations.iter().map(animation).collect()),
         ("Materials", scene.materials.iter().map(|item| material(item, &scene)).collect()),
         ("Images", scene.images.iter().map(image).collect()),
@@ -47,6 +47,7 @@ pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(),
 fn geometry(scene: &Scene) -> [String; 5] {
     let (lower, upper) = scene.bounds();
     let size = upper - lower;
+    let [lower, upper] = [lower, upper].map(|corner| scene.in_file(corner));
     let emissive = scene.emissive_triangles();
     [
         format!("triangles   {}, {emissive} of them emissive", scene.triangles.len()),
@@ -80,9 +81,9 @@ fn image(image: &Image) -> String {
     format!("{}: {} x {}, {encoding}", image.name, image.width, image.height)
 }
 
-fn camera(camera: &Camera) -> String {
+fn camera(camera: &Camera, scene: &Scene) -> String {
     let degrees = camera.vertical_fov.to_degrees();
-    let Camera { name, origin, .. } = camera;
+    let (name, origin) = (&camera.name, scene.in_file(camera.origin));
     let aspect = camera.aspect.map_or(String::new(), |aspect| format!(", aspect ratio {aspect}"));
     format!("{name}: at {origin}, vertical field of view {degrees:.1} degrees{aspect}")
 }
@@ -95,14 +96,17 @@ fn animation(animation: &Animation) -> String {
     format!("{name}: {begin} to {end} s, {moved}")
 }
 
-fn light(light: &PunctualLight) -> String {
+fn light(light: &PunctualLight, scene: &Scene) -> String {
     let PunctualLight { name, kind, intensity } = light;
     let degrees = |cosine: f32| cosine.clamp(-1.0, 1.0).acos().to_degrees();
     let kind = match kind {
-        PunctualKind::Point { position } => format!("point at {position}, {intensity} W/sr"),
+        PunctualKind::Point { position } => {
+            format!("point at {}, {intensity} W/sr", scene.in_file(*position))
+        }
         PunctualKind::Spot { position, direction, inner_cosine, outer_cosine } => {
             let (inner, outer) = (degrees(*inner_cosine), degrees(*outer_cosine));
             let cone = format!("{inner:.1} to {outer:.1} degrees");
+            let position = scene.in_file(*position);
             format!("spot at {position} towards {direction}, {cone}, {intensity} W/sr")
         }
         PunctualKind::Directional { direction } => {

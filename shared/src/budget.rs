@@ -62,9 +62,12 @@ pub const MAX_TILE_PIXELS: u32 = 1 << 15;
 /// Maximum of [`Budget::gather_rays`] over all chips.
 pub const MAX_GATHER_RAYS: u32 = 1 << 14;
 
-/// Maximum number of specular bounces of a path; a path that would take more is black. In a clear glass ball
-/// less than 1e-20 of the light is left by then.
-pub const SPECULAR_BOUNCES: u32 = 16;
+/// Specular bounces that a path takes without Russian roulette.
+pub const FREE_BOUNCES: u32 = 16;
+
+/// Maximum number of specular bounces of a path; a path that would take more is black. Between mirrors of reflectance 0.98 less than
+/// 4e-5 of the light is left by then.
+pub const SPECULAR_BOUNCES: u32 = 512;
 
 /// Maximum number of direction bins of generative reordering.
 pub const MAX_BINS: u32 = 256;

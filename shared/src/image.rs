@@ -53,7 +53,8 @@ pub enum SectionKind {
     DistantLights = 10,
     /// Distribution of the environment's cells: `u32` thresholds of the cumulative distribution function, in units of
     /// 2^-32. First the marginal one of the rows, then for each row the conditional one of its cells; each ends with
-    /// 2^32 - 1.
+    /// 2^32 - 1. If cells are divided there follow their count, the number n of rows and of columns of their parts, the numbers
+    /// of the divided cells (row by row), increasing, and for each of them the like distributions of n rows and n x n parts.
     EnvironmentCells = 11,
     /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
     Photons = 12,

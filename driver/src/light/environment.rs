@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use photoncard_shared::layout::{self, TexelFormat, Wrap};
 use rayon::prelude::*;
 
+use super::environment_parts::{Parts, SIDE, luminance};
 use super::thresholds::thresholds;
 use crate::scene::Environment;
 
@@ -41,6 +42,8 @@ pub(crate) struct Cells {
     pub(crate) rows: u32,
     /// Weights of the cells, row by row: mean radiance of the channels times solid angle, W/m^2; all above 0.
     pub(crate) weights: Vec<f64>,
+    /// Divided cells, in the order of their numbers.
+    pub(crate) divided: Vec<Parts>,
 }
 
 impl EnvironmentMap {
@@ -146,21 +149,30 @@ impl Cells {
                 })
             })
             .collect();
+        let divided = Parts::of_cells(environment, [columns, rows], &weights);
         let total: f64 = weights.iter().sum();
         for (weight, index) in weights.iter_mut().zip(0..) {
             let even = solid_angle_of_row(index / columns, rows) / (4.0 * PI * f64::from(columns));
             *weight = *weight * (1.0 - EVEN) + total * EVEN * even;
         }
-        Self { columns, rows, weights }
+        Self { columns, rows, weights, divided }
     }
 
-    /// Thresholds of the rows, then of the cells of each row ([`thresholds`]).
+    /// Thresholds of the rows, then of the cells of each row ([`thresholds`]); and those of the parts of divided cells.
     pub(super) fn thresholds(&self) -> Vec<u32> {
-        let rows = self.weights.chunks(self.columns as usize);
-        let sums: Vec<f64> = rows.clone().map(|row| row.iter().sum()).collect();
-        let mut all = thresholds(&sums);
-        all.extend(rows.flat_map(thresholds));
+        let mut all = of_grid(&self.weights, self.columns);
+        if !self.divided.is_empty() {
+            all.extend([self.divided.len() as u32, SIDE]);
+            all.extend(self.divided.iter().map(|parts| parts.cell));
+            all.extend(self.divided.iter().flat_map(|parts| of_grid(&parts.weights, SIDE)));
+        }
         all
+    }
+
+    /// The parts of a cell, if it is divided.
+    pub(crate) fn parts(&self, row: u32, column: u32) -> Option<&Parts> {
+        let cell = row * self.columns + column;
+        self.divided.binary_search_by_key(&cell, |parts| parts.cell).ok().map(|index| &self.divided[index])
     }
 
     /// Solid angle of a cell of a row, sr.
@@ -169,25 +181,19 @@ impl Cells {
     }
 }
 
+/// Thresholds of the rows of a grid, then of the cells of each row.
+fn of_grid(weights: &[f64], columns: u32) -> Vec<u32> {
+    let rows = weights.chunks(columns as usize);
+    let sums: Vec<f64> = rows.clone().map(|row| row.iter().sum()).collect();
+    let mut all = thresholds(&sums);
+    all.extend(rows.flat_map(thresholds));
+    all
+}
+
 /// Solid angle of a row of cells, sr.
 fn solid_angle_of_row(row: u32, rows: u32) -> f64 {
     let half = 0.5 * PI / f64::from(rows);
     4.0 * PI * libm::sin(f64::from(2 * row + 1) * half) * libm::sin(half)
-}
-
-/// Mean radiance of the channels at texture coordinates `(u, v)`, interpolated bilinearly as on a card, W/(sr m^2).
-fn luminance(environment: &Environment, [u, v]: [f64; 2]) -> f64 {
-    let [width, height] = [environment.width, environment.height].map(i64::from);
-    let [x, y] = [u * width as f64 - 0.5, v * height as f64 - 0.5];
-    let [column, row] = [x.floor(), y.floor()];
-    let texel = |column: i64, row: i64| {
-        let [column, row] = [column.rem_euclid(width), row.clamp(0, height - 1)];
-        let texel = environment.texels[(row * width + column) as usize];
-        texel.into_iter().map(f64::from).sum::<f64>() / 3.0
-    };
-    let [right, below] = [x - column, y - row];
-    let row_at = |row: i64| texel(column as i64, row) * (1.0 - right) + texel(column as i64 + 1, row) * right;
-    row_at(row as i64) * (1.0 - below) + row_at(row as i64 + 1) * below
 }
 
 #[cfg(test)]
@@ -245,5 +251,38 @@ mod tests {
         assert_eq!(decode(map.texel(0, 0)), [1.0; 3]);
         assert!((map.fluence / (4.0 * PI * 0.2) - 1.0).abs() < 1e-6);
         assert!(EnvironmentMap::new(&Environment::constant(Vec3::ZERO)).is_none());
+    }
+
+    fn sky(width: u32, sun: impl Fn(u32, u32) -> f32) -> Environment {
+        let height = width / 2;
+        let texels = (0..height).flat_map(|row| (0..width).map(move |column| (column, row)));
+        let texels = texels.map(|(column, row)| [1.0 + sun(column, row); 3]).collect();
+        Environment { width, height, texels, strength: 1.0 }
+    }
+
+    fn divided(environment: &Environment) -> Vec<Parts> {
+        EnvironmentMap::new(environment).expect("lit").cells.divided
+    }
+
+    #[test]
+    fn cells_with_a_sun_are_divided_and_others_not() {
+        let found = divided(&sky(1024, |column, row| if (column, row) == (300, 101) { 1e6 } else { 0.0 }));
+        let [parts] = &found[..] else { panic!("{} cells are divided", found.len()) };
+        assert_eq!(parts.cell, 101 / 8 * 128 + 300 / 8);
+        let greatest = parts.weights.iter().copied().fold(0.0, f64::max);
+        assert!(
+            greatest > 0.02 * parts.weights.iter().sum::<f64>()
+                && parts.weights.iter().all(|weight| *weight > 0.0)
+        );
+        assert!(divided(&sky(1024, |_, _| 0.0)).is_empty());
+        assert!(divided(&sky(1024, |_, row| row as f32)).is_empty());
+        assert!(divided(&sky(128, |column, row| if (column, row) == (9, 9) { 1e6 } else { 0.0 })).is_empty());
+    }
+
+    #[test]
+    fn no_more_cells_are_divided_than_the_card_has_room_for() {
+        let found =
+            divided(&sky(1024, |column, row| if column % 32 == 4 && row % 32 == 4 { 1e6 } else { 0.0 }));
+        assert!(found.len() <= 16 && found.is_sorted_by_key(|parts| parts.cell));
     }
 }

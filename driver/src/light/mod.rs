@@ -4,6 +4,7 @@
 mod colour;
 mod emission;
 pub(crate) mod environment;
+mod environment_parts;
 mod footprint;
 mod pyramid;
 mod shares;

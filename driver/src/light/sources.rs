@@ -5,6 +5,8 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use photoncard_firmware::scene::light::environment_direction;
 
+use super::environment::Cells;
+use super::environment_parts::{Parts, SIDE};
 use super::shares::projected_area;
 use super::targets::Targets;
 use super::thresholds::thresholds;
@@ -186,6 +188,10 @@ impl AllSources {
             let border = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(cells.rows));
             let [upper, lower] = [border(row), border(row + 1)];
             for column in 0..cells.columns {
+                if let Some(parts) = cells.parts(row, column) {
+                    self.add_parts(cells, parts, (row, column), (&shown, all_sides));
+                    continue;
+                }
                 let width = 1.0 / cells.columns as f32;
                 let left = column as f32 * width;
                 let middle = environment_direction(left + 0.5 * width, (0.5 * (upper + lower)) as f32);
@@ -202,6 +208,33 @@ impl AllSources {
                 let strongest = f64::from(map.brightest) * solid_angle * all_sides;
                 self.add(source, weight * area, strongest);
             }
+        }
+    }
+
+    /// Adds the parts of a divided cell, as [`Self::add_cells`].
+    fn add_parts(
+        &mut self,
+        cells: &Cells,
+        parts: &Parts,
+        (row, column): (u32, u32),
+        (shown, all_sides): (impl Fn(DVec3) -> f64, f64),
+    ) {
+        let border = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(cells.rows));
+        let [upper, lower] = [border(row), border(row + 1)];
+        let height = (lower - upper) / f64::from(SIDE);
+        let width = 1.0 / (cells.columns * SIDE) as f32;
+        let solid_angle = cells.solid_angle(row) / f64::from(SIDE * SIDE);
+        for (index, (weight, brightest)) in (0..).zip(parts.weights.iter().zip(&parts.brightest)) {
+            let [down, right] = [index / SIDE, index % SIDE];
+            let upper = upper + height * f64::from(down);
+            let left = column as f32 / cells.columns as f32 + right as f32 * width;
+            let middle = environment_direction(left + 0.5 * width, (upper + 0.5 * height) as f32);
+            let source = Source::Cell {
+                across: [left, width],
+                cosines: [upper as f32, (upper + height) as f32],
+                solid_angle: solid_angle as f32,
+            };
+            self.add(source, weight * shown(middle.as_dvec3()), brightest * solid_angle * all_sides);
         }
     }
 }

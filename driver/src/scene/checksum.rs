@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 
+use glam::DVec3;
 use photoncard_shared::checksum::Checksum;
 
 use super::{Camera, Scene};
@@ -56,6 +57,9 @@ impl Scene {
             let _ = write!(text, "{} {} {:?}", image.width, image.height, image.encoding);
         }
         let _ = write!(text, "{:?}", self.environment.as_ref().map(|map| (map.width, map.height)));
+        if self.offset != DVec3::ZERO {
+            let _ = write!(text, "{:?}", self.offset);
+        }
         if let Some(map) = self.environment.as_ref().filter(|map| map.strength != 1.0) {
             let _ = write!(text, "{:?}", map.strength);
         }

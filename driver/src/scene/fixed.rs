@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::ops::Deref;
 use std::sync::OnceLock;
 
+use glam::DVec3;
 use photoncard_shared::checksum::Checksum;
 
 use super::{Camera, Scene};
@@ -61,9 +62,14 @@ impl Deref for FixedScene<'_> {
 
 impl FixedScene<'static> {
     /// The cameras of a scene of these checksums, with cameras and without. Of the rest nothing is there but whether it is specular.
-    pub(crate) fn of_cameras(cameras: Vec<Camera>, checksums: [String; 2], is_specular: bool) -> Self {
+    pub(crate) fn of_cameras(
+        cameras: Vec<Camera>,
+        offset: DVec3,
+        checksums: [String; 2],
+        is_specular: bool,
+    ) -> Self {
         let [checksum, without_cameras] = checksums.map(OnceLock::from);
-        let scene = Cow::Owned(Scene { cameras, ..Scene::default() });
+        let scene = Cow::Owned(Scene { cameras, offset, ..Scene::default() });
         Self { scene, bulk: OnceLock::new(), checksum, without_cameras, is_specular: is_specular.into() }
     }
 }

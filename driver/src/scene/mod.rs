@@ -1,10 +1,12 @@
 //! Loaded scenes: triangles, materials, textures, lights and cameras in world space.
 //!
-//! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel.
+//! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel. They are about the scene's own
+//! origin, which lies at [`Scene::offset`] in the file: single precision resolves little far from an origin.
 
 mod blender;
 mod camera;
 mod checksum;
+mod coplanar;
 mod environment;
 mod fixed;
 pub mod gltf;
@@ -22,7 +24,7 @@ mod settings;
 mod texture;
 mod triangle;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 pub use self::camera::Camera;
 pub use self::environment::Environment;
@@ -47,6 +49,8 @@ const NO_LIGHT: &str = "give a material of at least one triangle an emissiveFact
 /// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
+    /// Place of the scene's origin in the coordinates of its file, metres: 0 unless the scene lies far from the file's origin.
+    pub offset: DVec3,
     /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
     pub triangles: Vec<Triangle>,
     /// Attributes of the triangles that have any: normals, texture coordinates and colours of the corners.
@@ -76,6 +80,18 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Coordinates in the file of a place in the scene. Where the scene has no offset they read as the place's own do.
+    pub fn in_file(&self, place: Vec3) -> DVec3 {
+        // Of all double-precision numbers that round to a coordinate the one with its shortest decimal form is meant.
+        let decimal = |value: f32| value.to_string().parse().unwrap_or(f64::from(value));
+        DVec3::from_array(place.to_array().map(decimal)) + self.offset
+    }
+
+    /// Place in the scene of coordinates in the file.
+    pub fn in_scene(&self, place: DVec3) -> Vec3 {
+        (place - self.offset).as_vec3()
+    }
+
     /// Lower and upper corner of the scene's bounding box; both zero for a scene without triangles.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let mut vertices = self.triangles.iter().flat_map(|triangle| triangle.vertices);

@@ -6,6 +6,10 @@ mod nearest;
 #[cfg(test)]
 mod tests;
 
+use std::str::FromStr;
+
+use glam::DVec3;
+
 use self::light::LightProperty;
 use self::material::MaterialProperty;
 use self::nearest::nearest;
@@ -44,6 +48,8 @@ struct Assignment<'a> {
     name: &'a str,
     property: Property,
     values: Vec<f32>,
+    /// The values in double precision.
+    precise: Vec<f64>,
 }
 
 impl<'a> Assignment<'a> {
@@ -54,8 +60,9 @@ impl<'a> Assignment<'a> {
             left.rsplit_once('.').ok_or_else(|| form("there is no . between name and property".into()))?;
         let property = Property::of_name(property.trim())
             .ok_or_else(|| form(format!("there is no property '{}'", property.trim())))?;
-        let values = parse(value).ok_or_else(|| form(format!("'{value}' is neither a number nor three")))?;
-        Ok(Self { text, name, property, values })
+        let none = || form(format!("'{value}' is neither a number nor three"));
+        let (values, precise) = parse(value).zip(parse(value)).ok_or_else(none)?;
+        Ok(Self { text, name, property, values, precise })
     }
 
     fn fault(&self, reason: impl Into<String>, remedy: &'static str) -> SceneError {
@@ -79,7 +86,8 @@ impl Scene {
     /// not emit was not loaded, as a notice says.
     ///
     /// Of a light it is `colour` (of which the proportions of the channels count alone), `intensity` (of the greatest channel, W/sr, or W/m^2 of a
-    /// directional light; the colour stays, and is white for a light that was dark) or `position` (`x,y,z` in metres, of a point or spot
+    /// directional light; the colour stays, and is white for a light that was dark) or `position` (`x,y,z` in the file's
+    /// coordinates, metres, of a point or spot
     /// light that shares its name with no other). The strength of the environment is a factor of its map.
     ///
     /// No property is one of both materials and lights, so that a name may be that of both. A name may itself contain dots.
@@ -151,8 +159,12 @@ impl Scene {
             }
             _ => {}
         }
+        let values = match (property, &assignment.precise[..]) {
+            (LightProperty::Position, &[x, y, z]) => self.in_scene(DVec3::new(x, y, z)).to_array().to_vec(),
+            _ => assignment.values.clone(),
+        };
         for light in &mut selected {
-            let set = light.assign(property, &assignment.values);
+            let set = light.assign(property, &values);
             set.map_err(|(reason, remedy)| assignment.fault(reason, remedy))?;
         }
         self.lights = changed;
@@ -186,7 +198,7 @@ impl Scene {
 }
 
 /// Parses one number, or three with commas between them.
-fn parse(text: &str) -> Option<Vec<f32>> {
-    let values: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+fn parse<T: FromStr>(text: &str) -> Option<Vec<T>> {
+    let values: Option<Vec<T>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
     values.filter(|values| matches!(values.len(), 1 | 3))
 }

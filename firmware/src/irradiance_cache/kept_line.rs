@@ -3,6 +3,7 @@
 use glam::Vec3;
 use photoncard_shared::address::{LINE_BYTES, Line};
 
+use super::packed_normal::PackedNormal;
 use super::record::{Content, Irradiance, Record};
 use super::{LatticePoint, MAX_ROOTS, Window};
 
@@ -84,12 +85,13 @@ impl KeptRecord {
         let lengths = [record.magnitude, record.distance, record.radius];
         let vectors = [record.position, record.normal, mean].into_iter().chain(translation).chain(rotation);
         let values = lengths.into_iter().chain(vectors.flat_map(|vector| vector.to_array()));
-        Some(line_of_first([x, y].into_iter().chain(values.map(f32::to_bits))))
+        let PackedNormal(geometric_normal) = record.geometric_normal;
+        Some(line_of_first([x, y, geometric_normal].into_iter().chain(values.map(f32::to_bits))))
     }
 
     /// The record of a line, whatever it holds.
     pub(super) fn read(line: &Line) -> Option<Self> {
-        let [x, y, magnitude, distance, radius, rest @ ..] = words_of(line);
+        let [x, y, geometric_normal, magnitude, distance, radius, rest @ ..] = words_of(line);
         let vectors = rest.as_chunks::<3>().0.first_chunk()?;
         let vectors = vectors.map(|vector| Vec3::from_array(vector.map(f32::from_bits)));
         let [position, normal, mean, along, across, about, about_other] = vectors;
@@ -99,7 +101,8 @@ impl KeptRecord {
             rotation: [about, about_other],
         });
         let [magnitude, distance, radius] = [magnitude, distance, radius].map(f32::from_bits);
-        let record = Record { position, normal, magnitude, distance, radius, content };
+        let geometric_normal = PackedNormal(geometric_normal);
+        let record = Record { position, normal, geometric_normal, magnitude, distance, radius, content };
         Some(Self { point: LatticePoint { x, y }, record })
     }
 }
@@ -119,6 +122,7 @@ mod tests {
         let record = Record {
             position: vector(6.0),
             normal: vector(7.0),
+            geometric_normal: PackedNormal(0x1234_5678),
             magnitude: 8.0,
             distance: 9.0,
             radius: 10.0,

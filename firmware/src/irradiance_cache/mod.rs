@@ -30,6 +30,7 @@ mod gradient;
 mod interpolation;
 mod kept_line;
 mod lattice;
+mod packed_normal;
 mod record;
 mod store;
 mod survey;

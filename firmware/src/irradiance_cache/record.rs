@@ -3,6 +3,7 @@
 use glam::Vec3;
 
 use super::gradient::{Coefficients, Distances, rotation};
+use super::packed_normal::PackedNormal;
 use crate::fixed_point::ColourSum;
 use crate::importance::CELLS;
 use crate::scene::Surface;
@@ -85,6 +86,8 @@ pub(super) struct Record {
     pub(super) position: Vec3,
     /// Unit normal on the side of the eye.
     pub(super) normal: Vec3,
+    /// Unit normal of the triangle on that side; none if it is `normal`.
+    pub(super) geometric_normal: PackedNormal,
     /// Maximum magnitude of the coordinates that the position was computed from, metres: it bounds the rounding error.
     pub(super) magnitude: f32,
     /// Harmonic mean of the distances to the surroundings, metres; undefined before the survey ends.
@@ -108,8 +111,11 @@ impl Record {
     /// Unsurveyed record of a surface, with a radius of at least `least` metres.
     pub(super) fn new(surface: &Surface, least: f32) -> Self {
         let Surface { position, normal, magnitude, .. } = *surface;
+        let is_flat = surface.geometric_normal == normal;
+        let geometric_normal =
+            if is_flat { PackedNormal::NONE } else { PackedNormal::new(surface.geometric_normal) };
         let content = Content::Surveying([0; CELLS]);
-        Self { position, normal, magnitude, distance: least, radius: least, content }
+        Self { position, normal, geometric_normal, magnitude, distance: least, radius: least, content }
     }
 
     /// Sets the distance to the surroundings in a cell of the hemisphere, metres; infinite if there are none. Its
@@ -134,7 +140,8 @@ impl Record {
 
     /// White Lambertian surface at the record's position.
     pub(super) fn surface(&self) -> Surface {
-        Surface::white(self.position, self.normal, self.magnitude)
+        let geometric_normal = self.geometric_normal.get().unwrap_or(self.normal);
+        Surface { geometric_normal, ..Surface::white(self.position, self.normal, self.magnitude) }
     }
 
     /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, with `radius` R. It is of second order in

@@ -103,9 +103,12 @@ impl<R: Capacity> IrradianceCache<R> {
         let is_last = direction as usize + 1 >= CELLS;
         let end = self.records.entries().min(index + BUNDLE_RAYS);
         let mut rays = Vec::<Ray, BUNDLE_RAYS>::new();
-        for index in index..end {
-            if let Some((point, Some(record))) = self.records.entry(index) {
-                let _ = rays.push(survey_ray(context, point, &record.surface(), direction));
+        let mut is_aimed = [false; BUNDLE_RAYS];
+        for (index, is_aimed) in (index..end).zip(&mut is_aimed) {
+            if let Some((point, Some(record))) = self.records.entry(index)
+                && let Some(ray) = survey_ray(context, point, &record.surface(), direction)
+            {
+                *is_aimed = rays.push(ray).is_ok();
             }
         }
         context.memory.enter(Stage::Survey);
@@ -114,9 +117,10 @@ impl<R: Capacity> IrradianceCache<R> {
         closest_hits(context.scene, context.memory, &rays, &mut hits)?;
         let mut distances =
             hits.iter().map(|hit| hit.as_ref().map_or(f32::INFINITY, |hit| hit.intersection.distance));
-        for index in index..end {
+        for (index, is_aimed) in (index..end).zip(is_aimed) {
             let Some((_, Some(record))) = self.records.entry_mut(index) else { continue };
-            record.set_distance(direction, distances.next().unwrap_or(f32::INFINITY));
+            let distance = if is_aimed { distances.next() } else { None };
+            record.set_distance(direction, distance.unwrap_or(f32::INFINITY));
             if is_last {
                 record.end_survey();
             }
@@ -183,9 +187,10 @@ fn new_record<M: MemoryPort>(
     }))
 }
 
-/// A random ray from the surface of a record in a cell of its hemisphere.
-fn survey_ray<M>(context: &Context<M>, point: &LatticePoint, surface: &Surface, cell: u8) -> Ray {
+/// A random ray from the surface of a record in a cell of its hemisphere; `None` below the triangle.
+fn survey_ray<M>(context: &Context<M>, point: &LatticePoint, surface: &Surface, cell: u8) -> Option<Ray> {
     let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
     let square = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];
-    Ray::new(surface.offset_origin(), direction_in(surface.normal, cell, square))
+    let direction = direction_in(surface.normal, cell, square);
+    surface.is_above(direction).then(|| Ray::new(surface.offset_origin(), direction))
 }

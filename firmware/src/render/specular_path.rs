@@ -2,20 +2,22 @@
 //! ([`crate::scene::Reflection::has_narrow_lobe`]).
 //!
 //! At such a surface a path takes one continuation at random, in proportion to its share of the light: reflection, transmission, a
-//! direction of the narrow lobe, or an end at the surface for the rest of its reflection. The samples of a pixel cover all of them. A
-//! path is black after [`SPECULAR_BOUNCES`].
+//! direction of the narrow lobe, or an end at the surface for the rest of its reflection. The samples of a pixel cover all of them.
+//! After [`FREE_BOUNCES`] a path survives by its throughput (Russian roulette), and after [`SPECULAR_BOUNCES`] it is black.
 //!
 //! Absorption follows the Beer-Lambert law, with the coefficient of the glass entered last; nested glass is not tracked.
 
 use glam::Vec3;
-use photoncard_shared::budget::SPECULAR_BOUNCES;
+use photoncard_shared::budget::{FREE_BOUNCES, SPECULAR_BOUNCES};
 use photoncard_shared::message::Fault;
 
 use super::{Context, SHORTER};
 use crate::memory::MemoryPort;
 use crate::scene::light::{LightChoices, LightSample, Receiver, sample_light};
-use crate::scene::{Hit, Ray, Reflection, Reflector, Surface, closest_hit, is_occluded, read_surface};
-use crate::vector::{max, max_component};
+use crate::scene::{
+    Hit, Ray, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit, is_occluded, read_surface,
+};
+use crate::vector::{max, max_component, min};
 
 /// Minimum ratio of the probabilities to end at a surface and to go on, if its reflection is not black.
 const MIN_STAY: f32 = 1.0 / 16.0;
@@ -83,7 +85,7 @@ pub enum PathEnd {
     Surface,
     /// Outside the scene.
     Escaped,
-    /// Lost: see [`Arrival::Lost`].
+    /// Black: see [`Arrival::Lost`] and [`Arrival::Absorbed`]; or ended by Russian roulette.
     Lost,
 }
 
@@ -189,8 +191,21 @@ impl SpecularPath {
         Arrival::GoesOn
     }
 
+    /// Russian roulette of a path with many bounces: it survives with the probability of its throughput, over which that is divided.
+    fn survives(&mut self, random: &dyn Fn(u32) -> f32) -> bool {
+        if self.bounces <= FREE_BOUNCES {
+            return true;
+        }
+        let probability = min(max_component(self.throughput), 1.0);
+        let survives = random(Choice::SURVIVAL.number(self.bounces)) < probability;
+        if survives {
+            self.throughput *= 1.0 / probability;
+        }
+        survives
+    }
+
     /// Follows the path from a surface that it may pass to its end, which replaces `surface` and `hit`. `random` gives a number in
-    /// [0, 1) for each choice: [`SPECULAR_BOUNCES`] choices of continuations, then two of a direction for each.
+    /// [0, 1) for each choice, by [`Choice::number`].
     ///
     /// # Errors
     /// If the image is not sound.
@@ -207,16 +222,16 @@ impl SpecularPath {
                 let throughput = self.throughput;
                 self.collected += throughput * punctual_light(context, surface, self.bounces, random)?;
             }
-            let [first, second] = [1, 2].map(|k| k * (SPECULAR_BOUNCES + 1) + self.bounces);
-            let direction =
-                if self.passes_lobe(surface) { [random(first), random(second)] } else { [0.0; 2] };
-            match self.arrive(surface, [random(self.bounces), direction[0], direction[1]]) {
+            let here = |choice: Choice| random(choice.number(self.bounces));
+            let [u, v] = if self.passes_lobe(surface) { Choice::DIRECTION.map(here) } else { [0.0; 2] };
+            match self.arrive(surface, [here(Choice::CONTINUATION), u, v]) {
                 Arrival::Ends => return Ok(PathEnd::Surface),
                 Arrival::Lost => {
                     context.counters.lost_paths += 1;
                     return Ok(PathEnd::Lost);
                 }
                 Arrival::Absorbed => return Ok(PathEnd::Lost),
+                Arrival::GoesOn if !self.survives(random) => return Ok(PathEnd::Lost),
                 Arrival::GoesOn => context.counters.specular_rays += 1,
             }
             let next = closest_hit(context.scene, context.memory, &self.ray)?;
@@ -228,9 +243,32 @@ impl SpecularPath {
     }
 }
 
+/// A choice of a path at a surface.
+#[derive(Clone, Copy, Debug)]
+struct Choice(u32);
+
+impl Choice {
+    const CONTINUATION: Self = Self(0);
+    const DIRECTION: [Self; 2] = [Self(1), Self(2)];
+    const LIGHT: [Self; 2] = [Self(3), Self(4)];
+    const LAYER: Self = Self(5);
+    const SURVIVAL: Self = Self(Self::LAYER.0 + SURFACE_CHOICES);
+    /// Number of choices at a surface.
+    const ALL: u32 = Self::SURVIVAL.0 + 1;
+
+    /// Number of the choice's random number after a number of bounces; each has one of its own.
+    fn number(self, bounces: u32) -> u32 {
+        const NUMBERED: u32 = FREE_BOUNCES + 1;
+        match bounces.checked_sub(NUMBERED) {
+            None => self.0 * NUMBERED + bounces,
+            Some(further) => Self::ALL * NUMBERED + further * Self::ALL + self.0,
+        }
+    }
+}
+
 /// Number of the random number with which a path chooses the layer of a surface.
 pub fn surface_choice(bounces: u32, choice: u32) -> u32 {
-    (5 + choice) * (SPECULAR_BOUNCES + 1) + bounces
+    Choice(Choice::LAYER.0 + choice).number(bounces)
 }
 
 /// Light of one sampled light, if it has no extent, that the narrow lobe of a surface reflects, W/(sr m^2). Lights with extent are met
@@ -242,7 +280,7 @@ fn punctual_light<M: MemoryPort>(
     bounce: u32,
     random: &dyn Fn(u32) -> f32,
 ) -> Result<Vec3, Fault> {
-    let [u, v] = [3, 4].map(|k| random(k * (SPECULAR_BOUNCES + 1) + bounce));
+    let [u, v] = Choice::LIGHT.map(|choice| random(choice.number(bounce)));
     let receiver = Receiver::new(surface);
     let mut choices = LightChoices::new(receiver);
     let Some(light) = sample_light(context.scene, context.memory, &mut choices, [u, v], u.to_bits())? else {
@@ -259,4 +297,20 @@ fn punctual_light<M: MemoryPort>(
     }
     let lobe = Reflector { reflection: surface.reflection.narrow_lobe(), ..surface.reflector() };
     Ok(lobe.evaluate(direction) * irradiance * surface.normal.dot(direction))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_choice_at_every_surface_has_a_number_of_its_own() {
+        let mut numbers = std::collections::BTreeSet::new();
+        for bounces in 0..=SPECULAR_BOUNCES {
+            for choice in 0..Choice::ALL {
+                assert!(numbers.insert(Choice(choice).number(bounces)), "{choice} {bounces}");
+            }
+        }
+        assert_eq!(surface_choice(0, 0), 5 * 17);
+    }
 }

@@ -25,14 +25,14 @@ pub(crate) struct PictureOptions {
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
     camera: Option<String>,
-    /// Place of the camera, metres [default: the camera's own]
+    /// Place of the camera in the scene file's coordinates, metres [default: the camera's own]
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
-    camera_at: Option<[f32; 3]>,
+    camera_at: Option<[f64; 3]>,
     /// Place in the middle of the picture, metres [default: in the camera's own direction]
     ///
     /// The top of the picture is towards +y. Straight up and straight down the right is +x, so that the top is +z and -z.
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
-    look_at: Option<[f32; 3]>,
+    look_at: Option<[f64; 3]>,
     /// Vertical field of view [default: the camera's own]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f32>,
@@ -118,9 +118,9 @@ fn crop(text: &str) -> Result<Window, String> {
     }
 }
 
-fn place(text: &str) -> Result<[f32; 3], String> {
-    let numbers: Option<Vec<f32>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
-    let place = numbers.and_then(|numbers| <[f32; 3]>::try_from(numbers).ok());
+fn place(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
+    let place = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
     let place = place.filter(|place| place.iter().all(|number| number.is_finite()));
     place.ok_or_else(|| "a place is X,Y,Z: three numbers of metres, such as 0,1.5,4".into())
 }

@@ -1,5 +1,6 @@
 //! Contents of a scene as JSON. The keys are stable.
 
+use glam::Vec3;
 use photoncard_driver::scene::gltf::Animation;
 use photoncard_driver::scene::{
     Camera, Encoding, Image, Material, PunctualKind, PunctualLight, Reflection, Scene,
@@ -13,11 +14,11 @@ pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
         "triangles": scene.triangles.len(),
         "emissive_triangles": scene.emissive_triangles(),
         "skipped_triangles": scene.skipped_triangles,
-        "bounds": [lower.to_array(), upper.to_array()],
+        "bounds": [scene.in_file(lower).to_array(), scene.in_file(upper).to_array()],
         "textures": scene.textures.len(),
-        "cameras": scene.cameras.iter().map(camera).collect::<Vec<_>>(),
+        "cameras": scene.cameras.iter().map(|item| camera(item, scene)).collect::<Vec<_>>(),
         "animations": animations.iter().map(animation).collect::<Vec<_>>(),
-        "lights": scene.lights.iter().map(light).collect::<Vec<_>>(),
+        "lights": scene.lights.iter().map(|item| light(item, scene)).collect::<Vec<_>>(),
         "materials": scene.materials.iter().map(material).collect::<Vec<_>>(),
         "images": scene.images.iter().map(image).collect::<Vec<_>>(),
         "variants": scene.variants,
@@ -26,11 +27,11 @@ pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
     })
 }
 
-fn camera(camera: &Camera) -> Value {
+fn camera(camera: &Camera, scene: &Scene) -> Value {
     let Camera { name, origin, forward, up, vertical_fov, aspect, right: _ } = camera;
     json!({
         "name": name,
-        "at": origin.to_array(),
+        "at": scene.in_file(*origin).to_array(),
         "forward": forward.to_array(),
         "up": up.to_array(),
         "fov": vertical_fov.to_degrees(),
@@ -43,14 +44,15 @@ fn animation(animation: &Animation) -> Value {
     json!({"name": name, "seconds": seconds, "moves_only_cameras": moves_only_cameras})
 }
 
-fn light(light: &PunctualLight) -> Value {
+fn light(light: &PunctualLight, scene: &Scene) -> Value {
+    let place = |position: Vec3| Some(scene.in_file(position).to_array());
     let PunctualLight { name, kind, intensity } = light;
     let degrees = |cosine: f32| cosine.clamp(-1.0, 1.0).acos().to_degrees();
     let (kind, position, direction, cone) = match kind {
-        PunctualKind::Point { position } => ("point", Some(position.to_array()), None, None),
+        PunctualKind::Point { position } => ("point", place(*position), None, None),
         PunctualKind::Spot { position, direction, inner_cosine, outer_cosine } => {
             let cone = [degrees(*inner_cosine), degrees(*outer_cosine)];
-            ("spot", Some(position.to_array()), Some(direction.to_array()), Some(cone))
+            ("spot", place(*position), Some(direction.to_array()), Some(cone))
         }
         PunctualKind::Directional { direction } => ("directional", None, Some(direction.to_array()), None),
     };

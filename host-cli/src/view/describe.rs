@@ -28,7 +28,7 @@ impl SceneFacts {
     pub(super) fn hello(&self, scene: &Scene, out: Option<&str>, steers: bool) -> Value {
         let layers = ["radiance"].into_iter().chain(Layer::ALL.map(Layer::name));
         let cameras = scene.cameras.iter().map(|camera| {
-            let mut described = self.camera(camera);
+            let mut described = self.camera(camera, scene);
             described["name"] = json!(camera.name);
             described
         });
@@ -36,10 +36,10 @@ impl SceneFacts {
             "type": "hello",
             "scene": {
                 "name": self.name,
-                "low": self.low.to_array(),
-                "high": self.high.to_array(),
+                "low": scene.in_file(self.low).to_array(),
+                "high": scene.in_file(self.high).to_array(),
                 "cameras": cameras.collect::<Vec<_>>(),
-                "lights": scene.lights.iter().map(light).collect::<Vec<_>>(),
+                "lights": scene.lights.iter().map(|found| light(found, scene)).collect::<Vec<_>>(),
                 "materials": materials(scene),
                 "environment": scene.environment.as_ref().map(|Environment { strength, .. }| json!({"strength": strength})),
             },
@@ -49,24 +49,25 @@ impl SceneFacts {
         })
     }
 
-    /// A camera, and a place in its direction at about the distance of the scene's middle.
-    pub(super) fn camera(&self, camera: &Camera) -> Value {
+    /// A camera of a scene, and a place in its direction at about the distance of the scene's middle.
+    pub(super) fn camera(&self, camera: &Camera, scene: &Scene) -> Value {
         let middle = 0.5 * (self.low + self.high);
         let size = (self.high - self.low).length().max(1e-3);
         let distance = (middle - camera.origin).dot(camera.forward).max(0.1 * size);
         json!({
-            "position": camera.origin.to_array(),
-            "look_at": (camera.origin + distance * camera.forward).to_array(),
+            "position": scene.in_file(camera.origin).to_array(),
+            "look_at": scene.in_file(camera.origin + distance * camera.forward).to_array(),
             "fov": camera.vertical_fov.to_degrees(),
         })
     }
 }
 
-fn light(light: &PunctualLight) -> Value {
+fn light(light: &PunctualLight, scene: &Scene) -> Value {
+    let place = |position| Some(scene.in_file(position).to_array());
     let (colour, strength) = light.colour();
     let (kind, position) = match light.kind {
-        PunctualKind::Point { position } => ("point", Some(position.to_array())),
-        PunctualKind::Spot { position, .. } => ("spot", Some(position.to_array())),
+        PunctualKind::Point { position } => ("point", place(position)),
+        PunctualKind::Spot { position, .. } => ("spot", place(position)),
         PunctualKind::Directional { .. } => ("directional", None),
     };
     let unit = if position.is_some() { "W/sr" } else { "W/m^2" };
@@ -117,7 +118,7 @@ fn properties(material: &Material) -> Map<String, Value> {
 
 /// Changes of the scene by pages.
 pub(super) fn changes(wish: &Wish) -> Value {
-    let change = |(name, value): &(String, Vec<f32>)| match value[..] {
+    let change = |(name, value): &(String, Vec<f64>)| match value[..] {
         [value] => json!({"name": name, "value": value}),
         _ => json!({"name": name, "value": value}),
     };

@@ -24,14 +24,14 @@ const MAX_NAME: usize = 1024;
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Request {
     Camera {
-        position: [f32; 3],
-        look_at: [f32; 3],
+        position: [f64; 3],
+        look_at: [f64; 3],
         fov: f32,
         is_moving: bool,
     },
     Set {
         name: String,
-        value: Vec<f32>,
+        value: Vec<f64>,
     },
     Setting(Setting),
     Reset,
@@ -163,10 +163,9 @@ impl Fields<'_> {
         number.ok_or_else(|| format!("{name:?} is a whole number from 0 to {most}"))
     }
 
-    /// Finite numbers of single precision: one, or those of a list.
-    fn values(&self, name: &str) -> Result<Vec<f32>, String> {
-        let number =
-            |value: &Value| value.as_f64().map(|number| number as f32).filter(|number| number.is_finite());
+    /// Numbers in the range of single precision: one, or those of a list.
+    fn values(&self, name: &str) -> Result<Vec<f64>, String> {
+        let number = |value: &Value| value.as_f64().filter(|number| (*number as f32).is_finite());
         let values = match self.field(name)? {
             Value::Array(list) if list.len() == 3 => list.iter().map(number).collect(),
             value => number(value).map(|number| vec![number]),
@@ -183,12 +182,10 @@ impl Fields<'_> {
         Ok(ToneMapping { exposure, curve: curve.unwrap_or_default() })
     }
 
-    fn place(&self, name: &str) -> Result<[f32; 3], String> {
+    fn place(&self, name: &str) -> Result<[f64; 3], String> {
         let list = self.field(name)?.as_array().filter(|list| list.len() == 3);
-        let number = |value: &Value| {
-            value.as_f64().filter(|number| number.abs() <= MAX_PLACE).map(|number| number as f32)
-        };
-        let numbers: Option<Vec<f32>> = list.and_then(|list| list.iter().map(number).collect());
+        let number = |value: &Value| value.as_f64().filter(|number| number.abs() <= MAX_PLACE);
+        let numbers: Option<Vec<f64>> = list.and_then(|list| list.iter().map(number).collect());
         let place = numbers.and_then(|numbers| numbers.try_into().ok());
         place.ok_or_else(|| format!("{name:?} is a place: a list of three numbers of metres"))
     }

@@ -316,7 +316,7 @@ impl View {
                 let up = (1.0 - 2.0 * (at[1] as f32 + 0.5) / height) * half;
                 let direction: Vec3 = camera.forward + right * camera.right + up * camera.up;
                 let point = camera.origin + depth * direction;
-                json!({"type": "picked", "point": point.to_array(), "depth": depth})
+                json!({"type": "picked", "point": self.scene.in_file(point).to_array(), "depth": depth})
             }
         };
         self.reply(number, &message);
@@ -362,7 +362,7 @@ impl View {
         let settings = &self.wish.settings;
         // The camera was checked when it was wished for.
         let camera = settings.camera(&self.scene).map(|camera| {
-            let mut described = self.start.facts.camera(&camera);
+            let mut described = self.start.facts.camera(&camera, &self.scene);
             if let Some(look_at) = settings.picture.look_at {
                 described["look_at"] = json!(look_at);
             }

@@ -22,7 +22,7 @@ pub(super) struct Wish {
     /// Assignments of the command line.
     given: Vec<String>,
     /// Names of properties with their values: changes by pages.
-    edits: Vec<(String, Vec<f32>)>,
+    edits: Vec<(String, Vec<f64>)>,
 }
 
 impl Wish {
@@ -42,18 +42,18 @@ impl Wish {
     }
 
     /// Changes by pages.
-    pub(super) fn edits(&self) -> &[(String, Vec<f32>)] {
+    pub(super) fn edits(&self) -> &[(String, Vec<f64>)] {
         &self.edits
     }
 
     /// Places the camera.
-    pub(super) fn look(&mut self, position: [f32; 3], look_at: [f32; 3], fov: f32) {
+    pub(super) fn look(&mut self, position: [f64; 3], look_at: [f64; 3], fov: f32) {
         let picture = &mut self.settings.picture;
         (picture.camera_at, picture.look_at, picture.fov) = (Some(position), Some(look_at), Some(fov));
     }
 
     /// Sets a property, at the place of an earlier value of it: what was possible after that one stays so.
-    pub(super) fn set(&mut self, name: String, value: Vec<f32>) {
+    pub(super) fn set(&mut self, name: String, value: Vec<f64>) {
         match self.edits.iter_mut().find(|(edited, _)| *edited == name) {
             Some((_, earlier)) => *earlier = value,
             None => self.edits.push((name, value)),
@@ -123,8 +123,8 @@ impl Wish {
 }
 
 /// Numbers as an option takes them; they parse to the same bits.
-pub(super) fn numbers(values: &[f32]) -> String {
-    values.iter().map(f32::to_string).collect::<Vec<_>>().join(",")
+pub(super) fn numbers<T: ToString>(values: &[T]) -> String {
+    values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
 }
 
 /// A scene without its surfaces, against which wishes are checked at once.
@@ -145,6 +145,7 @@ impl Sketch {
             materials: scene.materials.clone(),
             lights: scene.lights.clone(),
             cameras: scene.cameras.clone(),
+            offset: scene.offset,
             generator: scene.generator.clone(),
             environment,
             ..Scene::default()

@@ -103,6 +103,23 @@ fn directional(direction: DVec3, irradiance: f32) -> PunctualLight {
     }
 }
 
+/// A lone plane does not light itself: rays of irradiance records stay above the triangle, whatever the normal of the map.
+#[test]
+fn irradiance_records_of_a_lone_bumpy_plate_gather_nothing() {
+    for normals in [vec![tilted(15.0, 40.0)], vec![tilted(25.0, 10.0), tilted(30.0, 200.0)]] {
+        let view = far_camera(Vec3::Z);
+        let mut scene = plate(mapped(lambertian("plate", ALBEDO), 1.0), &normals, Vec4::X, view);
+        scene.lights = vec![directional(DVec3::new(0.2, 0.1, 0.9).normalize(), 3.0)];
+        let [with, without] = [(32, Some(0.1)), (0, None)].map(|(gather_rays, irradiance_error)| {
+            let settings =
+                settings(gather_rays, 1).with(|s| s.integrator.irradiance_error = irradiance_error);
+            radiances(&film(&scene, &settings))
+        });
+        assert!(mean(&without) > 0.1);
+        assert_eq!(with, without);
+    }
+}
+
 #[test]
 fn a_tilted_plate_is_lit_by_the_cosine_to_its_mapped_normal() {
     let light = DVec3::new(0.3, 0.5, 0.8).normalize();

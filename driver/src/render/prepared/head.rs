@@ -29,6 +29,8 @@ pub(super) struct Head {
     /// CRC-32C of the card image.
     pub(super) checksum: u32,
     cameras: Vec<StoredCamera>,
+    /// Place of the scene's origin in the coordinates of its file.
+    offset: [f64; 3],
     /// Checksums of the scene, with and without cameras.
     scene: [String; 2],
     is_specular: bool,
@@ -51,6 +53,7 @@ impl Head {
             lines: image.lines().len() as u32,
             checksum: checksum(image.lines()),
             cameras: scene.cameras.iter().map(StoredCamera::new).collect(),
+            offset: scene.offset.to_array(),
             scene: [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
             is_specular: scene.is_specular(),
             photons: photons.clone(),
@@ -68,7 +71,9 @@ impl Head {
     /// # Errors
     /// If there is no such camera or distance, or the photons are for one camera.
     pub(super) fn into_scene(self, image: CardImage) -> Result<PreparedScene, &'static str> {
-        let Self { cameras, photons, integrator, max_distance, caustics, paths, frames, notes, .. } = self;
+        let Self {
+            cameras, offset, photons, integrator, max_distance, caustics, paths, frames, notes, ..
+        } = self;
         let is_distance = |distance: f32| distance.is_normal() && distance > 0.0;
         let distances = [Some(max_distance), caustics.map(|gather| gather.max_distance)];
         if !distances.into_iter().flatten().all(is_distance) {
@@ -84,6 +89,9 @@ impl Head {
         if !is_seen(&cameras) || !frames.values().all(|view| is_seen(&view.cameras)) {
             return Err("its cameras are none");
         }
+        if !offset.into_iter().all(f64::is_finite) {
+            return Err("its place is none");
+        }
         let settings = RenderSettings { photons, integrator, ..RenderSettings::default() };
         let prepared = Prepared { image: Arc::new(image), max_distance, caustics, paths, guiding: None };
         let kept = Kept {
@@ -92,7 +100,7 @@ impl Head {
             prepared,
         };
         let RenderSettings { photons, integrator, .. } = settings;
-        let scene = FixedScene::of_cameras(cameras, self.scene, self.is_specular);
+        let scene = FixedScene::of_cameras(cameras, offset.into(), self.scene, self.is_specular);
         Ok(PreparedScene { scene, photons, integrator, kept, frames, notes })
     }
 }

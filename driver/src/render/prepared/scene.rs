@@ -57,6 +57,7 @@ impl PreparedScene {
         let RenderSettings { photons, integrator, .. } = settings;
         let scene = FixedScene::of_cameras(
             scene.cameras.clone(),
+            scene.offset,
             [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
             scene.is_specular(),
         );
@@ -83,7 +84,8 @@ impl PreparedScene {
     pub fn frame(&self, number: u32) -> Option<FixedScene<'static>> {
         let View { cameras, checksum } = self.frames.get(&number)?;
         let checksums = [checksum, self.scene.checksum_without_cameras()].map(str::to_owned);
-        Some(FixedScene::of_cameras(cameras.clone(), checksums, self.scene.is_specular()))
+        let offset = self.scene.offset;
+        Some(FixedScene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
     }
 
     /// Cameras of the scene, without anything else of it.

@@ -19,12 +19,12 @@ impl RenderSettings {
         let Picture { camera, camera_at, look_at, fov, .. } = &self.picture;
         let mut camera = scene.camera(camera.as_deref())?.clone();
         if let Some(at) = camera_at {
-            camera.origin = finite("--camera-at", *at)?;
+            camera.origin = placed("--camera-at", *at, scene)?;
         }
         if let Some(target) = look_at {
-            let target = finite("--look-at", *target)?;
+            let target = placed("--look-at", *target, scene)?;
             let forward = (target.as_dvec3() - camera.origin.as_dvec3()).try_normalize();
-            let forward = forward.ok_or_else(|| at_the_camera(target))?;
+            let forward = forward.ok_or_else(|| at_the_camera(scene.in_file(target)))?;
             [camera.right, camera.up, camera.forward] = upright(forward).map(DVec3::as_vec3);
         }
         if let Some(degrees) = *fov {
@@ -58,10 +58,12 @@ fn field_of_view(degrees: f32) -> Result<f32, RenderError> {
     })
 }
 
-fn finite(option: &'static str, place: [f32; 3]) -> Result<Vec3, RenderError> {
-    let place = Vec3::from_array(place);
-    if place.is_finite() {
-        return Ok(place);
+/// Place in the scene of coordinates in its file.
+fn placed(option: &'static str, place: [f64; 3], scene: &Scene) -> Result<Vec3, RenderError> {
+    let place = DVec3::from_array(place);
+    let placed = scene.in_scene(place);
+    if placed.is_finite() {
+        return Ok(placed);
     }
     Err(RenderError::Setting {
         option,
@@ -71,7 +73,7 @@ fn finite(option: &'static str, place: [f32; 3]) -> Result<Vec3, RenderError> {
     })
 }
 
-fn at_the_camera(target: Vec3) -> RenderError {
+fn at_the_camera(target: DVec3) -> RenderError {
     let [x, y, z] = target.to_array();
     RenderError::Setting {
         option: "--look-at",
@@ -117,12 +119,12 @@ mod tests {
     #[test]
     fn a_view_is_upright_and_orthonormal_in_every_direction() {
         for index in 1..1000 {
-            let angle = |step: f32| (index as f32 * step).sin();
+            let angle = |step: f64| (f64::from(index) * step).sin();
             let target = [angle(0.7), if index % 3 == 0 { 0.0 } else { 100.0 * angle(1.3) }, angle(1.9)];
             let camera =
                 camera(|picture| (picture.camera_at, picture.look_at) = (Some([0.0; 3]), Some(target)));
             let Camera { right, up, forward, .. } = camera.unwrap();
-            assert!(forward.distance(Vec3::from_array(target).normalize()) < 1e-6);
+            assert!(forward.distance(DVec3::from_array(target).normalize().as_vec3()) < 1e-6);
             assert!(right.cross(forward).distance(up) < 1e-6 && right.dot(forward).abs() < 1e-6);
             assert!((right.length() - 1.0).abs() < 1e-6);
             assert!(up.y >= 0.0 && right.y.abs() < 1e-6, "{up}");
@@ -155,10 +157,11 @@ mod tests {
             refused("--fov", &|picture| picture.fov = Some(fov));
         }
         refused("--look-at", &|picture| picture.look_at = Some([1.0, 2.0, 3.0]));
-        refused("--look-at", &|picture| picture.look_at = Some([1.0, f32::NAN, 3.0]));
-        refused("--camera-at", &|picture| picture.camera_at = Some([f32::INFINITY, 0.0, 0.0]));
+        refused("--look-at", &|picture| picture.look_at = Some([1.0, f64::NAN, 3.0]));
+        refused("--camera-at", &|picture| picture.camera_at = Some([f64::INFINITY, 0.0, 0.0]));
         let far = |picture: &mut Picture| {
-            (picture.camera_at, picture.look_at) = (Some([f32::MAX; 3]), Some([-f32::MAX; 3]));
+            (picture.camera_at, picture.look_at) =
+                (Some([f32::MAX.into(); 3]), Some([(-f32::MAX).into(); 3]));
         };
         assert!(camera(far).unwrap().forward.is_normalized());
     }

@@ -27,10 +27,10 @@ pub struct Picture {
     pub crop: Option<Window>,
     /// Name of the camera; `None` for the first.
     pub camera: Option<String>,
-    /// Place of the camera, metres; `None` for its own.
-    pub camera_at: Option<[f32; 3]>,
-    /// Place in the middle of the picture, metres, with +y upwards; `None` for the camera's own direction.
-    pub look_at: Option<[f32; 3]>,
+    /// Place of the camera in the coordinates of the scene's file, metres; `None` for its own.
+    pub camera_at: Option<[f64; 3]>,
+    /// Place in the middle of the picture, likewise, with +y upwards; `None` for the camera's own direction.
+    pub look_at: Option<[f64; 3]>,
     /// Vertical field of view, degrees; `None` for the camera's own.
     pub fov: Option<f32>,
     /// Layers of the picture besides radiance.

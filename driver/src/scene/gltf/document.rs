@@ -31,8 +31,9 @@ const INCONSISTENT: &str = "export the scene again; the file is inconsistent";
 pub(super) struct Document {
     pub(super) path: PathBuf,
     pub(super) root: json::Root,
-    /// Bytes of the file; a range of them is the BIN chunk of a GLB.
+    /// Bytes of the file; ranges of them are the JSON and the BIN chunk of a GLB.
     bytes: Vec<u8>,
+    text: Range<usize>,
     blob: Option<Range<usize>>,
     /// Materials and images that were converted from another model.
     pub(super) conversions: Conversions,
@@ -54,12 +55,17 @@ impl Document {
             read_file(path).map_err(|source| SceneError::Unreadable { file: path.to_owned(), source })?;
         let (text, blob) =
             if bytes.starts_with(GLB_MAGIC) { split_glb(path, &bytes)? } else { (0..bytes.len(), None) };
-        let root = parse(path, &bytes[text])?;
+        let root = parse(path, &bytes[text.clone()])?;
         let (conversions, files) = (Conversions::default(), Files::default());
-        let mut document = Self { path: path.to_owned(), root, bytes, blob, conversions, files };
+        let mut document = Self { path: path.to_owned(), root, bytes, text, blob, conversions, files };
         document.check()?;
         document.conversions = specular_glossiness::convert(&mut document.root);
         Ok(document)
+    }
+
+    /// The file's JSON, whose encoding was checked.
+    pub(super) fn text(&self) -> &str {
+        self.bytes.get(self.text.clone()).map_or("", json_text)
     }
 
     /// BIN chunk of a GLB.
@@ -246,7 +252,7 @@ fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<us
 fn parse(path: &Path, bytes: &[u8]) -> Result<json::Root, SceneError> {
     let not_gltf = |reason: &str| SceneError::NotGltf { file: path.to_owned(), reason: reason.to_owned() };
     let text = str::from_utf8(bytes).map_err(|_| not_gltf("it is neither a GLB nor UTF-8 text"))?;
-    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let text = without_mark(text);
     if text.trim().is_empty() {
         return Err(not_gltf("it is empty"));
     }
@@ -265,6 +271,15 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<json::Root, SceneError> {
 }
 
 const CONTRADICTION: &str = "its structure contradicts itself";
+
+/// JSON of bytes in UTF-8; empty for others.
+fn json_text(bytes: &[u8]) -> &str {
+    str::from_utf8(bytes).map_or("", without_mark)
+}
+
+fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
 
 /// Syntax error with an excerpt of the text: a line of glTF may contain a whole buffer in base64.
 fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError {

@@ -102,7 +102,11 @@ impl<'a> MeshPlacer<'a> {
     }
 
     /// Primitives of triangles of mesh `index`.
-    fn primitives(&mut self, index: usize, scene: &mut Scene) -> Result<Rc<Vec<Primitive<'a>>>, SceneError> {
+    pub(super) fn primitives(
+        &mut self,
+        index: usize,
+        scene: &mut Scene,
+    ) -> Result<Rc<Vec<Primitive<'a>>>, SceneError> {
         if let Some(primitives) = self.prepared.get(&index) {
             return Ok(Rc::clone(primitives));
         }

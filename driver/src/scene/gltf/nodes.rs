@@ -1,6 +1,7 @@
 //! Nodes of a scene: world transforms, and conversion of their meshes, lights and cameras.
 
 use std::collections::BTreeMap;
+use std::sync::OnceLock;
 
 use glam::DMat4;
 
@@ -8,6 +9,7 @@ use super::accessor::Source;
 use super::animation::Poses;
 use super::camera::CameraPlacer;
 use super::document::Document;
+use super::extent::Anchor;
 use super::instances::Instances;
 use super::light::LightPlacer;
 use super::mesh::MeshPlacer;
@@ -22,23 +24,21 @@ use crate::scene::{Camera, LightUnits, Scene};
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Adds the meshes, lights and cameras of the scene's nodes in their poses; the lights are stated in `units`.
+/// Adds the meshes, lights and cameras of the scene's nodes in their poses; the lights are stated in `units`. The anchor of the scene at
+/// rest is found once.
 ///
 /// All triangles are counted before the first is added.
 pub(super) fn place(
     source: &Source<'_>,
     poses: &Poses,
     units: LightUnits,
+    anchor: &OnceLock<Anchor>,
     scene: &mut Scene,
     room: &mut Room,
     notices: &mut Notices,
 ) -> Result<(), SceneError> {
     let document = source.document;
-    let nodes = walk(document, poses)?;
-    let mut worlds = vec![None; document.root.nodes.len()];
-    for &(index, world) in &nodes {
-        worlds[index] = Some(world);
-    }
+    let nodes = walk(document, poses, None)?;
     let mut placer = Placer {
         source,
         poses,
@@ -46,20 +46,27 @@ pub(super) fn place(
         cameras: CameraPlacer::new(document),
         lights: LightPlacer::new(document, units),
         skins: BTreeMap::new(),
-        worlds,
+        worlds: Vec::new(),
     };
     nodes.iter().try_for_each(|(index, _)| placer.count(*index, scene))?;
     placer.meshes.check_room(room)?;
+    let nodes = walk(document, poses, Some(placer.anchor(anchor, scene)?))?;
+    placer.worlds = vec![None; document.root.nodes.len()];
+    nodes.iter().for_each(|&(index, world)| placer.worlds[index] = Some(world));
     nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))?;
     notices.not_finite = placer.meshes.not_finite;
     Ok(())
 }
 
 /// Cameras of the scene's nodes in their poses.
-pub(super) fn cameras(document: &Document, poses: &Poses) -> Result<Vec<Camera>, SceneError> {
+pub(super) fn cameras(
+    document: &Document,
+    poses: &Poses,
+    anchor: Option<&Anchor>,
+) -> Result<Vec<Camera>, SceneError> {
     let mut placer = CameraPlacer::new(document);
     let (mut scene, mut notices) = (Scene::default(), Notices::default());
-    for (index, world) in walk(document, poses)? {
+    for (index, world) in walk(document, poses, anchor)? {
         if let Some(camera) = document.root.nodes[index].camera {
             placer.place(camera.value(), index, &world, &mut scene, &mut notices)?;
         }
@@ -92,6 +99,20 @@ impl<'a> Placer<'a> {
             None => Instances::of(self.source, index, node)?,
         };
         self.meshes.count(mesh, instances.map_or(1, |instances| instances.count), scene)
+    }
+
+    /// Anchor of the scene at rest.
+    fn anchor<'o>(
+        &mut self,
+        found: &'o OnceLock<Anchor>,
+        scene: &mut Scene,
+    ) -> Result<&'o Anchor, SceneError> {
+        if found.get().is_none() {
+            let nodes = walk(self.source.document, &Poses::new(), None)?;
+            let anchor = Anchor::of(self.source, &mut self.meshes, &nodes, scene)?;
+            return Ok(found.get_or_init(|| anchor));
+        }
+        Ok(found.get_or_init(Anchor::default))
     }
 
     fn place(
@@ -163,8 +184,13 @@ impl<'a> Placer<'a> {
     }
 }
 
-/// Nodes of the default scene, or of the first, with their world transforms; each parent precedes its children.
-fn walk(document: &Document, poses: &Poses) -> Result<Vec<(usize, DMat4)>, SceneError> {
+/// Nodes of the default scene, or of the first, with their world transforms about the anchor or, for none, the file's origin; each parent
+/// precedes its children.
+fn walk(
+    document: &Document,
+    poses: &Poses,
+    anchor: Option<&Anchor>,
+) -> Result<Vec<(usize, DMat4)>, SceneError> {
     let root = &document.root;
     let chosen = root.scene.map_or(0, |scene| scene.value());
     let Some(chosen) = root.scenes.get(chosen) else {
@@ -191,7 +217,9 @@ fn walk(document: &Document, poses: &Poses) -> Result<Vec<(usize, DMat4)>, Scene
                 "the transform is not finite, or does not keep parallels parallel, or has a zero rotation";
             return fault(reason, "give the node a finite translation, rotation and scale");
         };
-        let world = parent * local;
+        let is_posed = poses.get(&index).is_some_and(|pose| pose.translation.is_some());
+        let placed_local = anchor.map(|anchor| anchor.placed(index, local, is_posed, depth == 0));
+        let world = parent * placed_local.unwrap_or(local);
         placed.push((index, world));
         let children = node.children.iter().flatten().rev();
         open.extend(children.map(|child| (child.value(), world, depth + 1)));

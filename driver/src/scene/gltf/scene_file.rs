@@ -3,12 +3,14 @@
 use std::path::Path;
 use std::sync::OnceLock;
 
+use glam::DVec3;
 use gltf::json;
 
 use super::accessor::Source;
 use super::animation::{self, Animation, Moment, Poses};
 use super::buffers::Buffers;
 use super::document::Document;
+use super::extent::Anchor;
 use super::notices::{self, Notices};
 use super::room::Room;
 use super::settings::LoadSettings;
@@ -46,6 +48,8 @@ pub struct SceneFile {
     unreadable: Vec<String>,
     /// Camera that shows the scene as it stands, if the file has none; known once it is needed.
     framed: OnceLock<Camera>,
+    /// Place of the scene in the file, by the scene at rest; known once any moment is.
+    anchor: OnceLock<Anchor>,
 }
 
 impl SceneFile {
@@ -61,7 +65,8 @@ impl SceneFile {
         let mut room = Room::new(path, (*dram_bytes).into());
         room.materials(document.root.materials.len())?;
         let (bare, unreadable) = bare_scene(&document, &mut room)?;
-        Ok(Self { document, light_units: *light_units, bare, room, unreadable, framed: OnceLock::new() })
+        let (framed, anchor) = (OnceLock::new(), OnceLock::new());
+        Ok(Self { document, light_units: *light_units, bare, room, unreadable, framed, anchor })
     }
 
     /// The default scene of the file, or its first, as it stands.
@@ -97,11 +102,14 @@ impl SceneFile {
     /// The cameras of the scene at a moment, without its geometry; none if the file has none.
     ///
     /// # Errors
-    /// As [`Self::at`], but for geometry.
+    /// As [`Self::at`].
     pub fn cameras_at(&self, moment: &Moment) -> Result<Vec<Camera>, SceneError> {
+        if self.anchor.get().is_none() {
+            self.at_rest()?;
+        }
         let buffers = Buffers::load(&self.document)?;
         let source = Source::new(&self.document, &buffers);
-        nodes::cameras(&self.document, &animation::poses(&source, moment)?)
+        nodes::cameras(&self.document, &animation::poses(&source, moment)?, self.anchor.get())
     }
 
     /// Returns whether the file has animations.
@@ -159,12 +167,13 @@ impl SceneFile {
 
     /// The scene, from what it has without its nodes.
     fn placed(&self, mut scene: Scene, moment: Option<&Moment>) -> Result<Scene, SceneError> {
-        let Self { document, light_units, bare: _, room, unreadable, framed: _ } = self;
+        let Self { document, light_units, bare: _, room, unreadable, framed: _, anchor } = self;
         let buffers = Buffers::load(document)?;
         let source = Source::new(document, &buffers);
         let poses = moment.map_or(Ok(Poses::new()), |moment| animation::poses(&source, moment))?;
         let mut notices = Notices { unreadable: unreadable.clone(), ..Notices::default() };
-        nodes::place(&source, &poses, *light_units, &mut scene, &mut room.clone(), &mut notices)?;
+        nodes::place(&source, &poses, *light_units, anchor, &mut scene, &mut room.clone(), &mut notices)?;
+        scene.offset = anchor.get().map_or(DVec3::ZERO, |anchor| anchor.offset);
         let file = || document.path.clone();
         match (scene.triangles.is_empty(), scene.skipped_triangles) {
             (true, 0) => return Err(SceneError::NoGeometry { file: file() }),
@@ -175,6 +184,7 @@ impl SceneFile {
             scene.cameras.push(self.framed(&scene, moment)?);
             notices.framed = true;
         }
+        scene.lift_lamps();
         notices.solid_glass = solid_glass::make_solid(document, &mut scene)?;
         scene.notices = notices.finish(document);
         Ok(scene)

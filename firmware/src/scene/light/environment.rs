@@ -1,5 +1,6 @@
 //! The environment: light from infinitely far, an equirectangular map. Directions are sampled by a grid of cells of equal
-//! angles: row, then column, in proportion to the light through the cell, then uniformly in solid angle within it.
+//! angles: row, then column, in proportion to the light through the cell, then uniformly in solid angle within it. Cells whose light comes
+//! through small parts of them, such as a sun, are divided into parts of equal solid angle, which are chosen likewise.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -60,10 +61,13 @@ pub fn environment_density(
     let [across, down] = environment_coordinates(direction);
     let row = cell_at(down, cells.rows);
     let column = cell_at(across, cells.columns);
-    let of_row = probability(row, |row| cells.threshold(scene, memory, row))?;
+    let of_row = probability(row, |row| threshold(scene, memory, row))?;
     let first = cells.first_of_row(row);
-    let of_column = probability(column, |column| cells.threshold(scene, memory, first.wrapping_add(column)))?;
-    Ok(cells.density(share, row, of_row * of_column))
+    let of_column = probability(column, |column| threshold(scene, memory, first.wrapping_add(column)))?;
+    let density = cells.density(share, row, of_row * of_column);
+    let Some(parts) = Parts::of(scene, memory, &cells, (row, column))? else { return Ok(density) };
+    let place = [cells.share(row, direction.y), across * cells.columns as f32 - column as f32];
+    Ok(density * parts.density(scene, memory, place)?)
 }
 
 /// Samples a direction of the environment. `share` is the probability of choosing the environment at all.
@@ -74,13 +78,18 @@ pub(super) fn sample(
     [across, down]: [Fraction; 2],
 ) -> Result<LightSample, Fault> {
     let cells = Cells::new(scene);
-    let row = choose(down, cells.rows, |row| cells.threshold(scene, memory, row))?;
+    let row = choose(down, cells.rows, |row| threshold(scene, memory, row))?;
     let first = cells.first_of_row(row.index);
     let column =
-        choose(across, cells.columns, |column| cells.threshold(scene, memory, first.wrapping_add(column)))?;
-    let across = (column.index as f32 + column.rest.value()) / cells.columns as f32;
-    let direction = environment_direction(across, cells.cosine(row.index, row.rest.value()));
-    let density = cells.density(share, row.index, row.probability * column.probability);
+        choose(across, cells.columns, |column| threshold(scene, memory, first.wrapping_add(column)))?;
+    let mut place = [row.rest.value(), column.rest.value()];
+    let mut density = cells.density(share, row.index, row.probability * column.probability);
+    if let Some(parts) = Parts::of(scene, memory, &cells, (row.index, column.index))? {
+        let (part, of_part) = parts.sample(scene, memory, [row.rest, column.rest])?;
+        (place, density) = (part, density * of_part);
+    }
+    let across = (column.index as f32 + place[1]) / cells.columns as f32;
+    let direction = environment_direction(across, cells.cosine(row.index, place[0]));
     let radiance = environment_radiance(scene, memory, direction)?;
     Ok(LightSample {
         direction,
@@ -112,17 +121,18 @@ impl Cells {
         self.rows.wrapping_add(row.wrapping_mul(self.columns))
     }
 
-    fn threshold(&self, scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<u32, Fault> {
-        let kind = SectionKind::EnvironmentCells;
-        let bytes = scene.record::<4, THRESHOLDS_PER_LINE>(memory, kind, index)?;
-        Ok(u32::from_le_bytes(*bytes))
-    }
-
     /// Cosine of the angle to +y at the fraction `share` of a row's solid angle, from its upper border.
     fn cosine(&self, row: u32, share: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
         min(max(upper + (lower - upper) * share, -1.0), 1.0)
+    }
+
+    /// Share of a row's solid angle above a direction of this cosine: the inverse of [`Self::cosine`].
+    fn share(&self, row: u32, cosine: f32) -> f32 {
+        let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
+        let [upper, lower] = [border(row), border(row + 1)];
+        (upper - cosine) / (upper - lower)
     }
 
     /// Density of a direction in a cell that is chosen with `probability`, 1/sr.
@@ -133,6 +143,87 @@ impl Cells {
         let solid_angle = 2.0 * PI / self.columns as f32 * height;
         share * probability / solid_angle
     }
+}
+
+/// Parts of a divided cell: rows and columns, as many of both, of equal solid angle.
+struct Parts {
+    /// Index of the first threshold: those of the rows, then those of the parts of each row.
+    first: u32,
+    side: u32,
+}
+
+impl Parts {
+    /// Parts of a cell, if it is divided. The numbers of all divided cells, increasing, follow the thresholds of all cells, after their
+    /// number and the number of rows of each.
+    fn of(
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        cells: &Cells,
+        (row, column): (u32, u32),
+    ) -> Result<Option<Self>, Fault> {
+        let end = cells.first_of_row(cells.rows);
+        if scene.header.section(SectionKind::EnvironmentCells).records <= end {
+            return Ok(None);
+        }
+        let mut read = |index: u32| threshold(scene, memory, index);
+        let [count, side] = [read(end)?, read(end.wrapping_add(1))?];
+        let numbers = end.wrapping_add(2);
+        let cell = row.wrapping_mul(cells.columns).wrapping_add(column);
+        let (mut low, mut high) = (0, count);
+        while low < high {
+            let middle = low + (high - low) / 2;
+            let found = read(numbers.wrapping_add(middle))?;
+            if found == cell {
+                let size = side.wrapping_mul(side.wrapping_add(1));
+                let first = numbers.wrapping_add(count).wrapping_add(middle.wrapping_mul(size));
+                return Ok(Some(Self { first, side: side.max(1) }));
+            }
+            (low, high) = if found < cell { (middle + 1, high) } else { (low, middle) };
+        }
+        Ok(None)
+    }
+
+    /// Index of the first threshold of a row's parts.
+    fn first_of_row(&self, row: u32) -> u32 {
+        self.first.wrapping_add(self.side.wrapping_mul(row.wrapping_add(1)))
+    }
+
+    /// Place in the cell, of its rows and columns, 0 to 1, and its density over that of an even choice.
+    fn sample(
+        &self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        [down, across]: [Fraction; 2],
+    ) -> Result<([f32; 2], f32), Fault> {
+        let mut read = |index: u32| threshold(scene, memory, index);
+        let row = choose(down, self.side, |row| read(self.first.wrapping_add(row)))?;
+        let first = self.first_of_row(row.index);
+        let column = choose(across, self.side, |column| read(first.wrapping_add(column)))?;
+        let side = self.side as f32;
+        let place = [&row, &column].map(|part| (part.index as f32 + part.rest.value()) / side);
+        Ok((place, row.probability * column.probability * (side * side)))
+    }
+
+    /// Density of [`Self::sample`] at a place in the cell.
+    fn density(
+        &self,
+        scene: &SceneImage,
+        memory: &mut impl MemoryPort,
+        place: [f32; 2],
+    ) -> Result<f32, Fault> {
+        let [row, column] = place.map(|share| cell_at(share, self.side));
+        let mut read = |index: u32| threshold(scene, memory, index);
+        let of_row = probability(row, |row| read(self.first.wrapping_add(row)))?;
+        let first = self.first_of_row(row);
+        let of_column = probability(column, |column| read(first.wrapping_add(column)))?;
+        let side = self.side as f32;
+        Ok(of_row * of_column * (side * side))
+    }
+}
+
+fn threshold(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<u32, Fault> {
+    let bytes = scene.record::<4, THRESHOLDS_PER_LINE>(memory, SectionKind::EnvironmentCells, index)?;
+    Ok(u32::from_le_bytes(*bytes))
 }
 
 #[cfg(test)]

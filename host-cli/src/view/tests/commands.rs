@@ -153,7 +153,7 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
 fn numbers_and_words_survive_a_shell() {
     let view = view_options(&["it's a scene.gltf".into()]);
     let mut wish = Wish::new(view.settings(), view.stated(), Vec::new());
-    wish.look([0.1, -2.0, 1e-7], [f32::MIN_POSITIVE, 16_777_216.0, -0.0], 33.3);
+    wish.look([0.1, -2.0, 1e-7], [f64::MIN_POSITIVE, 16_777_216.0, -0.0], 33.3);
     let line = quoted(&words(&view.scene, view.quality, &wish));
     assert!(line.starts_with(r"photoncard render 'it'\''s a scene.gltf' --quality good "), "{line}");
     let shell = std::process::Command::new("sh").arg("-c").arg(format!("printf '%s\\n' {line}")).output();
@@ -164,6 +164,6 @@ fn numbers_and_words_survive_a_shell() {
     let said: Vec<_> = String::from_utf8(output.stdout).unwrap().lines().map(str::to_owned).collect();
     assert_eq!(said, split(&line));
     let picture = render_options(&line).settings().picture;
-    assert_eq!(picture.camera_at.unwrap().map(f32::to_bits), [0.1_f32, -2.0, 1e-7].map(f32::to_bits));
+    assert_eq!(picture.camera_at.unwrap().map(f64::to_bits), [0.1_f64, -2.0, 1e-7].map(f64::to_bits));
     assert_eq!(picture.look_at.unwrap()[1..], [16_777_216.0, -0.0]);
 }

@@ -1,0 +1,154 @@
+//! Offset of a scene far from the file's origin, so that single precision resolves it.
+//!
+//! Places in a file of a building or a map may be thousands of kilometres from its origin, where single precision resolves half a
+//! metre. The scene's own origin is then a place near it, of few digits: what an exporter has added is taken off exactly, and the
+//! scene equals one that is modelled at the origin.
+
+use glam::{DMat4, DVec3};
+
+use super::vertex::MAX_COORDINATE;
+
+/// Distance from the origin, in sizes of the scene, up to which it stays where it is.
+const NEAR: f64 = 16.0;
+
+/// Distance, metres, beyond which a scene stays where it is only if it reaches to the origin: single precision is coarser than 60 um.
+const FAR: f64 = 1000.0;
+
+/// Least power of two that a coordinate is rounded to, 2^-10 m.
+const FINEST: i32 = -10;
+
+/// Bounding box in double precision; empty at first.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    pub(super) low: DVec3,
+    pub(super) high: DVec3,
+}
+
+impl Bounds {
+    pub(super) const EMPTY: Self = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
+
+    /// Adds a place; one that is not finite is left out.
+    pub(super) fn add(&mut self, place: DVec3) {
+        if place.is_finite() {
+            (self.low, self.high) = (self.low.min(place), self.high.max(place));
+        }
+    }
+
+    /// Adds a box that is placed by a transform.
+    pub(super) fn add_placed(&mut self, transform: &DMat4, local: &Self) {
+        if !local.low.is_finite() {
+            return;
+        }
+        for corner in 0..8 {
+            let is_high = [corner & 1, corner & 2, corner & 4].map(|bit| bit != 0);
+            let corner = DVec3::select(is_high.into(), local.high, local.low);
+            self.add(transform.transform_point3(corner));
+        }
+    }
+
+    /// Offset of a scene with these bounds; along an axis where it is near the origin, 0. `stated` are the whole coordinates that nodes
+    /// above the whole scene state.
+    pub(super) fn offset(&self, stated: &[DVec3]) -> DVec3 {
+        let size = (self.high - self.low).max_element();
+        let furthest = self.low.abs().max(self.high.abs()).max_element();
+        if !(size > 0.0 && furthest <= f64::from(MAX_COORDINATE)) {
+            return DVec3::ZERO;
+        }
+        let centre = 0.5 * (self.low + self.high);
+        let along = |axis: usize| {
+            let distance = centre[axis].abs();
+            let is_far = distance > NEAR * size || distance > FAR.max(size);
+            let [low, high] = [centre[axis] - size, centre[axis] + size];
+            let whole = stated.iter().map(|place| place[axis]);
+            let whole = whole.filter(|place| place.fract() == 0.0 && (low..=high).contains(place)).next();
+            if is_far { whole.unwrap_or_else(|| roundest(low, high)) } else { 0.0 }
+        };
+        DVec3::new(along(0), along(1), along(2))
+    }
+}
+
+/// Number of the fewest digits from `low` to `high`, which are of one sign: decimal ones or, at about half the price, binary ones. It is the
+/// nearest to the middle among such numbers.
+fn roundest(low: f64, high: f64) -> f64 {
+    let middle = 0.5 * (low + high);
+    let magnitude = |base: f64| libm::floor(libm::log2(low.abs().max(high.abs())) / libm::log2(base)) as i32;
+    let decimal = multiple(10.0, (0..=magnitude(10.0)).rev(), middle, low..=high);
+    let binary = multiple(2.0, (FINEST..=magnitude(2.0)).rev(), middle, low..=high);
+    let price = |digits: i32, of_each: i32| digits * of_each;
+    let decimal = decimal.map(|(number, power)| (price(magnitude(10.0) - power, 2), number));
+    let binary = binary.map(|(number, power)| (price(magnitude(2.0) - power, 1), number));
+    let found = [decimal, binary].into_iter().flatten();
+    let is_better = |one: &(i32, f64), other: &(i32, f64)| {
+        let distance = |(_, number): &(i32, f64)| (number - middle).abs();
+        one.0.cmp(&other.0).then(distance(one).total_cmp(&distance(other)))
+    };
+    found.min_by(is_better).map_or(0.0, |(_, number)| number)
+}
+
+/// Multiple of the first of the powers of a base of which there is one in a range, nearest to the middle, with the power.
+fn multiple(
+    base: f64,
+    mut powers: impl Iterator<Item = i32>,
+    middle: f64,
+    range: std::ops::RangeInclusive<f64>,
+) -> Option<(f64, i32)> {
+    powers.find_map(|power| {
+        let step = libm::pow(base, power.into());
+        let number = libm::round(middle / step) * step;
+        range.contains(&number).then_some((number, power))
+    })
+}
+
+/// Translation of a node, `stated` in double precision and in a scene with an offset: small ones have single precision, as in a scene at
+/// the origin. The offset is taken off at nodes without a parent.
+pub(super) fn translation(stated: DVec3, offset: DVec3, is_root: bool) -> DVec3 {
+    let moved = if is_root { stated - offset } else { stated };
+    let limit = 0.5 * offset.abs().max_element();
+    let rounded = moved.as_vec3().as_dvec3();
+    DVec3::select(moved.abs().cmplt(DVec3::splat(limit)), rounded, moved)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bounds(centre: DVec3, half: f64) -> Bounds {
+        Bounds { low: centre - half, high: centre + half }
+    }
+
+    #[test]
+    fn scenes_near_the_origin_stay() {
+        for (centre, half) in [(DVec3::ZERO, 1.0), (DVec3::splat(30.0), 1.0), (DVec3::X * 990.0, 500.0)] {
+            assert_eq!(bounds(centre, half).offset(&[]), DVec3::ZERO);
+        }
+        assert_eq!(Bounds::EMPTY.offset(&[]), DVec3::ZERO);
+        assert_eq!(bounds(DVec3::X * 2e8, 1.0).offset(&[]), DVec3::ZERO, "beyond the greatest coordinate");
+    }
+
+    #[test]
+    fn round_offsets_are_found_wherever_the_room_stands_about_its_origin() {
+        let rounds = [1e4, -1e4, 1e5, 5e6, 12e3, 131_072.0, -4_194_304.0, 1024.0, 2e7];
+        for offset in rounds {
+            for inside in [-0.9, -0.5, 0.0, 0.3, 0.99] {
+                let found = bounds(DVec3::new(offset + 4.0 * inside, 1.2, -offset), 2.0).offset(&[]);
+                assert_eq!(found, DVec3::new(offset, 0.0, -offset), "{offset} {inside}");
+            }
+        }
+    }
+
+    #[test]
+    fn whole_places_of_nodes_are_preferred() {
+        let place = DVec3::new(12_345.0, 7.0, 0.5);
+        assert_eq!(bounds(place, 2.0).offset(&[place]), DVec3::X * 12_345.0);
+        assert_eq!(bounds(place, 2.0).offset(&[DVec3::X * 12_345.25]), DVec3::X * 12_344.0);
+    }
+
+    #[test]
+    fn small_translations_have_single_precision() {
+        let offset = DVec3::new(1e4, 0.0, -1e4);
+        let stated = DVec3::new(10_000.0, 1.1, -9_995.8);
+        assert_eq!(translation(stated, offset, true), glam::Vec3::new(0.0, 1.1, 4.2).as_dvec3());
+        let deep = DVec3::new(10_000.1, 0.1, 0.0);
+        assert_eq!(translation(deep, offset, false), DVec3::new(10_000.1, f64::from(0.1_f32), 0.0));
+    }
+}
