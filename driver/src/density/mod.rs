@@ -18,4 +18,4 @@ mod surfaces;
 mod surroundings;
 
 pub(crate) use self::disc::measure_discs;
-pub(crate) use self::search::{automatic_max_distance, caustic_max_distance};
+pub(crate) use self::search::automatic_max_distance;

@@ -18,9 +18,6 @@ const SAMPLED_LEAVES: usize = 2048;
 /// Share of the sampled photons whose k-th neighbour lies within the automatic maximum distance.
 const COVERED_SHARE: f64 = 0.95;
 
-/// Share of the sampled caustic photons whose k-th neighbour lies within the automatic maximum distance.
-const FOCUSED_SHARE: f64 = 0.8;
-
 /// A search of the photon map, with its buffer.
 pub(super) struct Searcher<'a> {
     pub(super) scene: SceneImage,
@@ -35,11 +32,6 @@ impl<'a> Searcher<'a> {
     pub(super) fn new(image: &'a CardImage, neighbors: u32, max_distance: f32) -> Self {
         let (scene, memory) = image.view();
         Self { scene, memory, buffer: Box::default(), map: PhotonMap::Indirect, neighbors, max_distance }
-    }
-
-    /// The searcher with another map.
-    fn of(self, map: PhotonMap) -> Self {
-        Self { map, ..self }
     }
 
     /// Maximum distance of gathers, metres.
@@ -60,7 +52,8 @@ impl<'a> Searcher<'a> {
 }
 
 /// Automatic maximum distance of gathers, metres: the 95th percentile of the distance of the k-th neighbour,
-/// `k = neighbors`; with importons, among photons where there are any.
+/// `k = neighbors`; with importons, the lesser of those among all photons and among photons where there are importons. A distance by few
+/// photons in the dark alone would reach into the light beyond a corner.
 ///
 /// # Errors
 /// If the image is malformed.
@@ -69,35 +62,22 @@ pub(crate) fn automatic_max_distance(
     neighbors: u32,
     importons: Option<&Importons>,
 ) -> Result<f32, Fault> {
-    let importons = importons.map(|importons| &importons.indirect);
-    distance_within(image, (PhotonMap::Indirect, importons), neighbors, COVERED_SHARE)
+    let among = |importons| distance_within(image, importons, neighbors, COVERED_SHARE);
+    let of_all = among(None)?;
+    Ok(match importons {
+        Some(importons) => of_all.min(among(Some(&importons.indirect))?),
+        None => of_all,
+    })
 }
 
-/// Maximum distance of gathers of caustics, metres: the 80th percentile of the distance of the k-th neighbour among caustic
-/// photons, `k = neighbors`; with importons, among photons where there are any. Photons beyond it are spread too far to form a caustic.
-///
-/// # Errors
-/// If the image is malformed.
-pub(crate) fn caustic_max_distance(
-    image: &CardImage,
-    neighbors: u32,
-    importons: Option<&Importons>,
-) -> Result<f32, Fault> {
-    let importons = importons.map(|importons| &importons.caustic);
-    distance_within(image, (PhotonMap::Caustics, importons), neighbors, FOCUSED_SHARE)
-}
-
-/// Distance within which the share `share` of a map's photons, of those at importons, have `neighbors` neighbours.
+/// Distance within which the share `share` of the photons, of those at importons, have `neighbors` neighbours.
 fn distance_within(
     image: &CardImage,
-    (map, importons): (PhotonMap, Option<&ImportonGrid>),
+    importons: Option<&ImportonGrid>,
     neighbors: u32,
     share: f64,
 ) -> Result<f32, Fault> {
-    let leaves = match map {
-        PhotonMap::Indirect => image.section(SectionKind::PhotonLeaves),
-        PhotonMap::Caustics => image.section(SectionKind::CausticLeaves),
-    };
+    let leaves = image.section(SectionKind::PhotonLeaves);
     let grid = image.view().0.header.photon_grid;
     let unlimited = f32::MAX.sqrt() * 0.5;
     let distances: Result<Vec<f32>, Fault> = leaves
@@ -105,7 +85,7 @@ fn distance_within(
         .step_by(leaves.len().div_ceil(SAMPLED_LEAVES).max(1))
         .enumerate()
         .map_init(
-            || Searcher::new(image, neighbors, unlimited).of(map),
+            || Searcher::new(image, neighbors, unlimited),
             |searcher, (sample, line)| {
                 let leaf = PhotonLeaf::read(&line.0);
                 let photon = sample as u32 % leaf.photons().max(1);
