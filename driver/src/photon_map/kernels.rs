@@ -6,13 +6,14 @@
 
 use glam::Vec3;
 use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_kernel, kernel_share};
-use rayon::prelude::*;
 
 use super::neighbors::{Place, Places};
 use crate::photon::{Photons, StoredPhoton};
 
-/// Number of neighbours by which the density is estimated: the radius is that of more of them, at this density.
-const PROBED: u32 = 16;
+/// Maximum number of neighbours by which the density is estimated: the radius is that of more of them, at this density.
+const MAX_PROBED: u32 = 64;
+/// Area of a kernel's disc over that of an even disc of equal variance: a kernel that falls to its edge sees fewer photons.
+const AREA: f32 = 4.0 / 3.0;
 /// Maximum radius over the diagonal of the scene: light that is sparser shows its photons, as faint spots of this size.
 const MAX_SHARE_OF_DIAGONAL: f32 = 0.1;
 /// Minimum radius, cells of the photon grid.
@@ -25,16 +26,13 @@ const MARGIN_CELLS: u32 = 2;
 /// Gives each photon the code of its radius, in which about `neighbors` of its light lie. Returns the radius of the last code, metres.
 pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f32 {
     let grid = photons.grid();
-    let places: Vec<Place> = photons.stored().iter().map(place).collect();
-    let limit = MAX_SHARE_OF_DIAGONAL * diagonal / grid.cell;
-    let probed = neighbors.clamp(1, PROBED);
-    let by_probed = (neighbors as f32 / probed as f32).sqrt();
-    let places = Places::new(places);
-    let radius = |index: usize| {
-        let farthest = places.distance_of_neighbor(index, probed as usize, limit);
-        (farthest * by_probed).clamp(MIN_CELLS, limit.max(MIN_CELLS))
-    };
-    let radii: Vec<f32> = (0..photons.len()).into_par_iter().map(radius).collect();
+    let places = Places::new(photons.stored().iter().map(place).collect());
+    let limit = (MAX_SHARE_OF_DIAGONAL * diagonal / grid.cell).max(MIN_CELLS);
+    let probed = neighbors.clamp(1, MAX_PROBED);
+    let by_probed = (AREA * neighbors as f32 / probed as f32).sqrt();
+    let distances = places.distances(probed as usize, limit);
+    let radii: Vec<f32> =
+        distances.into_iter().map(|distance| (distance * by_probed).clamp(MIN_CELLS, limit)).collect();
     let greatest = radii.iter().copied().fold(MIN_CELLS, f32::max);
     for (photon, radius) in photons.stored_mut().iter_mut().zip(radii) {
         let code = encode_kernel((radius / greatest).powi(2) * ROUNDING);
@@ -96,7 +94,7 @@ mod tests {
         let radii: Vec<f32> =
             photons.iter().map(|photon| greatest * kernel_share(photon.disc).sqrt()).collect();
         let mean = |radii: &[f32]| radii.iter().sum::<f32>() / radii.len() as f32;
-        let expected = |density: f32| (50.0 / (std::f32::consts::PI * density)).sqrt();
+        let expected = |density: f32| (AREA * 50.0 / (std::f32::consts::PI * density)).sqrt();
         for (found, density) in [(mean(&radii[..100_000]), 1e5), (mean(&radii[100_000..]), 1e3)] {
             let ratio = found / expected(density);
             assert!(

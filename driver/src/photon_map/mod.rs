@@ -148,7 +148,11 @@ pub(crate) fn map_traced(
     let max_distance = match settings.max_distance {
         // A distance beyond the scene's diagonal has no further effect.
         Some(distance) => distance.min(image.diagonal()),
-        None => automatic_max_distance(&image, settings.neighbors, importons.as_ref())?,
+        None => {
+            let automatic = automatic_max_distance(&image, settings.neighbors, importons.as_ref())?;
+            // Photons for a camera may be dense in a small part of a wide scene.
+            if importons.is_some() { automatic.max(MIN_CELLS * cell) } else { automatic }
+        }
     };
     if max_distance < MIN_CELLS * cell {
         return Err(PhotonError::TooWide { cell, max_distance });

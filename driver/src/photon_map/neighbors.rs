@@ -1,6 +1,7 @@
 //! Distances of neighbours among photons of one surface and one light.
 
 use glam::Vec3;
+use rayon::prelude::*;
 
 /// Minimum cosine between the directions of photons of one light.
 const MIN_DIRECTION_COSINE: f32 = 0.8;
@@ -8,6 +9,8 @@ const MIN_DIRECTION_COSINE: f32 = 0.8;
 const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
 /// Maximum number of places of a leaf.
 const LEAF: usize = 12;
+/// Share of a distance within which places of a leaf have it in common.
+const SHARED_SHARE: f32 = 0.3;
 
 /// A photon's place, cells of the photon grid, and the unit vectors that neighbours share.
 #[derive(Clone, Copy, Debug)]
@@ -81,14 +84,51 @@ impl Places {
         self.divide(middle, last);
     }
 
+    /// Distance of the neighbour of a number, from 1 on, of each place among those like it, or of one near it; `limit` if there are fewer
+    /// within it. For places that are [`SHARED_SHARE`] of such a distance apart they differ by that share at most.
+    pub(super) fn distances(&self, number: usize, limit: f32) -> Vec<f32> {
+        let leaves: Vec<&[u32]> =
+            self.nodes.iter().filter(|node| node.second == 0).map(|node| self.of(node)).collect();
+        let of_leaves: Vec<Vec<f32>> =
+            leaves.par_iter().map(|leaf| self.distances_of_leaf(leaf, number, limit)).collect();
+        let mut distances = vec![limit; self.places.len()];
+        for (leaf, of_leaf) in leaves.into_iter().zip(of_leaves) {
+            for (&index, distance) in leaf.iter().zip(of_leaf) {
+                distances[index as usize] = distance;
+            }
+        }
+        distances
+    }
+
+    /// [`Self::distances`] of the places of a leaf.
+    fn distances_of_leaf(&self, leaf: &[u32], number: usize, limit: f32) -> Vec<f32> {
+        let mut found: Vec<(&Place, f32)> = Vec::new();
+        let distance = |&index: &u32| {
+            let own = &self.places[index as usize];
+            let near = found.iter().find(|(other, distance)| {
+                own.is_like(other) && own.position.distance(other.position) <= SHARED_SHARE * distance
+            });
+            near.map(|(_, distance)| *distance).unwrap_or_else(|| {
+                let distance = self.distance_of_neighbor(index as usize, number, limit);
+                found.push((own, distance));
+                distance
+            })
+        };
+        leaf.iter().map(distance).collect()
+    }
+
+    fn of(&self, node: &Node) -> &[u32] {
+        &self.order[node.first as usize..node.last as usize]
+    }
+
     /// Distance of a place's neighbour of a number, from 1 on, among those like it; `limit` if there are fewer within it.
-    pub(super) fn distance_of_neighbor(&self, index: usize, number: usize, limit: f32) -> f32 {
+    fn distance_of_neighbor(&self, index: usize, number: usize, limit: f32) -> f32 {
         let own = &self.places[index];
         // The squared distances found so far, in ascending order.
         let mut nearest = vec![limit * limit; number.max(1)];
         let mut waiting = vec![0];
         while let Some(node) = waiting.pop() {
-            let Node { first, last, second, .. } = self.nodes[node];
+            let second = self.nodes[node].second;
             if self.nodes[node].distance_squared(own.position) >= nearest[number - 1] {
                 continue;
             }
@@ -99,7 +139,7 @@ impl Places {
                 waiting.extend(if a < b { [parts[1], parts[0]] } else { parts });
                 continue;
             }
-            for &other in &self.order[first as usize..last as usize] {
+            for &other in self.of(&self.nodes[node]) {
                 let place = &self.places[other as usize];
                 let squared = place.position.distance_squared(own.position);
                 if squared < nearest[number - 1] && other as usize != index && own.is_like(place) {
@@ -141,6 +181,10 @@ mod tests {
                 assert!((tree.distance_of_neighbor(index, number, 1e6) - distances[number - 1]).abs() < 1e-2);
             }
             assert_eq!(tree.distance_of_neighbor(index, 5, 0.5 * distances[4]), 0.5 * distances[4]);
+        }
+        for (index, distance) in tree.distances(16, 1e6).into_iter().enumerate() {
+            let own = tree.distance_of_neighbor(index, 16, 1e6);
+            assert!((distance / own - 1.0).abs() <= SHARED_SHARE / (1.0 - SHARED_SHARE), "{distance} {own}");
         }
     }
 }

@@ -257,13 +257,12 @@ impl Level {
             gather_rays_per_ray,
             level,
             photon: of_scene,
-            photon_for_camera,
+            for_camera,
             ..
         } = *variances;
-        // In a scene without noise by the map there is nothing to gain.
-        let by_camera = photon_for_camera.map(|photon| if of_scene > 0.0 { photon / of_scene } else { 1.0 });
-        let gains = by_camera.is_some_and(|ratio| ratio < MAX_RATIO_FOR_CAMERA);
-        let photon = photon_for_camera.filter(|_| gains).unwrap_or(of_scene);
+        // NaN without errors, and then no gain.
+        let gaining = for_camera.filter(|maps| maps.ratio < MAX_RATIO_FOR_CAMERA);
+        let photon = gaining.map_or(of_scene, |maps| maps.photon);
         let number = |variance: f64, cost: f64| self.worth * (variance / cost).sqrt();
         let samples = within(number(place, 1.0), &self.samples, 4);
         let shadow_rays = number(shadow_ray, COST_OF_SHADOW_RAY) / f64::from(samples);
@@ -275,7 +274,7 @@ impl Level {
         Fit {
             samples,
             photons: rounded(photons, &self.photons),
-            photons_for: if gains { PhotonsFor::Camera } else { PhotonsFor::Scene },
+            photons_for: if gaining.is_some() { PhotonsFor::Camera } else { PhotonsFor::Scene },
             gather_rays: within(gather_rays, &self.gather_rays, 8),
             beyond: Beyond {
                 photons: (photons > *self.photons.end() as f64).then(|| rounded(photons, &(0..=MAX_PHOTONS))),
@@ -292,7 +291,7 @@ impl Level {
                 shadow_ray: shadow_ray.sqrt(),
                 gather_ray: gather_ray.sqrt(),
                 million_photons: (photon / 1e6).sqrt(),
-                photons_for_camera: by_camera,
+                photons_for_camera: for_camera.map(|maps| maps.ratio).filter(|ratio| ratio.is_finite()),
                 gather_rays_per_ray,
             },
         }
@@ -324,6 +323,7 @@ fn rounded(number: f64, bounds: &RangeInclusive<usize>) -> usize {
 #[cfg(test)]
 mod tests {
     use super::super::paths::Deviations;
+    use super::super::pilot::ForCamera;
     use super::*;
 
     const VARIANCES: Variances = Variances {
@@ -333,7 +333,7 @@ mod tests {
         photon: 3.0,
         lambertian: 1.0,
         gather_rays_per_ray: 0.2,
-        photon_for_camera: None,
+        for_camera: None,
         level: 4.0,
         deviations: Deviations::NONE,
     };
@@ -395,8 +395,10 @@ mod tests {
 
     #[test]
     fn photons_are_for_the_camera_where_that_gains_and_are_then_fewer() {
-        let by =
-            |ratio: f64| good(&Variances { photon_for_camera: Some(ratio * VARIANCES.photon), ..VARIANCES });
+        let by = |ratio: f64| {
+            let maps = ForCamera { photon: 0.25 * VARIANCES.photon, ratio };
+            good(&Variances { for_camera: Some(maps), ..VARIANCES })
+        };
         let [gaining, even] = [by(0.25), by(0.8)];
         assert_eq!([gaining.photons_for, even.photons_for], [PhotonsFor::Camera, PhotonsFor::Scene]);
         assert_eq!(even.photons, good(&VARIANCES).photons);

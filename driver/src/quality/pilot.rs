@@ -48,8 +48,8 @@ pub(super) struct Variances {
     pub(super) gather_ray: f64,
     /// Mean squared error that a map of one photon would make in the light of 4x4 pixels, by the law `1 / N`.
     pub(super) photon: f64,
-    /// [`Self::photon`] of a map for the camera; `None` where the camera uses most photons anyway, or photons are stated to be for either.
-    pub(super) photon_for_camera: Option<f64>,
+    /// Maps for the camera; `None` where the camera uses most photons anyway, or photons are stated to be for either.
+    pub(super) for_camera: Option<ForCamera>,
     /// Share of the samples that see a surface with a Lambertian part.
     pub(super) lambertian: f64,
     /// Number of gather rays that a pixel costs for each one of its own: those of irradiance records, and of samples between which
@@ -59,6 +59,26 @@ pub(super) struct Variances {
     pub(super) level: f64,
     /// Deviations of the direct light of a sample with the greater numbers of [`SHADOW_RAYS`] and [`GATHER_RAYS`].
     pub(super) deviations: Deviations,
+}
+
+/// Errors of maps for the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ForCamera {
+    /// [`Variances::photon`] of a map for the camera.
+    pub(super) photon: f64,
+    /// Squared error of a map for the camera over that of one of as many photons for any camera, blur included: where few photons are used, two
+    /// maps for any camera are blurred alike, and differ by less than they err.
+    pub(super) ratio: f64,
+}
+
+impl ForCamera {
+    /// Errors by maps of fewer and more photons for the camera, and the map of more photons for any camera.
+    fn new(best: &[Pixels; 2], [few, more]: [Pixels; 2], of_scene: &Pixels) -> Self {
+        let photon = of_photon(best, [&few, &more]);
+        let own = photon / (MORE * FEW_PHOTONS) as f64;
+        let of_scene = (difference(best, [of_scene, &more]) - own).max(0.0);
+        Self { photon, ratio: own / of_scene }
+    }
 }
 
 /// Renders the pilots of a picture.
@@ -105,11 +125,11 @@ pub(super) fn measure(
     });
     let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
     let maps = [render_map(&few)?, render_map(&more)?];
-    let photon_for_camera = if more.used_share.is_some_and(|share| share < MAX_USED_SHARE) {
-        let for_camera = settings.clone().with(|settings| settings.photons.photons_for = PhotonsFor::Camera);
-        let pilot = |photons| Pilot::new(scene, packed, &for_camera, photons, &pool, observer);
-        let maps = [render_map(&pilot(FEW_PHOTONS)?)?, render_map(&pilot(MORE * FEW_PHOTONS)?)?];
-        Some(of_photon(&best, &maps))
+    let for_camera = if more.used_share.is_some_and(|share| share < MAX_USED_SHARE) {
+        let settings = settings.clone().with(|settings| settings.photons.photons_for = PhotonsFor::Camera);
+        let pilot = |photons| Pilot::new(scene, packed, &settings, photons, &pool, observer);
+        let guided = [render_map(&pilot(FEW_PHOTONS)?)?, render_map(&pilot(MORE * FEW_PHOTONS)?)?];
+        Some(ForCamera::new(&best, guided, &maps[1]))
     } else {
         None
     };
@@ -120,8 +140,8 @@ pub(super) fn measure(
         place: (of_pairs([&best])[0] - of_rays).max(0.0),
         shadow_ray,
         gather_ray,
-        photon: of_photon(&best, &maps),
-        photon_for_camera,
+        photon: of_photon(&best, [&maps[0], &maps[1]]),
+        for_camera,
         lambertian: best[0].lambertian,
         gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
         level: level_of(&best),
@@ -168,12 +188,18 @@ fn deviations(pair: &[Pixels; 2]) -> Deviations {
     }))
 }
 
-/// Mean squared error of tiles by a map of one photon, from the difference of two maps whose errors are independent.
-fn of_photon(best: &[Pixels; 2], maps: &[Pixels; 2]) -> f64 {
+/// Mean squared error of tiles by a map of one photon, from the difference of two maps of fewer and more photons whose errors are independent.
+fn of_photon(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
+    difference(best, maps) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
+}
+
+/// Mean squared difference of tiles by two maps.
+fn difference(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     // All tiles are of equal size.
     let pixels_of_tile = (best[0].direct.len() / SPREAD.number()).max(1);
     let mut tiles = vec![Vec::new(); SPREAD.number()];
-    for pixel in pixels_with_surfaces(&[best, maps]) {
+    let all_see = |&pixel: &usize| maps.iter().all(|map| map.is_seen[pixel]);
+    for pixel in pixels_with_surfaces(&[best]).filter(all_see) {
         tiles[pixel / pixels_of_tile].push(pixel);
     }
     tiles.retain(|pixels| 2 * pixels.len() > pixels_of_tile);
@@ -183,8 +209,8 @@ fn of_photon(best: &[Pixels; 2], maps: &[Pixels; 2]) -> f64 {
         tiles.iter().map(mean).collect()
     };
     let levels = Levels::new(means(&|pixel| 0.5 * (best[0].radiance(pixel) + best[1].radiance(pixel))));
-    let [few, more] = [0, 1].map(|map| means(&|pixel| maps[map].indirect[pixel]));
-    levels.mean_square(few, more) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
+    let [first, second] = maps.map(|map| means(&|pixel| map.indirect[pixel]));
+    levels.mean_square(first, second)
 }
 
 /// Photon map of a pilot, with the scene, and the threads of its chips.

@@ -139,6 +139,11 @@ impl RenderOptions {
         }
     }
 
+    /// Returns whether a pilot chooses the cameras that the photons are for.
+    pub(crate) fn leaves_cameras_open(&self) -> bool {
+        self.photons_for() == PhotonsFor::Auto
+    }
+
     /// Cameras that the photons are for: any, where several pictures share them.
     fn photons_for(&self) -> PhotonsFor {
         let is_shared = self.frames.numbers().is_some() || self.prepared.prepared;
