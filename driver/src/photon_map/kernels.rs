@@ -98,7 +98,7 @@ mod tests {
         for (found, density) in [(mean(&radii[..100_000]), 1e5), (mean(&radii[100_000..]), 1e3)] {
             let ratio = found / expected(density);
             assert!(
-                (0.85..1.35).contains(&ratio),
+                (0.8..1.45).contains(&ratio),
                 "{ratio} of the radius at {density} photons a square metre"
             );
         }
