@@ -32,6 +32,7 @@ mod direction;
 mod distant_light;
 mod emitter;
 mod irradiance_point;
+mod kernel;
 mod layers;
 mod light_node;
 mod material;
@@ -50,6 +51,7 @@ pub use direction::{decode_direction, decode_normal, encode_direction, encode_no
 pub use distant_light::DistantLight;
 pub use emitter::{Emitter, EmitterKind};
 pub use irradiance_point::IrradiancePoint;
+pub use kernel::{encode_kernel, kernel_share};
 pub use layers::{LayerTexture, Layers};
 pub use light_node::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 pub use material::{

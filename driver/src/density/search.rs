@@ -20,9 +20,6 @@ const USUAL_SHARE: f64 = 0.95;
 /// Automatic maximum distance over the greatest distance of a sampled photon's k-th neighbour: there may be greater ones.
 const BEYOND_SAMPLES: f32 = 1.5;
 
-/// Share of the sampled caustic photons whose k-th neighbour lies within the automatic maximum distance.
-const FOCUSED_SHARE: f64 = 0.8;
-
 /// A search of the photon map, with its buffer.
 pub(super) struct Searcher<'a> {
     pub(super) scene: SceneImage,
@@ -37,11 +34,6 @@ impl<'a> Searcher<'a> {
     pub(super) fn new(image: &'a CardImage, neighbors: u32, max_distance: f32) -> Self {
         let (scene, memory) = image.view();
         Self { scene, memory, buffer: Box::default(), map: PhotonMap::Indirect, neighbors, max_distance }
-    }
-
-    /// The searcher with another map.
-    fn of(self, map: PhotonMap) -> Self {
-        Self { map, ..self }
     }
 
     /// Number of photons of a gather.
@@ -77,37 +69,18 @@ pub(crate) fn gather_distances(
     importons: Option<&Importons>,
 ) -> Result<GatherDistances, Fault> {
     let importons = importons.map(|importons| &importons.indirect);
-    let of_map = (PhotonMap::Indirect, importons);
-    let [usual, greatest] = distances_within(image, of_map, neighbors, [USUAL_SHARE, 1.0])?;
+    let [usual, greatest] = distances_within(image, importons, neighbors, [USUAL_SHARE, 1.0])?;
     Ok(GatherDistances { usual, greatest: (BEYOND_SAMPLES * greatest).min(image.diagonal()) })
 }
 
-/// Maximum distance of gathers of caustics, metres: the 80th percentile of the distance of the k-th neighbour among caustic
-/// photons, `k = neighbors`; with importons, among photons where there are any. Photons beyond it are spread too far to form a caustic.
-///
-/// # Errors
-/// If the image is malformed.
-pub(crate) fn caustic_max_distance(
-    image: &CardImage,
-    neighbors: u32,
-    importons: Option<&Importons>,
-) -> Result<f32, Fault> {
-    let importons = importons.map(|importons| &importons.caustic);
-    let [focused] = distances_within(image, (PhotonMap::Caustics, importons), neighbors, [FOCUSED_SHARE])?;
-    Ok(focused)
-}
-
-/// Distances within which some shares of a map's photons, of those at importons, have `neighbors` neighbours.
+/// Distances within which some shares of the photons, of those at importons, have `neighbors` neighbours.
 fn distances_within<const N: usize>(
     image: &CardImage,
-    (map, importons): (PhotonMap, Option<&ImportonGrid>),
+    importons: Option<&ImportonGrid>,
     neighbors: u32,
     shares: [f64; N],
 ) -> Result<[f32; N], Fault> {
-    let leaves = match map {
-        PhotonMap::Indirect => image.section(SectionKind::PhotonLeaves),
-        PhotonMap::Caustics => image.section(SectionKind::CausticLeaves),
-    };
+    let leaves = image.section(SectionKind::PhotonLeaves);
     let grid = image.view().0.header.photon_grid;
     let unlimited = f32::MAX.sqrt() * 0.5;
     let distances: Result<Vec<f32>, Fault> = leaves
@@ -115,7 +88,7 @@ fn distances_within<const N: usize>(
         .step_by(leaves.len().div_ceil(SAMPLED_LEAVES).max(1))
         .enumerate()
         .map_init(
-            || Searcher::new(image, neighbors, unlimited).of(map),
+            || Searcher::new(image, neighbors, unlimited),
             |searcher, (sample, line)| {
                 let leaf = PhotonLeaf::read(&line.0);
                 let photon = sample as u32 % leaf.photons().max(1);

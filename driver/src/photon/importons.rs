@@ -18,6 +18,8 @@ use crate::pack::PackedScene;
 
 /// Eye paths along each axis of the picture.
 const EYE_PATHS: u32 = 128;
+/// Eye paths along each axis of the picture of [`Importons::few`].
+const FEW_EYE_PATHS: u32 = 32;
 /// Gather rays of an eye path.
 const GATHER_RAYS: u32 = 4;
 /// Random numbers of eye paths are those of photon paths of another seed.
@@ -45,25 +47,45 @@ impl Importons {
     ///
     /// # Errors
     /// If the image is not sound.
-    pub(crate) fn new(
+    pub(crate) fn new(packed: &PackedScene, camera: &Camera, areas: [f32; 2]) -> Result<Self, Fault> {
+        Self::of(packed, camera, EYE_PATHS, areas)
+    }
+
+    /// Fewer importons, within the least areas that they show.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn few(packed: &PackedScene, camera: &Camera) -> Result<Self, Fault> {
+        Self::of(packed, camera, FEW_EYE_PATHS, [0.0; 2])
+    }
+
+    /// Importons of `paths` times `paths` eye paths.
+    fn of(
         packed: &PackedScene,
         camera: &Camera,
+        paths: u32,
         [indirect, caustic]: [f32; 2],
     ) -> Result<Self, Fault> {
-        let rows: Result<Vec<_>, Fault> = (0..EYE_PATHS)
+        let rows: Result<Vec<_>, Fault> = (0..paths)
             .into_par_iter()
             .map(|row| {
                 let (scene, mut memory) = packed.view();
                 let mut seen = Vec::new();
                 let mut used = Vec::new();
-                for column in 0..EYE_PATHS {
+                for column in 0..paths {
                     let mut walk = Walk {
                         scene: &scene,
                         memory: &mut memory,
-                        random: PathRandom::new(SEED, u64::from(row * EYE_PATHS + column)),
+                        random: PathRandom::new(SEED, u64::from(row * paths + column)),
                         bounce: 0,
+                        side: 1.0 / paths as f32,
                     };
-                    walk.look(camera, [column, row], &mut seen, &mut used)?;
+                    walk.look(
+                        camera,
+                        [column, row].map(|place| place as f32 / paths as f32),
+                        &mut seen,
+                        &mut used,
+                    )?;
                 }
                 Ok((seen, used))
             })
@@ -83,20 +105,21 @@ struct Walk<'a, M> {
     random: PathRandom,
     /// Number of the next random numbers.
     bounce: u32,
+    /// Side of an eye path's part of the picture, over that of the picture.
+    side: f32,
 }
 
 impl<M: MemoryPort> Walk<'_, M> {
-    /// Adds the importons of an eye path and of its gather rays.
+    /// Adds the importons of an eye path and of its gather rays; `left` and `above` are the corner of its part of the picture.
     fn look(
         &mut self,
         camera: &Camera,
-        pixel: [u32; 2],
+        [left, above]: [f32; 2],
         seen: &mut Vec<Importon>,
         used: &mut Vec<Importon>,
     ) -> Result<(), Fault> {
         let [u, v] = self.random.bounce(u32::MAX).point();
-        let across = (pixel[0] as f32 + u) / EYE_PATHS as f32;
-        let down = (pixel[1] as f32 + v) / EYE_PATHS as f32;
+        let (across, down) = (left + u * self.side, above + v * self.side);
         let [forward, right, up] = [camera.forward, camera.right, camera.up].map(Vec3::from_array);
         let direction = forward + right * (2.0 * across - 1.0) + up * (1.0 - 2.0 * down);
         let ray = Ray::new(camera.origin.into(), direction.normalize());

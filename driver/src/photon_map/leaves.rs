@@ -10,7 +10,7 @@ use std::num::NonZeroU8;
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::PHOTON_STACK;
-use photoncard_shared::layout::{GridBox, LEAF_PHOTONS, PhotonLeaf, PhotonNode, leaf_capacity};
+use photoncard_shared::layout::{GRID_BITS, GridBox, LEAF_PHOTONS, PhotonLeaf, PhotonNode, leaf_capacity};
 
 use crate::fold::{Folded, Tree};
 use crate::photon::StoredPhoton;
@@ -26,6 +26,8 @@ const SAMPLED: usize = 4096;
 const MANY: usize = 64;
 /// Depth of the binary tree below which subtrees are split at the median.
 const MAX_SKEWED: usize = 40;
+/// Greatest coordinate of a grid point.
+const LAST_POINT: u32 = (1 << GRID_BITS) - 1;
 
 /// Photons of a leaf: a range in the order of the tree.
 #[derive(Clone, Copy)]
@@ -43,10 +45,25 @@ pub(super) struct PhotonTree<'a> {
 impl<'a> PhotonTree<'a> {
     /// Tree of photons, for searches of about `radius` cells. It does not depend on threads. `None` without photons.
     pub(super) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
-        let mut folded = Folded::new(build(photons, 0, radius, 0)?);
+        Self::of(photons, &Searches { radius, reach: &|_| 0 })
+    }
+
+    /// Tree of photons whose boxes hold all points within the reach of a photon, cells, for searches at a point.
+    pub(super) fn of_discs(photons: &'a mut [StoredPhoton], reach: Reach) -> Option<Self> {
+        let mut reaches: Vec<u32> = photons.iter().map(reach).collect();
+        if reaches.is_empty() {
+            return None;
+        }
+        let middle = reaches.len() / 2;
+        let typical = *reaches.select_nth_unstable(middle).1;
+        Self::of(photons, &Searches { radius: typical.into(), reach })
+    }
+
+    fn of(photons: &'a mut [StoredPhoton], searches: &Searches) -> Option<Self> {
+        let mut folded = Folded::new(build(photons, 0, searches, 0)?);
         if folded.stack > PHOTON_STACK {
             // Median splits are slower to search, but have minimum depth.
-            folded = Folded::new(build(photons, 0, radius, MAX_SKEWED)?);
+            folded = Folded::new(build(photons, 0, searches, MAX_SKEWED)?);
         }
         Some(Self { photons, folded })
     }
@@ -71,17 +88,35 @@ impl<'a> PhotonTree<'a> {
     }
 }
 
+/// Distance from a photon within which searches find it, cells.
+type Reach<'r> = &'r (dyn Fn(&StoredPhoton) -> u32 + Sync);
+
+/// Searches that a tree is built for.
+struct Searches<'r> {
+    /// Radius of a typical search, cells.
+    radius: f64,
+    /// Distance by which a photon's box is enlarged.
+    reach: Reach<'r>,
+}
+
 /// Tree of photons whose first has the index `first`; `None` without photons.
-fn build(photons: &mut [StoredPhoton], first: u32, radius: f64, depth: usize) -> Option<Tree<Run, Extent>> {
+fn build(
+    photons: &mut [StoredPhoton],
+    first: u32,
+    searches: &Searches,
+    depth: usize,
+) -> Option<Tree<Run, Extent>> {
     if photons.is_empty() {
         return None;
     }
-    let extent = Extent::new(photons);
+    let radius = searches.radius;
+    let extent = Extent::new(photons, &|_| 0);
+    let reached = Extent::new(photons, searches.reach);
     let count = u8::try_from(photons.len()).ok().and_then(NonZeroU8::new);
     if let Some(count) = count
         && PhotonLeaf::fits(&extent.0, photons.len())
     {
-        return Some(Tree::leaf(Run { first, count }, extent, 0.0));
+        return Some(Tree::leaf(Run { first, count }, reached, 0.0));
     }
     let (axis, middle) = if depth < MAX_SKEWED {
         extent.split(photons, radius)
@@ -91,10 +126,10 @@ fn build(photons: &mut [StoredPhoton], first: u32, radius: f64, depth: usize) ->
     photons.select_nth_unstable_by_key(middle, |photon| (photon.coordinate(axis), *photon));
     let (below, above) = photons.split_at_mut(middle);
     let is_large = below.len().max(above.len()) > SEQUENTIAL;
-    let mut below = || build(below, first, radius, depth + 1);
-    let mut above = || build(above, first + middle as u32, radius, depth + 1);
+    let mut below = || build(below, first, searches, depth + 1);
+    let mut above = || build(above, first + middle as u32, searches, depth + 1);
     let (below, above) = if is_large { rayon::join(below, above) } else { (below(), above()) };
-    Some(Tree::node([below?, above?], extent, extent.chance(radius) as f32, None))
+    Some(Tree::node([below?, above?], reached, extent.chance(radius) as f32, None))
 }
 
 /// Bounding box of photons.
@@ -102,13 +137,15 @@ fn build(photons: &mut [StoredPhoton], first: u32, radius: f64, depth: usize) ->
 struct Extent(GridBox);
 
 impl Extent {
-    fn new(photons: &[StoredPhoton]) -> Self {
+    /// Box of all grid points within the reach of the photons, along each axis.
+    fn new(photons: &[StoredPhoton], reach: Reach) -> Self {
         let mut extent = GridBox { lower: [u32::MAX; 3], upper: [0; 3] };
         for photon in photons {
+            let reach = reach(photon);
             let sides = extent.lower.iter_mut().zip(&mut extent.upper);
             for ((lower, upper), coordinate) in sides.zip(photon.point()) {
-                *lower = coordinate.min(*lower);
-                *upper = coordinate.max(*upper);
+                *lower = coordinate.saturating_sub(reach).min(*lower);
+                *upper = (coordinate + reach).min(LAST_POINT).max(*upper);
             }
         }
         Self(extent)

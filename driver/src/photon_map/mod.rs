@@ -6,7 +6,9 @@
 mod budget;
 mod irradiance;
 mod kd_tree;
+mod kernels;
 mod leaves;
+mod neighbors;
 mod radius;
 mod settings;
 mod size;
@@ -16,7 +18,8 @@ mod tests;
 
 use std::time::{Duration, Instant};
 
-use photoncard_shared::message::{CausticGather, Radiance};
+use photoncard_shared::layout::Photon;
+use photoncard_shared::message::{Camera, CausticGather, Radiance};
 
 pub use self::budget::{check_image, check_packed};
 pub use self::irradiance::precompute_irradiance;
@@ -25,7 +28,7 @@ pub use self::settings::{PhotonLayout, PhotonSettings, PhotonsFor};
 pub use self::size::PhotonMapSize;
 use self::store::store_caustics;
 pub use self::store::store_photons;
-use crate::density::{GatherDistances, caustic_max_distance, gather_distances, measure_discs};
+use crate::density::{GatherDistances, gather_distances, measure_discs};
 use crate::pack::{CardImage, PackedScene};
 pub use crate::photon::Guiding;
 use crate::photon::{
@@ -115,6 +118,17 @@ impl TracedPhotons {
         let caustic = caustics(packed, of_caustics, settings, progress)?;
         Ok(Self { photons, paths, guiding, caustic, importons })
     }
+
+    /// Share of the photons that are where the picture of a camera uses any, by few eye paths.
+    ///
+    /// # Errors
+    /// If the image is not sound.
+    pub(crate) fn used_share(&self, packed: &PackedScene, camera: &Camera) -> Result<f64, PhotonError> {
+        let used = Importons::few(packed, camera)?.indirect;
+        let is_used = |photon: &Photon| used.is_used(photon.position.into(), photon.normal);
+        let count = self.photons.iter().filter(is_used).count();
+        Ok(count as f64 / self.photons.len().max(1) as f64)
+    }
 }
 
 /// Completes the image of a packed scene with its photons, as [`map_photons`].
@@ -136,6 +150,9 @@ pub(crate) fn map_traced(
         // A distance beyond the scene's diagonal has no further effect.
         let greatest = distance.min(image.diagonal());
         distances = GatherDistances { usual: distances.usual.min(greatest), greatest };
+    } else if importons.is_some() {
+        // Photons for a camera may be dense in a small part of a wide scene.
+        distances.greatest = distances.greatest.max(MIN_CELLS * cell);
     }
     let max_distance = distances.greatest;
     if max_distance < MIN_CELLS * cell {
@@ -149,10 +166,10 @@ pub(crate) fn map_traced(
         times.building += start.elapsed();
     }
     let mut caustics = None;
-    if let Some(photons) = caustic {
+    if let Some(mut photons) = caustic {
         let start = Instant::now();
-        image = store_caustics(image, photons, settings.caustic_neighbors)?;
-        let max_distance = caustic_max_distance(&image, settings.caustic_neighbors, importons.as_ref())?;
+        let max_distance = kernels::spread(&mut photons, settings.caustic_neighbors, image.diagonal());
+        image = store_caustics(image, photons, max_distance)?;
         caustics = Some(CausticGather { neighbors: settings.caustic_neighbors, max_distance });
         times.building += start.elapsed();
     }

@@ -36,12 +36,23 @@ pub enum PhotonsFor {
     Scene,
     /// The camera of the picture: photons are guided towards what it uses, without bias.
     Camera,
+    /// The camera of the picture where a pilot measures that it gains, and otherwise any.
+    Auto,
 }
 
 choices!(PhotonsFor {
+    Auto = "auto": "The camera of the picture, where a pilot measures that this gains",
     Scene = "scene": "Any camera",
     Camera = "camera": "The camera of the picture: fewer where it does not use them",
 });
+
+impl PhotonsFor {
+    /// The cameras without a pilot: any, where one would choose.
+    #[must_use]
+    pub fn resolved(self) -> Self {
+        if self == Self::Auto { Self::Scene } else { self }
+    }
+}
 
 /// Layout of the photon map in card memory. A gather finds the same photons in each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

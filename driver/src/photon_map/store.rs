@@ -2,6 +2,7 @@
 
 use photoncard_shared::image::SectionKind;
 
+use super::kernels::reach;
 use super::leaves::PhotonTree;
 use super::radius::typical_radius;
 use crate::pack::{CardImage, ImageWriter, PackError, PackedScene};
@@ -39,19 +40,19 @@ pub fn store_photons(
     Ok(image.finish())
 }
 
-/// Adds a caustic map to an image, for searches of about `neighbors` photons.
+/// Adds a caustic map to an image: photons with the codes of their radii, whose last is `greatest`, metres.
 ///
 /// # Errors
 /// As [`store_photons`].
 pub(super) fn store_caustics(
     image: CardImage,
     mut photons: Photons,
-    neighbors: u32,
+    greatest: f32,
 ) -> Result<CardImage, PackError> {
     let mut image = ImageWriter::resume(image);
     image.set_caustic_power_unit(photons.power_unit());
-    let radius = typical_radius(&photons, neighbors);
-    if let Some(tree) = PhotonTree::new(photons.stored_mut(), radius) {
+    let greatest = greatest / photons.grid().cell;
+    if let Some(tree) = PhotonTree::of_discs(photons.stored_mut(), &|photon| reach(photon, greatest)) {
         append_tree(&mut image, CAUSTIC_SECTIONS, &tree)?;
     }
     Ok(image.finish())

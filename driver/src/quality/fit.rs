@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::level::{Level, Quality};
 use super::pilot::{SHADOW_RAYS as PILOT_SHADOW_RAYS, Variances, measure};
 use crate::pack::PackedScene;
+use crate::photon_map::PhotonsFor;
 use crate::render::{Integrator, Observer, RenderError, RenderSettings};
 use crate::scene::Scene;
 
@@ -18,6 +19,8 @@ pub struct Fit {
     pub samples: u32,
     /// Number of photons in the map.
     pub photons: usize,
+    /// Cameras that the photons are for: never [`PhotonsFor::Auto`].
+    pub photons_for: PhotonsFor,
     /// Number of gather rays of a pixel, and of an irradiance record.
     pub gather_rays: u32,
     /// Number of shadow rays per sample.
@@ -31,8 +34,19 @@ pub struct Fit {
     /// Threshold of adaptive sampling by which the later samples of the pilot's pixels, with the pilot's shadow rays, have a tenth of a path beyond one on average,
     /// W^(1/2)/(sr^(1/2) m); `None` where these paths lower the variance of direct light by less than half.
     pub spent_threshold: Option<f64>,
+    /// Numbers that the scene would take beyond the bounds of the quality.
+    pub beyond: Beyond,
     /// Noise of the pilot, from which the settings follow.
     pub measured: Measured,
+}
+
+/// Numbers that a scene would take, where they exceed the bounds of a quality.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Beyond {
+    /// Number of photons in the map.
+    pub photons: Option<usize>,
+    /// Number of gather rays of a pixel, and of an irradiance record.
+    pub gather_rays: Option<u32>,
 }
 
 /// Settings that a fit leaves as they are, because they are stated.
@@ -80,6 +94,9 @@ pub struct Measured {
     pub gather_ray: f64,
     /// Error of 4x4 pixels by a map of a million photons.
     pub million_photons: f64,
+    /// Squared error of a map for the camera over that of one for any camera; `None` where the camera uses most photons anyway, or the
+    /// photons are stated to be for either.
+    pub photons_for_camera: Option<f64>,
     /// Number of gather rays that a pixel costs for each one of its own, by irradiance records and samples without.
     pub gather_rays_per_ray: f64,
 }
@@ -94,6 +111,9 @@ impl Measured {
     }
 }
 
+/// Maximum squared error of a map for the camera, over that of one for any camera, for which photons are for the camera: the ratio of two pilots is
+/// uncertain by a third.
+const MAX_RATIO_FOR_CAMERA: f64 = 0.6;
 /// Share of samples with a Lambertian part below which nothing is interpolated.
 const FEW_LAMBERTIAN: f64 = 0.05;
 /// Number of shadow rays of a sample.
@@ -131,9 +151,16 @@ impl Fit {
         let photons = 1e6 * (million_photons / (SHARE_OF_MAP * noise)).powi(2);
         let rays = WEIGHT_OF_RECORDS * (gather_ray / (SHARE_OF_RECORDS * noise)).powi(2);
         let rays = if self.interpolates { within(rays, &(0..=MAX_RAYS_OF_RECORD), 8) } else { 0 };
+        let photons = self.photons.max(rounded(photons, &(0..=MAX_PHOTONS)));
+        let gather_rays = self.gather_rays.max(rays);
+        let Beyond { photons: more_photons, gather_rays: more_rays } = self.beyond;
         Self {
-            photons: self.photons.max(rounded(photons, &(0..=MAX_PHOTONS))),
-            gather_rays: self.gather_rays.max(rays),
+            photons,
+            gather_rays,
+            beyond: Beyond {
+                photons: more_photons.filter(|&more| more > photons),
+                gather_rays: more_rays.filter(|&more| more > gather_rays),
+            },
             max_irradiance_error: (IRRADIANCE_ERROR_OF_NOISE * noise) as f32,
             ..self
         }
@@ -148,6 +175,9 @@ impl Fit {
         }
         if !stated.photons {
             photons.count = self.photons;
+        }
+        if photons.photons_for == PhotonsFor::Auto {
+            photons.photons_for = self.photons_for;
         }
         if !stated.shadow_rays {
             let of_pixel = f64::from(self.shadow_rays) * f64::from(self.samples);
@@ -220,8 +250,19 @@ impl Level {
     /// `c n + w^2 v / n` is the least for `n = w sqrt(v / c)`, `w` the worth of accuracy.
     fn fit(&self, variances: &Variances, of: &Pictured) -> Fit {
         let Variances {
-            place, shadow_ray, gather_ray, photon, lambertian, gather_rays_per_ray, level, ..
+            place,
+            shadow_ray,
+            gather_ray,
+            lambertian,
+            gather_rays_per_ray,
+            level,
+            photon: of_scene,
+            for_camera,
+            ..
         } = *variances;
+        // NaN without errors, and then no gain.
+        let gaining = for_camera.filter(|maps| maps.ratio < MAX_RATIO_FOR_CAMERA);
+        let photon = gaining.map_or(of_scene, |maps| maps.photon);
         let number = |variance: f64, cost: f64| self.worth * (variance / cost).sqrt();
         let samples = within(number(place, 1.0), &self.samples, 4);
         let shadow_rays = number(shadow_ray, COST_OF_SHADOW_RAY) / f64::from(samples);
@@ -233,7 +274,13 @@ impl Level {
         Fit {
             samples,
             photons: rounded(photons, &self.photons),
+            photons_for: if gaining.is_some() { PhotonsFor::Camera } else { PhotonsFor::Scene },
             gather_rays: within(gather_rays, &self.gather_rays, 8),
+            beyond: Beyond {
+                photons: (photons > *self.photons.end() as f64).then(|| rounded(photons, &(0..=MAX_PHOTONS))),
+                gather_rays: (gather_rays > f64::from(*self.gather_rays.end()))
+                    .then(|| within(gather_rays, &(0..=MAX_RAYS_OF_RECORD), 8)),
+            },
             shadow_rays: within(shadow_rays, &SHADOW_RAYS, 1),
             interpolates,
             max_irradiance_error: f32::INFINITY,
@@ -244,6 +291,7 @@ impl Level {
                 shadow_ray: shadow_ray.sqrt(),
                 gather_ray: gather_ray.sqrt(),
                 million_photons: (photon / 1e6).sqrt(),
+                photons_for_camera: for_camera.map(|maps| maps.ratio).filter(|ratio| ratio.is_finite()),
                 gather_rays_per_ray,
             },
         }
@@ -275,6 +323,7 @@ fn rounded(number: f64, bounds: &RangeInclusive<usize>) -> usize {
 #[cfg(test)]
 mod tests {
     use super::super::paths::Deviations;
+    use super::super::pilot::ForCamera;
     use super::*;
 
     const VARIANCES: Variances = Variances {
@@ -284,6 +333,7 @@ mod tests {
         photon: 3.0,
         lambertian: 1.0,
         gather_rays_per_ray: 0.2,
+        for_camera: None,
         level: 4.0,
         deviations: Deviations::NONE,
     };
@@ -341,6 +391,36 @@ mod tests {
             good(&Variances { gather_ray: 0.0, gather_rays_per_ray: 0.0, ..VARIANCES }).gather_rays,
             128
         );
+    }
+
+    #[test]
+    fn photons_are_for_the_camera_where_that_gains_and_are_then_fewer() {
+        let by = |ratio: f64| {
+            let maps = ForCamera { photon: 0.25 * VARIANCES.photon, ratio };
+            good(&Variances { for_camera: Some(maps), ..VARIANCES })
+        };
+        let [gaining, even] = [by(0.25), by(0.8)];
+        assert_eq!([gaining.photons_for, even.photons_for], [PhotonsFor::Camera, PhotonsFor::Scene]);
+        assert_eq!(even.photons, good(&VARIANCES).photons);
+        assert!(gaining.photons < even.photons && gaining.measured.photons_for_camera == Some(0.25));
+        let applied = |photons_for| {
+            let mut settings = Quality::Good.settings();
+            settings.photons.photons_for = photons_for;
+            gaining.apply(&mut settings, Stated::default());
+            settings.photons.photons_for
+        };
+        assert_eq!(applied(PhotonsFor::Auto), PhotonsFor::Camera);
+        assert_eq!(applied(PhotonsFor::Scene), PhotonsFor::Scene);
+    }
+
+    #[test]
+    fn numbers_beyond_the_bounds_are_those_that_the_scene_would_take() {
+        let beyond = |photon, gather_ray| good(&Variances { photon, gather_ray, ..VARIANCES }).beyond;
+        assert_eq!(beyond(VARIANCES.photon, VARIANCES.gather_ray), Beyond::default());
+        let Beyond { photons, gather_rays } = beyond(100.0 * VARIANCES.photon, 100.0 * VARIANCES.gather_ray);
+        assert_eq!([photons, gather_rays.map(|rays| rays as usize)], [Some(2_800_000), Some(2000)]);
+        let most = beyond(f64::INFINITY, f64::INFINITY);
+        assert_eq!(most, Beyond { photons: Some(MAX_PHOTONS), gather_rays: Some(MAX_RAYS_OF_RECORD) });
     }
 
     /// Rays of records are shared by the pixels around them.

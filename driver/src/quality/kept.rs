@@ -3,6 +3,8 @@
 use serde_json::Value;
 
 use super::Stated;
+use crate::choice::Choice;
+use crate::photon_map::PhotonsFor;
 use crate::render::{NamedSettings, RenderSettings};
 
 impl Stated {
@@ -15,6 +17,11 @@ impl Stated {
         if !self.photons {
             let kept = number("photons").and_then(|count| usize::try_from(count).ok());
             photons.count = kept.unwrap_or(photons.count);
+        }
+        if photons.photons_for == PhotonsFor::Auto {
+            let kept = kept.get("photons-for").and_then(Value::as_str);
+            let is_of_camera = kept == Some(PhotonsFor::Camera.name());
+            photons.photons_for = if is_of_camera { PhotonsFor::Camera } else { PhotonsFor::Scene };
         }
         if !self.gather_rays {
             integrator.gather_rays = rays("gather-rays").unwrap_or(integrator.gather_rays);

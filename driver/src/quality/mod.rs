@@ -9,5 +9,5 @@ mod paths;
 mod pilot;
 mod spread;
 
-pub use self::fit::{Fit, Measured, Stated};
+pub use self::fit::{Beyond, Fit, Measured, Stated};
 pub use self::level::Quality;

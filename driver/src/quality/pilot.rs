@@ -12,7 +12,7 @@ use crate::emulator::THREAD_STACK;
 use crate::emulator::direct::{RenderedTile, render_tiles_apart};
 use crate::film::Window;
 use crate::pack::PackedScene;
-use crate::photon_map::{MappedImage, PhotonSettings, map_photons};
+use crate::photon_map::{MappedImage, PhotonSettings, PhotonsFor, TracedPhotons, map_traced};
 use crate::render::{Observer, Phase, RenderError, RenderSettings, Sampling};
 use crate::scene::Scene;
 use crate::sums::SumFormat;
@@ -21,6 +21,9 @@ use crate::sums::SumFormat;
 const SPREAD: Grid = Grid { cells: 8, side: 4 };
 /// Tiles in which irradiance records are placed: large, as tiles compute records at their borders of their own.
 const SURVEYED: Grid = Grid { cells: 4, side: 32 };
+/// Maximum share of the photons that are where the picture uses any for which maps for the camera are measured: in rooms, halls and Cornell
+/// boxes, where guiding gains nothing, it is greater.
+const MAX_USED_SHARE: f64 = 0.3;
 /// Photons of the smaller map; the larger one has four times as many.
 const FEW_PHOTONS: usize = 16_384;
 const MORE: usize = 4;
@@ -45,6 +48,8 @@ pub(super) struct Variances {
     pub(super) gather_ray: f64,
     /// Mean squared error that a map of one photon would make in the light of 4x4 pixels, by the law `1 / N`.
     pub(super) photon: f64,
+    /// Maps for the camera; `None` where the camera uses most photons anyway, or photons are stated to be for either.
+    pub(super) for_camera: Option<ForCamera>,
     /// Share of the samples that see a surface with a Lambertian part.
     pub(super) lambertian: f64,
     /// Number of gather rays that a pixel costs for each one of its own: those of irradiance records, and of samples between which
@@ -54,6 +59,26 @@ pub(super) struct Variances {
     pub(super) level: f64,
     /// Deviations of the direct light of a sample with the greater numbers of [`SHADOW_RAYS`] and [`GATHER_RAYS`].
     pub(super) deviations: Deviations,
+}
+
+/// Errors of maps for the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ForCamera {
+    /// [`Variances::photon`] of a map for the camera.
+    pub(super) photon: f64,
+    /// Squared error of a map for the camera over that of one of as many photons for any camera, blur included: where few photons are used, two
+    /// maps for any camera are blurred alike, and differ by less than they err.
+    pub(super) ratio: f64,
+}
+
+impl ForCamera {
+    /// Errors by maps of fewer and more photons for the camera, and the map of more photons for any camera.
+    fn new(best: &[Pixels; 2], [few, more]: [Pixels; 2], of_scene: &Pixels) -> Self {
+        let photon = of_photon(best, [&few, &more]);
+        let own = photon / (MORE * FEW_PHOTONS) as f64;
+        let of_scene = (difference(best, [of_scene, &more]) - own).max(0.0);
+        Self { photon, ratio: own / of_scene }
+    }
 }
 
 /// Renders the pilots of a picture.
@@ -100,6 +125,14 @@ pub(super) fn measure(
     });
     let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
     let maps = [render_map(&few)?, render_map(&more)?];
+    let for_camera = if more.used_share.is_some_and(|share| share < MAX_USED_SHARE) {
+        let settings = settings.clone().with(|settings| settings.photons.photons_for = PhotonsFor::Camera);
+        let pilot = |photons| Pilot::new(scene, packed, &settings, photons, &pool, observer);
+        let guided = [render_map(&pilot(FEW_PHOTONS)?)?, render_map(&pilot(MORE * FEW_PHOTONS)?)?];
+        Some(ForCamera::new(&best, guided, &maps[1]))
+    } else {
+        None
+    };
     let [shadow_ray, gather_ray] =
         [of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best), of_ray(GATHER_RAYS, &by_few_gather_rays, &best)];
     let of_rays = shadow_ray / f64::from(shadow_rays) + gather_ray / f64::from(gather_rays);
@@ -107,7 +140,8 @@ pub(super) fn measure(
         place: (of_pairs([&best])[0] - of_rays).max(0.0),
         shadow_ray,
         gather_ray,
-        photon: of_photon(&best, &maps),
+        photon: of_photon(&best, [&maps[0], &maps[1]]),
+        for_camera,
         lambertian: best[0].lambertian,
         gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
         level: level_of(&best),
@@ -154,12 +188,18 @@ fn deviations(pair: &[Pixels; 2]) -> Deviations {
     }))
 }
 
-/// Mean squared error of tiles by a map of one photon, from the difference of two maps whose errors are independent.
-fn of_photon(best: &[Pixels; 2], maps: &[Pixels; 2]) -> f64 {
+/// Mean squared error of tiles by a map of one photon, from the difference of two maps of fewer and more photons whose errors are independent.
+fn of_photon(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
+    difference(best, maps) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
+}
+
+/// Mean squared difference of tiles by two maps.
+fn difference(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     // All tiles are of equal size.
     let pixels_of_tile = (best[0].direct.len() / SPREAD.number()).max(1);
     let mut tiles = vec![Vec::new(); SPREAD.number()];
-    for pixel in pixels_with_surfaces(&[best, maps]) {
+    let all_see = |&pixel: &usize| maps.iter().all(|map| map.is_seen[pixel]);
+    for pixel in pixels_with_surfaces(&[best]).filter(all_see) {
         tiles[pixel / pixels_of_tile].push(pixel);
     }
     tiles.retain(|pixels| 2 * pixels.len() > pixels_of_tile);
@@ -169,8 +209,8 @@ fn of_photon(best: &[Pixels; 2], maps: &[Pixels; 2]) -> f64 {
         tiles.iter().map(mean).collect()
     };
     let levels = Levels::new(means(&|pixel| 0.5 * (best[0].radiance(pixel) + best[1].radiance(pixel))));
-    let [few, more] = [0, 1].map(|map| means(&|pixel| maps[map].indirect[pixel]));
-    levels.mean_square(few, more) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
+    let [first, second] = maps.map(|map| means(&|pixel| map.indirect[pixel]));
+    levels.mean_square(first, second)
 }
 
 /// Photon map of a pilot, with the scene, and the threads of its chips.
@@ -181,6 +221,8 @@ struct Pilot<'a> {
     observer: &'a dyn Observer,
     /// If the picture has a caustic map, which takes that light from gather rays.
     has_caustics: bool,
+    /// Share of the photons that are where the picture uses any; `None` where nothing follows from it.
+    used_share: Option<f64>,
 }
 
 impl<'a> Pilot<'a> {
@@ -196,9 +238,14 @@ impl<'a> Pilot<'a> {
         let of_picture = settings.photon_settings(scene);
         // Caustics add no noise: gathers find an empty map instead of one of its own.
         let photons = PhotonSettings { photons, seed: PHOTON_SEED, caustic_photons: 0, ..of_picture };
-        let mapped = map_photons(packed.clone(), &photons, &|_| !observer.is_stopped())?;
+        let go_on = |_| !observer.is_stopped();
+        let traced = TracedPhotons::new(packed, &photons, &go_on)?;
+        let is_open = settings.photons.photons_for == PhotonsFor::Auto;
+        let camera = settings.pinhole(&settings.camera(scene)?);
+        let used_share = is_open.then(|| traced.used_share(packed, &camera)).transpose()?;
+        let mapped = map_traced(packed.clone(), traced, &photons, &go_on)?;
         let has_caustics = of_picture.caustic_photons > 0;
-        Ok(Self { scene, mapped, pool, observer, has_caustics })
+        Ok(Self { scene, mapped, pool, observer, has_caustics, used_share })
     }
 
     /// Number of gather rays of tiles with the irradiance cache, for each ray of a pixel.

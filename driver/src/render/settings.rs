@@ -115,7 +115,7 @@ impl RenderSettings {
     }
 
     /// Canonical settings, equal for all settings that give the scene equal pixels: the number of caustic photons is the
-    /// scene's, and without a caustic map the neighbours of its gathers are the default's.
+    /// scene's, photons that no pilot has chosen are for any camera, and without a caustic map the neighbours of its gathers are the default's.
     #[must_use]
     pub fn resolved(&self, scene: &Scene) -> Self {
         self.resolved_if(scene.is_specular())
@@ -126,6 +126,7 @@ impl RenderSettings {
         let caustic_photons = self.caustic_photons(is_specular);
         self.clone().with(|settings| {
             settings.photons.caustic_photons = Some(caustic_photons);
+            settings.photons.photons_for = settings.photons.photons_for.resolved();
             if caustic_photons == 0 {
                 settings.photons.caustic_neighbors = PhotonMaps::default().caustic_neighbors;
             }
@@ -140,7 +141,7 @@ impl RenderSettings {
     /// [`Self::photon_settings`] of a scene that stays as it is. A camera that the scene does not have is any.
     pub(super) fn photon_settings_of(&self, scene: &FixedScene) -> PhotonSettings {
         let camera = match self.photons.photons_for {
-            PhotonsFor::Scene => None,
+            PhotonsFor::Scene | PhotonsFor::Auto => None,
             PhotonsFor::Camera => self.camera(scene).ok().map(|camera| self.pinhole(&camera)),
         };
         PhotonSettings { camera, ..self.photon_settings_if(scene.is_specular()) }
@@ -204,7 +205,7 @@ impl RenderSettings {
 
     /// Pinhole camera of the frame. The vertical field of view is the camera's; the horizontal one follows from the
     /// picture's size.
-    fn pinhole(&self, camera: &Camera) -> message::Camera {
+    pub(crate) fn pinhole(&self, camera: &Camera) -> message::Camera {
         let half_height = libm::tanf(0.5 * camera.vertical_fov);
         let half_width = half_height * self.picture.width as f32 / self.picture.height as f32;
         let scaled = |axis: Vec3, length: f32| (axis * length).to_array();

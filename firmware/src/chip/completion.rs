@@ -69,7 +69,7 @@ impl<K: ChipKind> Flight<K> {
         let is_term = sample >= frame.first_sample;
         let weight = self.paths(pixel).weight(frame, sample);
         let as_what = if is_term { Use::Term(weight) } else { Use::Probe };
-        let has_rays = self.look_at(job, shared, pixel, (as_what, &mut completion))?;
+        let has_rays = self.look_at(job, pixel, (as_what, &mut completion))?;
         if has_rays && is_plain && is_term {
             self.give_rays(pixel);
             self.position.index += 1;
@@ -94,18 +94,14 @@ impl<K: ChipKind> Flight<K> {
     ///
     /// # Errors
     /// If the image is not sound.
-    pub(super) fn probe<M: MemoryPort>(
-        &mut self,
-        job: &mut RenderJob<M>,
-        shared: &mut Shared<K>,
-    ) -> Result<(), Fault> {
+    pub(super) fn probe<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<(), Fault> {
         let Some(pixel) = self.first_with_rays(self.position.index..self.block.pixels()) else {
             self.position = Position::at(Pass::Eye);
             return Ok(());
         };
         self.position.index = pixel;
         let mut completion = self.completion.take().unwrap_or_else(|| Completion::new(PixelLight::NONE, 0));
-        self.look_at(job, shared, pixel, (Use::Probe, &mut completion))?;
+        self.look_at(job, pixel, (Use::Probe, &mut completion))?;
         completion.next_path(1);
         if completion.sample < PROBES {
             self.completion = Some(completion);
@@ -127,7 +123,6 @@ impl<K: ChipKind> Flight<K> {
     fn look_at<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
-        shared: &mut Shared<K>,
         pixel: u32,
         (as_what, completion): (Use, &mut Completion),
     ) -> Result<bool, Fault> {
@@ -144,7 +139,7 @@ impl<K: ChipKind> Flight<K> {
                 if completion.path == 0 && matches!(as_what, Use::Term(_)) {
                     completion.view.add(&context.scene.header, &view);
                 }
-                light_path(context, &self.cache, shared, (at, &view, paths), (as_what, completion))?
+                light_path::<K, M>(context, &self.cache, (at, &view, paths), (as_what, completion))?
             }
         };
         completion.end_light(context.scene.header.radiance_unit);
@@ -184,7 +179,6 @@ impl Completion {
 fn light_path<K: ChipKind, M: MemoryPort>(
     context: &mut Context<M>,
     cache: &IrradianceCache<K::IrradianceRecords>,
-    shared: &mut Shared<K>,
     (at, view, paths): (PixelSample, &View, u32),
     (as_what, completion): (Use, &mut Completion),
 ) -> Result<bool, Fault> {
@@ -222,7 +216,7 @@ fn light_path<K: ChipKind, M: MemoryPort>(
     if let Some(seen) = &view.seen {
         eye::surface(context, view.film, seen, &mut point.surface)?;
     }
-    for (component, light) in direct_light(context, at, &point, shared)? {
+    for (component, light) in direct_light(context, at, &point)? {
         completion.add(frame, as_what, component, light);
     }
     Ok(has_rays)

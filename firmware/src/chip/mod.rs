@@ -208,7 +208,7 @@ impl<K: ChipKind> Chip<K> {
             Pass::Survey => flight.survey(job, shared)?,
             Pass::RecordPoints => flight.choose_record_point(job, shared)?,
             Pass::RecordRays => flight.cast_for_record(job, shared, number)?,
-            Pass::Probe => flight.probe(job, shared)?,
+            Pass::Probe => flight.probe(job)?,
             Pass::Eye => flight.look(job, shared, number)?,
             Pass::Direct => flight.light_directly(job, shared, number)?,
             Pass::Rays => flight.cast_for_pixel(job, shared, number)?,

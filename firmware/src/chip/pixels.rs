@@ -169,7 +169,7 @@ impl<K: ChipKind> Flight<K> {
             context.memory.enter(Stage::Shadow);
             let mut point = stored.point(pattern(context.frame, at));
             if stored.read_surface(context, at, &mut point.surface)? {
-                let light = direct_light(context, at, &point, shared)?;
+                let light = direct_light(context, at, &point)?;
                 for (component, light) in light {
                     shared.sums.add(context.frame, (flight, number), component, light * weight);
                 }
@@ -249,15 +249,14 @@ impl<K: ChipKind> Flight<K> {
 }
 
 /// Light of shadow rays and caustics at a point, of one sample of a pixel, in the image's radiance units.
-pub(super) fn direct_light<K: ChipKind, M: MemoryPort>(
+pub(super) fn direct_light<M: MemoryPort>(
     context: &mut Context<M>,
     at: PixelSample,
     point: &GatherPoint,
-    shared: &mut Shared<K>,
 ) -> Result<[(Component, glam::Vec3); 2], Fault> {
     let reflected = direct::reflected(context, at, point)?;
     let direct = reflected * per_unit(context);
-    let caustic = caustic::reflected(context, point, shared.gathers.candidates())?;
+    let caustic = caustic::reflected(context, point)?;
     Ok([(Component::Direct, direct), (Component::Caustic, caustic)])
 }
 

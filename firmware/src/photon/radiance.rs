@@ -73,23 +73,6 @@ pub fn reflected_radiance(
     simd::run(Estimate::<false> { nearest, position, region, reflection, lobe, lit_by: LitBy::All, normals })
 }
 
-/// [`reflected_radiance`] of caustics, by a lobe that was not decoded from the record; `normals` are the shading normal and the
-/// triangle's.
-#[inline(always)]
-pub fn reflected_caustics(
-    nearest: &NearestPhotons,
-    position: Vec3,
-    (reflection, lobe): (&PartialReflection, DecodedLobe),
-    lit_by: LitBy,
-    normals: [Vec3; 2],
-) -> Reflected {
-    if normals[0] == normals[1] {
-        simd::run(Estimate::<false> { nearest, position, region: None, reflection, lobe, lit_by, normals })
-    } else {
-        simd::run(Estimate::<true> { nearest, position, region: None, reflection, lobe, lit_by, normals })
-    }
-}
-
 /// Photons that light a lobe; the Lambertian part is lit by all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LitBy {
@@ -297,6 +280,12 @@ impl SameSurface {
     #[inline(always)]
     pub fn new(code: u8) -> Self {
         Self { normal: unit(decode_normal(code).into()), last: (code, true), decoded: 0 }
+    }
+
+    /// Number of normals decoded so far.
+    #[inline(always)]
+    pub(super) fn decoded(&self) -> u32 {
+        self.decoded
     }
 
     /// `true` for a photon of the surface, by its normal's code.

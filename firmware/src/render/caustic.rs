@@ -6,23 +6,18 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::encode_normal;
 use photoncard_shared::message::{CausticGather, Fault};
 
-use super::search::{count_reflection, search};
 use super::{Context, GatherPoint};
 use crate::memory::{MemoryPort, Stage};
-use crate::photon::{Candidates, LitBy, NearestPhotons, PhotonMap, reflected_caustics};
+use crate::photon::{CausticSearch, LitBy, reflected_caustics};
 use crate::scene::{PartialReflection, Reflection, Reflector};
 
 /// Radiance of reflected caustics at a point, in the image's radiance units.
 ///
 /// # Errors
 /// If the image is not sound.
-pub fn reflected<M: MemoryPort>(
-    context: &mut Context<M>,
-    point: &GatherPoint,
-    candidates: Candidates,
-) -> Result<Vec3, Fault> {
+pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -> Result<Vec3, Fault> {
     let frame = context.frame;
-    let Some(CausticGather { neighbors, max_distance }) = frame.caustics else { return Ok(Vec3::ZERO) };
+    let Some(CausticGather { max_distance, .. }) = frame.caustics else { return Ok(Vec3::ZERO) };
     let photons = context.scene.header.section(SectionKind::CausticLeaves).records;
     let (reflection, lit_by) = lit(&point.surface.reflection, frame.gather_rays);
     if photons == 0 || reflection.is_black() {
@@ -30,9 +25,6 @@ pub fn reflected<M: MemoryPort>(
     }
     context.memory.enter(Stage::Caustic);
     context.counters.caustic_gathers += 1;
-    let position = point.surface.position;
-    let mut nearest = NearestPhotons::new(candidates, neighbors, max_distance);
-    search(context, PhotonMap::Caustics, position, &mut nearest)?;
     let header = &context.scene.header;
     let unit = header.caustic_power_unit / header.radiance_unit;
     // Reflection is by the shading normal; photons carry the geometric one.
@@ -41,10 +33,25 @@ pub fn reflected<M: MemoryPort>(
     let (record, lobe) =
         PartialReflection::encode_present(&reflector, Vec3::splat(unit), point.pattern.dither(0));
     let record = record.among(encode_normal(surface.geometric_normal.to_array()));
-    let normals = [surface.normal, surface.geometric_normal];
-    let reflected = reflected_caustics(&nearest, position, (&record, lobe), lit_by, normals);
-    count_reflection(context.counters, &record, &nearest, &reflected);
-    Ok(reflected.radiance)
+    let caustics = reflected_caustics(CausticSearch {
+        scene: context.scene,
+        memory: context.memory,
+        position: surface.position,
+        max_radius: max_distance,
+        reflection: &record,
+        lobe,
+        lit_by,
+        normals: [surface.normal, surface.geometric_normal],
+    })?;
+    let counters = &mut context.counters;
+    counters.normals_decoded += u64::from(caustics.normals_decoded);
+    if !record.is_lambertian() {
+        counters.photons_reflected += u64::from(caustics.photons);
+        if record.is_of_microfacets() {
+            counters.photons_on_microfacets += u64::from(caustics.photons);
+        }
+    }
+    Ok(caustics.radiance)
 }
 
 /// The reflection that the map lights, and the photons that light its lobe. Gather rays of a narrow lobe meet lights with extent, but

@@ -41,8 +41,9 @@ pub(crate) struct RenderOptions {
     /// Cameras that the photons are for
     ///
     /// For the picture's camera more photons are where it uses them: light through a window wastes fewer on the outside of a house. The
-    /// picture's expected value stays. Pictures of several cameras, such as frames and prepared scenes, share photons for the scene.
-    #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::default().name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
+    /// picture's expected value stays. With auto a pilot measures what that gains, unless all that it would choose is stated. Pictures of
+    /// several cameras, such as frames and prepared scenes, share photons for the scene.
+    #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::Auto.name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
     photons_for: PhotonsFor,
     #[command(flatten)]
     pub(super) integrator: IntegratorOptions,
@@ -130,12 +131,23 @@ impl RenderOptions {
         let base = quality.settings();
         RenderSettings {
             picture: self.picture.settings(&base.picture),
-            photons: PhotonMaps { photons_for: self.photons_for, ..self.photons.settings(&base.photons) },
+            photons: PhotonMaps { photons_for: self.photons_for(), ..self.photons.settings(&base.photons) },
             integrator: self.integrator.settings(&base.integrator),
             schedule: Schedule { part: self.parts.part, ..self.schedule.settings() },
             cards,
             outputs: self.tile_outputs(&self.outputs),
         }
+    }
+
+    /// Returns whether a pilot chooses the cameras that the photons are for.
+    pub(crate) fn leaves_cameras_open(&self) -> bool {
+        self.photons_for() == PhotonsFor::Auto
+    }
+
+    /// Cameras that the photons are for: any, where several pictures share them.
+    fn photons_for(&self) -> PhotonsFor {
+        let is_shared = self.frames.numbers().is_some() || self.prepared.prepared;
+        if is_shared { PhotonsFor::Scene } else { self.photons_for }
     }
 
     /// Settings of these outputs while a picture is rendered.

@@ -75,7 +75,10 @@ pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitte
             None => "--adaptive off".to_owned(),
         }
     });
-    words.chain(adaptive).collect::<Vec<_>>().join(" ")
+    let for_camera = pixels.get("photons-for").and_then(serde_json::Value::as_str) == Some("camera");
+    let cameras =
+        (is_fitted && options.leaves_cameras_open() && for_camera).then(|| "--photons-for camera".to_owned());
+    words.chain(adaptive).chain(cameras).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

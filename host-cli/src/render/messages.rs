@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use photoncard_driver::choice::Choice;
-use photoncard_driver::quality::Quality;
+use photoncard_driver::photon_map::PhotonsFor;
+use photoncard_driver::quality::{Beyond, Fit, Quality, Stated};
 use photoncard_driver::render::{
     MemoryStatistics, NamedSettings, Picture, ReadStatistics, RenderSettings, Rendering, Statistics, Times,
 };
@@ -68,16 +69,36 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
         Some(threshold) => format!(", more paths by the threshold {threshold}"),
         None => String::new(),
     };
+    let cameras = if photons.photons_for == PhotonsFor::Camera { " for the camera" } else { "" };
     let (planned, samples) =
         if are_planned { ("planned for ", integrator.planned()) } else { ("", integrator.samples) };
     format!(
-        "{planned}{} a pixel{paths}; {} a sample, {} {of}; {interpolated}; {} photons, {} a gather",
+        "{planned}{} a pixel{paths}; {} a sample, {} {of}; {interpolated}; {} photons{cameras}, {} a gather",
         counted(samples as usize, "sample"),
         counted(integrator.shadow_rays as usize, "shadow ray"),
         counted(integrator.gather_rays as usize, "gather ray"),
         photons.count,
         photons.neighbors,
     )
+}
+
+/// What a fit has measured for photons of the camera, and what the scene would take beyond the bounds of its quality, where settings are
+/// not stated.
+pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Vec<String> {
+    let gain = fit.measured.photons_for_camera.map(|ratio| {
+        let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };
+        format!("photons for the camera have {ratio:.2} times the squared error of as many for any camera: {taken}")
+    });
+    let Beyond { photons, gather_rays } = fit.beyond;
+    let photons = photons.filter(|_| !stated.photons).map(|more| {
+        let most = settings.photons.count;
+        format!("no more than {most} photons; this scene would take {more} (--photons {more}, or a better --quality)")
+    });
+    let gather_rays = gather_rays.filter(|_| !stated.gather_rays).map(|more| {
+        let most = fit.gather_rays;
+        format!("no more than {most} gather rays a pixel; this scene would take {more} (a better --quality)")
+    });
+    [gain, photons, gather_rays].into_iter().flatten().collect()
 }
 
 /// Contents of a scene, and the view of it.

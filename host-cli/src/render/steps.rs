@@ -75,6 +75,8 @@ pub(super) fn chosen(
         let by = if are_kept { "kept samples".to_owned() } else { messages::by_quality(options.quality) };
         let are_planned = options.samples.aim().is_some();
         progress.say(format_args!("photoncard: {by}: {}", messages::chosen(&settings, are_planned)));
+        let notes = fit.map(|fit| messages::fitted(fit, &settings, stated)).unwrap_or_default();
+        notes.iter().for_each(|note| progress.say(format_args!("photoncard: {by}: {note}")));
     }
     (settings.photons, settings.integrator)
 }

@@ -86,7 +86,7 @@ fn of_picture(picture: &Picture, words: &mut Words) {
 fn of_photons(photons: &PhotonMaps, words: &mut Words) {
     let PhotonMaps {
         count,
-        photons_for: _,
+        photons_for,
         layout,
         neighbors,
         max_distance,
@@ -95,6 +95,7 @@ fn of_photons(photons: &PhotonMaps, words: &mut Words) {
         radiance,
     } = photons;
     words.add("--photons", count);
+    words.add("--photons-for", photons_for.resolved().name());
     words.add("--photon-map", layout.name());
     words.add("--neighbors", neighbors);
     words.add_some("--caustic-photons", *caustic_photons);

@@ -20,6 +20,8 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// ([`is_of_region`]), a gather counts photons of the region that its point sees alone, and divides by that region's area in the plane
 /// times the fraction. It is stored as a code of [`disc_fraction`].
 ///
+/// In the caustic map these bits hold the code of the radius that the photon is spread over, of [`super::kernel_share`].
+///
 /// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it, but importance
 /// sampling, which asks for the directions of indirect light, leaves it out. In the caustic map the flag marks light of a surface or of
 /// the environment, which gather rays of a narrow lobe meet as well.

@@ -50,7 +50,8 @@ impl PreparedScene {
         settings.check()?;
         check_cameras(settings.photons.photons_for)?;
         let mut times = Times::default();
-        let (settings, source) = Source::new(scene, settings, Some(choose), &mut None, &mut times)?;
+        let (mut settings, source) = Source::new(scene, settings, Some(choose), &mut None, &mut times)?;
+        settings.photons.photons_for = settings.photons.photons_for.resolved();
         settings.check()?;
         settings.check_budgets(budgets)?;
         let kept = source.prepare(scene, &settings, budgets, &mut times, observer)?;
@@ -119,7 +120,7 @@ impl PreparedScene {
 /// Checks that photons are for all cameras of a scene.
 fn check_cameras(photons_for: PhotonsFor) -> Result<(), RenderError> {
     match photons_for {
-        PhotonsFor::Scene => Ok(()),
+        PhotonsFor::Scene | PhotonsFor::Auto => Ok(()),
         PhotonsFor::Camera => Err(RenderError::Setting {
             option: "--photons-for",
             value: photons_for.name().into(),

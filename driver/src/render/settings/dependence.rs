@@ -62,7 +62,7 @@ impl RenderSettings {
             ("filter", json!(filter.name())),
             ("aov", json!(layers.of_chip().to_string())),
             ("photons", json!(count)),
-            ("photons-for", json!(photons_for.name())),
+            ("photons-for", json!(photons_for.resolved().name())),
             ("neighbors", json!(neighbors)),
             ("max-distance", json!(max_distance)),
             ("caustic-photons", json!(caustic_photons)),

@@ -98,9 +98,9 @@ fn options(random: &mut Random) -> Vec<String> {
 fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
     let mut wish = Wish::new(options.settings(), options.stated(), options.scene.assignments.clone());
     for _ in 0..random.below(6) {
-        let mut place = |reach| [(); 3].map(|()| random.number(reach));
+        let mut place = |reach: f32| [(); 3].map(|()| f64::from(random.number(reach)));
         match place(1.0)[0] {
-            change if change < -0.4 => wish.look(place(1e3), place(1e-6), place(1.0)[0].abs() * 90.0),
+            change if change < -0.4 => wish.look(place(1e3), place(1e-6), place(1.0)[0].abs() as f32 * 90.0),
             change if change < 0.0 => wish.set("lamp \"x\".emission".into(), place(1e20).to_vec()),
             change if change < 0.2 => wish.set("a.exponent".into(), vec![place(1e-20)[0].abs()]),
             change if change < 0.6 => wish.change(random.one(&[

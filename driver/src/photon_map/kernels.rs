@@ -1,0 +1,114 @@
+//! Radii of the kernels of caustic photons, by the density of the light that each belongs to.
+//!
+//! Photons of one light have like directions: those that a ball scatters over a room are few, and lie among the many of a patch of sun.
+//! The radius of a photon is that within which a number of photons of its surface and of about its direction lie, so that neither a
+//! sparse light shows its photons nor a dense one is blurred by it.
+
+use glam::Vec3;
+use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_kernel, kernel_share};
+
+use super::neighbors::{Place, Places};
+use crate::photon::{Photons, StoredPhoton};
+
+/// Maximum number of neighbours by which the density is estimated: the radius is that of more of them, at this density.
+const MAX_PROBED: u32 = 64;
+/// Area of a kernel's disc over that of an even disc of equal variance: a kernel that falls to its edge sees fewer photons.
+const AREA: f32 = 4.0 / 3.0;
+/// Maximum radius over the diagonal of the scene: light that is sparser shows its photons, as faint spots of this size.
+const MAX_SHARE_OF_DIAGONAL: f32 = 0.1;
+/// Minimum radius, cells of the photon grid.
+const MIN_CELLS: f32 = 4.0;
+/// Ratio of the area of a photon's disc and that of its code, at which the code changes: the middle of two powers of two.
+const ROUNDING: f32 = std::f32::consts::FRAC_1_SQRT_2;
+/// Cells by which the reach of a photon is rounded up.
+const MARGIN_CELLS: u32 = 2;
+
+/// Gives each photon the code of its radius, in which about `neighbors` of its light lie. Returns the radius of the last code, metres.
+pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f32 {
+    let grid = photons.grid();
+    let places = Places::new(photons.stored().iter().map(place).collect());
+    let limit = (MAX_SHARE_OF_DIAGONAL * diagonal / grid.cell).max(MIN_CELLS);
+    let probed = neighbors.clamp(1, MAX_PROBED);
+    let by_probed = (AREA * neighbors as f32 / probed as f32).sqrt();
+    let distances = places.distances(probed as usize, limit);
+    let radii: Vec<f32> =
+        distances.into_iter().map(|distance| (distance * by_probed).clamp(MIN_CELLS, limit)).collect();
+    let greatest = radii.iter().copied().fold(MIN_CELLS, f32::max);
+    for (photon, radius) in photons.stored_mut().iter_mut().zip(radii) {
+        let code = encode_kernel((radius / greatest).powi(2) * ROUNDING);
+        *photon = StoredPhoton::at(photon.point(), Photon::content_with_disc(photon.content(), code));
+    }
+    greatest * grid.cell
+}
+
+/// Cells that a photon's disc reaches from its place; `greatest` is the radius of the last code.
+pub(super) fn reach(photon: &StoredPhoton, greatest: f32) -> u32 {
+    let [.., low, high] = photon.content();
+    let code = Photon::disc_of_flags(u16::from_le_bytes([low, high]));
+    (greatest * kernel_share(code).sqrt()).ceil() as u32 + MARGIN_CELLS
+}
+
+fn place(photon: &StoredPhoton) -> Place {
+    let [_, _, _, _, u, v, low, high] = photon.content();
+    let normal = decode_normal(Photon::normal_of_flags(u16::from_le_bytes([low, high])));
+    Place {
+        position: Vec3::from_array(photon.point().map(|coordinate| coordinate as f32)),
+        normal: Vec3::from(normal).normalize_or_zero(),
+        direction: Vec3::from(decode_direction([u, v])).normalize_or_zero(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::sampler::hash;
+    use photoncard_shared::layout::{FULL_DISC, PhotonGrid, Rgbe, encode_direction, encode_normal};
+
+    use super::*;
+
+    fn photon(position: Vec3, direction: Vec3) -> Photon {
+        Photon {
+            position: position.to_array(),
+            power: Rgbe::encode([1.0; 3], 0),
+            direction: encode_direction(direction.to_array()),
+            axis: 0,
+            normal: encode_normal([0.0, 1.0, 0.0]),
+            disc: FULL_DISC,
+            direct: false,
+        }
+    }
+
+    /// Places in a square of a side, at height 0.
+    fn square(side: f32, count: u32) -> impl Iterator<Item = Vec3> {
+        let number = |index: u32| (hash(index) >> 8) as f32 / 16_777_216.0;
+        (0..count).map(move |index| Vec3::new(number(2 * index), 0.0, number(2 * index + 1)) * side)
+    }
+
+    /// A thousand photons of a square metre are hidden in ten thousand of another light: each has the radius of its own.
+    #[test]
+    fn a_radius_is_by_the_density_of_the_photons_own_light() {
+        let sun = square(1.0, 100_000).map(|place| photon(place, Vec3::Y));
+        let sparse = square(1.0, 1000).map(|place| photon(place, Vec3::new(0.8, 0.6, 0.0)));
+        let grid = PhotonGrid::around([0.0; 3], [1.0; 3]);
+        let mut photons = Photons::new(grid, 1.0, sun.chain(sparse));
+        let greatest = spread(&mut photons, 50, 10.0);
+        let radii: Vec<f32> =
+            photons.iter().map(|photon| greatest * kernel_share(photon.disc).sqrt()).collect();
+        let mean = |radii: &[f32]| radii.iter().sum::<f32>() / radii.len() as f32;
+        let expected = |density: f32| (AREA * 50.0 / (std::f32::consts::PI * density)).sqrt();
+        for (found, density) in [(mean(&radii[..100_000]), 1e5), (mean(&radii[100_000..]), 1e3)] {
+            let ratio = found / expected(density);
+            assert!(
+                (0.8..1.45).contains(&ratio),
+                "{ratio} of the radius at {density} photons a square metre"
+            );
+        }
+    }
+
+    #[test]
+    fn few_photons_have_a_share_of_the_diagonal() {
+        let grid = PhotonGrid::around([0.0; 3], [1.0; 3]);
+        let mut photons = Photons::new(grid, 1.0, [photon(Vec3::ZERO, Vec3::Y), photon(Vec3::X, Vec3::Y)]);
+        assert_eq!(spread(&mut photons, 50, 2.0), 0.2);
+        assert!(photons.iter().all(|photon| kernel_share(photon.disc) == 1.0));
+    }
+}

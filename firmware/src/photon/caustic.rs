@@ -1,0 +1,172 @@
+//! Radiance that caustic photons reflect, each spread over a disc of its own radius: a kernel estimate with sample-point bandwidths
+//! (Abramson 1982, *On bandwidth variation in kernel estimates*).
+//!
+//! `L = sum f(incoming) power K(d / h)`, over the photons of the surface within their radii `h`, with the kernel of Epanechnikov
+//! `K = 2 (1 - d^2 / h^2) / (pi h^2)`, whose integral over a plane is 1: a photon brings its power, however dense others are. The
+//! host chooses each radius by the density of the light that the photon belongs to. Boxes of the tree hold the discs of their photons,
+//! so that a search visits the boxes that hold its position.
+
+use core::f32::consts::PI;
+
+use glam::Vec3;
+use photoncard_shared::layout::{decode_direction, kernel_share};
+use photoncard_shared::message::Fault;
+
+use super::collector::Collector;
+use super::region::All;
+use super::{Candidate, LitBy, PhotonMap, SameSurface, leaves};
+use crate::fixed_point::ColourSum;
+use crate::memory::MemoryPort;
+use crate::scene::{DecodedLobe, PartialReflection, SceneImage};
+use crate::simd::{self, Isa, Kernel, LANES};
+use crate::vector::max;
+
+/// Light of caustic photons at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Caustics {
+    /// Radiance, in the units of the reflection.
+    pub radiance: Vec3,
+    /// Number of photons within their radii.
+    pub photons: u32,
+    /// Number of photons' normals that were decoded.
+    pub normals_decoded: u32,
+}
+
+/// Radiance of reflected caustic photons at a position; see [`CausticSearch`].
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(always)]
+pub fn reflected_caustics(search: CausticSearch<'_, impl MemoryPort>) -> Result<Caustics, Fault> {
+    simd::run(search)
+}
+
+/// Kernel of [`reflected_caustics`].
+pub struct CausticSearch<'s, M> {
+    /// The scene, with its caustic map.
+    pub scene: &'s SceneImage,
+    /// Card memory.
+    pub memory: &'s mut M,
+    /// Query position, metres.
+    pub position: Vec3,
+    /// Maximum radius of a photon, metres: that of the last code.
+    pub max_radius: f32,
+    /// Reflection at the position.
+    pub reflection: &'s PartialReflection,
+    /// Its lobe.
+    pub lobe: DecodedLobe,
+    /// Photons that light the lobe.
+    pub lit_by: LitBy,
+    /// The shading normal and the triangle's. A photon of incidence `i` counts by `n.i / g.i`, `n` the shading normal and `g` the
+    /// triangle's: the density of photons is the irradiance of the triangle.
+    pub normals: [Vec3; 2],
+}
+
+/// Maximum of `n.i / g.i`, where light comes along the triangle.
+const MAX_SHADING: f32 = 4.0;
+/// Distance to boxes within which a search visits them, cells of the photon grid: rounding at the borders of the scene.
+const MARGIN_CELLS: f32 = 2.0;
+/// Unit of the kernels' factors, 1 over the share of a disc's area: fifty photons of the smallest discs stay below the limit of a
+/// [`ColourSum`], and one of the largest has twenty bits.
+const FACTOR_UNIT: f32 = 32_768.0;
+
+impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
+    type Output = Result<Caustics, Fault>;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Self::Output {
+        let Self { scene, memory, position, max_radius, reflection, lobe, lit_by, normals } = self;
+        let margin = MARGIN_CELLS * scene.header.photon_grid.cell;
+        let max_squared = max(max_radius * max_radius, f32::MIN_POSITIVE);
+        let mut sums = Sums {
+            limit: margin * margin,
+            max_squared,
+            reflection,
+            lobe,
+            lit_by,
+            normals,
+            surface: SameSurface::new(reflection.normal()),
+            power: ColourSum::ZERO,
+            of_lobe: ColourSum::ZERO,
+            photons: 0,
+        };
+        leaves::gather(isa, scene, PhotonMap::Caustics.sections(), memory, (position, &All), &mut sums)?;
+        let area = PI * max_squared;
+        let reflected = reflection.reflected(&sums.power, &sums.of_lobe);
+        Ok(Caustics {
+            radiance: reflected * (2.0 * FACTOR_UNIT / area),
+            photons: sums.photons,
+            normals_decoded: sums.surface.decoded(),
+        })
+    }
+}
+
+/// Sums over the photons within their radii, in any order.
+struct Sums<'a> {
+    /// Squared distance to boxes within which a search visits them, m^2.
+    limit: f32,
+    /// Squared maximum radius, m^2.
+    max_squared: f32,
+    reflection: &'a PartialReflection,
+    lobe: DecodedLobe,
+    lit_by: LitBy,
+    normals: [Vec3; 2],
+    surface: SameSurface,
+    /// Sum of power times kernel.
+    power: ColourSum,
+    /// Sum of power times kernel and the lobe's factor.
+    of_lobe: ColourSum,
+    photons: u32,
+}
+
+impl Sums<'_> {
+    #[inline(always)]
+    fn add(&mut self, photon: &Candidate) {
+        let share = kernel_share(photon.disc());
+        let from_edge = 1.0 - photon.distance_squared() / (self.max_squared * share);
+        // False for NaN as well.
+        let is_within = from_edge > 0.0;
+        if !is_within || !self.surface.holds(photon.normal()) {
+            return;
+        }
+        self.photons += 1;
+        let factor = from_edge / (share * FACTOR_UNIT) * self.shading(photon);
+        let power = Vec3::from_array(photon.power().decode()) * factor;
+        self.power.add_light(power);
+        let is_lit = self.lit_by == LitBy::All || !photon.is_direct();
+        if is_lit && !self.reflection.is_lambertian() {
+            self.of_lobe.add_light(power * PartialReflection::lobe_factor(&self.lobe, photon.direction()));
+        }
+    }
+
+    /// `n.i / g.i`, 0 for light from below the shading normal's horizon.
+    #[inline(always)]
+    fn shading(&self, photon: &Candidate) -> f32 {
+        let [shading, geometric] = self.normals;
+        if shading == geometric {
+            return 1.0;
+        }
+        let incident = Vec3::from_array(decode_direction(photon.direction()));
+        let [shading, geometric] = [shading, geometric].map(|normal| max(normal.dot(incident), 0.0));
+        if shading < MAX_SHADING * geometric { shading / geometric } else { MAX_SHADING }
+    }
+}
+
+impl Collector for Sums<'_> {
+    #[inline(always)]
+    fn limit(&self) -> f32 {
+        self.limit
+    }
+
+    #[inline(always)]
+    fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]) {
+        // No overflow: the bits of infinity are below `u32::MAX`.
+        let mut mask = isa.below(distances, self.max_squared.to_bits() + 1) & !(u32::MAX << count);
+        while mask != 0 {
+            let lane = mask.trailing_zeros() as usize;
+            mask &= mask - 1;
+            let (Some(&distance), Some(&content)) = (distances.get(lane), contents.get(lane)) else { break };
+            self.add(&Candidate::new(f32::from_bits(distance), content.to_le_bytes()));
+        }
+    }
+}
