@@ -5,9 +5,9 @@ Two pictures of different seeds are rendered. Columns, in % and of channels apar
 - median, p95, most: errors of the blocks of the pictures' mean;
 - noise: root mean square of half of what the blocks of the two pictures differ by.
 
-With --map the picture is the photon map's own estimate, by a plate of metal before the camera (`plate.py`), its mean over more seeds. With
---furnace every surface is white under an even sky, and that estimate is 1 wherever light reaches: there is no reference, and rooms that
-are nearly closed are too noisy.
+With --map the picture is the photon map's own estimate, by a plate of metal before the camera (`plate.py`),
+its mean over more seeds. With --furnace every surface is white under an even sky, and that estimate is 1
+wherever light reaches: there is no reference, and rooms that are nearly closed are too noisy.
 """
 
 import argparse
@@ -23,14 +23,15 @@ mi.set_variant("scalar_rgb")
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "mitsuba"))
 
-import plate  # noqa: E402
 import gltf  # noqa: E402: of the folder beside
+import plate  # noqa: E402
 
 NAMES = ("living-room", "staircase", "classroom", "dining-room", "living-room-2")
 FURNACES = ("living-room",)
 BLOCK, DARK, LONG = 12, 0.05, 192
 # Settings of a view of the map, whose samples have nothing to average but the lobe.
-MAP = "--photons 1000000 --neighbors 24 --irradiance-cache off --spp 4 --gather-rays 1 --shadow-rays 2 --adaptive off".split()
+MAP = "--photons 1000000 --neighbors 24 --spp 4 --gather-rays 1 --shadow-rays 2".split()
+MAP += "--irradiance-cache off --adaptive off".split()
 # An error of this share is shown as full red or blue.
 SHOWN = 0.2
 
@@ -42,7 +43,10 @@ def main():
     for name in arguments.names or (FURNACES if arguments.furnace else NAMES):
         scene = convert(arguments, name)
         truth = None if arguments.furnace else reference(arguments, scene)
-        pictures = [photoncard(arguments, scene, seed) for seed in range(1, 1 + (arguments.seeds or (8 if shows_map(arguments) else 2)))]
+        pictures = [
+            photoncard(arguments, scene, seed)
+            for seed in range(1, 1 + (arguments.seeds or (8 if shows_map(arguments) else 2)))
+        ]
         report(arguments, name, pictures, np.ones_like(pictures[0]) if truth is None else truth)
 
 
@@ -52,7 +56,9 @@ def parse():
     if "--" in words:
         place = words.index("--")
         words, options = words[:place], words[place + 1 :]
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(NAMES)} [default: all]")
     parser.add_argument("--photoncard", type=Path, required=True, help="the command")
     parser.add_argument("--rooms", type=Path, required=True, help="the folder of the rooms' XML")
@@ -78,7 +84,17 @@ def convert(arguments, name):
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         options = ["--furnace", "--flat", "--no-glass"] if arguments.furnace else []
-        run([sys.executable, HERE / "to_gltf.py", arguments.rooms / name / "scene.xml", "--output", path, "--lambertian", *options])
+        run(
+            [
+                sys.executable,
+                HERE / "to_gltf.py",
+                arguments.rooms / name / "scene.xml",
+                "--output",
+                path,
+                "--lambertian",
+                *options,
+            ]
+        )
     return path
 
 
@@ -102,8 +118,26 @@ def reference(arguments, scene):
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         width, height = size(scene)
-        command = [sys.executable, HERE.parent / "mitsuba" / "converge.py", scene, "--size", f"{width}x{height}", *environment(arguments, scene)]
-        command += ["--per-pass", 128, "--every", 8, "--passes", arguments.passes, "--work", path.parent, "--output", path]
+        command = [
+            sys.executable,
+            HERE.parent / "mitsuba" / "converge.py",
+            scene,
+            "--size",
+            f"{width}x{height}",
+            *environment(arguments, scene),
+        ]
+        command += [
+            "--per-pass",
+            128,
+            "--every",
+            8,
+            "--passes",
+            arguments.passes,
+            "--work",
+            path.parent,
+            "--output",
+            path,
+        ]
         run(command)
     return read(path)
 
@@ -116,8 +150,27 @@ def photoncard(arguments, scene, seed):
         seen = scene.with_name(f"{scene.stem}-plate.glb")
         plate.add(scene, seen)
     output = arguments.folder / "picture.exr"
-    command = [arguments.photoncard, "render", seen, "--size", f"{width}x{height}", "--filter", "box", "--seed", seed, "-o", output, "--quiet"]
-    command += ["--aov", "none", *environment(arguments, scene), *(MAP if shows_map(arguments) else []), *arguments.options]
+    command = [
+        arguments.photoncard,
+        "render",
+        seen,
+        "--size",
+        f"{width}x{height}",
+        "--filter",
+        "box",
+        "--seed",
+        seed,
+        "-o",
+        output,
+        "--quiet",
+    ]
+    command += [
+        "--aov",
+        "none",
+        *environment(arguments, scene),
+        *(MAP if shows_map(arguments) else []),
+        *arguments.options,
+    ]
     run(command)
     picture = read(output)
     return picture[:, ::-1] if shows_map(arguments) else picture
@@ -131,7 +184,9 @@ def report(arguments, name, pictures, truth):
     errors = 100.0 * np.abs(found - expected) / level
     halves = [blocks(np.mean(pictures[first::2], axis=0)) for first in (0, 1)]
     noise = 100.0 * np.sqrt(np.mean(((halves[0] - halves[-1]) / level) ** 2)) / 2.0
-    columns = [f"{value:.1f} %" for value in (np.median(errors), np.percentile(errors, 95), errors.max(), noise)]
+    columns = [
+        f"{value:.1f} %" for value in (np.median(errors), np.percentile(errors, 95), errors.max(), noise)
+    ]
     print(f"| {name} | {picture.mean() / truth.mean():.4f} | {' | '.join(columns)} |", flush=True)
     show(arguments.folder / f"{name}.png", picture, truth, ((found - expected) / level).mean(axis=2))
 
@@ -139,7 +194,9 @@ def report(arguments, name, pictures, truth):
 def blocks(picture):
     """The mean colour of each whole block."""
     rows, columns = (side // BLOCK for side in picture.shape[:2])
-    return picture[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK, 3).mean(axis=(1, 3))
+    return (
+        picture[: rows * BLOCK, : columns * BLOCK].reshape(rows, BLOCK, columns, BLOCK, 3).mean(axis=(1, 3))
+    )
 
 
 def show(path, picture, truth, errors):
@@ -149,7 +206,10 @@ def show(path, picture, truth, errors):
     fine = np.kron(errors, np.ones((BLOCK, BLOCK)))
     signed[: fine.shape[0], : fine.shape[1], 0] = np.clip(fine / SHOWN, 0.0, 1.0)
     signed[: fine.shape[0], : fine.shape[1], 2] = np.clip(-fine / SHOWN, 0.0, 1.0)
-    shown = [(light * exposure / (1.0 + light * exposure)) ** (1.0 / 2.2) for light in np.maximum([truth, picture], 0.0)]
+    shown = [
+        (light * exposure / (1.0 + light * exposure)) ** (1.0 / 2.2)
+        for light in np.maximum([truth, picture], 0.0)
+    ]
     pixels = (255.0 * np.concatenate([*shown, signed], axis=1)).astype(np.uint8)
     mi.Bitmap(np.ascontiguousarray(pixels)).write(str(path))
 

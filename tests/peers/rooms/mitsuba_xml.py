@@ -1,4 +1,4 @@
-"""A scene of Mitsuba's XML: shapes as triangles in world space, materials, emitters and the sensor, names resolved."""
+"""A scene of Mitsuba's XML: triangles in world space, materials, emitters and the sensor, names resolved."""
 
 import xml.etree.ElementTree as xml
 from dataclasses import dataclass, field
@@ -30,7 +30,7 @@ class Shape:
 
 @dataclass
 class Bsdf:
-    """A material: its kind, the kinds it is wrapped in, and its properties: numbers, colours, or paths of textures."""
+    """A material: its kind, what it is wrapped in, and its numbers, colours and paths of textures."""
 
     name: str
     kind: str
@@ -41,7 +41,7 @@ class Bsdf:
 
 @dataclass
 class Sensor:
-    """A perspective camera: its matrix, the angle across the picture's width in degrees, and the picture's sides."""
+    """A perspective camera: its matrix, the angle across the picture in degrees, and the picture's sides."""
 
     to_world: np.ndarray
     fov: float
@@ -50,7 +50,7 @@ class Sensor:
 
 
 class Scene:
-    """Everything of a file that is read. `emitters` are (kind, properties, matrix) of those without a shape."""
+    """What is read of a file. `emitters` are (kind, properties, matrix) of those without a shape."""
 
     def __init__(self, path):
         path = Path(path)
@@ -65,7 +65,9 @@ class Scene:
         for index, item in enumerate(root.findall("shape")):
             self.add(item, f"{item.get('type')} {index}")
         self.sensor = self.read_sensor(root.find("sensor"))
-        self.emitters = [(item.get("type"), self.properties(item), matrix(item)) for item in root.findall("emitter")]
+        self.emitters = [
+            (item.get("type"), self.properties(item), matrix(item)) for item in root.findall("emitter")
+        ]
 
     def properties(self, item):
         """Numbers, colours, words and textures right below an element, by their names."""
@@ -184,6 +186,8 @@ def single(step):
         turn = mi.ScalarTransform4f().rotate([x, y, z], float(step.get("angle")))
         return np.array(turn.matrix)
     if step.tag == "lookat":
-        origin, target, up = ([float(number) for number in step.get(name).split(",")] for name in ("origin", "target", "up"))
+        origin, target, up = (
+            [float(number) for number in step.get(name).split(",")] for name in ("origin", "target", "up")
+        )
         return np.array(mi.ScalarTransform4f().look_at(origin, target, up).matrix)
     raise ValueError(f"a transform '{step.tag}' is not read here")

@@ -1,6 +1,7 @@
-"""Puts a plate of white, nearly smooth metal before a glTF scene's camera, turned so that it shows the view of before as a mirror does.
+"""Puts a plate of white, nearly smooth metal before a glTF scene's camera, which is turned to look into it.
 
-Gather rays of the plate's lobe end on what is seen: the picture is the photon map's own estimate, without a final gather in between.
+Gather rays of the plate's lobe end on what is seen: the picture, left and right exchanged, is the
+photon map's own estimate, without a final gather in between.
 """
 
 import json
@@ -30,7 +31,9 @@ def add(source, output):
     right, up, forward, eye = world[:3, 0], world[:3, 1], -world[:3, 2], world[:3, 3]
     half = REACH * DISTANCE
     middle = eye + DISTANCE * forward
-    corners = np.array([middle + half * (x * right + y * up) for x, y in ((1, -1), (-1, -1), (-1, 1), (1, 1))])
+    corners = np.array(
+        [middle + half * (x * right + y * up) for x, y in ((1, -1), (-1, -1), (-1, 1), (1, 1))]
+    )
     plate(document, data, corners)
     # The mirror's image of this camera is the one of before.
     turned = np.eye(4)
@@ -54,7 +57,11 @@ def plate(document, data, corners):
     ]
     metal = {"metallicFactor": 1.0, "roughnessFactor": ROUGHNESS}
     document["materials"].append({"name": "plate", "pbrMetallicRoughness": metal})
-    primitive = {"attributes": {"POSITION": first}, "indices": first + 1, "material": len(document["materials"]) - 1}
+    primitive = {
+        "attributes": {"POSITION": first},
+        "indices": first + 1,
+        "material": len(document["materials"]) - 1,
+    }
     document["meshes"].append({"name": "plate", "primitives": [primitive]})
     document["nodes"].append({"name": "plate", "mesh": len(document["meshes"]) - 1})
     document["scenes"][document.get("scene", 0)]["nodes"].append(len(document["nodes"]) - 1)
@@ -71,5 +78,10 @@ def binary(document, data):
     """The bytes of a .glb."""
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
-    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + bytes(data)
+    chunks = (
+        struct.pack("<I4s", len(text), b"JSON")
+        + text
+        + struct.pack("<I4s", len(data), b"BIN\0")
+        + bytes(data)
+    )
     return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks

@@ -1,4 +1,4 @@
-"""The light from infinitely far of a scene of Mitsuba's, as an equirectangular map in photoncard's orientation."""
+"""The light from infinitely far of a Mitsuba scene, as an equirectangular map as photoncard orients it."""
 
 import mitsuba as mi
 import numpy as np
@@ -16,7 +16,13 @@ def bake(scene):
 
 def texels(scene, kind, properties, to_world):
     """The mean radiance of each texel."""
-    radiance = {"constant": constant, "envmap": mapped, "sunsky": sun_and_sky, "sky": sun_and_sky, "sun": sun_and_sky}.get(kind)
+    radiance = {
+        "constant": constant,
+        "envmap": mapped,
+        "sunsky": sun_and_sky,
+        "sky": sun_and_sky,
+        "sun": sun_and_sky,
+    }.get(kind)
     if radiance is None:
         raise ValueError(f"light of the kind '{kind}' is not read here")
     total = np.zeros((HEIGHT, WIDTH, 3))
@@ -45,7 +51,9 @@ def constant(_scene, _kind, properties):
 def mapped(scene, _kind, properties):
     """A map, its texels taken as they are."""
     bitmap = mi.Bitmap(str(scene.folder / properties["filename"]))
-    picture = np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)) * properties.get("scale", 1.0)
+    picture = np.array(
+        bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False)
+    ) * properties.get("scale", 1.0)
 
     def lookup(way):
         u = np.arctan2(way[..., 0], -way[..., 2]) / (2.0 * np.pi) % 1.0
@@ -59,14 +67,16 @@ def mapped(scene, _kind, properties):
 def sun_and_sky(_scene, kind, properties):
     """Mitsuba's model of the sky; its zenith is y in files of Mitsuba 0.6, and z in Mitsuba 3."""
     x, y, z = properties["sunDirection"]
-    emitter = mi.load_dict({
-        "type": "sunsky",
-        "sun_direction": [float(x), float(-z), float(y)],
-        "turbidity": properties.get("turbidity", 3.0),
-        "sky_scale": properties.get("skyScale", 1.0) if kind != "sun" else 0.0,
-        "sun_scale": properties.get("sunScale", 1.0) if kind != "sky" else 0.0,
-        "sun_aperture": SUN_APERTURE * properties.get("sunRadiusScale", 1.0),
-    })
+    emitter = mi.load_dict(
+        {
+            "type": "sunsky",
+            "sun_direction": [float(x), float(-z), float(y)],
+            "turbidity": properties.get("turbidity", 3.0),
+            "sky_scale": properties.get("skyScale", 1.0) if kind != "sun" else 0.0,
+            "sun_scale": properties.get("sunScale", 1.0) if kind != "sky" else 0.0,
+            "sun_aperture": SUN_APERTURE * properties.get("sunRadiusScale", 1.0),
+        }
+    )
 
     def lookup(way):
         point = mi.SurfaceInteraction3f()

@@ -1,6 +1,7 @@
-"""Converts a room of Mitsuba's XML to glTF: a .glb, and beside it an .exr of its light from infinitely far, if there is any.
+"""Converts a room of Mitsuba's XML to a .glb, and beside it an .exr of its light from infinitely far, if any.
 
-Emission is radiometric. A `twosided` material is double-sided, others have one side. What is left out is named on the standard error.
+Emission is radiometric. A `twosided` material is double-sided, others have one side. Bumps are left out,
+and shapes whose files are absent, which are named on the standard error.
 """
 
 import argparse
@@ -50,9 +51,15 @@ def parse():
     parser.add_argument("--no-glass", action="store_true", help="leave out glass")
     parser.add_argument("--flat", action="store_true", help="leave out smooth normals")
     parser.add_argument("--one-sided", action="store_true", help="nothing is double-sided")
-    parser.add_argument("--furnace", action="store_true", help="all but glass is white and diffuse: under an even sky every surface has its radiance")
+    parser.add_argument(
+        "--furnace",
+        action="store_true",
+        help="all but glass is white and diffuse: under an even sky every surface has its radiance",
+    )
     parser.add_argument("--no-textures", action="store_true", help="the mean colour instead of textures")
-    parser.add_argument("--without", nargs="+", default=[], help="leave out materials or shapes of these names")
+    parser.add_argument(
+        "--without", nargs="+", default=[], help="leave out materials or shapes of these names"
+    )
     return parser.parse_args()
 
 
@@ -73,7 +80,19 @@ class Writer:
             "asset": {"version": "2.0", "generator": "photoncard, tests/peers/rooms"},
             "scene": 0,
             "scenes": [{"nodes": []}],
-            **{name: [] for name in ("nodes", "meshes", "accessors", "bufferViews", "materials", "textures", "images", "cameras")},
+            **{
+                name: []
+                for name in (
+                    "nodes",
+                    "meshes",
+                    "accessors",
+                    "bufferViews",
+                    "materials",
+                    "textures",
+                    "images",
+                    "cameras",
+                )
+            },
         }
 
     def add(self, shape, arguments):
@@ -83,8 +102,13 @@ class Writer:
             attributes["NORMAL"] = self.accessor(shape.normals, "VEC3", FLOAT)
         if shape.coordinates is not None:
             # Mitsuba's coordinates begin below, glTF's above.
-            attributes["TEXCOORD_0"] = self.accessor(shape.coordinates * [1.0, -1.0] + [0.0, 1.0], "VEC2", FLOAT)
-        primitive = {"attributes": attributes, "indices": self.accessor(shape.corners.reshape(-1, 1), "SCALAR", UNSIGNED)}
+            attributes["TEXCOORD_0"] = self.accessor(
+                shape.coordinates * [1.0, -1.0] + [0.0, 1.0], "VEC2", FLOAT
+            )
+        primitive = {
+            "attributes": attributes,
+            "indices": self.accessor(shape.corners.reshape(-1, 1), "SCALAR", UNSIGNED),
+        }
         primitive["material"] = self.material(shape, arguments)
         mesh = self.append("meshes", {"name": shape.name, "primitives": [primitive]})
         self.document["scenes"][0]["nodes"].append(self.append("nodes", {"name": shape.name, "mesh": mesh}))
@@ -97,7 +121,12 @@ class Writer:
     def accessor(self, values, kind, component):
         """The accessor of an array."""
         stored = values.astype(np.float32 if component == FLOAT else np.uint32)
-        item = {"bufferView": self.view(stored.tobytes()), "componentType": component, "count": len(stored), "type": kind}
+        item = {
+            "bufferView": self.view(stored.tobytes()),
+            "componentType": component,
+            "count": len(stored),
+            "type": kind,
+        }
         if kind == "VEC3":
             item |= {"min": stored.min(axis=0).tolist(), "max": stored.max(axis=0).tolist()}
         return self.append("accessors", item)
@@ -120,7 +149,10 @@ class Writer:
         """glTF's material of a shape."""
         bsdf = shape.material
         # Mitsuba's lamps shine from their fronts.
-        item = {"name": bsdf.name, "doubleSided": bsdf.is_twosided and shape.radiance is None and not arguments.one_sided}
+        item = {
+            "name": bsdf.name,
+            "doubleSided": bsdf.is_twosided and shape.radiance is None and not arguments.one_sided,
+        }
         if shape.radiance is not None and not arguments.furnace:
             strength = float(max(shape.radiance))
             item["emissiveFactor"] = (shape.radiance / max(strength, 1e-12)).tolist()
@@ -132,28 +164,46 @@ class Writer:
             item |= {"alphaMode": "MASK", "alphaCutoff": 0.5}
         elif bsdf.opacity is not None:
             item["alphaMode"] = "BLEND"
-            surface["baseColorFactor"] = [*surface.get("baseColorFactor", [1.0] * 4)[:3], float(np.mean(bsdf.opacity))]
+            surface["baseColorFactor"] = [
+                *surface.get("baseColorFactor", [1.0] * 4)[:3],
+                float(np.mean(bsdf.opacity)),
+            ]
         return item
 
     def surface(self, bsdf, has_coordinates, arguments):
         """Metallic-roughness parameters, and extensions."""
         values = bsdf.values
         if bsdf.kind in GLASS and not is_black(values.get("specularTransmittance")):
-            extensions = {"KHR_materials_transmission": {"transmissionFactor": 1.0}, "KHR_materials_ior": {"ior": ior(values)}}
+            extensions = {
+                "KHR_materials_transmission": {"transmissionFactor": 1.0},
+                "KHR_materials_ior": {"ior": ior(values)},
+            }
             if bsdf.kind != "thindielectric":
                 extensions["KHR_materials_volume"] = {"thicknessFactor": 1.0}
             return {"metallicFactor": 0.0, "roughnessFactor": roughness(bsdf)}, extensions
         if arguments.furnace:
-            return {"metallicFactor": 0.0, "baseColorFactor": [1.0] * 4}, {"KHR_materials_specular": {"specularFactor": 0.0}}
+            return {"metallicFactor": 0.0, "baseColorFactor": [1.0] * 4}, {
+                "KHR_materials_specular": {"specularFactor": 0.0}
+            }
         if bsdf.kind in METALS:
             if arguments.lambertian:
-                return {"metallicFactor": 0.0, "baseColorFactor": [GREY] * 3 + [1.0]}, {"KHR_materials_specular": {"specularFactor": 0.0}}
-            return {"metallicFactor": 1.0, "roughnessFactor": roughness(bsdf), "baseColorFactor": [*metal(bsdf), 1.0]}, {}
-        reflectance = values.get("diffuseReflectance", values.get("reflectance", np.full(3, 0.0 if bsdf.kind in GLASS else 0.5)))
+                return {"metallicFactor": 0.0, "baseColorFactor": [GREY] * 3 + [1.0]}, {
+                    "KHR_materials_specular": {"specularFactor": 0.0}
+                }
+            return {
+                "metallicFactor": 1.0,
+                "roughnessFactor": roughness(bsdf),
+                "baseColorFactor": [*metal(bsdf), 1.0],
+            }, {}
+        reflectance = values.get(
+            "diffuseReflectance", values.get("reflectance", np.full(3, 0.0 if bsdf.kind in GLASS else 0.5))
+        )
         surface = {"metallicFactor": 0.0, **self.base(reflectance, has_coordinates, arguments)}
         if arguments.lambertian or bsdf.kind in ("diffuse", "roughdiffuse"):
             return surface, {"KHR_materials_specular": {"specularFactor": 0.0}}
-        return {**surface, "roughnessFactor": max(roughness(bsdf), 0.1)}, {"KHR_materials_ior": {"ior": ior(values)}}
+        return {**surface, "roughnessFactor": max(roughness(bsdf), 0.1)}, {
+            "KHR_materials_ior": {"ior": ior(values)}
+        }
 
     def base(self, reflectance, has_coordinates, arguments):
         """The base colour, a factor or a texture."""
@@ -163,7 +213,9 @@ class Writer:
             return {"baseColorFactor": [*mean_colour(reflectance), 1.0]}
         if reflectance not in self.images:
             view = self.view(reflectance.read_bytes())
-            source = self.append("images", {"bufferView": view, "mimeType": MEDIA[reflectance.suffix.lower()]})
+            source = self.append(
+                "images", {"bufferView": view, "mimeType": MEDIA[reflectance.suffix.lower()]}
+            )
             self.images[reflectance] = self.append("textures", {"source": source})
         return {"baseColorTexture": {"index": self.images[reflectance]}}
 
@@ -172,7 +224,10 @@ class Writer:
         across = math.radians(sensor.fov)
         aspect = sensor.width / sensor.height
         yfov = 2.0 * math.atan(math.tan(across / 2.0) / aspect)
-        camera = self.append("cameras", {"type": "perspective", "perspective": {"yfov": yfov, "aspectRatio": aspect, "znear": 0.01}})
+        camera = self.append(
+            "cameras",
+            {"type": "perspective", "perspective": {"yfov": yfov, "aspectRatio": aspect, "znear": 0.01}},
+        )
         matrix = np.eye(4)
         axes = sensor.to_world[:3, :3] / np.linalg.norm(sensor.to_world[:3, :3], axis=0) * [-1.0, 1.0, -1.0]
         # A mirrored camera is turned into one that is not.
@@ -190,7 +245,9 @@ class Writer:
         text = json.dumps(document).encode()
         text += b" " * (-len(text) % 4)
         data = bytes(self.buffer) + bytes(-len(self.buffer) % 4)
-        chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+        chunks = (
+            struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(data), b"BIN\0") + data
+        )
         path.write_bytes(struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks)
 
 
@@ -210,7 +267,7 @@ def roughness(bsdf):
 
 
 def metal(bsdf):
-    """Reflectance of a metal straight on; smooth ones are white, as Mitsuba has no mirror with Schlick's reflectance."""
+    """Reflectance of a metal straight on; smooth ones are white, as Mitsuba has no Schlick mirror."""
     if bsdf.kind == "conductor":
         return [1.0, 1.0, 1.0]
     scale = bsdf.values.get("specularReflectance", np.ones(3))
