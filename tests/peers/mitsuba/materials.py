@@ -6,6 +6,8 @@ import numpy as np
 import textures
 
 VERTEX_COLOUR = "vertex_color"
+# The first bytes of an image without alpha.
+JPEG = b"\xff\xd8"
 SPECULAR, TRANSMISSION = "KHR_materials_specular", "KHR_materials_transmission"
 
 
@@ -16,8 +18,6 @@ def reflection(source, material, part):
     bsdf = {"type": "twosided", "front": front} if has_two_sides else front
     if material.get("alphaMode", "OPAQUE") == "OPAQUE":
         return bsdf
-    if material["alphaMode"] != "MASK":
-        raise ValueError(f"{material['name']}: blended surfaces are not read here")
     return {"type": "mask", "opacity": opacity(source, material), "nested": bsdf}
 
 
@@ -96,8 +96,12 @@ def lambertian(source, material, part):
 
 
 def opacity(source, material):
-    """One where the surface is there."""
+    """One where the surface is there; the share of it that is there, where it is blended."""
     info = material["pbrMetallicRoughness"].get("baseColorTexture")
+    if material["alphaMode"] == "BLEND":
+        if info is not None and not source.texture(info).image.startswith(JPEG):
+            raise ValueError(f"{material['name']}: surfaces blended by a texture are not read here")
+        return base_factor(material)[3]
     if info is None:
         raise ValueError(f"{material['name']}: cut out without a texture")
     return textures.cut_out(source.texture(info), base_factor(material)[3], material.get("alphaCutoff", 0.5))

@@ -27,8 +27,8 @@ def load(path, width, height, camera_name=None, environment_path=None):
 
 
 def has_holes(path):
-    """Whether surfaces are cut out."""
-    return any(material.get("alphaMode") == "MASK" for material in gltf.Scene(path).materials)
+    """Whether surfaces are cut out or blended."""
+    return any(material.get("alphaMode", "OPAQUE") != "OPAQUE" for material in gltf.Scene(path).materials)
 
 
 def sensor(camera, width, height):
