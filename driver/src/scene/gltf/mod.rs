@@ -40,6 +40,7 @@ mod specular_glossiness;
 mod tangents;
 mod texture;
 mod topology;
+mod touching_glass;
 mod transform;
 mod uri;
 mod variants;
