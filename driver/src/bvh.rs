@@ -28,10 +28,20 @@ pub struct Hierarchy {
 /// Indices of the triangles of a leaf, in the leaf's order.
 pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
 
-/// Triangles of a hierarchy; `cut_out` holds one entry per material.
+/// Properties of materials that leaves hold for their triangles. Materials beyond the end of a list have
+/// none.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Finishes<'a> {
+    /// True for materials whose triangles may have cut-outs.
+    pub cut_out: &'a [bool],
+    /// True for flat glass, which light passes without a change of direction.
+    pub flat_glass: &'a [bool],
+}
+
+/// Triangles of a hierarchy.
 struct Mesh<'a> {
     triangles: &'a [Triangle],
-    cut_out: &'a [bool],
+    finishes: Finishes<'a>,
 }
 
 /// Error of [`build`].
@@ -83,12 +93,11 @@ const REINSERTED: [f32; 2] = [0.2, 0.4];
 const SEARCH_DEPTH: usize = 2;
 
 /// Builds the hierarchy of `triangles`, at least one. The result does not depend on the machine or on threads.
-/// `cut_out[m]` is true if triangles of material `m` may have cut-outs; materials beyond its end have none.
 ///
 /// # Errors
 /// If the triangles or materials are too many, a corner is not finite or too far away, or a descent could overflow the
 /// chip's stack.
-pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, HierarchyError> {
+pub fn build(triangles: &[Triangle], finishes: Finishes) -> Result<Hierarchy, HierarchyError> {
     if triangles.len() > MAX_TRIANGLES {
         return Err(HierarchyError::TooMany { triangles: triangles.len() });
     }
@@ -105,7 +114,7 @@ pub fn build(triangles: &[Triangle], cut_out: &[bool]) -> Result<Hierarchy, Hier
     let parts = Parts::new(&boxes);
     let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, &boxes)).collect();
     let binary = binary(&around_parts);
-    let mesh = &Mesh { triangles, cut_out };
+    let mesh = &Mesh { triangles, finishes };
     let mut folded = Folded::new(tree(&binary, &parts, &boxes, mesh));
     if folded.stack > BVH_STACK {
         // A tree of median splits is slower to traverse, but has minimum depth.
@@ -183,8 +192,9 @@ impl Mesh<'_> {
     fn record(&self, triangle: &Triangle) -> layout::Triangle {
         let vertices = triangle.vertices.map(|vertex| vertex.to_array());
         let material = triangle.material;
-        let cut_out = self.cut_out.get(material as usize).copied().unwrap_or(false);
-        layout::Triangle { vertices, material, cut_out }
+        let is = |list: &[bool]| list.get(material as usize).copied().unwrap_or(false);
+        let [cut_out, flat_glass] = [self.finishes.cut_out, self.finishes.flat_glass].map(is);
+        layout::Triangle { vertices, material, cut_out, flat_glass }
     }
 
     /// Encodes a leaf of the triangles `indices`; `None` if they exceed one line.
@@ -306,7 +316,7 @@ mod tests {
     #[test]
     fn every_triangle_is_in_one_leaf_and_in_its_boxes() {
         for count in [1, 2, 3, 4, 17, 1000, 20_000] {
-            let hierarchy = build(&triangles(count), &[]).expect("builds");
+            let hierarchy = build(&triangles(count), Finishes::default()).expect("builds");
             let everywhere = NodeBox { lower: [-9.0; 3], upper: [9.0; 3] };
             let mut found = Vec::new();
             walk(&hierarchy, Child::Node(0), everywhere, &mut found);
@@ -328,7 +338,7 @@ mod tests {
                     [[a, b, c], [a, c, d]].map(|vertices| Triangle::new(vertices, hash(x + y) % materials))
                 })
                 .collect();
-            let hierarchy = build(&mesh, &[]).expect("builds");
+            let hierarchy = build(&mesh, Finishes::default()).expect("builds");
             let bits = |triangle: layout::Triangle| {
                 (triangle.vertices.map(|vertex| vertex.map(f32::to_bits)), triangle.material)
             };
@@ -338,7 +348,9 @@ mod tests {
                 .collect();
             let mut expected: Vec<_> = mesh
                 .iter()
-                .map(|triangle| bits(Mesh { triangles: &mesh, cut_out: &[] }.record(triangle)))
+                .map(|triangle| {
+                    bits(Mesh { triangles: &mesh, finishes: Finishes::default() }.record(triangle))
+                })
                 .collect();
             found.sort_unstable();
             expected.sort_unstable();
@@ -356,7 +368,10 @@ mod tests {
         for coordinate in [f32::NAN, f32::INFINITY, 1e30] {
             let mut triangles = triangles(20);
             triangles[7].vertices[1] = Vec3::splat(coordinate);
-            assert!(matches!(build(&triangles, &[]), Err(HierarchyError::NotFinite)), "{coordinate}");
+            assert!(
+                matches!(build(&triangles, Finishes::default()), Err(HierarchyError::NotFinite)),
+                "{coordinate}"
+            );
         }
     }
 
@@ -371,7 +386,7 @@ mod tests {
                 Triangle::new([a, b, c], i % 3)
             });
             let begin = std::time::Instant::now();
-            let hierarchy = build(&squares.collect::<Vec<_>>(), &[]).expect("builds");
+            let hierarchy = build(&squares.collect::<Vec<_>>(), Finishes::default()).expect("builds");
             assert!(begin.elapsed().as_secs() < 60, "{:?}", begin.elapsed());
             let mut found: Vec<u32> = hierarchy.leaf_triangles.iter().flatten().copied().collect();
             found.sort_unstable();
@@ -382,7 +397,7 @@ mod tests {
     #[test]
     fn triangles_in_one_place_are_no_trouble() {
         let [triangle] = triangles(1)[..] else { unreachable!() };
-        let hierarchy = build(&vec![triangle; 5000], &[]).expect("builds");
+        let hierarchy = build(&vec![triangle; 5000], Finishes::default()).expect("builds");
         assert!((5000 / LEAF_TRIANGLES..5000 / 3).contains(&hierarchy.leaves.len()));
     }
 }

@@ -13,13 +13,14 @@ use photoncard_shared::layout::{
 use photoncard_shared::message::SumScale;
 
 use crate::allocation::{self, OutOfMemory};
-use crate::bvh::{self, LeafTriangles};
+use crate::bvh::{self, Finishes, LeafTriangles};
 use crate::light::{Lights, Sources};
 use crate::scene::Scene;
 
 mod card_image;
 mod corners;
 mod error;
+mod flat_glass;
 mod image_lines;
 mod mapped;
 mod materials;
@@ -29,6 +30,7 @@ mod writer;
 pub use self::card_image::CardImage;
 use self::corners::PackedCorners;
 pub use self::error::PackError;
+use self::flat_glass::Glazing;
 pub(crate) use self::mapped::MappedLines;
 pub(crate) use self::writer::ImageWriter;
 
@@ -124,7 +126,10 @@ impl PackedScene {
 /// Writes the sections of a scene.
 fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     let uncovered = scene.uncovered_materials();
-    let hierarchy = bvh::build(&scene.triangles, &uncovered)?;
+    let glazing = Glazing::new(scene);
+    let flat_glass = glazing.is_flat(scene);
+    let cut_out = glazing.of_materials(&uncovered);
+    let hierarchy = bvh::build(&glazing.triangles, Finishes { cut_out: &cut_out, flat_glass: &flat_glass })?;
     let corners = PackedCorners::new(scene, lights, (&hierarchy.leaf_triangles, &uncovered));
     let textures = textures::records(scene, lights.environment())?;
     let indices = indices_in_image(scene, &hierarchy.leaf_triangles);
@@ -133,7 +138,8 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     image.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
     image.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
     image.append(SectionKind::Attributes, corners.records.into_iter())?;
-    image.append(SectionKind::Materials, materials::records(scene, lights, &uncovered))?;
+    let materials = glazing.records(materials::records(scene, lights, &uncovered));
+    image.append(SectionKind::Materials, materials.iter().map(layout::Material::to_bytes))?;
     image.append(SectionKind::Layers, materials::layers(scene).into_iter())?;
     image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
     image.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;

@@ -19,7 +19,7 @@ use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::render::RenderJob;
 use photoncard_firmware::sampler::hash;
-use photoncard_firmware::scene::{Ray, Surface, closest_hit, is_occluded, read_surface};
+use photoncard_firmware::scene::{Ray, Surface, closest_hit, read_surface, transmittance};
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::Photon;
 use photoncard_shared::message::{Radiance, Tile};
@@ -135,7 +135,7 @@ fn cast(bencher: Bencher, prepared: &Prepared, any_hit: bool) {
     let (scene, mut memory) = prepared.image.view();
     bencher.counter(ItemsCount::new(rays.len())).bench_local(|| {
         let is_hit = |ray: &&Ray| match any_hit {
-            true => is_occluded(&scene, &mut memory, ray).expect("sound"),
+            true => transmittance(&scene, &mut memory, ray).expect("sound") == Vec3::ZERO,
             false => closest_hit(&scene, &mut memory, ray).expect("sound").is_some(),
         };
         rays.iter().filter(is_hit).count()

@@ -10,12 +10,14 @@
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_firmware::memory::{Counted, Lines, MemoryPort};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{
-    BUNDLE_RAYS, Ray, SceneImage, Surface, are_occluded, closest_hit, closest_hits, is_occluded, read_surface,
+    BUNDLE_RAYS, Ray, SceneImage, Surface, closest_hit, closest_hits, read_surface, transmittance,
+    transmittances,
 };
 use photoncard_shared::address::Structure;
 use photoncard_shared::image::SectionKind;
@@ -71,11 +73,13 @@ fn cast_all(
     };
     for bundle in rays.chunks(if is_bundled { BUNDLE_RAYS } else { 1 }) {
         match (is_any, bundle) {
-            (true, [ray]) if is_occluded(image, memory, ray).expect("sound") => add(0.0),
-            (true, [_]) => {}
+            (true, [ray]) => {
+                let share = transmittance(image, memory, ray).expect("sound");
+                (share == Vec3::ZERO).then(|| add(0.0));
+            }
             (true, rays) => {
-                let occluded = are_occluded(image, memory, rays).expect("sound");
-                occluded.iter().filter(|&&is_occluded| is_occluded).for_each(|_| add(0.0));
+                let passed = transmittances(image, memory, rays).expect("sound");
+                passed.iter().filter(|passed| passed.0 == Vec3::ZERO).for_each(|_| add(0.0));
             }
             (false, [ray]) => {
                 let hit = closest_hit(image, memory, ray).expect("sound");

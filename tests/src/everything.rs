@@ -23,11 +23,13 @@ const PANE: u32 = 10;
 const ICE: u32 = 11;
 const BUMPS: u32 = 12;
 const DENTS: u32 = 13;
+const WINDOW: u32 = 14;
 
 /// A room with a lamp, a point light, a spot and a directional light, a sky through its open front, walls with textures
 /// of both sets of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, an emissive
 /// screen, a veil of partial coverage with sheen and diffuse transmission, a varnished board, a rough pane and a rough block of glass,
-/// and normal maps on a glossy and on a Lambertian sheet.
+/// normal maps on a glossy and on a Lambertian sheet, and under the lamps a shelf of tinted glass and a
+/// coated window with textures.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
@@ -63,6 +65,8 @@ pub fn everything() -> Scene {
     add_textured_quad(&mut scene, upright(Vec3::new(0.7, -0.1, -0.2), 0.2), coordinates, VARNISHED);
     add_textured_quad(&mut scene, upright(Vec3::new(-0.2, -0.6, 0.3), 0.15), coordinates, PANE);
     scene.triangles.extend(cuboid(Vec3::new(0.0, -0.8, 0.0), Vec3::splat(0.1), ICE));
+    scene.triangles.extend(cuboid(Vec3::new(0.3, 0.8, 0.2), Vec3::new(0.5, 0.01, 0.4), GLASS));
+    add_textured_quad(&mut scene, upright(Vec3::new(-0.2, 0.6, 0.4), 0.3), coordinates, WINDOW);
     for (material, x) in [(BUMPS, -0.7), (DENTS, 0.8)] {
         add_textured_quad(&mut scene, upright(Vec3::new(x, -0.1, -0.4), 0.2), coordinates, material);
         let along = Vec3::new(1.0, 0.0, 0.3).normalize();
@@ -116,12 +120,19 @@ fn materials() -> Vec<Material> {
             ..Material::new("varnished", glossy(0.3, 0.9, None))
         },
         Material {
-            layers: Some(Box::new(Layers { transmission_texture: Some(2), ..none })),
+            layers: Some(Box::new(Layers { transmission_texture: Some(2), ..none.clone() })),
             ..Material::new("pane", glossy(0.0, 0.4, Some(thin)))
         },
         Material::new("ice", glossy(0.1, 0.3, Some(clear))),
         Material { layers: bumpy(0.7), ..Material::new("bumps", glossy(0.9, 0.3, None)) },
         Material { layers: bumpy(-0.4), double_sided: true, ..lambertian("dents", 0.7) },
+        Material {
+            blends: true,
+            alpha: 0.8,
+            base_texture: Some(3),
+            layers: Some(Box::new(Layers { transmission_texture: Some(2), ..varnish(&none) })),
+            ..Material::new("window", glossy(0.0, 0.0, Some(thin)))
+        },
     ]
 }
 

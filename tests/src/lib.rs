@@ -13,11 +13,25 @@ pub mod wire;
 use glam::Vec3;
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{RenderSettings, Rendering, Unobserved, render};
-use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
+use photoncard_driver::scene::{Camera, Material, Reflection, Scene, Transmission, Triangle};
 
 /// A grey, one-sided Lambertian material of an albedo that does not emit.
 pub fn lambertian(name: &str, albedo: f32) -> Material {
     Material::lambertian(name, Vec3::splat(albedo))
+}
+
+/// Smooth clear glass of a base colour and an index of refraction of 1.5.
+pub fn glass(name: &str, base_colour: Vec3, is_volume: bool) -> Material {
+    let transmission = Transmission { factor: 1.0, ior: 1.5, is_volume, absorption: Vec3::ZERO };
+    let reflection = Reflection::MetallicRoughness {
+        base_colour,
+        metallic: 0.0,
+        roughness: 0.0,
+        dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
+        transmission: Some(transmission),
+    };
+    Material::new(name, reflection)
 }
 
 /// The two triangles of a quadrilateral with corners in counter-clockwise order, seen from its front.

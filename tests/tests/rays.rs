@@ -6,14 +6,14 @@ use photoncard_driver::scene::{Material, Scene, Triangle, gltf};
 use photoncard_firmware::memory::{Counted, Lines};
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{
-    AnyHit, BUNDLE_RAYS, Bundle, ClosestHit, Hit, Ray, RayFrame, SceneImage, are_occluded, closest_hit,
-    closest_hits, is_occluded,
+    BUNDLE_RAYS, Bundle, ClosestHit, Hit, Passed, Ray, RayFrame, SceneImage, ShadowRay, closest_hit,
+    closest_hits, transmittance, transmittances,
 };
 use photoncard_firmware::simd::Level;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES};
-use photoncard_tests::{camera, lambertian, scene};
+use photoncard_tests::{camera, glass, lambertian, scene};
 
 fn packed(triangles: Vec<Triangle>) -> PackedScene {
     let scene = scene(triangles, vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
@@ -144,8 +144,9 @@ fn every_processor_finds_what_brute_force_finds() {
                     closest.is_none_or(|hit| hit == Ok(expected)),
                     "{level:?}: {ray:?} in scene {number}"
                 );
-                let any = level.run(AnyHit { scene: &image, memory: &mut memory, ray });
-                assert!(any.is_none_or(|any| any == Ok(expected.is_some())), "{level:?}: {ray:?}");
+                let passed = level.run(ShadowRay { scene: &image, memory: &mut memory, ray });
+                let share = if expected.is_some() { Vec3::ZERO } else { Vec3::ONE };
+                assert!(passed.is_none_or(|passed| passed == Ok(share)), "{level:?}: {ray:?}");
             }
         }
         assert!(hits > 1000 && hits < 3900, "{hits} of scene {number}");
@@ -170,7 +171,7 @@ fn no_ray_leaves_a_closed_surface() {
             };
             let ray = Ray::new(origin, (target - origin).normalize());
             assert!(closest_hit(&image, &mut memory, &ray).unwrap().is_some(), "{ray:?} leaves");
-            assert!(is_occluded(&image, &mut memory, &ray).unwrap(), "{ray:?} leaves");
+            assert_eq!(transmittance(&image, &mut memory, &ray).unwrap(), Vec3::ZERO, "{ray:?} leaves");
         }
     }
 }
@@ -217,7 +218,10 @@ fn rays_of_a_bundle_hit_what_each_hits_alone_in_every_shipped_scene() {
         paths.filter(is_scene).map(|path| gltf::load(&path).expect("a shipped scene loads")).collect();
     assert!(scenes.len() > 8, "{}", scenes.len());
     let sheet = Material { blends: true, alpha: 0.5, double_sided: true, ..lambertian("sheet", 0.5) };
-    scenes.push(scene(boards(), vec![sheet], camera(Vec3::splat(3.0), Vec3::NEG_ONE.normalize())));
+    let eye = || camera(Vec3::splat(3.0), Vec3::NEG_ONE.normalize());
+    scenes.push(scene(boards(), vec![sheet], eye()));
+    scenes.push(scene(boards(), vec![glass("panes", Vec3::new(0.9, 0.5, 0.1), false)], eye()));
+    let mut partly = 0;
     for (number, scene) in scenes.iter().enumerate() {
         let packed = PackedScene::new(scene).expect("packs");
         let (image, mut memory) = packed.view();
@@ -229,23 +233,30 @@ fn rays_of_a_bundle_hit_what_each_hits_alone_in_every_shipped_scene() {
             hits += alone.iter().flatten().count();
             let mut together = [None; BUNDLE_RAYS];
             closest_hits(&image, &mut memory, &rays, &mut together).expect("sound");
-            let occluded = are_occluded(&image, &mut memory, &rays).expect("sound");
+            let passed = transmittances(&image, &mut memory, &rays).expect("sound");
             assert_eq!(together[..rays.len()], alone, "bundle {index} of scene {number}");
-            assert!(
-                alone.iter().zip(occluded).all(|(hit, any)| hit.is_some() == any),
-                "bundle {index} of {number}"
-            );
+            for ((ray, hit), Passed(share)) in rays.iter().zip(&alone).zip(passed) {
+                assert_eq!(
+                    share,
+                    transmittance(&image, &mut memory, ray).expect("sound"),
+                    "{index} of {number}"
+                );
+                let meets_glass = hit.is_some_and(|hit| hit.triangle.flat_glass);
+                partly += u32::from(share != Vec3::ZERO && share != Vec3::ONE);
+                assert!(meets_glass || (share == Vec3::ONE) == hit.is_none(), "{index} of {number}");
+            }
             for level in Level::ALL {
-                let (mut closest, mut any) = ([None; BUNDLE_RAYS], [false; BUNDLE_RAYS]);
+                let (mut closest, mut any) = ([None; BUNDLE_RAYS], [Passed::ALL; BUNDLE_RAYS]);
                 let (scene, memory, rays) = (&image, &mut memory, &rays[..]);
                 let found = level.run(Bundle { scene, memory, rays, searches: &mut closest });
                 assert!(found.is_none_or(|found| found.is_ok() && closest == together), "{level:?}");
                 let found = level.run(Bundle { scene, memory, rays, searches: &mut any });
-                assert!(found.is_none_or(|found| found.is_ok() && any == occluded), "{level:?}");
+                assert!(found.is_none_or(|found| found.is_ok() && any == passed), "{level:?}");
             }
         }
         assert!(hits > 200, "{hits} of scene {number}");
     }
+    assert!(partly > 100, "{partly} rays through glass alone");
 }
 
 #[test]
@@ -263,11 +274,11 @@ fn shadow_rays_request_in_bundles_what_they_request_alone() {
         let rays = bundle(&scene, &scene.triangles, index);
         let alone = requests(&|memory| {
             for ray in &rays {
-                is_occluded(&image, memory, ray).expect("sound");
+                transmittance(&image, memory, ray).expect("sound");
             }
         });
         let together = requests(&|memory| {
-            are_occluded(&image, memory, &rays).expect("sound");
+            transmittances(&image, memory, &rays).expect("sound");
         });
         assert_eq!(together, alone, "{index}");
     }

@@ -166,29 +166,6 @@ fn what_is_inside_of_glass_shows_its_radiance_over_the_square_of_the_index() {
     assert!((seen / expected - 1.0).abs() < 0.01, "{seen} instead of {expected}");
 }
 
-/// Light of a lamp behind a pane reaches a floor as a caustic alone, reduced by the pane's transmittance.
-#[test]
-fn a_caustic_through_a_pane_is_the_lamp_dimmed() {
-    let square = |half: f32, y: f32, sign: f32, material: u32| {
-        let corner = |x: f32, z: f32| Vec3::new(x * half, y, -z * half * sign);
-        quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], material)
-    };
-    let floor = lambertian("floor", 0.8);
-    let look = |pane: bool| {
-        let mut triangles = [square(1.0, 0.0, 1.0, 1), square(0.5, 1.0, -1.0, 0)].concat();
-        if pane {
-            triangles.extend(square(4.0, 0.5, 1.0, 2));
-        }
-        let mut view = camera(Vec3::new(0.0, 0.3, 0.9), Vec3::new(0.0, -0.3, -0.9));
-        view.vertical_fov = 0.3;
-        let scene = scene(triangles, vec![black_lamp(), floor.clone(), glass(false, 0.0)], view);
-        mean(&radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.gather_rays = 0)).film))
-    };
-    // Most light is near normal incidence, so the mean transmittance is little less than there.
-    let share = look(true) / look(false);
-    assert!((0.88..0.925).contains(&share), "{share}");
-}
-
 /// A coat or a mirror alone casts no caustic on any surface: it shows the sky, and its base's reflection of the sky.
 #[test]
 fn specular_things_alone_under_a_sky_show_it() {

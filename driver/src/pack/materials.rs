@@ -11,19 +11,13 @@ use photoncard_shared::layout::{
 use crate::light::Lights;
 use crate::scene::{Layers, Material, NO_ATTRIBUTES, NormalMap, Reflection, Scene, Transmission};
 
-const RECORD_BYTES: usize = layout::Material::BYTES;
-
 /// The records of the layers of a scene's materials.
 pub(super) fn layers(scene: &Scene) -> Vec<[u8; layout::Layers::BYTES]> {
     scene.materials.iter().filter_map(|material| material.layers.as_deref()).map(layers_record).collect()
 }
 
 /// The records of a scene's materials; `uncovered` are [`Scene::uncovered_materials`].
-pub(super) fn records(
-    scene: &Scene,
-    lights: &Lights,
-    uncovered: &[bool],
-) -> impl ExactSizeIterator<Item = [u8; RECORD_BYTES]> {
+pub(super) fn records(scene: &Scene, lights: &Lights, uncovered: &[bool]) -> Vec<layout::Material> {
     let mut has_attributes = vec![false; scene.materials.len()];
     for (index, triangle) in (0..).zip(&scene.triangles) {
         let has_any = triangle.attributes != NO_ATTRIBUTES || lights.of_triangle(index).is_some();
@@ -31,12 +25,19 @@ pub(super) fn records(
     }
     let mut layers = 0..;
     let materials = scene.materials.iter().zip(has_attributes).zip(uncovered);
-    materials.map(move |((material, has_attributes), &is_uncovered)| {
+    let record_of = |((material, has_attributes), &is_uncovered): ((&Material, bool), &bool)| {
         let mut attributes = if has_attributes || is_uncovered { HAS_ATTRIBUTES } else { 0 };
         attributes |= if material.blends && is_uncovered { BLENDS } else { 0 };
         let layers = material.layers.as_ref().and_then(|_| layers.next());
         record(material, attributes | lobe_flag(scene, material), layers)
-    })
+    };
+    materials.map(record_of).collect()
+}
+
+/// Record of a material without what follows from its scene.
+pub(super) fn bare_record(material: &Material) -> layout::Material {
+    // Read again: the chip has some values in steps.
+    layout::Material::read(&record(material, 0, None).to_bytes())
 }
 
 /// Returns whether any triangle's material stores photons, as the chip decides from the image.
@@ -47,8 +48,9 @@ pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Line
     }
     let mut used = scene.materials.iter().zip(is_used).filter(|(_, is_used)| *is_used);
     used.any(|(material, _)| {
-        let material =
-            layout::Material::read(&record(material, HAS_ATTRIBUTES | lobe_flag(scene, material), None));
+        let material = layout::Material::read(
+            &record(material, HAS_ATTRIBUTES | lobe_flag(scene, material), None).to_bytes(),
+        );
         // The image was just packed. If it were malformed, tracing photons would report it.
         keeps_photons(&image, &mut memory, &material).unwrap_or(true)
     })
@@ -61,7 +63,7 @@ fn lobe_flag(scene: &Scene, material: &Material) -> u32 {
 
 /// Record of a material; `flags` are those that follow from the scene: [`HAS_ATTRIBUTES`] if any of its triangles may have
 /// attributes, and [`NARROW_LOBE`]; `layers` is the index of its layers. `u16` indexes all textures of the scene.
-fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> [u8; RECORD_BYTES] {
+fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::Material {
     let transmission = transmission_of(material);
     flags |= if material.double_sided { DOUBLE_SIDED } else { 0 };
     flags |= if material.energy_compensation { COMPENSATED } else { 0 };
@@ -80,7 +82,6 @@ fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> [u8; RECO
         ],
         layers,
     }
-    .to_bytes()
 }
 
 /// Maximum share of diffuse transmission. Photons are stored where the base reflects diffusely, at both sides.
@@ -138,7 +139,7 @@ fn cutoff(material: &Material) -> f32 {
 }
 
 /// Transmission of a material that transmits light.
-fn transmission_of(material: &Material) -> Option<Transmission> {
+pub(super) fn transmission_of(material: &Material) -> Option<Transmission> {
     match material.reflection {
         Reflection::MetallicRoughness { transmission, metallic, .. }
             if material.may_be_dielectric(metallic) =>
@@ -189,7 +190,7 @@ mod tests {
     use super::*;
 
     fn read(material: &Material) -> layout::Material {
-        layout::Material::read(&record(material, 0, None))
+        bare_record(material)
     }
 
     #[test]

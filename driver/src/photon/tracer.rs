@@ -43,7 +43,8 @@ impl Traced {
 pub(super) enum Purpose {
     /// The photon map: a photon at every surface that is not specular.
     Indirect,
-    /// The caustic map: a photon at the first such surface, of paths that have met specular surfaces before.
+    /// The caustic map: a photon at the first such surface, of paths that specular surfaces have turned
+    /// before: flat glass, which shadow rays pass, does not.
     Caustics,
 }
 
@@ -130,7 +131,7 @@ impl<'s> Tracer<'s> {
                 }
                 Arrival::Ends => {
                     let surface = surface.flat();
-                    let is_caustic = is_direct && path.bounces > 0;
+                    let is_caustic = is_direct && !path.is_straight;
                     let is_of_map = self.purpose == Purpose::Indirect || is_caustic;
                     if !is_of_map || !is_lit(&surface, emission.has_extent) {
                         break;

@@ -12,6 +12,9 @@
 //!
 //! Points, spots and distant lights are met by no gather ray: shadow rays alone bring their light.
 //!
+//! Flat glass hides no light from a point: shadow rays pass it with its transmittance, and a gather ray that
+//! has passed nothing else meets the light as if it had passed nothing, with equal weights.
+//!
 //! Light samples are stratified over all samples of a pixel: many samples with one or two shadow rays each are as good as one sample
 //! with many.
 
@@ -28,7 +31,7 @@ use crate::scene::light::{
     LightChoices, LightSample, Receiver, emitter_density, environment_density, environment_radiance,
     sample_light,
 };
-use crate::scene::{BUNDLE_RAYS, Ray, Surface, are_occluded};
+use crate::scene::{BUNDLE_RAYS, Passed, Ray, Surface, transmittances};
 use crate::vector::max_component;
 
 /// Reflected direct light at a point by shadow rays, weighted, W/(sr m^2).
@@ -97,10 +100,10 @@ impl ShadowRays {
         mut sum: Vec3,
     ) -> Result<Vec3, Fault> {
         context.counters.shadow_rays += self.rays.len() as u64;
-        let occluded = are_occluded(context.scene, context.memory, &self.rays)?;
-        for (light, is_occluded) in self.lights.iter().zip(occluded) {
-            if !is_occluded {
-                sum += from_light(context, point, light);
+        let passed = transmittances(context.scene, context.memory, &self.rays)?;
+        for (light, Passed(share)) in self.lights.iter().zip(passed) {
+            if share != Vec3::ZERO {
+                sum += from_light(context, point, light) * share;
             }
         }
         self.rays.clear();
@@ -109,7 +112,7 @@ impl ShadowRays {
     }
 }
 
-/// Reflected radiance of one light sample, W/(sr m^2), that is not occluded.
+/// Reflected radiance of one light sample, all of whose light arrives, W/(sr m^2).
 fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample) -> Vec3 {
     let surface = &point.surface;
     let LightSample { direction, irradiance, density, .. } = *light;
@@ -131,8 +134,8 @@ fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample)
     reflected * irradiance * cosine
 }
 
-/// Emission of the surface at the end of a gather ray, times its weight against shadow rays, W/(sr m^2). `gather_density` is the ray's
-/// probability density, 1/sr.
+/// Emission of the surface at the end of a gather ray, times its weight against shadow rays, W/(sr m^2).
+/// `met.distance` is that from the point, and `gather_density` the ray's probability density, 1/sr.
 ///
 /// # Errors
 /// If the image is not sound.

@@ -107,7 +107,8 @@ fn arrive<M: MemoryPort>(
         }
     }
     met.normal = met.geometric_normal;
-    let emitted = if path.bounces == 0 {
+    let emitted = if path.is_straight {
+        met.distance += path.travelled;
         weight * direct::seen_by_gather_ray(context, point, ray, &met, sampled.density)?
     } else {
         beyond_specular(context, point, sampled, weight) * met.emission
@@ -142,7 +143,7 @@ fn escaped<M: MemoryPort>(
         let end = GatherRayEnd { cell: sampled.cell, direct: collected, request: None };
         return Ok((collected != Vec3::ZERO).then_some(end));
     }
-    let emitted = if path.bounces == 0 {
+    let emitted = if path.is_straight {
         weight * direct::escaped(context, point, path.ray.direction, sampled.density)?
     } else {
         let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
@@ -170,8 +171,9 @@ fn collected<M>(
         * (1.0 / context.scene.header.radiance_unit)
 }
 
-/// Weight of emission at the end of a gather ray that passed specular surfaces or narrow lobes: `weight` without a caustic map, and
-/// with one, which brings that light to all other reflection, the narrow lobe's part of it. No shadow ray brings it.
+/// Weight of emission at the end of a gather ray that passed specular surfaces or narrow lobes other than
+/// flat glass: `weight` without a caustic map, and with one, which brings that light to all other reflection,
+/// the narrow lobe's part of it. No shadow ray brings it.
 fn beyond_specular<M>(
     context: &Context<M>,
     point: &GatherPoint,

@@ -5,7 +5,8 @@
 //! direction of the narrow lobe, or an end at the surface for the rest of its reflection. The samples of a pixel cover all of them.
 //! After [`FREE_BOUNCES`] a path survives by its throughput (Russian roulette), and after [`SPECULAR_BOUNCES`] it is black.
 //!
-//! Absorption follows the Beer-Lambert law, with the coefficient of the glass entered last; nested glass is not tracked.
+//! Absorption follows the Beer-Lambert law, with the coefficient of the glass entered last; nested glass is
+//! not tracked. Flat glass changes neither direction nor medium.
 
 use glam::Vec3;
 use photoncard_shared::budget::{FREE_BOUNCES, SPECULAR_BOUNCES};
@@ -15,7 +16,7 @@ use super::{Context, SHORTER};
 use crate::memory::MemoryPort;
 use crate::scene::light::{LightChoices, LightSample, Receiver, sample_light};
 use crate::scene::{
-    Hit, Ray, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit, is_occluded, read_surface,
+    Hit, Ray, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit, read_surface, transmittance,
 };
 use crate::vector::{max, max_component, min};
 
@@ -35,6 +36,10 @@ pub struct SpecularPath {
     pub bounces: u32,
     /// Distance of the first specular surface from the origin, metres.
     pub first_distance: f32,
+    /// `true` as long as the path has passed nothing but flat glass: it is a straight line.
+    pub is_straight: bool,
+    /// Length of the path up to the present ray, metres.
+    pub travelled: f32,
     /// Transported quantity.
     carried: Carried,
     /// Surfaces that the path passes.
@@ -99,6 +104,8 @@ impl SpecularPath {
             collected: Vec3::ZERO,
             bounces: 0,
             first_distance: 0.0,
+            is_straight: true,
+            travelled: 0.0,
             carried,
             passes,
             absorption: Vec3::ZERO,
@@ -145,7 +152,7 @@ impl SpecularPath {
             },
             ..surface.reflector()
         };
-        let ends_at_lobe = self.passes == Passes::CausticPhotons && self.bounces > 0;
+        let ends_at_lobe = self.passes == Passes::CausticPhotons && !self.is_straight;
         let keeps_lobe = ends_at_lobe && surface.reflection.keeps_caustics();
         if !lobe.reflection.is_black() && !keeps_lobe {
             surface.reflection = surface.reflection.without_narrow_lobe();
@@ -171,6 +178,8 @@ impl SpecularPath {
             return Arrival::Lost;
         }
         self.bounces += 1;
+        self.travelled += surface.distance;
+        let was_straight = core::mem::replace(&mut self.is_straight, false);
         let past_specular = chosen - (stays + reflected + transmitted);
         if glossy > 0.0 && (past_specular >= 0.0 || reflected + transmitted <= 0.0) {
             let direction = lobe.sample_lobe([u, v]);
@@ -186,7 +195,11 @@ impl SpecularPath {
             let scale = if self.carried == Carried::Radiance { specular.radiance_scale } else { 1.0 };
             self.throughput *= specular.transmitted * (scale * all / transmitted);
             self.ray = Ray::new(surface.offset_behind(), specular.behind);
-            self.absorption = specular.absorption;
+            if specular.is_straight() {
+                self.is_straight = was_straight;
+            } else {
+                self.absorption = specular.absorption;
+            }
         }
         Arrival::GoesOn
     }
@@ -292,11 +305,12 @@ fn punctual_light<M: MemoryPort>(
     }
     context.counters.shadow_rays += 1;
     let ray = Ray { origin: receiver.origin, direction, max_distance: distance * SHORTER };
-    if is_occluded(context.scene, context.memory, &ray)? {
+    let share = transmittance(context.scene, context.memory, &ray)?;
+    if share == Vec3::ZERO {
         return Ok(Vec3::ZERO);
     }
     let lobe = Reflector { reflection: surface.reflection.narrow_lobe(), ..surface.reflector() };
-    Ok(lobe.evaluate(direction) * irradiance * surface.normal.dot(direction))
+    Ok(lobe.evaluate(direction) * irradiance * surface.normal.dot(direction) * share)
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, WideNode};
 use photoncard_shared::message::Fault;
 
-use super::bvh::{BvhStack, Search, closest_hit, is_occluded, meet_leaf};
+use super::bvh::{BvhStack, Passed, Search, closest_hit, meet_leaf, transmittance};
 use super::slabs::Slabs;
 use super::{Hit, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
@@ -47,25 +47,25 @@ pub fn closest_hits(
     }
 }
 
-/// [`is_occluded`] of each of up to [`BUNDLE_RAYS`] rays.
+/// [`transmittance`] of each of up to [`BUNDLE_RAYS`] rays.
 ///
 /// # Errors
 /// As [`closest_hit`].
-pub fn are_occluded(
+pub fn transmittances(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     rays: &[Ray],
-) -> Result<[bool; BUNDLE_RAYS], Fault> {
-    let mut searches = [false; BUNDLE_RAYS];
+) -> Result<[Passed; BUNDLE_RAYS], Fault> {
+    let mut searches = [Passed::ALL; BUNDLE_RAYS];
     match (rays, &mut searches) {
         ([], _) => {}
-        ([ray], [occluded, ..]) => *occluded = is_occluded(scene, memory, ray)?,
+        ([ray], [passed, ..]) => *passed = Passed(transmittance(scene, memory, ray)?),
         (_, searches) => cast(Bundle { scene, memory, rays, searches })?,
     }
     Ok(searches)
 }
 
-/// Kernel of [`closest_hits`] with searches of the type `Option<Hit>`, of [`are_occluded`] with `bool`.
+/// Kernel of [`closest_hits`] with searches of the type `Option<Hit>`, of [`transmittances`] with [`Passed`].
 pub struct Bundle<'a, M, S> {
     /// The scene.
     pub scene: &'a SceneImage,

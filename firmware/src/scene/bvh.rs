@@ -3,12 +3,14 @@
 
 use core::ops::ControlFlow;
 
+use glam::Vec3;
 use photoncard_shared::budget::BVH_STACK;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, Triangle, WideNode};
 use photoncard_shared::message::Fault;
 
 use super::coverage::is_met;
+use super::flat_glass::of_flat_glass;
 use super::slabs::Slabs;
 use super::triangle::ShearedLeaf;
 use super::{Hit, Intersection, Ray, RayFrame, SceneImage};
@@ -29,13 +31,14 @@ pub fn closest_hit(
     simd::run(ClosestHit { scene, memory, ray })
 }
 
-/// `true` if the ray meets any triangle.
+/// Share of a light's radiance that arrives along a ray: the product of the transmittances of the flat glass
+/// that the ray meets, 0 if it meets anything else.
 ///
 /// # Errors
 /// As [`closest_hit`].
 #[inline(never)]
-pub fn is_occluded(scene: &SceneImage, memory: &mut impl MemoryPort, ray: &Ray) -> Result<bool, Fault> {
-    simd::run(AnyHit { scene, memory, ray })
+pub fn transmittance(scene: &SceneImage, memory: &mut impl MemoryPort, ray: &Ray) -> Result<Vec3, Fault> {
+    simd::run(ShadowRay { scene, memory, ray })
 }
 
 /// Kernel of [`closest_hit`].
@@ -60,8 +63,8 @@ impl<M: MemoryPort> Kernel for ClosestHit<'_, M> {
     }
 }
 
-/// Kernel of [`is_occluded`].
-pub struct AnyHit<'a, M> {
+/// Kernel of [`transmittance`].
+pub struct ShadowRay<'a, M> {
     /// The scene.
     pub scene: &'a SceneImage,
     /// Card memory.
@@ -70,30 +73,38 @@ pub struct AnyHit<'a, M> {
     pub ray: &'a Ray,
 }
 
-impl<M: MemoryPort> Kernel for AnyHit<'_, M> {
-    type Output = Result<bool, Fault>;
+impl<M: MemoryPort> Kernel for ShadowRay<'_, M> {
+    type Output = Result<Vec3, Fault>;
 
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let Self { scene, memory, ray } = self;
-        let mut occluded = false;
-        descend(isa, scene, memory, ray, &mut occluded)?;
-        Ok(occluded)
+        let mut passed = Passed::ALL;
+        descend(isa, scene, memory, ray, &mut passed)?;
+        Ok(passed.0)
     }
 }
 
-/// Search along a ray: for the closest hit, or for any.
+/// Search along a ray: for the closest hit, or for the light that passes.
 pub(super) trait Search {
     /// Order of the visits to a node's children.
     const ORDER: Order;
+    /// `true` for a search that goes on behind flat glass.
+    const PASSES_FLAT_GLASS: bool;
 
     /// Takes a hit of the triangle of an index, in a slot of its leaf. The next hits may be up to the returned distance away; after
     /// [`ControlFlow::Break`] none is needed.
     fn meet(&mut self, hit: Intersection, index: u32, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
+
+    /// Passes flat glass of a transmittance.
+    fn pass(&mut self, _transmittance: Vec3) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
 }
 
 impl Search for Option<Hit> {
     const ORDER: Order = Order::NearestFirst;
+    const PASSES_FLAT_GLASS: bool = false;
 
     #[inline(always)]
     fn meet(
@@ -117,13 +128,31 @@ impl Search for Option<Hit> {
     }
 }
 
-impl Search for bool {
+/// Light that passes along a shadow ray, as a share.
+///
+/// Factors are multiplied in the order of the visits, unsorted. It follows from the tree and the ray alone:
+/// rounding is equal in bundles of any rays and on every processor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Passed(pub Vec3);
+
+impl Passed {
+    /// All light.
+    pub const ALL: Self = Self(Vec3::ONE);
+}
+
+impl Search for Passed {
     const ORDER: Order = Order::Any;
+    const PASSES_FLAT_GLASS: bool = true;
 
     #[inline(always)]
     fn meet(&mut self, _: Intersection, _: u32, _: (BvhLeaf, usize)) -> ControlFlow<(), f32> {
-        *self = true;
+        self.0 = Vec3::ZERO;
         ControlFlow::Break(())
+    }
+
+    fn pass(&mut self, transmittance: Vec3) -> ControlFlow<()> {
+        self.0 *= transmittance;
+        if self.0 == Vec3::ZERO { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
@@ -189,6 +218,13 @@ pub(super) fn meet_leaf<S: Search>(
         let weights = intersection.barycentric;
         if line.is_cut_out(slot) && !is_met(scene, memory, ray, (index, &line.triangle(slot)), weights)? {
             continue;
+        }
+        if S::PASSES_FLAT_GLASS && line.is_flat_glass(slot) {
+            let transmittance = of_flat_glass(scene, memory, ray, (index, &line.triangle(slot)), weights)?;
+            match search.pass(transmittance) {
+                ControlFlow::Continue(()) => continue,
+                ControlFlow::Break(()) => return Ok(ControlFlow::Break(())),
+            }
         }
         match search.meet(intersection, index, (line, slot)) {
             ControlFlow::Continue(distance) => until = distance,

@@ -5,6 +5,7 @@ mod bvh;
 mod corners;
 mod coverage;
 mod cut_out;
+mod flat_glass;
 pub mod light;
 mod materials;
 mod normal_map;
@@ -17,8 +18,8 @@ mod surface;
 mod texture;
 mod triangle;
 
-pub use bundle::{BUNDLE_RAYS, Bundle, are_occluded, closest_hits};
-pub use bvh::{AnyHit, ClosestHit, closest_hit, is_occluded};
+pub use bundle::{BUNDLE_RAYS, Bundle, closest_hits, transmittances};
+pub use bvh::{ClosestHit, Passed, ShadowRay, closest_hit, transmittance};
 pub use cut_out::is_there;
 pub use reflection::{
     DecodedLobe, NARROW_ALPHA, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,

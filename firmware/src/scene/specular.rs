@@ -1,6 +1,7 @@
 //! The perfectly specular part of a surface: mirrors, smooth coats, smooth glass.
 
 use glam::Vec3;
+use photoncard_shared::layout::{Material, PANE, THIN_WALLED};
 
 use super::shading_normal::bent;
 use crate::vector::{max, mirror, unit};
@@ -16,8 +17,11 @@ pub struct Specular {
     pub beside: Vec3,
     /// Direction of transmitted light: a unit vector behind the surface.
     pub behind: Vec3,
-    /// Absorption coefficient behind the surface, 1/m.
+    /// Absorption coefficient behind the surface, 1/m; meaningless where light passes straight.
     pub absorption: Vec3,
+    /// For flat glass, which light passes without a change of direction or medium (thin walls, and the faces
+    /// of panes), the probability with which its layer was taken; 0 for all else.
+    pub straight: f32,
     /// Radiance in front over radiance behind at a transmittance of 1: `1 / n^2`, n the index of refraction.
     pub radiance_scale: f32,
 }
@@ -30,6 +34,7 @@ impl Specular {
         beside: Vec3::ZERO,
         behind: Vec3::ZERO,
         absorption: Vec3::ZERO,
+        straight: 0.0,
         radiance_scale: 1.0,
     };
 
@@ -41,6 +46,12 @@ impl Specular {
     /// Reflectance and transmittance times `share`.
     pub(super) fn dimmed(self, share: f32) -> Self {
         Self { reflected: self.reflected * share, transmitted: self.transmitted * share, ..self }
+    }
+
+    /// `true` for flat glass.
+    #[inline(always)]
+    pub fn is_straight(&self) -> bool {
+        self.straight > 0.0
     }
 
     /// `true` without perfectly specular reflection and transmission.
@@ -57,10 +68,35 @@ impl Specular {
     }
 }
 
+/// What a surface of glass bounds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Bounds {
+    /// A volume of glass.
+    Solid,
+    /// Air on both sides: a wall without thickness.
+    ThinWall,
+    /// One face of a pane: see [`photoncard_shared::layout::PANE`].
+    Pane,
+}
+
+impl Bounds {
+    /// By the flags of a material.
+    #[inline(always)]
+    pub(super) fn of(material: &Material) -> Self {
+        match material.flags & (PANE | THIN_WALLED) {
+            0 => Self::Solid,
+            THIN_WALLED => Self::ThinWall,
+            _ => Self::Pane,
+        }
+    }
+}
+
 /// Smooth dielectric at a point, textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glass {
+    /// Tint of one passage: of a thin wall the base colour, of a face of a volume its square root.
     pub(super) base: Vec3,
+    /// Absorption coefficient inside, 1/m; of a pane its optical depth.
     pub(super) absorption: Vec3,
     /// Transmitted share of the light that is not reflected.
     pub(super) transmission: f32,
@@ -68,7 +104,7 @@ pub(super) struct Glass {
     pub(super) ior: f32,
     /// Factor of the reflectance (`specularFactor` of `KHR_materials_specular`).
     pub(super) specular: f32,
-    pub(super) is_thin: bool,
+    pub(super) bounds: Bounds,
 }
 
 impl Glass {
@@ -80,26 +116,62 @@ impl Glass {
         [normal, geometric_normal]: [Vec3; 2],
         is_inside: bool,
     ) -> (f32, Specular) {
+        if self.bounds == Bounds::Pane && is_inside {
+            return self.passed_on(outgoing);
+        }
         let cosine = max(normal.dot(outgoing), 0.0);
-        let index = if is_inside && !self.is_thin { 1.0 / self.ior } else { self.ior };
+        let index = if is_inside && self.bounds == Bounds::Solid { 1.0 / self.ior } else { self.ior };
         let (reflectance, cosine_behind) = fresnel(cosine, index);
         // Total internal reflection is not scaled.
         let reflectance = if cosine_behind > 0.0 { reflectance * self.specular } else { reflectance };
+        if self.bounds == Bounds::Pane {
+            return self.pane(outgoing, reflectance, cosine_behind);
+        }
+        let is_straight = self.bounds == Bounds::ThinWall;
         // Interreflection between both faces of a thin wall: 2 R / (1 + R) (Stokes 1862).
-        let reflectance = if self.is_thin { 2.0 * reflectance / (1.0 + reflectance) } else { reflectance };
+        let reflectance = if is_straight { 2.0 * reflectance / (1.0 + reflectance) } else { reflectance };
         let refracted = unit(normal * (cosine / index - cosine_behind) - outgoing * (1.0 / index));
         let behind =
-            if self.is_thin || refracted.dot(geometric_normal) >= 0.0 { -outgoing } else { refracted };
+            if is_straight || refracted.dot(geometric_normal) >= 0.0 { -outgoing } else { refracted };
         let through = 1.0 - reflectance;
         let specular = Specular {
             reflected: Vec3::splat(reflectance),
             transmitted: self.base * (through * self.transmission),
             beside: Vec3::ZERO,
             behind,
-            absorption: if is_inside || self.is_thin { Vec3::ZERO } else { self.absorption },
-            radiance_scale: if self.is_thin { 1.0 } else { 1.0 / (index * index) },
+            absorption: if is_inside || is_straight { Vec3::ZERO } else { self.absorption },
+            straight: if is_straight { 1.0 } else { 0.0 },
+            radiance_scale: if is_straight { 1.0 } else { 1.0 / (index * index) },
         };
         (through * (1.0 - self.transmission), specular)
+    }
+
+    /// The face of a pane that light enters by, of a face's reflectance `R` at the angle. With `a` the
+    /// transmittance inside on the way from face to face, the pane transmits `(1 - R)^2 a / (1 - R^2 a^2)`
+    /// and reflects `R + (1 - R)^2 R a^2 / (1 - R^2 a^2)`.
+    #[inline(never)]
+    fn pane(&self, outgoing: Vec3, reflectance: f32, cosine_inside: f32) -> (f32, Specular) {
+        let through = 1.0 - reflectance;
+        let depth = self.absorption * (-1.0 / max(cosine_inside, f32::MIN_POSITIVE));
+        let once = Vec3::from_array(depth.to_array().map(libm::expf));
+        let there_and_back = once * once;
+        let of_all = (through * through) / (Vec3::ONE - there_and_back * (reflectance * reflectance));
+        let both_faces = self.base * self.base * (self.transmission * self.transmission);
+        let specular = Specular {
+            reflected: Vec3::splat(reflectance) + both_faces * of_all * there_and_back * reflectance,
+            transmitted: self.base * of_all * once * self.transmission,
+            behind: -outgoing,
+            straight: 1.0,
+            ..Specular::NONE
+        };
+        (through * (1.0 - self.transmission), specular)
+    }
+
+    /// The face of a pane that light leaves by.
+    fn passed_on(&self, outgoing: Vec3) -> (f32, Specular) {
+        let transmitted = self.base * self.transmission;
+        let specular = Specular { transmitted, behind: -outgoing, straight: 1.0, ..Specular::NONE };
+        (1.0 - self.transmission, specular)
     }
 }
 
@@ -128,7 +200,7 @@ mod tests {
         transmission: 1.0,
         ior: 1.5,
         specular: 1.0,
-        is_thin: false,
+        bounds: Bounds::Solid,
     };
 
     fn at(degrees: f32, is_inside: bool, glass: Glass) -> Specular {
@@ -165,9 +237,9 @@ mod tests {
 
     #[test]
     fn nothing_is_lost_at_clear_glass() {
-        for thin in [false, true] {
+        for bounds in [Bounds::Solid, Bounds::ThinWall, Bounds::Pane] {
             for degrees in [0.0, 30.0, 60.0, 89.0] {
-                let specular = at(degrees, false, Glass { is_thin: thin, ..GLASS });
+                let specular = at(degrees, false, Glass { bounds, absorption: Vec3::ZERO, ..GLASS });
                 assert!((specular.reflected + specular.transmitted - Vec3::ONE).abs().max_element() < 1e-6);
                 assert!(specular.behind.y < 0.0);
             }
@@ -176,11 +248,37 @@ mod tests {
 
     #[test]
     fn a_thin_wall_lets_light_through_as_a_slab_does_and_does_not_bend_it() {
-        let wall = at(30.0, false, Glass { is_thin: true, ..GLASS });
+        let wall = at(30.0, false, Glass { bounds: Bounds::ThinWall, ..GLASS });
         let face = at(30.0, false, GLASS).reflected.x;
         // The sum over all reflections inside the slab.
         let slab: f32 = (0..20).map(|k| (1.0 - face) * (1.0 - face) * face.powi(2 * k)).sum();
         assert!((wall.transmitted.x - slab).abs() < 1e-5);
         assert!((wall.behind + Vec3::new(0.5, 30_f32.to_radians().cos(), 0.0)).length() < 1e-5);
+    }
+
+    #[test]
+    fn a_pane_is_all_reflections_within_a_slab_and_does_not_bend_light() {
+        let depth = Vec3::new(0.0, 0.3, 2.0);
+        let tint = Vec3::new(0.9, 0.7, 1.0);
+        let pane = Glass { base: tint, absorption: depth, bounds: Bounds::Pane, ..GLASS };
+        for degrees in [0.0_f32, 30.0, 75.0] {
+            let front = at(degrees, false, pane);
+            let back = at(degrees, true, pane);
+            assert_eq!(back.reflected, Vec3::ZERO);
+            let outgoing = Vec3::new(degrees.to_radians().sin(), degrees.to_radians().cos(), 0.0);
+            assert!((front.behind + outgoing).length() < 1e-5 && (back.behind + outgoing).length() < 1e-5);
+            let face = f64::from(at(degrees, false, GLASS).reflected.x);
+            let inside = (1.0 - (f64::from(degrees).to_radians().sin() / 1.5).powi(2)).sqrt();
+            for channel in 0..3 {
+                let [depth, tint] = [depth, tint].map(|colour| f64::from(colour[channel]));
+                let once = (-depth / inside).exp();
+                let through: f64 =
+                    (0..20).map(|k| (1.0 - face).powi(2) * once * (face * once).powi(2 * k)).sum();
+                let found = f64::from(front.transmitted[channel] * back.transmitted[channel]);
+                assert!((found - tint * tint * through).abs() < 1e-5, "{found} of {through}");
+                let returned = face + tint * tint * through * face * once;
+                assert!((f64::from(front.reflected[channel]) - returned).abs() < 1e-5);
+            }
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_shared::layout::{
-    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, Material, NO_TEXTURE, Reflectance, Triangle,
+    BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, Material, NO_TEXTURE, PANE, Reflectance, Triangle,
 };
 use photoncard_shared::message::Fault;
 
@@ -223,7 +223,10 @@ fn finish(
             surface.emitter = corners.emitter();
         }
         let front = if is_front { geometric_normal } else { -geometric_normal };
-        if let Some(normal) = base_normal(scene, memory, material, corners, front)? {
+        // The smooth normals of a box's corners would tilt the faces of a pane.
+        if material.flags & PANE == 0
+            && let Some(normal) = base_normal(scene, memory, material, corners, front)?
+        {
             surface.normal = if is_front { normal } else { -normal };
         }
     }

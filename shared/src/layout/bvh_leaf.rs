@@ -24,10 +24,16 @@ const SECOND_MATERIAL: usize = MATERIALS + MATERIAL_BYTES * LEAF_MATERIALS;
 const COUNTS: usize = SECOND_MATERIAL + 1;
 const _: () = assert!(COUNTS + 1 == LINE_BYTES && 2 * COORDINATE_BYTES + 4 * VERTEX_LANES <= LINE_BYTES);
 
-/// Bound of the indices of materials: 2^23.
-pub const MAX_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 1);
+/// Bound of the indices of materials: 2^22.
+pub const MAX_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 2);
 /// Flag in a leaf's material index: its triangles may have cut-outs.
-const CUT_OUT: u32 = MAX_MATERIALS;
+const CUT_OUT: u32 = 2 * MAX_MATERIALS;
+/// Flag in a leaf's material index: its triangles are flat glass.
+const FLAT_GLASS: u32 = MAX_MATERIALS;
+/// Highest byte of a flag.
+const fn in_last_byte(flag: u32) -> u8 {
+    (flag >> (8 * (MATERIAL_BYTES - 1))) as u8
+}
 
 /// A leaf, one line.
 ///
@@ -35,7 +41,7 @@ const CUT_OUT: u32 = MAX_MATERIALS;
 /// |---|---|
 /// | 0..108 | coordinates of nine vertices: all x, all y, all z, metres |
 /// | 108..120 | vertex indices of the triangles' first corners, four bits each; of the second corners; of the third |
-/// | 120..126 | indices of two materials, the highest bit set if their triangles may have cut-outs |
+/// | 120..126 | indices of two materials; bit 23: their triangles may have cut-outs, bit 22: are flat glass |
 /// | 126 | bit `i`: triangle `i` has the second material |
 /// | 127 | bits 0-3 number of triangles, 4-7 number of vertices |
 #[derive(Clone, Copy)]
@@ -50,6 +56,9 @@ pub struct Triangle {
     pub material: u32,
     /// True if alpha (of the base texture or the vertex colours) may cut out parts of the triangle: glTF's `MASK`.
     pub cut_out: bool,
+    /// True for flat glass, which light passes without a change of direction: thin walls and panes, perfectly
+    /// smooth.
+    pub flat_glass: bool,
 }
 
 impl BvhLeaf<'_> {
@@ -129,7 +138,19 @@ impl BvhLeaf<'_> {
     /// Returns whether triangle `slot`, below [`LEAF_TRIANGLES`], may have cut-outs.
     #[inline(always)]
     pub fn is_cut_out(&self, slot: usize) -> bool {
-        self.byte(self.material_of(slot) + MATERIAL_BYTES - 1) & 0x80 != 0
+        self.last_byte(slot) & in_last_byte(CUT_OUT) != 0
+    }
+
+    /// Returns whether triangle `slot`, below [`LEAF_TRIANGLES`], is flat glass.
+    #[inline(always)]
+    pub fn is_flat_glass(&self, slot: usize) -> bool {
+        self.last_byte(slot) & in_last_byte(FLAT_GLASS) != 0
+    }
+
+    /// Last byte of a triangle's material index, with the flags.
+    #[inline(always)]
+    fn last_byte(&self, slot: usize) -> u8 {
+        self.byte(self.material_of(slot) + MATERIAL_BYTES - 1)
     }
 
     /// Triangle `slot`, below [`LEAF_TRIANGLES`].
@@ -141,8 +162,9 @@ impl BvhLeaf<'_> {
         let [a, b, c] = self.vertices_of(slot);
         Triangle {
             vertices: [self.vertex(a), self.vertex(b), self.vertex(c)],
-            material: material & !CUT_OUT,
+            material: material & (MAX_MATERIALS - 1),
             cut_out: material & CUT_OUT != 0,
+            flat_glass: material & FLAT_GLASS != 0,
         }
     }
 
@@ -172,7 +194,9 @@ impl BvhLeaf<'_> {
             if triangle.material >= MAX_MATERIALS {
                 return None;
             }
-            let material = triangle.material | if triangle.cut_out { CUT_OUT } else { 0 };
+            let flags = [(triangle.cut_out, CUT_OUT), (triangle.flat_glass, FLAT_GLASS)];
+            let flags = flags.into_iter().filter(|(is_set, _)| *is_set).map(|(_, flag)| flag);
+            let material = flags.fold(triangle.material, |material, flag| material | flag);
             *line.get_mut(SECOND_MATERIAL)? |= (materials.index(material)? << slot) as u8;
         }
         for (index, vertex) in vertices.items().enumerate() {
@@ -226,7 +250,8 @@ mod tests {
     fn apart(number: usize) -> Triangle {
         let coordinate = |corner: usize, axis: usize| (100 * number + 10 * corner + axis) as f32;
         let vertices = [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| coordinate(corner, axis)));
-        Triangle { vertices, material: 70_000 + number as u32 % 2, cut_out: number.is_multiple_of(2) }
+        let material = 70_000 + number as u32 % 2;
+        Triangle { vertices, material, cut_out: number.is_multiple_of(2), flat_glass: number % 2 == 1 }
     }
 
     /// The triangles of two by two squares.
@@ -234,7 +259,12 @@ mod tests {
         let vertex = |x: u32, y: u32| [x as f32, y as f32, (x * y) as f32];
         let square = |x, y| {
             let [a, b, c, d] = [vertex(x, y), vertex(x + 1, y), vertex(x + 1, y + 1), vertex(x, y + 1)];
-            [[a, b, c], [a, c, d]].map(|vertices| Triangle { vertices, material: x, cut_out: false })
+            [[a, b, c], [a, c, d]].map(|vertices| Triangle {
+                vertices,
+                material: x,
+                cut_out: false,
+                flat_glass: false,
+            })
         };
         [square(0, 0), square(1, 0), square(0, 1), square(1, 1)].concat()
     }
@@ -247,6 +277,7 @@ mod tests {
         for (slot, triangle) in triangles.iter().enumerate() {
             assert_eq!(leaf.triangle(slot), *triangle);
             assert_eq!(leaf.is_cut_out(slot), triangle.cut_out);
+            assert_eq!(leaf.is_flat_glass(slot), triangle.flat_glass);
             let vertex = |corner| {
                 let index = leaf.corners(corner)[slot];
                 assert!(index < leaf.vertices());
@@ -277,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leaf_tells_two_materials_of_eight_million_apart() {
+    fn a_leaf_tells_two_materials_of_four_million_apart() {
         let of = |material| Triangle { material, ..apart(1) };
         survive(&[of(MAX_MATERIALS - 1), of(0), of(MAX_MATERIALS - 1)]);
         assert!(BvhLeaf::encode(&[of(0), of(1), of(2)]).is_none());

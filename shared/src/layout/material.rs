@@ -20,12 +20,17 @@ pub const BLENDS: u32 = 64;
 /// Flag of [`Material::flags`]: the GGX lobe is brightened by the light that a rough microsurface reflects several times.
 pub const COMPENSATED: u32 = 128;
 
-const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS | COMPENSATED;
+/// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a face of a pane, a slab with parallel faces whose
+/// thickness is small beside its extents. The face that light enters by has the reflectance and transmittance
+/// of the whole slab; the one that it leaves by passes it on.
+pub const PANE: u32 = 256;
+
+const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS | COMPENSATED | PANE;
 
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
 /// Shift of the index of [`super::Layers`], plus 1.
-const LAYERS_SHIFT: u32 = 8;
+const LAYERS_SHIFT: u32 = 9;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
 
@@ -42,7 +47,8 @@ pub struct Material {
     pub reflectance: Reflectance,
     /// Emitted radiance, W/(sr m^2), to be multiplied by the emissive texture.
     pub emission: [f32; 3],
-    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`], [`BLENDS`] and [`COMPENSATED`].
+    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`], [`BLENDS`],
+    /// [`COMPENSATED`] and [`PANE`].
     pub flags: u32,
     /// glTF's `alphaCutoff`: triangles with cut-outs are absent where the product of base texture and vertex alpha is
     /// below it. With [`BLENDS`] the product of the three is their coverage.
@@ -50,7 +56,7 @@ pub struct Material {
     /// Indices of the textures of base colour (or diffuse albedo), metallic-roughness (roughness in green, metalness in
     /// blue) and emission; [`NO_TEXTURE`] if absent.
     pub textures: [u16; 3],
-    /// Index of the material's [`super::Layers`], below 2^24 - 1; `None` without.
+    /// Index of the material's [`super::Layers`], below 2^23 - 1; `None` without.
     pub layers: Option<u32>,
 }
 
@@ -83,7 +89,8 @@ pub enum Reflectance {
     Glass {
         /// Transmission colour, to be multiplied by the base texture.
         base: [f32; 3],
-        /// Absorption coefficient inside, 1/m.
+        /// Absorption coefficient inside, 1/m; of a [`PANE`] its optical depth, the coefficient times the
+        /// thickness.
         absorption: [f32; 3],
         /// Fraction, 0 to 1, of the light not reflected by the interface that is transmitted; a Lambertian surface of
         /// the base colour reflects the rest.
@@ -200,7 +207,7 @@ mod tests {
                 roughness: 0.4,
             },
         ] {
-            for flags in [0, FLAGS].into_iter().chain((0..8).map(|bit| FLAGS & 1 << bit)) {
+            for flags in [0, FLAGS].into_iter().chain((0..9).map(|bit| FLAGS & 1 << bit)) {
                 let material = Material {
                     reflectance,
                     emission: [18.0, 14.0, 6.5],

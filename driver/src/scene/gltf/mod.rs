@@ -43,6 +43,7 @@ mod stated_places;
 mod tangents;
 mod texture;
 mod topology;
+mod touching_glass;
 mod transform;
 mod uri;
 mod variants;

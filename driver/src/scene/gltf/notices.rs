@@ -10,6 +10,7 @@ use super::extensions::SUPPORTED_EXTENSIONS;
 use super::material::has_dark_texture;
 use super::names::mesh_name;
 use super::not_finite::NotFinite;
+use super::solid_glass::Resolved;
 use super::topology::Topology;
 use crate::scene::{LightUnits, blender};
 
@@ -21,8 +22,10 @@ const LISTED: usize = 8;
 pub(super) struct Notices {
     /// Names of orthographic cameras.
     pub(super) orthographic: Vec<String>,
-    /// Names of materials of closed meshes that became solid glass.
-    pub(super) solid_glass: Vec<String>,
+    /// Names of materials of glass whose surfaces bound a solid or none against what is stated.
+    pub(super) glass: Resolved,
+    /// Names of materials of solid glass of which faces are in one place.
+    pub(super) touching_glass: Vec<String>,
     /// Units other than radiometric ones in which the lights were read because Blender's exporter wrote them.
     pub(super) blender_units: Option<LightUnits>,
     /// Names of Blender's spot lights with a penumbra.
@@ -117,7 +120,16 @@ impl Notices {
         note(penumbra, "light", &self.blender_spots);
         note("orthographic cameras are ignored", "camera", &self.orthographic);
         let solid = "closed meshes of glass without a thickness are solid, as in Blender (a thin wall by --set MATERIAL.thickness=0)";
-        note(solid, "material", &self.solid_glass);
+        note(solid, "material", &self.glass.solid);
+        let walls =
+            "flat sheets of glass with a thickness bound no solid: they are thin walls of that thickness";
+        note(walls, "material", &self.glass.walls);
+        let open = "open meshes of glass with a thickness bound no solid: light that enters by one stays in \
+                    the glass until it meets another face";
+        note(open, "material", &self.glass.open);
+        let apart = "faces of solids of glass are in one place, and light meets one of them alone: leave a \
+                     gap of air between them";
+        note(apart, "material", &self.touching_glass);
         for (extension, places) in other_extensions(root) {
             let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };
             sentences.push(format!("the extension {extension} is ignored{places}"));

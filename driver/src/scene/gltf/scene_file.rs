@@ -15,7 +15,7 @@ use super::notices::{self, Notices};
 use super::room::Room;
 use super::settings::LoadSettings;
 use super::texture::Textures;
-use super::{camera, material, nodes, solid_glass, variants};
+use super::{camera, material, nodes, solid_glass, touching_glass, variants};
 use crate::error::SceneError;
 use crate::scene::{Camera, LightUnits, Scene};
 
@@ -185,7 +185,8 @@ impl SceneFile {
             notices.framed = true;
         }
         scene.lift_lamps();
-        notices.solid_glass = solid_glass::make_solid(document, &mut scene)?;
+        notices.glass = solid_glass::resolve(document, &mut scene)?;
+        notices.touching_glass = touching_glass::join(&mut scene);
         scene.notices = notices.finish(document);
         Ok(scene)
     }

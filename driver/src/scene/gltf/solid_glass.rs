@@ -1,85 +1,184 @@
-//! Solid glass without `KHR_materials_volume`: Blender writes no thickness, and its users mean solids.
+//! Glass that is a solid or a thin wall by the form of its mesh, whatever its material says.
+//!
+//! Blender writes no thickness, and its users mean solids: closed parts of meshes bound volumes. A flat sheet
+//! bounds none, and is a thin wall of the thickness that its material states. Where one material is both,
+//! each has a copy of its own.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 use glam::Vec3;
+use gltf::json;
 
 use super::document::Document;
 use crate::allocation;
 use crate::error::SceneError;
-use crate::scene::{Material, Reflection, Scene, Transmission, Triangle};
+use crate::scene::{Material, Reflection, Scene, Transmission, Triangle, parts};
 
 /// Memory of an edge of a triangle while it is matched, bytes.
 const BYTES_OF_AN_EDGE: u64 = 64;
+/// Maximum thickness of a sheet over its extent: a water surface states the depth of the water.
+const THIN: f32 = 0.1;
+/// Distance from the plane of a flat sheet, over its extent and over the greatest coordinate.
+const UNEVEN: [f32; 2] = [1e-4, 1e-6];
 
-/// Makes closed meshes of glass without a thickness solid in a file of Blender: all surfaces of a material, if all of them are closed.
-/// Returns the materials' names.
+/// Names of materials, by what became of surfaces of theirs.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Resolved {
+    /// Closed parts became solid.
+    pub(super) solid: Vec<String>,
+    /// Flat sheets became thin walls.
+    pub(super) walls: Vec<String>,
+    /// Open parts that are not flat have a thickness.
+    pub(super) open: Vec<String>,
+}
+
+/// Triangles of each form of each material.
+type Surfaces = BTreeMap<u32, BTreeMap<Form, Vec<u32>>>;
+
+/// What a part of a surface becomes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Form {
+    AsStated,
+    Solid,
+    Wall,
+    /// As stated, though it bounds no solid.
+    Open,
+}
+
+/// Makes closed parts of glass without a thickness solid in a file of Blender, and flat sheets of glass with
+/// one thin walls in any file.
 ///
 /// # Errors
 /// If the memory for the edges is not to be had.
-pub(super) fn make_solid(document: &Document, scene: &mut Scene) -> Result<Vec<String>, SceneError> {
-    if !document.is_of_blender() {
-        return Ok(Vec::new());
-    }
-    let is_wall: Vec<bool> = scene.materials.iter().map(|material| wall(material).is_some()).collect();
-    let is_of_wall = |triangle: &&Triangle| is_wall[triangle.material as usize];
-    let edges = 3 * scene.triangles.iter().filter(is_of_wall).count() as u64;
-    allocation::check(edges * BYTES_OF_AN_EDGE)
+pub(super) fn resolve(document: &Document, scene: &mut Scene) -> Result<Resolved, SceneError> {
+    let is_considered: Vec<bool> = scene
+        .materials
+        .iter()
+        .map(|material| transmission(material).is_some_and(|it| it.is_volume || document.is_of_blender()))
+        .collect();
+    let of_glass = |triangle: &Triangle| is_considered[triangle.material as usize];
+    let glass: Vec<u32> = (0..)
+        .zip(&scene.triangles)
+        .filter(|(_, triangle)| of_glass(triangle))
+        .map(|(index, _)| index)
+        .collect();
+    allocation::check(3 * glass.len() as u64 * BYTES_OF_AN_EDGE)
         .map_err(|error| SceneError::memory(&document.path, "matching edges of glass", error))?;
-    let is_open = open_materials(scene.triangles.iter().filter(is_of_wall), scene.materials.len());
-    let mut names = Vec::new();
-    for (material, is_open) in scene.materials.iter_mut().zip(is_open) {
-        if let Some(transmission) = wall(material).filter(|_| !is_open) {
-            let Reflection::MetallicRoughness { transmission: target, .. } = &mut material.reflection else {
-                continue;
+    let corners: Vec<[Vec3; 3]> =
+        glass.iter().map(|&index| scene.triangles[index as usize].vertices).collect();
+    let thicknesses: Vec<f32> =
+        (0..scene.materials.len()).map(|index| stated_thickness(document, index)).collect();
+    let mut surfaces = Surfaces::default();
+    for part in parts(&corners) {
+        let triangles = || part.triangles.iter().map(|&index| &corners[index as usize]);
+        // Two sheets back to back are closed, and hold nothing.
+        let is_flat = is_flat(triangles());
+        let is_closed = part.is_closed && !is_flat;
+        let extent = extent(triangles());
+        for &index in &part.triangles {
+            let triangle = glass[index as usize];
+            let material = scene.triangles[triangle as usize].material;
+            let is_volume = transmission(&scene.materials[material as usize]).is_some_and(|it| it.is_volume);
+            let is_thin = is_flat && thicknesses[material as usize] <= THIN * extent;
+            let form = match (is_closed, is_volume) {
+                (true, false) => Form::Solid,
+                (false, true) if is_thin => Form::Wall,
+                (false, true) => Form::Open,
+                _ => Form::AsStated,
             };
-            *target = Some(Transmission { is_volume: true, ..transmission });
-            names.push(material.name.clone());
+            surfaces.entry(material).or_default().entry(form).or_default().push(triangle);
         }
     }
-    Ok(names)
+    let names = |form: Form| {
+        let materials = surfaces.iter().filter(|(_, of_forms)| of_forms.contains_key(&form));
+        materials.map(|(&material, _)| scene.materials[material as usize].name.clone()).collect()
+    };
+    let [solid, walls, open] = [Form::Solid, Form::Wall, Form::Open].map(names);
+    change(scene, &surfaces, &thicknesses);
+    Ok(Resolved { solid, walls, open })
 }
 
-/// Transmission of a thin wall; `None` for any other material.
-fn wall(material: &Material) -> Option<Transmission> {
+/// Gives triangles of other forms than stated the materials of these: a copy, if the material has surfaces of
+/// several forms.
+fn change(scene: &mut Scene, surfaces: &Surfaces, thicknesses: &[f32]) {
+    for (&material, of_forms) in surfaces {
+        let original = scene.materials[material as usize].clone();
+        for (&form, triangles) in of_forms.iter().filter(|(form, _)| [Form::Solid, Form::Wall].contains(form))
+        {
+            let changed = of_form(&original, form, thicknesses[material as usize]);
+            if of_forms.len() == 1 {
+                scene.materials[material as usize] = changed;
+            } else {
+                let copy = scene.materials.len() as u32;
+                scene.materials.push(changed);
+                triangles.iter().for_each(|&triangle| scene.triangles[triangle as usize].material = copy);
+            }
+        }
+    }
+}
+
+/// A material of glass in another form.
+fn of_form(material: &Material, form: Form, thickness: f32) -> Material {
+    let mut material = material.clone();
+    if let Reflection::MetallicRoughness { base_colour, transmission: Some(transmission), .. } =
+        &mut material.reflection
+    {
+        transmission.is_volume = form == Form::Solid;
+        if form == Form::Wall {
+            let depth = transmission.absorption * -thickness;
+            *base_colour *= Vec3::from_array(depth.to_array().map(libm::expf));
+            transmission.absorption = Vec3::ZERO;
+        }
+    }
+    material
+}
+
+/// Transmission of a material that transmits light.
+pub(super) fn transmission(material: &Material) -> Option<Transmission> {
     let Reflection::MetallicRoughness { transmission, .. } = material.reflection else { return None };
-    transmission.filter(|transmission| transmission.factor > 0.0 && !transmission.is_volume)
+    transmission.filter(|transmission| transmission.factor > 0.0)
 }
 
-/// Returns for each material whether its triangles leave an edge open, or it has none: an edge of a closed surface is passed as often in
-/// one direction as in the other.
-fn open_materials<'a>(triangles: impl Iterator<Item = &'a Triangle>, materials: usize) -> Vec<bool> {
-    // Negative zero equals zero.
-    let bits = |corner: Vec3| corner.to_array().map(|axis| (axis + 0.0).to_bits());
-    let mut passed: HashMap<(u32, [[u32; 3]; 2]), i64> = HashMap::new();
-    let mut is_open = vec![true; materials];
-    for triangle in triangles {
-        is_open[triangle.material as usize] = false;
-        let [a, b, c] = triangle.vertices.map(bits);
-        for [from, to] in [[a, b], [b, c], [c, a]] {
-            let (edge, direction) = if from < to { ([from, to], 1) } else { ([to, from], -1) };
-            *passed.entry((triangle.material, edge)).or_default() += direction;
-        }
-    }
-    for ((material, _), direction) in passed {
-        is_open[material as usize] |= direction != 0;
-    }
-    is_open
+/// Thickness that the file states for a material of the scene, metres; 0 if it states none.
+fn stated_thickness(document: &Document, material: usize) -> f32 {
+    let of =
+        |material: &json::Material| Some(material.extensions.as_ref()?.volume.as_ref()?.thickness_factor.0);
+    document.root.materials.get(material).and_then(of).unwrap_or(0.0)
+}
+
+/// Length of the diagonal of the triangles' bounding box.
+fn extent<'a>(triangles: impl Iterator<Item = &'a [Vec3; 3]>) -> f32 {
+    let bounds = triangles.flatten().map(|&corner| [corner, corner]);
+    let bounds = bounds.reduce(|[lower, upper], [corner, _]| [lower.min(corner), upper.max(corner)]);
+    bounds.map_or(0.0, |[lower, upper]| lower.distance(upper))
+}
+
+/// Returns whether triangles lie in one plane.
+fn is_flat<'a>(triangles: impl Iterator<Item = &'a [Vec3; 3]> + Clone) -> bool {
+    let normal = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a);
+    let largest =
+        triangles.clone().max_by(|a, b| normal(a).length_squared().total_cmp(&normal(b).length_squared()));
+    let Some(largest) = largest else { return false };
+    let axis = normal(largest).normalize_or_zero();
+    let corners = || triangles.clone().flatten();
+    let greatest = corners().map(|corner| corner.abs().max_element()).fold(0.0, f32::max);
+    let tolerance = UNEVEN[0] * extent(triangles.clone()) + UNEVEN[1] * greatest;
+    corners().all(|corner| axis.dot(*corner - largest[0]).abs() <= tolerance)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn tetrahedron() -> Vec<Triangle> {
-        let [o, x, y, z] = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
-        [[o, y, x], [o, x, z], [o, z, y], [x, y, z]].map(|vertices| Triangle::new(vertices, 0)).to_vec()
-    }
-
     #[test]
-    fn a_solid_is_closed_and_one_without_a_face_is_not() {
-        let solid = tetrahedron();
-        assert_eq!(open_materials(solid.iter(), 2), [false, true]);
-        assert_eq!(open_materials(solid.iter().skip(1), 1), [true]);
+    fn a_sheet_is_flat_whichever_way_it_is_turned_and_a_bent_one_is_not() {
+        let sheet = |bend: f32| {
+            let corner = |x: f32, y: f32| Vec3::new(x, y, 0.3 * x - 0.7 * y + bend * x * y + 4.0);
+            let [a, b, c, d] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
+            [[a, b, c], [a, c, d]]
+        };
+        assert!(is_flat(sheet(0.0).iter()));
+        assert!(!is_flat(sheet(0.01).iter()));
+        assert!(!is_flat([].iter()));
     }
 }

@@ -57,7 +57,7 @@ pub fn emitter_point(
     let [a, b, c] = vertices.map(Vec3::from_array);
     let [p, q] = square_to_triangle(square);
     let emission = if varies {
-        let place = (triangle, &Triangle { vertices, material, cut_out: true });
+        let place = (triangle, &Triangle { vertices, material, cut_out: true, flat_glass: false });
         emission_at(scene, memory, emitter, place, [1.0 - p - q, p, q])?
     } else {
         emitter.emission.into()

@@ -14,7 +14,7 @@ use super::lobe::Lobe;
 use super::material::{Scattering, Texel, View, scattering};
 use super::metallic_roughness::MetallicRoughness;
 use super::sheen::SheenLobe;
-use crate::scene::specular::{Glass, Specular};
+use crate::scene::specular::{Bounds, Glass, Specular};
 use crate::vector::{max, max_component};
 
 /// Minimum probability of a layer that reflects light: it bounds the weight of a sample.
@@ -150,7 +150,8 @@ impl Stack {
         };
         // Whichever layer the light goes to, it has come through the glass.
         let scattering = Scattering { absorption: self.base.absorption, ..scattering };
-        let scattering = dimmed(scattering, Vec3::splat(1.0 / probability));
+        let mut scattering = dimmed(scattering, Vec3::splat(1.0 / probability));
+        scattering.specular.straight *= probability;
         Taken { layer, scattering, normal, probability, of_front }
     }
 }
@@ -277,7 +278,7 @@ fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2])
     let microfacet = microfacet(normal, outgoing, roughness, point);
     let tint = Vec3::from_array(colour.to_array().map(libm::sqrtf));
     let absorption = Vec3::from(absorption);
-    let glass = Glass { base: tint, absorption, transmission, ior, specular, is_thin };
+    let glass = Glass { base: tint, absorption, transmission, ior, specular, bounds: Bounds::Solid };
     let (_, refracted) = glass.at(outgoing, [microfacet, geometric_normal], !is_front);
     // Of sampled visible normals, G2 / G1 = G1 of the direction of incidence remains.
     let mirrored = Specular::reflected_direction(outgoing, microfacet, geometric_normal);

@@ -1,13 +1,13 @@
 //! Materials as reflections: the factors of a record times those of textures and corners, seen from one direction.
 
 use glam::Vec3;
-use photoncard_shared::layout::{COMPENSATED, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
+use photoncard_shared::layout::{COMPENSATED, Material, NARROW_LOBE, Reflectance};
 
 use super::Reflection;
 use super::lobe::Lobe;
 use super::metallic_roughness::MetallicRoughness;
 use crate::scene::shading_normal::bent;
-use crate::scene::specular::{Glass, Specular};
+use crate::scene::specular::{Bounds, Glass, Specular};
 
 /// Factors of the material's values at a point, from textures and vertex colours.
 #[derive(Clone, Copy, Debug)]
@@ -92,11 +92,12 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
             }
         }
         Reflectance::Glass { base, absorption, transmission, ior, specular, metallic, roughness } => {
-            let is_thin = material.flags & THIN_WALLED != 0;
+            let bounds = Bounds::of(material);
+            let is_thin = bounds == Bounds::ThinWall;
             let (base, absorption) = (Vec3::from(base) * texel.colour, Vec3::from(absorption));
             // Light passes a volume's surface twice, and is tinted once.
             let tint = if is_thin { base } else { Vec3::from_array(base.to_array().map(libm::sqrtf)) };
-            let glass = Glass { base: tint, absorption, transmission, ior, specular, is_thin };
+            let glass = Glass { base: tint, absorption, transmission, ior, specular, bounds };
             let (scattered, specular) = glass.at(outgoing, normals, !is_front);
             // Metal is opaque.
             let [metallic, roughness] = [metallic * texel.metallic, roughness * texel.roughness];
@@ -112,7 +113,7 @@ pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &Vi
             scattering.reflection =
                 metal.lobe_beside(base * (scattered * (1.0 - metallic)), metallic, cosine);
             scattering.specular = specular.dimmed(1.0 - metallic);
-            if !(is_front || is_thin) {
+            if bounds == Bounds::Solid && !is_front {
                 scattering.absorption = absorption;
             }
         }

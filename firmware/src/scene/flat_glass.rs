@@ -1,0 +1,27 @@
+//! Flat glass: thin walls and panes, which shadow rays pass.
+
+use glam::Vec3;
+use photoncard_shared::layout::Triangle;
+use photoncard_shared::message::Fault;
+
+use super::surface::{Surface, surface_of};
+use super::{Ray, SceneImage};
+use crate::memory::MemoryPort;
+
+/// Transmittance of a triangle of flat glass at barycentric `weights`, along a ray.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(never)]
+pub(super) fn of_flat_glass(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    ray: &Ray,
+    place: (u32, &Triangle),
+    weights: [f32; 3],
+) -> Result<Vec3, Fault> {
+    let mut surface = Surface::NOWHERE;
+    // Of several layers the base alone transmits.
+    surface_of(scene, memory, ray, place, weights, &|_| 0.0, &mut surface)?;
+    Ok(surface.specular.transmitted * surface.specular.straight)
+}
