@@ -6,7 +6,7 @@ use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, m
 use photoncard_driver::render::Radiance;
 use photoncard_driver::scene::{Encoding, Image, Material, Scene, Texture, Triangle};
 use photoncard_firmware::photon::{
-    CandidateBuffer, Estimate, GatherLimits, LitBy, NearestPhotons, PhotonMap, Reflected, Sight, gather,
+    CandidateBuffer, Estimate, GatherLimits, NearestPhotons, PhotonMap, Reflected, Sight, gather,
     gathered_radiance,
 };
 use photoncard_firmware::scene::{PartialReflection, Reflection, Surface};
@@ -64,17 +64,8 @@ impl Map {
             1 << 31,
         );
         let lobe = reflection.decode_lobe();
-        let lit_by = LitBy::All;
-        let normals = [Vec3::ZERO; 2];
-        let estimate = || Estimate::<false> {
-            nearest: &nearest,
-            position,
-            region: None,
-            reflection: &reflection,
-            lobe,
-            lit_by,
-            normals,
-        };
+        let (nearest, reflection) = (&nearest, &reflection);
+        let estimate = || Estimate { nearest, position, region: None, reflection, lobe };
         let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
         let of_disc = radiances.next().expect("what every processor has");
         assert!(radiances.all(|other| other == of_disc), "{position}");

@@ -14,7 +14,7 @@ use photoncard_shared::message::Fault;
 
 use super::collector::Collector;
 use super::region::All;
-use super::{Candidate, LitBy, PhotonMap, SameSurface, leaves};
+use super::{Candidate, PhotonMap, SameSurface, leaves};
 use crate::fixed_point::ColourSum;
 use crate::memory::MemoryPort;
 use crate::scene::{DecodedLobe, PartialReflection, SceneImage};
@@ -30,6 +30,15 @@ pub struct Caustics {
     pub photons: u32,
     /// Number of photons' normals that were decoded.
     pub normals_decoded: u32,
+}
+
+/// Photons that light a lobe; the Lambertian part is lit by all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LitBy {
+    /// All photons.
+    All,
+    /// Photons from lights without extent.
+    Punctual,
 }
 
 /// Radiance of reflected caustic photons at a position; see [`CausticSearch`].

@@ -16,10 +16,10 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::message::Fault;
 
 pub use candidates::{Candidate, CandidateBuffer, CandidateStorage, Candidates};
-pub use caustic::{CausticSearch, Caustics, reflected_caustics};
+pub use caustic::{CausticSearch, Caustics, LitBy, reflected_caustics};
 pub use irradiance::{FoundIrradiance, PointSearch, nearest_irradiance};
 pub use nearest::NearestPhotons;
-pub use radiance::{Estimate, LitBy, MIN_NORMAL_COSINE, Reflected, SameSurface, Sight, reflected_radiance};
+pub use radiance::{Estimate, MIN_NORMAL_COSINE, Reflected, SameSurface, Sight, reflected_radiance};
 pub use region::{SECTORS, Sectors, VisibleRegion};
 
 use self::region::{All, Filter};

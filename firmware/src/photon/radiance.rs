@@ -17,7 +17,7 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::{decode_direction, decode_normal, disc_fraction, is_of_region};
+use photoncard_shared::layout::{decode_normal, disc_fraction, is_of_region};
 
 use super::{Candidate, NearestPhotons, Sectors};
 use crate::fixed_point::ColourSum;
@@ -69,25 +69,11 @@ pub fn reflected_radiance(
     reflection: &PartialReflection,
 ) -> Reflected {
     let lobe = reflection.decode_lobe();
-    let normals = [Vec3::ZERO; 2];
-    simd::run(Estimate::<false> { nearest, position, region, reflection, lobe, lit_by: LitBy::All, normals })
+    simd::run(Estimate { nearest, position, region, reflection, lobe })
 }
 
-/// Photons that light a lobe; the Lambertian part is lit by all.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LitBy {
-    /// All photons.
-    All,
-    /// Photons of the caustic map from lights without extent.
-    Punctual,
-}
-
-/// Maximum of `n.i / g.i`, where light comes along the triangle.
-const MAX_SHADING: f32 = 4.0;
-
-/// The [`Kernel`] of [`reflected_radiance`]. With `IS_SHADED` a photon of incidence `i` counts by `n.i / g.i`, `n` the shading normal and `g`
-/// the triangle's: the density of photons is the irradiance of the triangle.
-pub struct Estimate<'a, 'n, const IS_SHADED: bool> {
+/// The [`Kernel`] of [`reflected_radiance`].
+pub struct Estimate<'a, 'n> {
     /// The nearest photons.
     pub nearest: &'a NearestPhotons<'n>,
     /// Position of the gather, metres.
@@ -98,27 +84,21 @@ pub struct Estimate<'a, 'n, const IS_SHADED: bool> {
     pub reflection: &'a PartialReflection,
     /// Its lobe.
     pub lobe: DecodedLobe,
-    /// Photons that light the lobe.
-    pub lit_by: LitBy,
-    /// The shading normal and the triangle's, with `IS_SHADED`.
-    pub normals: [Vec3; 2],
 }
 
-impl<const IS_SHADED: bool> Kernel for Estimate<'_, '_, IS_SHADED> {
+impl Kernel for Estimate<'_, '_> {
     type Output = Reflected;
 
     #[inline(always)]
     fn run(self, _: impl Isa) -> Reflected {
-        let Self { nearest, position, region, reflection, lobe, lit_by, normals } = self;
+        let Self { nearest, position, region, reflection, lobe } = self;
         let (radius_squared, farthest) = if nearest.is_full() {
             let farthest = extreme(nearest, u32::max, |candidate, other| candidate.order() > other.order());
             (farthest.map_or(0.0, |farthest| farthest.distance_squared()), farthest)
         } else {
             (nearest.max_distance_squared(), None)
         };
-        let Some((closest, sums)) =
-            sum(nearest, farthest, Sums::<IS_SHADED>::new((reflection, lobe), lit_by, normals))
-        else {
+        let Some((closest, sums)) = sum(nearest, farthest, Sums::new(reflection, lobe)) else {
             let sight = if region.is_none() && !nearest.is_empty() { Sight::Unknown } else { Sight::Free };
             return Reflected { radiance: Vec3::ZERO, normals_decoded: 0, closest: None, sight };
         };
@@ -169,14 +149,14 @@ fn extreme(
 
 /// Closest photon of the surface, and the sums over its photons without `farthest`, if given.
 #[inline(always)]
-fn sum<'a, const IS_SHADED: bool>(
+fn sum<'a>(
     nearest: &NearestPhotons,
     farthest: Option<Candidate>,
-    mut sums: Sums<'a, IS_SHADED>,
-) -> Option<(Candidate, Sums<'a, IS_SHADED>)> {
+    mut sums: Sums<'a>,
+) -> Option<(Candidate, Sums<'a>)> {
     let (_, contents) = nearest.columns();
     let reflection = sums.reflection;
-    if !IS_SHADED && reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
+    if reflection.is_lambertian() && are_all_of(reflection.normal(), contents) {
         // With a single photon, `farthest` is the closest too.
         if farthest.is_some() && contents.len() < 2 {
             return None;
@@ -218,47 +198,27 @@ fn are_all_of(normal: u8, contents: &[u64]) -> bool {
 const NORMAL_SHIFT: u32 = 50;
 
 /// Sum of the photons' power, and sum of the power times the lobe's factor.
-struct Sums<'a, const IS_SHADED: bool> {
+struct Sums<'a> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,
-    lit_by: LitBy,
-    normals: [Vec3; 2],
     power: ColourSum,
     lobe: ColourSum,
     normals_decoded: u32,
 }
 
-impl<'a, const IS_SHADED: bool> Sums<'a, IS_SHADED> {
+impl<'a> Sums<'a> {
     #[inline(always)]
-    fn new(
-        (reflection, decoded): (&'a PartialReflection, DecodedLobe),
-        lit_by: LitBy,
-        normals: [Vec3; 2],
-    ) -> Self {
-        let [power, lobe] = [ColourSum::ZERO; 2];
-        Self { reflection, decoded, lit_by, normals, power, lobe, normals_decoded: 0 }
+    fn new(reflection: &'a PartialReflection, decoded: DecodedLobe) -> Self {
+        Self { reflection, decoded, power: ColourSum::ZERO, lobe: ColourSum::ZERO, normals_decoded: 0 }
     }
 
     #[inline(always)]
     fn add(&mut self, photon: &Candidate) {
-        let shading = if IS_SHADED { self.shading(photon) } else { 1.0 };
-        if IS_SHADED {
-            self.power.add(Vec3::from_array(photon.power().decode()) * shading);
-        } else {
-            self.power.add_rgbe(photon.power());
-        }
-        let is_lit = self.lit_by == LitBy::All || !photon.is_direct();
-        if is_lit && !self.reflection.is_lambertian() {
+        self.power.add_rgbe(photon.power());
+        if !self.reflection.is_lambertian() {
             let factor = PartialReflection::lobe_factor(&self.decoded, photon.direction());
-            self.lobe.add(Vec3::from_array(photon.power().decode()) * (factor * shading));
+            self.lobe.add(Vec3::from_array(photon.power().decode()) * factor);
         }
-    }
-
-    /// `n.i / g.i`, 0 for light from below the shading normal's horizon.
-    fn shading(&self, photon: &Candidate) -> f32 {
-        let incident = Vec3::from_array(decode_direction(photon.direction()));
-        let [shading, geometric] = self.normals.map(|normal| max(normal.dot(incident), 0.0));
-        if shading < MAX_SHADING * geometric { shading / geometric } else { MAX_SHADING }
     }
 
     #[inline(always)]
