@@ -7,6 +7,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::{Scene, Triangle};
+use crate::allocation::{self, OutOfMemory};
 
 /// Distance within which surfaces share a plane, in units in the last place of their greatest coordinate.
 const SHARED: f64 = 16.0;
@@ -18,10 +19,15 @@ const SEEN_FROM: f64 = 32.0;
 impl Scene {
     /// Lifts emissive triangles off surfaces that are not, and overlap them in one plane: along their own normal, or on both sides
     /// emissive ones towards the front of a one-sided surface.
-    pub(crate) fn lift_lamps(&mut self) {
+    ///
+    /// # Errors
+    /// If the process cannot have the memory.
+    pub(crate) fn lift_lamps(&mut self) -> Result<(), OutOfMemory> {
+        // Lists grow to twice their length, and are halved into others.
+        allocation::check(4 * (self.emitters().count() * size_of::<Lamp>()) as u64)?;
         let lamps: Vec<Lamp> = self.emitters().map(|(index, triangle)| Lamp::new(index, triangle)).collect();
         if lamps.is_empty() {
-            return;
+            return Ok(());
         }
         let tree = Tree::new(lamps);
         let found = self.triangles.par_iter().filter(|triangle| !self.emits(triangle));
@@ -36,6 +42,7 @@ impl Scene {
             let vertices = &mut self.triangles[lamp].vertices;
             *vertices = vertices.map(|vertex| (vertex.as_dvec3() + lift).as_vec3());
         }
+        Ok(())
     }
 
     fn emitters(&self) -> impl Iterator<Item = (usize, &Triangle)> {
@@ -216,7 +223,7 @@ mod tests {
 
     fn lifted(double_sided: [bool; 2], triangles: Vec<Triangle>) -> Scene {
         let mut scene = scene(double_sided, triangles);
-        scene.lift_lamps();
+        scene.lift_lamps().unwrap();
         scene
     }
 

@@ -52,7 +52,7 @@ impl PhotonMap {
 ///
 /// # Errors
 /// If the image is not sound.
-#[inline(always)]
+#[inline(never)]
 pub fn gather(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -97,7 +97,7 @@ const MAX_REACH: f32 = 4.0;
 ///
 /// # Errors
 /// If the image is not sound.
-#[inline(always)]
+#[inline(never)]
 pub fn gathered_radiance(
     (scene, memory): (&SceneImage, &mut impl MemoryPort),
     position: Vec3,
@@ -179,11 +179,18 @@ fn search<M: MemoryPort>(
     nearest: &mut NearestPhotons,
 ) -> Result<u32, Fault> {
     let has_leaves = scene.header.section(SectionKind::PhotonLeaves).records > 0;
-    let tested = if map == PhotonMap::Caustics || has_leaves {
-        leaves::gather(isa, scene, map.sections(), memory, query, nearest)?
-    } else {
-        kdtree::gather(isa, scene, memory, query, nearest)?
-    };
+    if map == PhotonMap::Indirect && !has_leaves {
+        let tested = kdtree::gather(isa, scene, memory, query, nearest)?;
+        nearest.finish(isa);
+        return Ok(tested);
+    }
+    let mut tested = 0;
+    loop {
+        tested += leaves::gather(isa, scene, map.sections(), memory, query, nearest)?;
+        if !nearest.widen() {
+            break;
+        }
+    }
     nearest.finish(isa);
     Ok(tested)
 }

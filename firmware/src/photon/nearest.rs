@@ -11,6 +11,9 @@ use super::collector::Collector;
 use super::select::{Chosen, select};
 use crate::simd::{Isa, LANES};
 
+/// Number of photons by which a search is narrowed: those of one leaf, or two.
+const FIRST: usize = 8;
+
 /// The nearest photons found so far, in a borrowed buffer.
 pub struct NearestPhotons<'a> {
     candidates: Candidates<'a>,
@@ -19,6 +22,9 @@ pub struct NearestPhotons<'a> {
     /// Number of candidates that triggers a selection.
     full: usize,
     limit: f32,
+    /// Limit of a search that the first photons have not narrowed, m^2.
+    widest: f32,
+    is_narrowed: bool,
     max_distance_squared: f32,
     /// Candidates read by selections.
     selected: u32,
@@ -43,6 +49,8 @@ impl<'a> NearestPhotons<'a> {
             neighbors,
             full,
             limit,
+            widest: limit,
+            is_narrowed: false,
             max_distance_squared: limit,
             selected: 0,
             compared: 0,
@@ -52,7 +60,41 @@ impl<'a> NearestPhotons<'a> {
 
     /// Limits the search radius of an empty set, m^2: there are no photons beyond. The maximum distance stays.
     pub(super) fn limit_to(&mut self, limit: f32) {
-        self.limit = if limit < self.limit { limit } else { self.limit };
+        self.widest = if limit < self.widest { limit } else { self.widest };
+        self.limit = self.widest;
+    }
+
+    /// Narrows the search by the first photons, which lie together: within their greatest distance the surface has so many, and within the
+    /// new limit most likely enough.
+    #[inline(always)]
+    fn narrow(&mut self) {
+        if self.is_narrowed || self.length < FIRST {
+            return;
+        }
+        self.is_narrowed = true;
+        // The limit must not leave out photons that are there.
+        if self.is_full() {
+            return;
+        }
+        let (distances, _) = self.columns();
+        let farthest = f32::from_bits(distances.iter().copied().fold(0, u32::max));
+        let limit = farthest * (self.neighbors as f32 / self.length as f32);
+        // False for NaN and without an area.
+        if limit > 0.0 && limit < self.limit {
+            self.limit = limit;
+        }
+    }
+
+    /// Begins the search anew, without narrowing, if narrowing has left out photons that were asked for. Returns whether it does.
+    #[inline(always)]
+    pub(super) fn widen(&mut self) -> bool {
+        let is_short = self.is_narrowed && !self.is_full() && self.limit < self.widest;
+        if is_short {
+            self.dropped += self.length as u32;
+            self.length = 0;
+            self.limit = self.widest;
+        }
+        is_short
     }
 
     /// Squared search radius: photons beyond it cannot be among the nearest, m^2.
@@ -166,6 +208,7 @@ impl Collector for NearestPhotons<'_> {
         let Some(free) = free else { return };
         isa.pack_long(mask, contents, free);
         self.length += mask.count_ones() as usize;
+        self.narrow();
         if self.length >= self.full {
             self.select(isa);
         }

@@ -61,7 +61,7 @@ const APART: f32 = 7.0;
 
 /// Radiance of a gather at a position: the photons' power, reflected, over the area of their disc, or of the visible region that they
 /// were searched in.
-#[inline(always)]
+#[inline(never)]
 pub fn reflected_radiance(
     nearest: &NearestPhotons,
     position: Vec3,

@@ -43,7 +43,7 @@ pub(crate) struct RenderOptions {
     /// For the picture's camera more photons are where it uses them: light through a window wastes fewer on the outside of a house. The
     /// picture's expected value stays. With auto a pilot measures what that gains, unless all that it would choose is stated. Pictures of
     /// several cameras, such as frames and prepared scenes, share photons for the scene.
-    #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::default().name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
+    #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::Auto.name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
     photons_for: PhotonsFor,
     #[command(flatten)]
     pub(super) integrator: IntegratorOptions,

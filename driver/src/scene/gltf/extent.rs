@@ -6,6 +6,7 @@ use glam::{DMat4, DVec3};
 
 use super::accessor::Source;
 use super::instances::Instances;
+use super::limits::MAX_TRIANGLES;
 use super::mesh::MeshPlacer;
 use super::offset::{Bounds, translation};
 use super::primitive::Primitive;
@@ -61,8 +62,14 @@ struct Extent<'e, 's, 'a> {
     source: &'e Source<'s>,
     meshes: &'e mut MeshPlacer<'a>,
     nodes: &'e [(usize, DMat4)],
-    /// Bounds of the primitives of each mesh, in its own space.
-    locals: BTreeMap<usize, Vec<Bounds>>,
+    locals: BTreeMap<usize, Local>,
+}
+
+/// Bounds of the primitives of a mesh that have triangles, in its own space, and the number of these.
+#[derive(Clone, Default)]
+struct Local {
+    bounds: Vec<Bounds>,
+    triangles: u64,
 }
 
 impl Extent<'_, '_, '_> {
@@ -70,34 +77,47 @@ impl Extent<'_, '_, '_> {
         let root = &self.source.document.root;
         let mut worlds = vec![None; root.nodes.len()];
         self.nodes.iter().for_each(|&(index, world)| worlds[index] = Some(world));
-        let mut bounds = Bounds::EMPTY;
+        let (mut bounds, mut placed) = (Bounds::EMPTY, 0_u64);
         for &(index, world) in self.nodes {
             let node = &root.nodes[index];
             let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
-            let locals = self.locals(mesh, scene)?;
-            let instances = if node.skin.is_some() { None } else { Instances::of(self.source, index, node)? };
-            let transforms = match (node.skin, instances) {
-                (Some(skin), _) => Skin::new(self.source, skin.value(), &worlds)?.joints().to_vec(),
-                (None, Some(instances)) => {
-                    let placed = |instance| Ok(world * instances.transform(self.source, instance)?);
-                    (0..instances.count).map(placed).collect::<Result<_, SceneError>>()?
-                }
-                (None, None) => vec![world],
-            };
-            for transform in &transforms {
+            let Local { bounds: locals, triangles } = self.locals(mesh, scene)?;
+            let mut add = |transform: &DMat4| {
                 locals.iter().for_each(|local| bounds.add_placed(transform, local));
+            };
+            if triangles == 0 {
+                continue;
             }
+            if let Some(skin) = node.skin {
+                Skin::new(self.source, skin.value(), &worlds)?.joints().iter().for_each(&mut add);
+                continue;
+            }
+            let Some(instances) = Instances::of(self.source, index, node)? else {
+                add(&world);
+                continue;
+            };
+            placed = placed.saturating_add(triangles.saturating_mul(instances.count as u64));
+            if placed > MAX_TRIANGLES as u64 {
+                // No scene is so large: the loader says so.
+                break;
+            }
+            // The loader names an instance without a sound transform.
+            let transforms =
+                (0..instances.count).filter_map(|index| instances.transform(self.source, index).ok());
+            transforms.for_each(|transform| add(&(world * transform)));
         }
         Ok(bounds)
     }
 
     /// Bounds of the primitives of a mesh.
-    fn locals(&mut self, mesh: usize, scene: &mut Scene) -> Result<Vec<Bounds>, SceneError> {
+    fn locals(&mut self, mesh: usize, scene: &mut Scene) -> Result<Local, SceneError> {
         if let Some(locals) = self.locals.get(&mesh) {
             return Ok(locals.clone());
         }
         let primitives = self.meshes.primitives(mesh, scene)?;
-        let locals: Vec<Bounds> = primitives.iter().map(local).collect();
+        let shown = primitives.iter().filter(|primitive| primitive.triangles > 0);
+        let triangles = shown.clone().map(|primitive| primitive.triangles as u64).sum();
+        let locals = Local { bounds: shown.map(local).collect(), triangles };
         self.locals.insert(mesh, locals.clone());
         Ok(locals)
     }

@@ -184,7 +184,9 @@ impl SceneFile {
             scene.cameras.push(self.framed(&scene, moment)?);
             notices.framed = true;
         }
-        scene.lift_lamps();
+        scene.lift_lamps().map_err(|error| {
+            SceneError::memory(&document.path, "looking for lamps in other planes", error)
+        })?;
         notices.glass = solid_glass::resolve(document, &mut scene)?;
         notices.touching_glass = touching_glass::join(&mut scene);
         scene.notices = notices.finish(document);
