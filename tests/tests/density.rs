@@ -72,15 +72,9 @@ impl Map {
         let limits = GatherLimits { neighbors: NEIGHBORS, max_distance: self.max_distance };
         let mut searches = 0;
         let mut count = |_: u32, _: &NearestPhotons, _: &Reflected| searches += 1;
-        let radiance = gathered_radiance(
-            (&scene, &mut memory),
-            position,
-            &reflection,
-            limits,
-            buffer.view(),
-            &mut count,
-        )
-        .unwrap();
+        let radiance =
+            gathered_radiance((&scene, &mut memory), position, reflection, limits, buffer.view(), &mut count)
+                .unwrap();
         assert!(if of_disc.sight == Sight::Free { radiance == of_disc.radiance } else { searches == 2 });
         f64::from(radiance.x)
     }
@@ -262,7 +256,7 @@ fn walls_of_boxes(thickness: f32, overlap: bool) -> Vec<Triangle> {
         let beyond = if overlap && axis == 1 { 1.0 + thickness } else { 1.0 };
         let (mut lower, mut size) = (Vec3::splat(-beyond), Vec3::splat(2.0 * beyond));
         size[axis] = thickness;
-        lower[axis] = if side % 2 == 0 { -1.0 - thickness } else { 1.0 };
+        lower[axis] = if side.is_multiple_of(2) { -1.0 - thickness } else { 1.0 };
         closed_box(lower, size)
     };
     [0, 1, 2, 4, 5].into_iter().flat_map(wall).collect()

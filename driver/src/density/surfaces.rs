@@ -222,11 +222,7 @@ impl SurfaceLanes {
 #[inline(always)]
 fn batch_ways(batch: &Batch, from: Vec3) -> [Lane; 3] {
     let [p, q, _] = from.to_array();
-    let mut ways = [[0.0; LANES]; 3];
-    for lane in 0..LANES {
-        (ways[0][lane], ways[1][lane]) = (batch.x[lane] - p, batch.y[lane] - q);
-    }
-    ways
+    [batch.x.map(|x| x - p), batch.y.map(|y| y - q), [0.0; LANES]]
 }
 
 /// A part over the whole, or `without` where there is none.

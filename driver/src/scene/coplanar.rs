@@ -57,7 +57,7 @@ impl Scene {
         };
         let [own, other] = [lamp, surface].map(normal);
         let turns = is_double_sided(lamp) && !is_double_sided(surface) && own.dot(other) < 0.0;
-        let [a, b, c] = lamp.vertices.map(|vertex| vertex.as_dvec3());
+        let [a, b, c] = lamp.vertices.map(DVec3::from);
         let edge = (b - a).length().max((c - b).length()).max((a - c).length());
         let distance = LIFT * f64::from(f32::EPSILON) * (magnitude(lamp) + SEEN_FROM * edge);
         if turns { -own * distance } else { own * distance }
@@ -65,7 +65,7 @@ impl Scene {
 }
 
 fn normal(triangle: &Triangle) -> DVec3 {
-    let [a, b, c] = triangle.vertices.map(|vertex| vertex.as_dvec3());
+    let [a, b, c] = triangle.vertices.map(DVec3::from);
     (b - a).cross(c - a).normalize_or_zero()
 }
 
@@ -84,7 +84,7 @@ struct Box3 {
 impl Box3 {
     /// Box of a triangle, with room for surfaces in its plane.
     fn of(triangle: &Triangle) -> Self {
-        let [a, b, c] = triangle.vertices.map(|vertex| vertex.as_dvec3());
+        let [a, b, c] = triangle.vertices.map(DVec3::from);
         let room = SHARED * f64::from(f32::EPSILON) * magnitude(triangle);
         Self { low: a.min(b).min(c) - room, high: a.max(b).max(c) + room }
     }
@@ -115,7 +115,7 @@ impl Lamp {
     fn is_covered_by(&self, surface: &Triangle) -> bool {
         let up = normal(&self.triangle);
         let [lamp, surface_corners] =
-            [&self.triangle, surface].map(|triangle| triangle.vertices.map(|vertex| vertex.as_dvec3()));
+            [&self.triangle, surface].map(|triangle| triangle.vertices.map(DVec3::from));
         let rounding = f64::from(f32::EPSILON) * magnitude(&self.triangle).max(magnitude(surface));
         let is_in_plane = |corner: DVec3| (corner - lamp[0]).dot(up).abs() <= SHARED * rounding;
         // A small triangle beside the plane may have its corners near it.

@@ -35,7 +35,7 @@ impl Anchor {
         let root = &source.document.root;
         let chosen = root.scenes.get(root.scene.map_or(0, |scene| scene.value()));
         let tops: Vec<usize> =
-            chosen.iter().flat_map(|scene| &scene.nodes).map(|node| node.value()).collect();
+            chosen.iter().flat_map(|scene| &scene.nodes).map(gltf::json::Index::value).collect();
         let is_above = |index: &usize| tops.contains(index) && root.nodes[*index].mesh.is_none();
         let above =
             nodes.iter().filter(|(index, _)| is_above(index) && root.nodes[*index].children.is_some());
@@ -96,7 +96,7 @@ impl Extent<'_, '_, '_> {
                 add(&world);
                 continue;
             };
-            placed = placed.saturating_add(triangles.saturating_mul(instances.count as u64));
+            placed = placed.saturating_add(triangles.saturating_mul(instances.count));
             if placed > MAX_TRIANGLES as u64 {
                 // No scene is so large: the loader says so.
                 break;
@@ -116,7 +116,7 @@ impl Extent<'_, '_, '_> {
         }
         let primitives = self.meshes.primitives(mesh, scene)?;
         let shown = primitives.iter().filter(|primitive| primitive.triangles > 0);
-        let triangles = shown.clone().map(|primitive| primitive.triangles as u64).sum();
+        let triangles = shown.clone().map(|primitive| primitive.triangles).sum();
         let locals = Local { bounds: shown.map(local).collect(), triangles };
         self.locals.insert(mesh, locals.clone());
         Ok(locals)

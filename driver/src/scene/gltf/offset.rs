@@ -60,7 +60,8 @@ impl Bounds {
             let is_far = distance > NEAR * size || distance > FAR.max(size);
             let [low, high] = [centre[axis] - size, centre[axis] + size];
             let whole = stated.iter().map(|place| place[axis]);
-            let whole = whole.filter(|place| place.fract() == 0.0 && (low..=high).contains(place)).next();
+            let mut whole = whole.filter(|place| place.fract() == 0.0);
+            let whole = whole.find(|place| (low..=high).contains(place));
             if is_far { whole.unwrap_or_else(|| roundest(low, high)) } else { 0.0 }
         };
         DVec3::new(along(0), along(1), along(2))

@@ -72,7 +72,7 @@ pub(super) fn resolve(document: &Document, scene: &mut Scene) -> Result<Resolved
     for part in parts(&corners) {
         let triangles = || part.triangles.iter().map(|&index| &corners[index as usize]);
         // Two sheets back to back are closed, and hold nothing.
-        let is_flat = is_flat(triangles());
+        let is_flat = is_flat(&triangles());
         let is_closed = part.is_closed && !is_flat;
         let extent = extent(triangles());
         for &index in &part.triangles {
@@ -154,7 +154,7 @@ fn extent<'a>(triangles: impl Iterator<Item = &'a [Vec3; 3]>) -> f32 {
 }
 
 /// Returns whether triangles lie in one plane.
-fn is_flat<'a>(triangles: impl Iterator<Item = &'a [Vec3; 3]> + Clone) -> bool {
+fn is_flat<'a>(triangles: &(impl Iterator<Item = &'a [Vec3; 3]> + Clone)) -> bool {
     let normal = |[a, b, c]: &[Vec3; 3]| (*b - *a).cross(*c - *a);
     let largest =
         triangles.clone().max_by(|a, b| normal(a).length_squared().total_cmp(&normal(b).length_squared()));
@@ -177,8 +177,8 @@ mod tests {
             let [a, b, c, d] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
             [[a, b, c], [a, c, d]]
         };
-        assert!(is_flat(sheet(0.0).iter()));
-        assert!(!is_flat(sheet(0.01).iter()));
-        assert!(!is_flat([].iter()));
+        assert!(is_flat(&sheet(0.0).iter()));
+        assert!(!is_flat(&sheet(0.01).iter()));
+        assert!(!is_flat(&[].iter()));
     }
 }
