@@ -91,8 +91,14 @@ fn absorbing(cosine: f64, depth: f64) -> f64 {
     (1.0 - reflectance).powi(2) * once / (1.0 - (reflectance * once).powi(2))
 }
 
-/// The lights of the tests, with the irradiance of the floor below glass of a transmittance by the cosine.
-fn lights() -> Vec<(&'static str, fn(&mut Scene), Box<dyn Fn(&dyn Fn(f64) -> f64) -> f64>)> {
+/// Irradiance of the floor below glass of a transmittance by the cosine.
+type Irradiance = Box<dyn Fn(&dyn Fn(f64) -> f64) -> f64>;
+
+/// Name of a light, its addition to a scene, and its irradiance.
+type Light = (&'static str, fn(&mut Scene), Irradiance);
+
+/// The lights of the tests.
+fn lights() -> Vec<Light> {
     vec![
         (
             "sun",

@@ -218,7 +218,7 @@ impl SpecularPath {
     }
 
     /// Follows the path from a surface that it may pass to its end, which replaces `surface` and `hit`. `random` gives a number in
-    /// [0, 1) for each choice, by [`Choice::number`].
+    /// [0, 1) for each choice, of which no two at any surface have one number.
     ///
     /// # Errors
     /// If the image is not sound.
