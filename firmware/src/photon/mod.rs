@@ -9,6 +9,7 @@ mod leaves;
 mod nearest;
 mod radiance;
 mod region;
+mod same_surface;
 mod select;
 
 use glam::Vec3;
@@ -19,8 +20,9 @@ pub use candidates::{Candidate, CandidateBuffer, CandidateStorage, Candidates};
 pub use caustic::{CausticSearch, Caustics, LitBy, reflected_caustics};
 pub use irradiance::{FoundIrradiance, PointSearch, nearest_irradiance};
 pub use nearest::NearestPhotons;
-pub use radiance::{Estimate, MIN_NORMAL_COSINE, Reflected, SameSurface, Sight, reflected_radiance};
+pub use radiance::{Estimate, Reflected, Sight, reflected_radiance};
 pub use region::{SECTORS, Sectors, VisibleRegion};
+pub use same_surface::{MIN_NORMAL_COSINE, SameSurface};
 
 use self::region::{All, Filter};
 use crate::memory::MemoryPort;

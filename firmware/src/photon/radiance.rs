@@ -17,16 +17,13 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::{decode_normal, disc_fraction, is_of_region};
+use photoncard_shared::layout::{disc_fraction, is_of_region};
 
-use super::{Candidate, NearestPhotons, Sectors};
+use super::{Candidate, NearestPhotons, SameSurface, Sectors};
 use crate::fixed_point::ColourSum;
 use crate::scene::{DecodedLobe, PartialReflection, magnitude};
 use crate::simd::{self, Isa, Kernel};
-use crate::vector::{max, min, unit};
-
-/// Minimum cosine between the normals of a photon and of the query that count as one surface.
-pub const MIN_NORMAL_COSINE: f32 = 0.75;
+use crate::vector::{max, min};
 
 /// Minimum radius of a disc over the query's greatest coordinate, about its rounding error: photons at one point have no density.
 const MIN_RADIUS_SHARE: f32 = 1e-6;
@@ -182,7 +179,7 @@ fn sum<'a>(
             sums.add(&candidate);
         }
     }
-    sums.normals_decoded = same_surface.decoded;
+    sums.normals_decoded = same_surface.decoded();
     Some((closest?, sums))
 }
 
@@ -224,38 +221,5 @@ impl<'a> Sums<'a> {
     #[inline(always)]
     fn reflected(&self) -> Vec3 {
         self.reflection.reflected(&self.power, &self.lobe)
-    }
-}
-
-/// Test for photons of one surface. Consecutive photons mostly have equal normals, so that the last result is cached.
-pub struct SameSurface {
-    normal: Vec3,
-    last: (u8, bool),
-    /// Number of normals decoded so far.
-    decoded: u32,
-}
-
-impl SameSurface {
-    /// The test for a surface whose normal has this code.
-    #[inline(always)]
-    pub fn new(code: u8) -> Self {
-        Self { normal: unit(decode_normal(code).into()), last: (code, true), decoded: 0 }
-    }
-
-    /// Number of normals decoded so far.
-    #[inline(always)]
-    pub(super) fn decoded(&self) -> u32 {
-        self.decoded
-    }
-
-    /// `true` for a photon of the surface, by its normal's code.
-    #[inline(always)]
-    pub fn holds(&mut self, code: u8) -> bool {
-        if self.last.0 != code {
-            let other = unit(decode_normal(code).into());
-            self.decoded += 1;
-            self.last = (code, other.dot(self.normal) >= MIN_NORMAL_COSINE);
-        }
-        self.last.1
     }
 }

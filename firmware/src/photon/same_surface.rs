@@ -1,0 +1,42 @@
+//! Photons of one surface, by their normals.
+
+use glam::Vec3;
+use photoncard_shared::layout::decode_normal;
+
+use crate::vector::unit;
+
+/// Minimum cosine between the normals of a photon and of the query that count as one surface.
+pub const MIN_NORMAL_COSINE: f32 = 0.75;
+
+/// Test for photons of one surface. Consecutive photons mostly have equal normals, so that the last result is cached.
+pub struct SameSurface {
+    normal: Vec3,
+    last: (u8, bool),
+    /// Number of normals decoded so far.
+    decoded: u32,
+}
+
+impl SameSurface {
+    /// The test for a surface whose normal has this code.
+    #[inline(always)]
+    pub fn new(code: u8) -> Self {
+        Self { normal: unit(decode_normal(code).into()), last: (code, true), decoded: 0 }
+    }
+
+    /// Number of normals decoded so far.
+    #[inline(always)]
+    pub(super) fn decoded(&self) -> u32 {
+        self.decoded
+    }
+
+    /// `true` for a photon of the surface, by its normal's code.
+    #[inline(always)]
+    pub fn holds(&mut self, code: u8) -> bool {
+        if self.last.0 != code {
+            let other = unit(decode_normal(code).into());
+            self.decoded += 1;
+            self.last = (code, other.dot(self.normal) >= MIN_NORMAL_COSINE);
+        }
+        self.last.1
+    }
+}
