@@ -25,7 +25,7 @@ pub use region::{SECTORS, Sectors, VisibleRegion};
 pub use same_surface::{MIN_NORMAL_COSINE, SameSurface};
 
 use self::region::{All, Filter};
-use crate::memory::MemoryPort;
+use crate::memory::{MemoryPort, Stage};
 use crate::scene::{PartialReflection, SceneImage};
 use crate::simd::{self, Isa, Kernel};
 
@@ -117,7 +117,9 @@ pub fn gathered_radiance(
     }
     let radius = nearest.radius();
     let reach = crate::vector::min(MAX_REACH * radius, max_distance);
+    memory.enter(Stage::GatherRay);
     let region = VisibleRegion::new(scene, memory, (position, reflection.normal()), radius, reach)?;
+    memory.enter(Stage::Gather);
     let mut nearest = NearestPhotons::new(candidates, neighbors, reach);
     let tested = gather_visible(scene, memory, PhotonMap::Indirect, (position, &region), &mut nearest)?;
     let of_region = reflected_radiance(&nearest, position, Some(&region.sectors), reflection);
