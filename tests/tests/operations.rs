@@ -75,7 +75,6 @@ fn the_model_computes_the_operations_that_the_firmware_does() {
     for (scene, layout, sampling, error) in [
         ("cornell.gltf", PhotonLayout::Lines, Sampling::Product, Some(0.1)),
         ("cornell-glossy.gltf", PhotonLayout::Jensen, Sampling::Reflection, None),
-        ("roughness.glb", PhotonLayout::Lines, Sampling::Reflection, None),
     ] {
         check(scene, &Run::new(&instrument, scene, &settings(layout, sampling, error), 2));
     }
