@@ -1,4 +1,5 @@
-//! The cost model's operations of a step are those of the firmware: counted again, and equal to what the model computes.
+//! The cost model's operations of a step are those of the firmware: counted again, and equal to what the model computes, but for rays and
+//! photons of visible regions, which it has no step for.
 
 use std::io::Write;
 
@@ -10,7 +11,7 @@ use photoncard_driver::scheduler::GatherOrder;
 use photoncard_tests::operations::Instrument;
 use photoncard_tests::operations::run::Run;
 
-/// Relative difference that rays and searches of visible regions may make, which the model has no step for.
+/// Maximum relative difference by visible regions: of rays by theirs, of photons by the test of their sectors.
 const OF_REGIONS: f64 = 0.15;
 
 /// Steps with equal lanes, whatever the data. Rays of a bundle share parts of a node's decoding.
@@ -44,14 +45,15 @@ fn check(name: &str, run: &Run) {
         let [counted, modelled] = [run.steps[index], modelled].map(|operations| operations.flops());
         let off = difference(modelled, counted);
         println!("{name}: {}: {off}", step.name());
-        assert!(off < OF_REGIONS, "{name}: {}: {modelled} instead of {counted}", step.name());
+        let allowed = if [Step::Ray, Step::Photon].contains(&step) { OF_REGIONS } else { 0.0 };
+        assert!(off <= allowed, "{name}: {}: {modelled} instead of {counted}", step.name());
     }
     let modelled = run.modelled();
     let mut total = Operations::default();
     Unit::ALL.iter().for_each(|&unit| total.add(&run.counted(unit)));
     let of_all = modelled.sum(|_| true).flops();
     println!("{name}: all: {}", difference(of_all, total.flops()));
-    assert!(difference(of_all, total.flops()) < OF_REGIONS, "{name}: {of_all} instead of {}", total.flops());
+    assert!(difference(of_all, total.flops()) < 0.05, "{name}: {of_all} instead of {}", total.flops());
     // A quarter of the unit, as directions depend on the few surfaces of the tiles, and a fiftieth of all: the model of shading and of pixels is by their mean.
     for &unit in Unit::ALL {
         let (counted, modelled) = (run.counted(unit).flops(), modelled.unit(unit).flops());

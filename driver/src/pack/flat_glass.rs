@@ -94,7 +94,7 @@ impl<'a> Glazing<'a> {
         records
     }
 
-    /// What materials of the scene have, for each material of the image.
+    /// Property of the scene's materials, for each material of the image.
     pub(super) fn of_materials(&self, of_scene: &[bool]) -> Vec<bool> {
         let of_panes = self.panes.iter().map(|pane| of_scene[pane.material as usize]);
         of_scene.iter().copied().chain(of_panes).collect()

@@ -37,7 +37,7 @@ pub struct Reflected {
     pub normals_decoded: u32,
     /// Closest photon of the surface.
     pub closest: Option<Candidate>,
-    /// What the closest photon says of the others.
+    /// Visibility of the photons from the point, by the closest one.
     pub sight: Sight,
 }
 

@@ -68,7 +68,7 @@ impl Specular {
     }
 }
 
-/// What a surface of glass bounds.
+/// Body that a glass surface bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Bounds {
     /// A volume of glass.

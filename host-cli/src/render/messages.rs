@@ -82,8 +82,8 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     )
 }
 
-/// What a fit has measured for photons of the camera, and what the scene would take beyond the bounds of its quality, where settings are
-/// not stated.
+/// Messages of a fit, where settings are not stated: gain of photons for the camera, and settings that the
+/// scene would take beyond the bounds of its quality.
 pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Vec<String> {
     let gain = fit.measured.photons_for_camera.map(|ratio| {
         let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };

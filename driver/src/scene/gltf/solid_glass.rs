@@ -35,7 +35,7 @@ pub(super) struct Resolved {
 /// Triangles of each form of each material.
 type Surfaces = BTreeMap<u32, BTreeMap<Form, Vec<u32>>>;
 
-/// What a part of a surface becomes.
+/// Form that a part of a glass surface takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Form {
     AsStated,

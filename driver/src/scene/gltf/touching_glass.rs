@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::solid_glass::transmission;
 use crate::scene::{Material, Reflection, Scene, Transmission};
 
-/// What becomes of two faces in one place.
+/// Outcome of joining two coinciding faces.
 #[derive(Clone, Debug, PartialEq)]
 enum Touch {
     /// Both are within one medium, and are left out.
