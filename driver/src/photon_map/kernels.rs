@@ -7,7 +7,7 @@
 use glam::Vec3;
 use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_kernel, kernel_share};
 
-use super::neighbors::{Place, Places};
+use super::neighbors::{Place, Places, arrange};
 use crate::photon::{Photons, StoredPhoton};
 
 /// Maximum number of neighbours by which the density is estimated: the radius is that of more of them, at this density.
@@ -26,6 +26,7 @@ const MARGIN_CELLS: u32 = 2;
 /// Gives each photon the code of its radius, in which about `neighbors` of its light lie. Returns the radius of the last code, metres.
 pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f32 {
     let grid = photons.grid();
+    arrange(photons.stored_mut());
     let places = Places::new(photons.stored().iter().map(place).collect());
     let limit = (MAX_SHARE_OF_DIAGONAL * diagonal / grid.cell).max(MIN_CELLS);
     let probed = neighbors.clamp(1, MAX_PROBED);
@@ -60,6 +61,7 @@ fn place(photon: &StoredPhoton) -> Place {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
     use photoncard_firmware::sampler::hash;
     use photoncard_shared::layout::{FULL_DISC, PhotonGrid, Rgbe, encode_direction, encode_normal};
 
