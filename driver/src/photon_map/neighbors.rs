@@ -14,7 +14,7 @@ const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
 /// Number of places of a leaf.
 const LEAF: usize = 12;
 /// Share of a distance within which places of a leaf have it in common.
-const SHARED_SHARE: f32 = 0.45;
+const SHARED_SHARE: f32 = 0.3;
 
 /// A photon's place, cells of the photon grid, and the unit vectors that neighbours share.
 #[derive(Clone, Copy, Debug)]

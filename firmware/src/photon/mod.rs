@@ -191,15 +191,15 @@ fn search<M: MemoryPort>(
     query: (Vec3, &impl Filter),
     nearest: &mut NearestPhotons,
 ) -> Result<u32, Fault> {
-    let has_leaves = scene.header.section(SectionKind::PhotonLeaves).records > 0;
-    if map == PhotonMap::Indirect && !has_leaves {
-        let tested = kdtree::gather(isa, scene, memory, query, nearest)?;
-        nearest.finish(isa);
-        return Ok(tested);
-    }
+    let has_leaves =
+        map == PhotonMap::Caustics || scene.header.section(SectionKind::PhotonLeaves).records > 0;
     let mut tested = 0;
     loop {
-        tested += leaves::gather(isa, scene, map.sections(), memory, query, nearest)?;
+        tested += if has_leaves {
+            leaves::gather(isa, scene, map.sections(), memory, query, nearest)?
+        } else {
+            kdtree::gather(isa, scene, memory, query, nearest)?
+        };
         if !nearest.widen() {
             break;
         }
