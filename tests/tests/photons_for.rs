@@ -77,7 +77,7 @@ impl Pictures {
 fn a_corridor_seen_from_its_dark_end_has_one_mean_by_photons_for_any_camera_and_for_its_own() {
     let scene = corridor(0.8);
     let [of_scene, of_camera] =
-        [PhotonsFor::Scene, PhotonsFor::Camera].map(|photons_for| Pictures::new(&scene, photons_for, 40));
+        [PhotonsFor::Scene, PhotonsFor::Camera].map(|photons_for| Pictures::new(&scene, photons_for, 16));
     let error = of_scene.error.hypot(of_camera.error);
     println!("{} +- {}, {} +- {}", of_scene.mean, of_scene.error, of_camera.mean, of_camera.error);
     println!("{} m, {} m", of_scene.max_distance, of_camera.max_distance);
