@@ -1,5 +1,5 @@
-//! The cost model's operations of a step are those of the firmware: counted again, and equal to what the model computes, but for rays and
-//! photons of visible regions, which it has no step for.
+//! The cost model's operations of a step are those of the firmware: counted again, and equal to what the model
+//! computes, but for rays and photons of visible regions, which it has no step for.
 
 use std::io::Write;
 
