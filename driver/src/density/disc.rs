@@ -43,7 +43,8 @@ const OPEN_HEIGHT: f32 = 0.1;
 const MARGIN: f32 = 1.15;
 /// Greatest difference of the hidden shares of area and light in that sphere for which a gather takes all photons.
 const MAX_DIFFERENCE: f32 = 0.06;
-/// Greatest difference at a photon for which the photons beside it are taken to have none above [`MAX_DIFFERENCE`].
+/// Greatest difference in the ball around photons, over the area of one photon's sphere, for which none of them is taken to have more
+/// than [`MAX_DIFFERENCE`].
 const NEAR_DIFFERENCE: f32 = 0.03;
 /// Radius of gathers over that of a disc with as many photons as a leaf, estimated by the greatest distance from its middle.
 const BY_SPREAD: f32 = 1.2;
@@ -300,7 +301,7 @@ impl<'a> Meter<'a> {
             }
             fractions[photon.photon] = if may_differ {
                 let region = self.region(photon, frame, cluster)?;
-                let (areas, powers) = self.seen(photon, &region, frame, cluster, &chords);
+                let [areas, powers] = self.seen(photon, &region, frame, cluster, (&chords, [radius, MARGIN * radius]));
                 Fraction::new(&areas, &powers)
             } else {
                 let (surfaces, chords) = (&self.surfaces, &chords);
@@ -313,23 +314,21 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Areas around a photon that its gathers count, and that it sees, and the same of photons' powers.
+    /// Areas within two radii around a photon that its gathers count, and that it sees, and the same of photons' powers.
     fn seen(
         &self,
         photon: &DiscPhoton,
         region: &SeenRegion,
         frame: &ChordFrame,
         cluster: &Cluster,
-        chords: &Chords,
-    ) -> (Areas, Areas) {
-        let Cluster { ball, radius, .. } = *cluster;
-        let lift = self.lift(radius) / ball.radius;
+        (chords, [radius, outer_radius]): (&Chords, [f32; 2]),
+    ) -> [Areas; 2] {
+        let ball = cluster.ball;
+        let lift = self.lift(cluster.radius) / ball.radius;
         let centre = frame.along((photon.position - ball.centre) / ball.radius);
-        let [radius, outer_radius] = [radius, MARGIN * radius].map(|radius| radius / ball.radius);
-        let surfaces = &self.surfaces;
-        let areas = AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift };
-        let powers = AreasWithin { surfaces: &self.lights, ..areas };
-        (run(areas), run(powers))
+        let [radius, outer_radius] = [radius, outer_radius].map(|radius| radius / ball.radius);
+        [&self.surfaces, &self.lights]
+            .map(|surfaces| run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift }))
     }
 
     /// Adds surfaces below others where photons show that they have light. One within the grid's error below another is the same.
@@ -371,25 +370,19 @@ impl<'a> Meter<'a> {
         let Some(first) = group.first() else { return Ok(false) };
         self.surfaces.choose(first.normal, self.same);
         let region = self.region(first, frame, cluster)?;
-        let Cluster { ball, radius, .. } = *cluster;
-        let all = AreasWithin {
-            chords,
-            surfaces: &self.surfaces,
-            region: &region,
-            centre: frame.along((first.position - ball.centre) / ball.radius),
-            radius: 2.0,
-            outer_radius: 2.0,
-            lift: self.lift(radius) / ball.radius,
-        };
-        if run(all).hidden <= 0.0 {
-            self.lights.clear();
+        let Cluster { ball, radius, outer } = *cluster;
+        let whole = [2.0 * ball.radius; 2];
+        self.lights.clear();
+        let [areas, _] = self.seen(first, &region, frame, cluster, (chords, whole));
+        if areas.hidden <= 0.0 {
             return Ok(false);
         }
         self.find_evidence(ball)?;
         self.evidence.powers(ball, frame, &mut self.lights);
         self.lights.choose(first.normal, self.same);
-        let (areas, powers) = self.seen(first, &region, frame, cluster, chords);
-        Ok((areas.hidden - powers.hidden).abs() > NEAR_DIFFERENCE)
+        let [areas, powers] = self.seen(first, &region, frame, cluster, (chords, whole));
+        let spheres = outer / (MARGIN * radius);
+        Ok(spheres * spheres * (areas.hidden - powers.hidden).abs() > NEAR_DIFFERENCE)
     }
 
     /// Region that a photon sees, in the ball's coordinates.
