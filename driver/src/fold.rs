@@ -59,6 +59,11 @@ impl<L, B: Copy> Tree<L, B> {
         Self { part: Part { bounds, leaf, parts, first }, costs }
     }
 
+    /// Bounds of the root.
+    pub(crate) fn bounds(&self) -> B {
+        self.part.bounds
+    }
+
     /// The leaf that the tree may become, if any.
     pub(crate) fn as_leaf(&self) -> Option<&L> {
         self.part.leaf.as_ref()

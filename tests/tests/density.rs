@@ -173,7 +173,7 @@ fn the_radiance_of_shelves_above_one_another_is_that_of_the_wall() {
             edge += along(0.24);
         }
         assert!((within - 1.0).abs() < 0.05, "on the shelves it is {within}");
-        assert!((edge - 1.0).abs() < 0.06, "at their edge it is {edge}");
+        assert!((edge - 1.0).abs() < 0.07, "at their edge it is {edge}");
     }
 }
 

@@ -43,6 +43,9 @@ const OPEN_HEIGHT: f32 = 0.1;
 const MARGIN: f32 = 1.15;
 /// Greatest difference of the hidden shares of area and light in that sphere for which a gather takes all photons.
 const MAX_DIFFERENCE: f32 = 0.06;
+/// Greatest difference in the ball around photons, over the area of one photon's sphere, for which none of them is taken to have more
+/// than [`MAX_DIFFERENCE`].
+const NEAR_DIFFERENCE: f32 = 0.03;
 /// Radius of gathers over that of a disc with as many photons as a leaf, estimated by the greatest distance from its middle.
 const BY_SPREAD: f32 = 1.2;
 /// Maximum distance at which a photon shows that a surface has light, over the radius of a gather.
@@ -289,31 +292,43 @@ impl<'a> Meter<'a> {
         let lift = self.lift(radius) / ball.radius;
         self.crossings.open_surfaces(&chords, &mut self.surfaces, &mut self.covered);
         self.add_covered(group.first().map_or(ball.centre, |photon| photon.position), frame, cluster)?;
-        let hides = self.hides(group, frame, cluster, &chords)?;
-        if hides {
-            self.find_evidence(ball)?;
-            self.evidence.powers(ball, frame, &mut self.lights);
-        }
+        let may_differ = self.may_differ(group, frame, cluster, &chords)?;
         let mut chosen = None;
         for photon in group {
             if chosen.replace(photon.normal) != Some(photon.normal) {
                 self.surfaces.choose(photon.normal, self.same);
                 self.lights.choose(photon.normal, self.same);
             }
-            let (surfaces, lights, chords) = (&self.surfaces, &self.lights, &chords);
-            let centre = frame.along((photon.position - ball.centre) / ball.radius);
-            let [radius, outer_radius] = [radius, MARGIN * radius].map(|radius| radius / ball.radius);
-            fractions[photon.photon] = if hides {
-                let region = &self.region(photon, frame, cluster)?;
-                let areas = AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift };
-                let powers = AreasWithin { surfaces: lights, ..areas };
-                Fraction::new(&run(areas), &run(powers))
+            fractions[photon.photon] = if may_differ {
+                let region = self.region(photon, frame, cluster)?;
+                let [areas, powers] = self.seen(photon, &region, frame, cluster, (&chords, [radius, MARGIN * radius]));
+                Fraction::new(&areas, &powers)
             } else {
+                let (surfaces, chords) = (&self.surfaces, &chords);
+                let centre = frame.along((photon.position - ball.centre) / ball.radius);
+                let radius = radius / ball.radius;
                 let fraction = run(FractionWithin { chords, surfaces, centre, radius, lift });
                 Fraction { fraction, is_of_region: false }
             };
         }
         Ok(())
+    }
+
+    /// Areas within two radii around a photon that its gathers count, and that it sees, and the same of photons' powers.
+    fn seen(
+        &self,
+        photon: &DiscPhoton,
+        region: &SeenRegion,
+        frame: &ChordFrame,
+        cluster: &Cluster,
+        (chords, [radius, outer_radius]): (&Chords, [f32; 2]),
+    ) -> [Areas; 2] {
+        let ball = cluster.ball;
+        let lift = self.lift(cluster.radius) / ball.radius;
+        let centre = frame.along((photon.position - ball.centre) / ball.radius);
+        let [radius, outer_radius] = [radius, outer_radius].map(|radius| radius / ball.radius);
+        [&self.surfaces, &self.lights]
+            .map(|surfaces| run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift }))
     }
 
     /// Adds surfaces below others where photons show that they have light. One within the grid's error below another is the same.
@@ -344,8 +359,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// True if the first photon of a group does not see all of its surface in the ball.
-    fn hides(
+    /// True if light that photons of a group do not see may differ from the light that they see, by the first of them.
+    fn may_differ(
         &mut self,
         group: &[DiscPhoton],
         frame: &ChordFrame,
@@ -355,13 +370,19 @@ impl<'a> Meter<'a> {
         let Some(first) = group.first() else { return Ok(false) };
         self.surfaces.choose(first.normal, self.same);
         let region = self.region(first, frame, cluster)?;
-        let ball = cluster.ball;
-        let centre = frame.along((first.position - ball.centre) / ball.radius);
-        let lift = self.lift(cluster.radius) / ball.radius;
-        let surfaces = &self.surfaces;
-        let all =
-            AreasWithin { chords, surfaces, region: &region, centre, radius: 2.0, outer_radius: 2.0, lift };
-        Ok(run(all).hidden > 0.0)
+        let Cluster { ball, radius, outer } = *cluster;
+        let whole = [2.0 * ball.radius; 2];
+        self.lights.clear();
+        let [areas, _] = self.seen(first, &region, frame, cluster, (chords, whole));
+        if areas.hidden <= 0.0 {
+            return Ok(false);
+        }
+        self.find_evidence(ball)?;
+        self.evidence.powers(ball, frame, &mut self.lights);
+        self.lights.choose(first.normal, self.same);
+        let [areas, powers] = self.seen(first, &region, frame, cluster, (chords, whole));
+        let spheres = outer / (MARGIN * radius);
+        Ok(spheres * spheres * (areas.hidden - powers.hidden).abs() > NEAR_DIFFERENCE)
     }
 
     /// Region that a photon sees, in the ball's coordinates.

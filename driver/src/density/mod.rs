@@ -19,4 +19,4 @@ mod surfaces;
 mod surroundings;
 
 pub(crate) use self::disc::measure_discs;
-pub(crate) use self::search::{GatherDistances, gather_distances};
+pub(crate) use self::search::{GatherDistances, SampledDistances};

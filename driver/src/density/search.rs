@@ -6,15 +6,15 @@ use photoncard_firmware::memory::Lines;
 use photoncard_firmware::photon::{NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{Photon, PhotonLeaf};
-use photoncard_shared::message::Fault;
+use photoncard_shared::layout::{Photon, PhotonLeaf, PhotonNode, WideNode};
+use photoncard_shared::message::{Fault, FaultCode};
 use rayon::prelude::*;
 
 use crate::pack::CardImage;
-use crate::photon::{ImportonGrid, Importons};
+use crate::photon::Importons;
 
-/// Number of leaves that the automatic maximum distance is estimated from, one photon of each.
-const SAMPLED_LEAVES: usize = 2048;
+/// Square of the distance within which searches in a node look first, over that of its sample.
+const MOST: f32 = 1.4;
 /// Share of the sampled photons whose k-th neighbour lies within the usual distance.
 const USUAL_SHARE: f64 = 0.95;
 /// Automatic maximum distance over the greatest distance of a sampled photon's k-th neighbour: there may be greater ones.
@@ -59,54 +59,85 @@ pub(crate) struct GatherDistances {
     pub(crate) greatest: f32,
 }
 
-/// Distances of gathers, `k = neighbors`; with importons, among photons where there are any.
-///
-/// # Errors
-/// If the image is malformed.
-pub(crate) fn gather_distances(
-    image: &CardImage,
+/// Distances of photons' k-th neighbours, one in each node of a photon map that has leaves.
+pub(crate) struct SampledDistances {
     neighbors: u32,
-    importons: Option<&Importons>,
-) -> Result<GatherDistances, Fault> {
-    let importons = importons.map(|importons| &importons.indirect);
-    let [usual, greatest] = distances_within(image, importons, neighbors, [USUAL_SHARE, 1.0])?;
-    Ok(GatherDistances { usual, greatest: (BEYOND_SAMPLES * greatest).min(image.diagonal()) })
+    samples: Vec<Sample>,
 }
 
-/// Distances within which some shares of the photons, of those at importons, have `neighbors` neighbours.
-fn distances_within<const N: usize>(
-    image: &CardImage,
-    importons: Option<&ImportonGrid>,
-    neighbors: u32,
-    shares: [f64; N],
-) -> Result<[f32; N], Fault> {
-    let leaves = image.section(SectionKind::PhotonLeaves);
-    let grid = image.view().0.header.photon_grid;
-    let unlimited = f32::MAX.sqrt() * 0.5;
-    let distances: Result<Vec<f32>, Fault> = leaves
-        .par_iter()
-        .step_by(leaves.len().div_ceil(SAMPLED_LEAVES).max(1))
-        .enumerate()
-        .map_init(
-            || Searcher::new(image, neighbors, unlimited),
-            |searcher, (sample, line)| {
-                let leaf = PhotonLeaf::read(&line.0);
-                let photon = sample as u32 % leaf.photons().max(1);
-                let position = grid.position(leaf.point(photon)).into();
-                let [.., low, high] = leaf.content(photon);
-                let normal = Photon::normal_of_flags(u16::from_le_bytes([low, high]));
-                let is_used = importons.is_none_or(|importons| importons.is_used(position, normal));
-                if is_used { searcher.radius(position) } else { Ok(unlimited) }
-            },
-        )
-        .collect();
-    let mut distances = distances?;
-    // A map of fewer photons than neighbours has no such distances, nor has a photon without importons.
-    distances.retain(|&distance| distance < unlimited);
-    distances.sort_by(f32::total_cmp);
-    Ok(shares.map(|share| {
-        let place = (distances.len() as f64 * share) as usize;
-        let covered = distances.get(place.min(distances.len().saturating_sub(1))).copied();
-        covered.unwrap_or_else(|| image.diagonal()).max(f32::MIN_POSITIVE.sqrt())
-    }))
+/// The distance of one photon's k-th neighbour.
+struct Sample {
+    /// Node whose leaf holds the photon.
+    node: usize,
+    position: Vec3,
+    normal: u8,
+    /// The distance, metres; [`UNLIMITED`] in a map of fewer photons.
+    distance: f32,
+}
+
+/// Distance that exceeds any other, and whose square is finite.
+const UNLIMITED: f32 = 1e18;
+
+impl SampledDistances {
+    /// Distances in the photon map of an image, `k = neighbors`.
+    ///
+    /// # Errors
+    /// If the image is malformed.
+    pub(crate) fn new(image: &CardImage, neighbors: u32) -> Result<Self, Fault> {
+        let nodes = image.section(SectionKind::PhotonNodes);
+        let samples: Result<Vec<Option<Sample>>, Fault> = nodes
+            .par_iter()
+            .enumerate()
+            .map_init(
+                || Searcher::new(image, neighbors, UNLIMITED),
+                |searcher, (node, line)| {
+                    let links = WideNode(&line.0).links();
+                    let middle = (links.leaves > 0).then_some(links.first_leaf + links.leaves / 2);
+                    middle.map(|leaf| Sample::new(searcher, image, node, leaf)).transpose()
+                },
+            )
+            .collect();
+        Ok(Self { neighbors, samples: samples?.into_iter().flatten().collect() })
+    }
+
+    /// Writes into each node how dense its photons are, by which gathers narrow their searches.
+    pub(crate) fn write_shares(&self, image: &mut CardImage) {
+        let nodes = image.section_mut(SectionKind::PhotonNodes);
+        for sample in self.samples.iter().filter(|sample| sample.distance < UNLIMITED) {
+            let share = MOST * sample.distance * sample.distance / self.neighbors as f32;
+            PhotonNode::set_photon_share(&mut nodes[sample.node].0, share);
+        }
+    }
+
+    /// Distances of gathers; with importons, among photons where there are any.
+    pub(crate) fn of_gathers(&self, image: &CardImage, importons: Option<&Importons>) -> GatherDistances {
+        let is_used = |sample: &&Sample| {
+            importons.is_none_or(|importons| importons.indirect.is_used(sample.position, sample.normal))
+        };
+        let used = self.samples.iter().filter(is_used).map(|sample| sample.distance);
+        // A map of fewer photons than neighbours has no such distances, nor has a photon without importons.
+        let mut distances: Vec<f32> = used.filter(|&distance| distance < UNLIMITED).collect();
+        distances.sort_by(f32::total_cmp);
+        let within = |share: f64| {
+            let place = (distances.len() as f64 * share) as usize;
+            let covered = distances.get(place.min(distances.len().saturating_sub(1))).copied();
+            covered.unwrap_or_else(|| image.diagonal()).max(f32::MIN_POSITIVE.sqrt())
+        };
+        let greatest = (BEYOND_SAMPLES * within(1.0)).min(image.diagonal());
+        GatherDistances { usual: within(USUAL_SHARE), greatest }
+    }
+}
+
+impl Sample {
+    /// The sample of a photon of a leaf below a node.
+    fn new(searcher: &mut Searcher, image: &CardImage, node: usize, leaf: u32) -> Result<Self, Fault> {
+        let fault = Fault { code: FaultCode::Record, detail: leaf };
+        let line = image.section(SectionKind::PhotonLeaves).get(leaf as usize).ok_or(fault)?;
+        let photons = PhotonLeaf::read(&line.0);
+        let photon = leaf % photons.photons().max(1);
+        let position = searcher.scene.header.photon_grid.position(photons.point(photon)).into();
+        let [.., low, high] = photons.content(photon);
+        let normal = Photon::normal_of_flags(u16::from_le_bytes([low, high]));
+        Ok(Self { node, position, normal, distance: searcher.radius(position)? })
+    }
 }

@@ -7,7 +7,7 @@
 use glam::Vec3;
 use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_kernel, kernel_share};
 
-use super::neighbors::{Place, Places};
+use super::neighbors::{Place, Places, arrange};
 use crate::photon::{Photons, StoredPhoton};
 
 /// Maximum number of neighbours by which the density is estimated: the radius is that of more of them, at this density.
@@ -23,9 +23,11 @@ const ROUNDING: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Cells by which the reach of a photon is rounded up.
 const MARGIN_CELLS: u32 = 2;
 
-/// Gives each photon the code of its radius, in which about `neighbors` of its light lie. Returns the radius of the last code, metres.
+/// Gives each photon the code of its radius, in which about `neighbors` of its light lie, and changes the photons'
+/// order. Returns the radius of the last code, metres.
 pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f32 {
     let grid = photons.grid();
+    arrange(photons.stored_mut());
     let places = Places::new(photons.stored().iter().map(place).collect());
     let limit = (MAX_SHARE_OF_DIAGONAL * diagonal / grid.cell).max(MIN_CELLS);
     let probed = neighbors.clamp(1, MAX_PROBED);
@@ -60,6 +62,7 @@ fn place(photon: &StoredPhoton) -> Place {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
     use photoncard_firmware::sampler::hash;
     use photoncard_shared::layout::{FULL_DISC, PhotonGrid, Rgbe, encode_direction, encode_normal};
 
@@ -91,12 +94,13 @@ mod tests {
         let grid = PhotonGrid::around([0.0; 3], [1.0; 3]);
         let mut photons = Photons::new(grid, 1.0, sun.chain(sparse));
         let greatest = spread(&mut photons, 50, 10.0);
-        let radii: Vec<f32> =
-            photons.iter().map(|photon| greatest * kernel_share(photon.disc).sqrt()).collect();
-        let mean = |radii: &[f32]| radii.iter().sum::<f32>() / radii.len() as f32;
-        let expected = |density: f32| (AREA * 50.0 / (std::f32::consts::PI * density)).sqrt();
-        for (found, density) in [(mean(&radii[..100_000]), 1e5), (mean(&radii[100_000..]), 1e3)] {
-            let ratio = found / expected(density);
+        let of_sun = encode_direction(Vec3::Y.to_array());
+        for (is_of_sun, density) in [(true, 1e5), (false, 1e3)] {
+            let of_light = photons.iter().filter(|photon| (photon.direction == of_sun) == is_of_sun);
+            let radii: Vec<f32> =
+                of_light.map(|photon| greatest * kernel_share(photon.disc).sqrt()).collect();
+            let mean = radii.iter().sum::<f32>() / radii.len() as f32;
+            let ratio = mean / (AREA * 50.0 / (std::f32::consts::PI * density)).sqrt();
             assert!(
                 (0.8..1.45).contains(&ratio),
                 "{ratio} of the radius at {density} photons a square metre"

@@ -110,12 +110,12 @@ fn build(
         return None;
     }
     let radius = searches.radius;
-    let extent = Extent::new(photons, &|_| 0);
-    let reached = Extent::new(photons, searches.reach);
+    let extent = Extent::new(photons);
     let count = u8::try_from(photons.len()).ok().and_then(NonZeroU8::new);
     if let Some(count) = count
         && PhotonLeaf::fits(&extent.0, photons.len())
     {
+        let reached = Extent::reached(photons, searches.reach);
         return Some(Tree::leaf(Run { first, count }, reached, 0.0));
     }
     let (axis, middle) = if depth < MAX_SKEWED {
@@ -129,7 +129,9 @@ fn build(
     let mut below = || build(below, first, searches, depth + 1);
     let mut above = || build(above, first + middle as u32, searches, depth + 1);
     let (below, above) = if is_large { rayon::join(below, above) } else { (below(), above()) };
-    Some(Tree::node([below?, above?], reached, extent.chance(radius) as f32, None))
+    let parts = [below?, above?];
+    let [below, above] = parts.each_ref().map(|part| part.bounds().0);
+    Some(Tree::node(parts, Extent(below.union(above)), extent.chance(radius) as f32, None))
 }
 
 /// Bounding box of photons.
@@ -137,16 +139,22 @@ fn build(
 struct Extent(GridBox);
 
 impl Extent {
+    fn new(photons: &[StoredPhoton]) -> Self {
+        let mut extent = GridBox { lower: [u32::MAX; 3], upper: [0; 3] };
+        for photon in photons {
+            extent = extent.union(GridBox::of(photon.point()));
+        }
+        Self(extent)
+    }
+
     /// Box of all grid points within the reach of the photons, along each axis.
-    fn new(photons: &[StoredPhoton], reach: Reach) -> Self {
+    fn reached(photons: &[StoredPhoton], reach: Reach) -> Self {
         let mut extent = GridBox { lower: [u32::MAX; 3], upper: [0; 3] };
         for photon in photons {
             let reach = reach(photon);
-            let sides = extent.lower.iter_mut().zip(&mut extent.upper);
-            for ((lower, upper), coordinate) in sides.zip(photon.point()) {
-                *lower = coordinate.saturating_sub(reach).min(*lower);
-                *upper = (coordinate + reach).min(LAST_POINT).max(*upper);
-            }
+            let lower = photon.point().map(|coordinate| coordinate.saturating_sub(reach));
+            let upper = photon.point().map(|coordinate| (coordinate + reach).min(LAST_POINT));
+            extent = extent.union(GridBox { lower, upper });
         }
         Self(extent)
     }

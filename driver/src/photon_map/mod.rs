@@ -28,7 +28,7 @@ pub use self::settings::{PhotonLayout, PhotonSettings, PhotonsFor};
 pub use self::size::PhotonMapSize;
 use self::store::store_caustics;
 pub use self::store::store_photons;
-use crate::density::{GatherDistances, gather_distances, measure_discs};
+use crate::density::{GatherDistances, SampledDistances, measure_discs};
 use crate::pack::{CardImage, PackedScene};
 pub use crate::photon::Guiding;
 use crate::photon::{
@@ -145,7 +145,9 @@ pub(crate) fn map_traced(
     let mut image = store_photons(packed, photons, settings.neighbors)?;
     times.building = start.elapsed();
     let start = Instant::now();
-    let mut distances = gather_distances(&image, settings.neighbors, importons.as_ref())?;
+    let sampled = SampledDistances::new(&image, settings.neighbors)?;
+    sampled.write_shares(&mut image);
+    let mut distances = sampled.of_gathers(&image, importons.as_ref());
     if let Some(distance) = settings.max_distance {
         // A distance beyond the scene's diagonal has no further effect.
         let greatest = distance.min(image.diagonal());

@@ -1,13 +1,17 @@
 //! Distances of neighbours among photons of one surface and one light.
 
+use std::collections::BinaryHeap;
+
 use glam::Vec3;
 use rayon::prelude::*;
+
+use crate::photon::StoredPhoton;
 
 /// Minimum cosine between the directions of photons of one light.
 const MIN_DIRECTION_COSINE: f32 = 0.8;
 /// Minimum cosine between the normals of photons of one surface.
 const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
-/// Maximum number of places of a leaf.
+/// Number of places of a leaf.
 const LEAF: usize = 12;
 /// Share of a distance within which places of a leaf have it in common.
 const SHARED_SHARE: f32 = 0.3;
@@ -27,129 +31,135 @@ impl Place {
     }
 }
 
-/// Places in a tree of boxes.
-pub(super) struct Places {
-    places: Vec<Place>,
-    /// Indices of places in the order of the tree.
-    order: Vec<u32>,
-    /// The root first, and the first part of a node right after it.
-    nodes: Vec<Node>,
-}
-
-/// A node of the tree: places `first..last` of the order.
-struct Node {
+/// Box of some places.
+#[derive(Clone, Copy)]
+struct Bounds {
     lower: Vec3,
     upper: Vec3,
-    first: u32,
-    last: u32,
-    /// Index of the second part; 0 for a leaf.
-    second: u32,
 }
 
-impl Node {
+impl Bounds {
+    const EMPTY: Self = Self { lower: Vec3::INFINITY, upper: Vec3::NEG_INFINITY };
+
+    fn of(places: &[Place]) -> Self {
+        places.iter().fold(Self::EMPTY, |bounds, place| Self {
+            lower: bounds.lower.min(place.position),
+            upper: bounds.upper.max(place.position),
+        })
+    }
+
+    fn around(bounds: &[Self]) -> Self {
+        bounds.iter().fold(Self::EMPTY, |around, bounds| Self {
+            lower: around.lower.min(bounds.lower),
+            upper: around.upper.max(bounds.upper),
+        })
+    }
+
     fn distance_squared(&self, position: Vec3) -> f32 {
         (position - position.clamp(self.lower, self.upper)).length_squared()
     }
 }
 
+/// Sorts photons such that [`Places`] of them are a kd-tree: each box is halved along its longest side.
+pub(super) fn arrange(photons: &mut [StoredPhoton]) {
+    let leaves = photons.len().div_ceil(LEAF);
+    if leaves < 2 {
+        // The order of a leaf must not depend on how larger parts were halved.
+        photons.sort_unstable();
+        return;
+    }
+    let middle = LEAF * leaves.next_power_of_two() / 2;
+    let side = |axis: &usize| {
+        let coordinates = || photons.iter().map(|photon| photon.coordinate(*axis));
+        coordinates().max().unwrap_or(0) - coordinates().min().unwrap_or(0)
+    };
+    let axis = (0..3).max_by_key(side).unwrap_or(0);
+    photons.select_nth_unstable_by_key(middle, |photon| (photon.coordinate(axis), *photon));
+    let (below, above) = photons.split_at_mut(middle);
+    rayon::join(|| arrange(below), || arrange(above));
+}
+
+/// Places in a binary tree of boxes.
+pub(super) struct Places {
+    places: Vec<Place>,
+    /// Boxes of each [`LEAF`] places, boxes of each two of these, and so on up to the root.
+    levels: Vec<Vec<Bounds>>,
+}
+
 impl Places {
+    /// The tree of places in the order of [`arrange`].
     pub(super) fn new(places: Vec<Place>) -> Self {
-        let order = (0..places.len() as u32).collect();
-        let mut tree = Self { places, order, nodes: Vec::new() };
-        if !tree.places.is_empty() {
-            tree.divide(0, tree.places.len());
+        let mut levels: Vec<Vec<Bounds>> = vec![places.chunks(LEAF).map(Bounds::of).collect()];
+        while let Some(below) = levels.last().filter(|below| below.len() > 1) {
+            levels.push(below.chunks(2).map(Bounds::around).collect());
         }
-        tree
+        Self { places, levels }
     }
 
-    /// Adds the node of places `first..last` with its parts.
-    fn divide(&mut self, first: usize, last: usize) {
-        let positions = || self.order[first..last].iter().map(|&index| self.places[index as usize].position);
-        let lower = positions().fold(Vec3::INFINITY, Vec3::min);
-        let upper = positions().fold(Vec3::NEG_INFINITY, Vec3::max);
-        let node = self.nodes.len();
-        self.nodes.push(Node { lower, upper, first: first as u32, last: last as u32, second: 0 });
-        if last - first <= LEAF {
-            return;
-        }
-        let axis = (upper - lower).max_position();
-        let middle = first + (last - first) / 2;
-        let Self { places, order, .. } = self;
-        order[first..last].select_nth_unstable_by(middle - first, |&a, &b| {
-            let [at_a, at_b] = [a, b].map(|index| places[index as usize].position[axis]);
-            at_a.total_cmp(&at_b).then(a.cmp(&b))
-        });
-        self.divide(first, middle);
-        self.nodes[node].second = self.nodes.len() as u32;
-        self.divide(middle, last);
-    }
-
-    /// Distance of the neighbour of a number, from 1 on, of each place among those like it, or of one near it; `limit` if there are fewer
-    /// within it. For places that are [`SHARED_SHARE`] of such a distance apart they differ by that share at most.
+    /// Distance of the neighbour of a number, from 1 on, of each place among those like it, or of one near it; `limit`
+    /// if there are fewer within it. For places that are [`SHARED_SHARE`] of such a distance apart they differ by that
+    /// share at most.
     pub(super) fn distances(&self, number: usize, limit: f32) -> Vec<f32> {
-        let leaves: Vec<&[u32]> =
-            self.nodes.iter().filter(|node| node.second == 0).map(|node| self.of(node)).collect();
-        let of_leaves: Vec<Vec<f32>> =
-            leaves.par_iter().map(|leaf| self.distances_of_leaf(leaf, number, limit)).collect();
-        let mut distances = vec![limit; self.places.len()];
-        for (leaf, of_leaf) in leaves.into_iter().zip(of_leaves) {
-            for (&index, distance) in leaf.iter().zip(of_leaf) {
-                distances[index as usize] = distance;
-            }
+        let leaves = self.places.par_chunks(LEAF).enumerate();
+        leaves.flat_map_iter(|(leaf, places)| self.distances_of_leaf(leaf, places, number, limit)).collect()
+    }
+
+    /// [`Self::distances`] of the places of a leaf.
+    fn distances_of_leaf(&self, leaf: usize, places: &[Place], number: usize, limit: f32) -> Vec<f32> {
+        let mut found: Vec<(&Place, f32)> = Vec::new();
+        let mut distances = Vec::with_capacity(places.len());
+        for (index, own) in (leaf * LEAF..).zip(places) {
+            let near = found.iter().find(|(other, distance)| {
+                own.is_like(other) && own.position.distance(other.position) <= SHARED_SHARE * distance
+            });
+            let distance = near.map(|(_, distance)| *distance).unwrap_or_else(|| {
+                let distance = self.distance_of_neighbor(index, number, limit);
+                found.push((own, distance));
+                distance
+            });
+            distances.push(distance);
         }
         distances
     }
 
-    /// [`Self::distances`] of the places of a leaf.
-    fn distances_of_leaf(&self, leaf: &[u32], number: usize, limit: f32) -> Vec<f32> {
-        let mut found: Vec<(&Place, f32)> = Vec::new();
-        let distance = |&index: &u32| {
-            let own = &self.places[index as usize];
-            let near = found.iter().find(|(other, distance)| {
-                own.is_like(other) && own.position.distance(other.position) <= SHARED_SHARE * distance
-            });
-            near.map(|(_, distance)| *distance).unwrap_or_else(|| {
-                let distance = self.distance_of_neighbor(index as usize, number, limit);
-                found.push((own, distance));
-                distance
-            })
-        };
-        leaf.iter().map(distance).collect()
-    }
-
-    fn of(&self, node: &Node) -> &[u32] {
-        &self.order[node.first as usize..node.last as usize]
-    }
-
-    /// Distance of a place's neighbour of a number, from 1 on, among those like it; `limit` if there are fewer within it.
+    /// Distance of a place's neighbour of a number, from 1 on, among those like it; `limit` if there are fewer within
+    /// it.
     fn distance_of_neighbor(&self, index: usize, number: usize, limit: f32) -> f32 {
         let own = &self.places[index];
-        // The squared distances found so far, in ascending order.
-        let mut nearest = vec![limit * limit; number.max(1)];
-        let mut waiting = vec![0];
-        while let Some(node) = waiting.pop() {
-            let second = self.nodes[node].second;
-            if self.nodes[node].distance_squared(own.position) >= nearest[number - 1] {
+        let mut limit = limit * limit;
+        // Bits of the least squared distances, the greatest on top: they are ordered as the distances.
+        let mut nearest = BinaryHeap::with_capacity(number);
+        // Distances of boxes, with their levels and numbers.
+        let mut waiting = vec![(0.0, self.levels.len() - 1, 0)];
+        while let Some((distance, level, node)) = waiting.pop() {
+            if distance >= limit {
                 continue;
             }
-            if second > 0 {
-                let parts = [node + 1, second as usize];
-                let [a, b] = parts.map(|part| self.nodes[part].distance_squared(own.position));
-                // The nearer part is the last, and visited first.
-                waiting.extend(if a < b { [parts[1], parts[0]] } else { parts });
+            if level > 0 {
+                let below = self.levels[level - 1].iter().enumerate().skip(2 * node).take(2);
+                let parts =
+                    below.map(|(part, bounds)| (bounds.distance_squared(own.position), level - 1, part));
+                let first = waiting.len();
+                waiting.extend(parts);
+                // The nearest on top.
+                waiting[first..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
                 continue;
             }
-            for &other in self.of(&self.nodes[node]) {
-                let place = &self.places[other as usize];
+            for (other, place) in (node * LEAF..).zip(self.places[node * LEAF..].iter().take(LEAF)) {
                 let squared = place.position.distance_squared(own.position);
-                if squared < nearest[number - 1] && other as usize != index && own.is_like(place) {
-                    let at = nearest.partition_point(|&nearer| nearer <= squared);
-                    nearest.pop();
-                    nearest.insert(at, squared);
+                if squared < limit && other != index && own.is_like(place) {
+                    if nearest.len() < number {
+                        nearest.push(squared.to_bits());
+                    } else if let Some(mut greatest) = nearest.peek_mut() {
+                        *greatest = squared.to_bits();
+                    }
+                    if nearest.len() == number {
+                        limit = nearest.peek().map_or(limit, |&greatest| f32::from_bits(greatest));
+                    }
                 }
             }
         }
-        nearest[number - 1].sqrt()
+        limit.sqrt()
     }
 }
 

@@ -169,8 +169,12 @@ impl Collector for Sums<'_> {
 
     #[inline(always)]
     fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]) {
-        // No overflow: the bits of infinity are below `u32::MAX`.
-        let mut mask = isa.below(distances, self.max_squared.to_bits() + 1) & !(u32::MAX << count);
+        let mut beyond = [0; LANES];
+        for ((beyond, &distance), &content) in beyond.iter_mut().zip(distances).zip(contents) {
+            let photon = Candidate { distance, content };
+            *beyond = u32::from(photon.distance_squared() >= self.max_squared * kernel_share(photon.disc()));
+        }
+        let mut mask = isa.below(&beyond, 1) & !(u32::MAX << count);
         while mask != 0 {
             let lane = mask.trailing_zeros() as usize;
             mask &= mask - 1;

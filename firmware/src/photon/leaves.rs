@@ -43,6 +43,7 @@ pub(super) fn gather(
                 tested += test_leaf(isa, grid, PhotonLeaf::read(line), (query, filter), nearest);
             }
             Child::Node(node) => descent.enter(isa, memory, node, Order::NearestFirst, |line| {
+                nearest.narrow(PhotonNode(line).photon_share());
                 distances_to_boxes(isa, grid, PhotonNode(line), query, nearest.limit())
             })?,
         }

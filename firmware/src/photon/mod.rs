@@ -12,6 +12,8 @@ mod region;
 mod same_surface;
 mod select;
 
+use core::f32::consts::PI;
+
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::message::Fault;
@@ -81,6 +83,10 @@ pub fn gather_visible(
     simd::run(VisibleSearch { scene, memory, map, position, region, nearest })
 }
 
+/// Square of the distance within which a search of a visible region looks first, over that of a disc of the area in which all photons were
+/// found.
+const VISIBLE_MOST: f32 = 1.35;
+
 /// Parameters of a gather.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherLimits {
@@ -92,7 +98,7 @@ pub struct GatherLimits {
 
 /// Maximum reach of a visible region, over the distance of the k-th of all photons: where most of these are hidden, photons that are
 /// not lie farther away.
-const MAX_REACH: f32 = 4.0;
+const MAX_REACH: f32 = 2.0;
 
 /// Radiance that the photons of the photon map reflect at a position, by those in the region that it sees where walls may hide others.
 /// `count` is called with the result of each search, of which there are one or two: the number of photons tested, the photons, their light.
@@ -121,6 +127,9 @@ pub fn gathered_radiance(
     let region = VisibleRegion::new(scene, memory, (position, reflection.normal()), radius, reach)?;
     memory.enter(Stage::Gather);
     let mut nearest = NearestPhotons::new(candidates, neighbors, reach);
+    nearest.narrow_to(
+        VISIBLE_MOST * radius * radius * (PI * radius * radius / region.sectors.area(radius * radius)),
+    );
     let tested = gather_visible(scene, memory, PhotonMap::Indirect, (position, &region), &mut nearest)?;
     let of_region = reflected_radiance(&nearest, position, Some(&region.sectors), reflection);
     count(tested, &nearest, &of_region);
@@ -182,15 +191,15 @@ fn search<M: MemoryPort>(
     query: (Vec3, &impl Filter),
     nearest: &mut NearestPhotons,
 ) -> Result<u32, Fault> {
-    let has_leaves = scene.header.section(SectionKind::PhotonLeaves).records > 0;
-    if map == PhotonMap::Indirect && !has_leaves {
-        let tested = kdtree::gather(isa, scene, memory, query, nearest)?;
-        nearest.finish(isa);
-        return Ok(tested);
-    }
+    let has_leaves =
+        map == PhotonMap::Caustics || scene.header.section(SectionKind::PhotonLeaves).records > 0;
     let mut tested = 0;
     loop {
-        tested += leaves::gather(isa, scene, map.sections(), memory, query, nearest)?;
+        tested += if has_leaves {
+            leaves::gather(isa, scene, map.sections(), memory, query, nearest)?
+        } else {
+            kdtree::gather(isa, scene, memory, query, nearest)?
+        };
         if !nearest.widen() {
             break;
         }

@@ -11,8 +11,8 @@ use super::collector::Collector;
 use super::select::{Chosen, select};
 use crate::simd::{Isa, LANES};
 
-/// Number of photons by which a search is narrowed: those of one leaf, or two.
-const FIRST: usize = 8;
+/// Square of the distance of a search that is widened, over that of the search before.
+const WIDER: f32 = 3.0;
 
 /// The nearest photons found so far, in a borrowed buffer.
 pub struct NearestPhotons<'a> {
@@ -22,7 +22,7 @@ pub struct NearestPhotons<'a> {
     /// Number of candidates that triggers a selection.
     full: usize,
     limit: f32,
-    /// Limit of a search that the first photons have not narrowed, m^2.
+    /// Limit of a search that is not narrowed, m^2.
     widest: f32,
     is_narrowed: bool,
     max_distance_squared: f32,
@@ -61,38 +61,29 @@ impl<'a> NearestPhotons<'a> {
     /// Limits the search radius of an empty set, m^2: there are no photons beyond. The maximum distance stays.
     pub(super) fn limit_to(&mut self, limit: f32) {
         self.widest = if limit < self.widest { limit } else { self.widest };
-        self.limit = self.widest;
+        self.limit = if self.widest < self.limit { self.widest } else { self.limit };
     }
 
-    /// Narrows the search by the first photons, which lie together: within their greatest distance the surface has so many, and within the
-    /// new limit most likely enough.
+    /// Narrows a search that has not begun, once: most likely there are enough photons within `limit`, m^2.
     #[inline(always)]
-    fn narrow(&mut self) {
-        if self.is_narrowed || self.length < FIRST {
-            return;
-        }
-        self.is_narrowed = true;
-        // The limit must not leave out photons that are there.
-        if self.is_full() {
-            return;
-        }
-        let (distances, _) = self.columns();
-        let farthest = f32::from_bits(distances.iter().copied().fold(0, u32::max));
-        let limit = farthest * (self.neighbors as f32 / self.length as f32);
-        // False for NaN and without an area.
-        if limit > 0.0 && limit < self.limit {
-            self.limit = limit;
+    pub(super) fn narrow_to(&mut self, limit: f32) {
+        // False for NaN.
+        if limit > 0.0 && !self.is_narrowed && self.length == 0 {
+            self.is_narrowed = true;
+            self.limit = if limit < self.limit { limit } else { self.limit };
         }
     }
 
-    /// Begins the search anew, without narrowing, if narrowing has left out photons that were asked for. Returns whether it does.
+    /// Begins the search anew, within more of its distance, if narrowing has left out photons that were asked for. Returns whether it
+    /// does.
     #[inline(always)]
     pub(super) fn widen(&mut self) -> bool {
         let is_short = self.is_narrowed && !self.is_full() && self.limit < self.widest;
         if is_short {
             self.dropped += self.length as u32;
             self.length = 0;
-            self.limit = self.widest;
+            let limit = WIDER * self.limit;
+            self.limit = if limit < self.widest { limit } else { self.widest };
         }
         is_short
     }
@@ -196,6 +187,11 @@ impl Collector for NearestPhotons<'_> {
     }
 
     #[inline(always)]
+    fn narrow(&mut self, photon_share: f32) {
+        self.narrow_to(photon_share * self.neighbors as f32);
+    }
+
+    #[inline(always)]
     fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]) {
         // No overflow: the bits of infinity are below `u32::MAX`.
         let mask = isa.below(distances, self.limit.to_bits() + 1) & !(u32::MAX << count);
@@ -208,7 +204,6 @@ impl Collector for NearestPhotons<'_> {
         let Some(free) = free else { return };
         isa.pack_long(mask, contents, free);
         self.length += mask.count_ones() as usize;
-        self.narrow();
         if self.length >= self.full {
             self.select(isa);
         }

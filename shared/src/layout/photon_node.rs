@@ -13,10 +13,13 @@ use crate::address::LINE_BYTES;
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | x, y, z of the corner: bits 0-23 grid coordinate, 24-31 exponent of the unit on this axis |
+/// | 22..24 | upper half of the bits of [`Self::photon_share`] |
 #[derive(Clone, Copy)]
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
+/// Position of the photon share.
+const SHARE: usize = 22;
 /// Maximum of [`NodeCoordinates::exponent`]: the one of a box as large as the grid.
 const MAX_EXPONENT: u32 = 13;
 
@@ -44,6 +47,20 @@ pub struct NodeCoordinates<'a> {
 }
 
 impl<'a> PhotonNode<'a> {
+    /// Square of the distance of the k-th photon over k, m^2, for most points among the node's photons: most searches that begin here
+    /// need not go farther. 0 in a node without leaves, and where nothing is known.
+    #[inline(always)]
+    pub fn photon_share(&self) -> f32 {
+        let [low, high] = [SHARE, SHARE + 1].map(|at| u32::from(WideNode(self.0).byte(at)));
+        f32::from_bits(low << 16 | high << 24)
+    }
+
+    /// Sets the photon share in the line of a node, rounded up to 7 bits of a fraction.
+    pub fn set_photon_share(line: &mut [u8; LINE_BYTES], share: f32) {
+        let [_, _, low, high] = share.to_bits().saturating_add(0xffff).to_le_bytes();
+        [line[SHARE], line[SHARE + 1]] = [low, high];
+    }
+
     /// Boxes of the children, by axis.
     #[inline(always)]
     pub fn coordinates(&self) -> [NodeCoordinates<'a>; 3] {
