@@ -17,7 +17,7 @@ use crate::message::SumScale;
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// Version of the formats in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 11;
+pub const LAYOUT_VERSION: u16 = 12;
 /// Lines of the header.
 pub const HEADER_LINES: usize = 2;
 /// Entries of [`SectionKind::LeafAttributes`] in one line.

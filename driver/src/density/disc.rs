@@ -301,7 +301,8 @@ impl<'a> Meter<'a> {
             }
             fractions[photon.photon] = if may_differ {
                 let region = self.region(photon, frame, cluster)?;
-                let [areas, powers] = self.seen(photon, &region, frame, cluster, (&chords, [radius, MARGIN * radius]));
+                let [areas, powers] =
+                    self.seen(photon, &region, frame, cluster, (&chords, [radius, MARGIN * radius]));
                 Fraction::new(&areas, &powers)
             } else {
                 let (surfaces, chords) = (&self.surfaces, &chords);

@@ -3,6 +3,7 @@
 //! Photons depend on the scene, the seed and their number alone, never on threads, tile or chip; and on the camera if, and only if,
 //! they are guided towards what it uses.
 
+mod crevices;
 mod emit;
 mod error;
 mod guide;

@@ -1,6 +1,10 @@
 //! Photons in host memory: sixteen bytes each, until they are written to the card image.
 
-use photoncard_shared::layout::{GRID_BITS, PHOTON_CONTENT_BYTES, Photon, PhotonGrid, Record, Rgbe};
+use glam::Vec3;
+use photoncard_firmware::sampler::hash;
+use photoncard_shared::layout::{
+    GRID_BITS, PHOTON_CONTENT_BYTES, Photon, PhotonGrid, Record, Rgbe, decode_normal,
+};
 
 /// A photon: its grid point, and its other values in encoded form.
 ///
@@ -52,6 +56,43 @@ impl StoredPhoton {
     pub(crate) fn power(self) -> f64 {
         let [a, b, c, d, ..] = self.content();
         Rgbe([a, b, c, d]).decode().into_iter().map(f64::from).sum()
+    }
+
+    /// Square of the distance to another photon, grid cells.
+    pub(crate) fn distance_squared(self, other: Self) -> f64 {
+        let differences =
+            [0, 1, 2].map(|axis| f64::from(self.coordinate(axis)) - f64::from(other.coordinate(axis)));
+        differences.into_iter().map(|difference| difference * difference).sum()
+    }
+
+    /// True for a photon that comes from a light.
+    pub(crate) fn is_direct(self) -> bool {
+        Photon::direct_of_flags(self.flags())
+    }
+
+    /// Unit normal of its surface.
+    pub(crate) fn normal(self) -> Vec3 {
+        Vec3::from(decode_normal(Photon::normal_of_flags(self.flags()))).normalize()
+    }
+
+    fn flags(self) -> u16 {
+        let [.., low, high] = self.content();
+        u16::from_le_bytes([low, high])
+    }
+
+    /// The photon with the power of another one besides its own.
+    #[must_use]
+    pub(crate) fn with_power_of(self, other: Self) -> Self {
+        let [own, others] = [self, other].map(|photon| {
+            let [a, b, c, d, ..] = photon.content();
+            Vec3::from(Rgbe([a, b, c, d]).decode())
+        });
+        let mut content = self.content();
+        // Random bits that neither power depends on.
+        let dither = hash(self.place as u32 ^ hash(other.place as u32));
+        let [power @ .., _, _, _, _] = &mut content;
+        *power = Rgbe::encode((own + others).to_array(), dither).0;
+        Self { content: u64::from_le_bytes(content), ..self }
     }
 
     /// The photon as a node of the kd-tree that splits along `axis`.

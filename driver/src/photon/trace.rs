@@ -5,6 +5,7 @@ use std::cell::LazyCell;
 use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
+use super::crevices::Spacing;
 use super::error::PhotonError;
 use super::importons::ImportonGrid;
 use super::pilot::{Guiding, caustic_share, guide, more_useful, tracer_of_more_photons};
@@ -146,6 +147,7 @@ fn trace_while(
     let mut list: Vec<StoredPhoton> = Vec::with_capacity(count);
     let mut paths = 0_u64;
     let mut met = 0_u64;
+    let mut spacing = None;
     while list.len() < count {
         let further = further(list.len(), paths).map_err(PhotonError::Unsound)?;
         if further == 0 {
@@ -159,8 +161,14 @@ fn trace_while(
                 tracer.trace(&mut memory, paths + task * PATHS_PER_TASK)
             })
             .collect();
-        for traced in round.map_err(PhotonError::Unsound)? {
+        let round = round.map_err(PhotonError::Unsound)?;
+        let spacing = *spacing.get_or_insert_with(|| spacing_of(&round, purpose, count));
+        for traced in round {
             met += traced.met;
+            let traced = match spacing {
+                Some(spacing) => spacing.merged(traced),
+                None => traced,
+            };
             let missing = count - list.len();
             if missing > 0 {
                 paths += traced.paths_until(missing);
@@ -171,6 +179,14 @@ fn trace_while(
     let power_unit = (tracer.path_unit / paths.max(1) as f32).max(f32::MIN_POSITIVE);
     let photons = Photons { list, grid: tracer.grid, power_unit };
     Ok(PhotonPass { photons, paths, guiding, met })
+}
+
+/// Distance within which a path has one photon in a map, by the photons of the first round; caustics are as sharp as their photons.
+fn spacing_of(first: &[Traced], purpose: Purpose, count: usize) -> Option<Spacing> {
+    (purpose == Purpose::Indirect).then(|| {
+        let photons: Vec<StoredPhoton> = first.iter().flat_map(|traced| &traced.photons).copied().collect();
+        Spacing::new(&photons, count)
+    })
 }
 
 /// Tracer of the photons of a map, whose paths start at the sources of most use. `towards` are importons, with sources that are aimed at
