@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Light in corners, in a shelf, under a chair and beside a slot, beside Mitsuba's path tracer: errors by the distance
-# from the nearest other surface.
+# Light in corners, in a shelf, under a chair and beside a slot, beside Mitsuba's path tracer: errors by the
+# distance from the nearest other surface.
 #
 #   tests/peers/corners.sh PHOTONCARD [--seeds N] [NAME ..] [-- OPTION ..]
 #

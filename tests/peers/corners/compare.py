@@ -1,8 +1,10 @@
-"""Light in corners beside Mitsuba's path tracer: errors of blocks of 4x4 pixels by their distance from the nearest other surface.
+"""Light in corners beside Mitsuba's path tracer: errors of blocks of 4x4 pixels by their distance from the
+nearest other surface.
 
-That distance is the least of 64 rays over the hemisphere. Columns of a distance: the mean of its blocks over the reference's, less 1, with the
-standard error by seeds; the root mean square of the errors of blocks without their noise, with that of the reference; the number of blocks. Options after -- are
-names with a value each, and replace those of SETTINGS.
+That distance is the least of 64 rays over the hemisphere. Columns of a distance: the mean of its blocks over
+the reference's, less 1, with the standard error by seeds; the root mean square of the errors of blocks without
+their noise, with that of the reference; the number of blocks. Options after -- are names with a value each,
+and replace those of SETTINGS.
 """
 
 import argparse

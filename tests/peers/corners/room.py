@@ -1,4 +1,4 @@
-"""A closed room of corners in glTF, 6 m long, all of it Lambertian, with one lamp and a camera for each kind of corner."""
+"""A closed Lambertian room in glTF, 6 m long, with one lamp and a camera for each kind of corner."""
 
 import json
 import math
