@@ -3,8 +3,8 @@ nearest other surface.
 
 That distance is the least of 64 rays over the hemisphere. Columns of a distance: the mean of its blocks over
 the reference's, less 1, with the standard error by seeds; the root mean square of the errors of blocks
-without their noise, with that of the reference; the number of blocks. Options after -- are names with a value each,
-and replace those of SETTINGS.
+without their noise, with that of the reference; the number of blocks. Options after -- are names with a value
+each, and replace those of SETTINGS.
 """
 
 import argparse
