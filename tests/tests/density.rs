@@ -332,3 +332,29 @@ fn a_sheet_close_before_a_wall_is_as_bright_as_the_wall() {
         assert!((beside - 1.0).abs() < 0.08, "{beside} beside a sheet {gap} m before the wall");
     }
 }
+
+/// A path between two white sheets meets them hundreds of times: its photons alone are no density.
+#[test]
+fn sheets_that_nearly_touch_have_no_bright_spot() {
+    const GAP: f32 = 0.001;
+    let sheet = |y: f32| {
+        let corner = |x: f32, z: f32| Vec3::new(x, y, z);
+        quad([corner(-0.4, -0.4), corner(-0.4, 0.4), corner(0.4, 0.4), corner(0.4, -0.4)], 1)
+    };
+    let room =
+        room([0; 6]).into_iter().filter(|triangle| !triangle.vertices.iter().all(|corner| corner.y == 1.0));
+    let white = room.chain(sheet(0.0)).chain(sheet(-GAP));
+    let map = Map::new(&white_furnace(white.collect(), true), 300_000);
+    let mut radiances = Vec::new();
+    for i in 0..2000 {
+        // Along the four edges, at most 3 cm from them.
+        let (along, inward) = (-0.4 + 0.8 * (i / 4) as f32 / 500.0, 0.03 * ((7 * i) % 40) as f32 / 40.0);
+        let (x, z) = if i % 2 == 0 { (along, 0.399 - inward) } else { (0.399 - inward, along) };
+        let side = if i % 4 < 2 { 1.0 } else { -1.0 };
+        radiances.push(map.radiance(Vec3::new(side * x, 0.0, side * z), Vec3::Y));
+    }
+    let mean = radiances.iter().sum::<f64>() / radiances.len() as f64;
+    let greatest = radiances.iter().copied().fold(0.0, f64::max);
+    assert!((mean - 1.0).abs() < 0.1, "the mean is {mean}");
+    assert!(greatest < 2.0, "a spot has {greatest}");
+}

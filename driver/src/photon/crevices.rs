@@ -1,5 +1,9 @@
-//! Photons of one path that lie together: a path that is caught in a crevice meets its walls many times, and its photons alone would be
-//! all that a gather there finds. One photon with the power of all takes their place, so that a gather finds those of other paths.
+//! Photons of one path that lie together. A path that is caught between sheets meets them many times, and its photons would be all that
+//! a gather there finds. One photon with the power of several takes their place, so that a gather finds those of other paths.
+
+use std::f64::consts::PI;
+
+use rayon::prelude::*;
 
 use super::stored::StoredPhoton;
 use super::tracer::Traced;
@@ -10,7 +14,6 @@ const SAMPLED: usize = 32;
 const NEIGHBOR: usize = 8;
 /// Share of the sampled photons that are at least as dense: a wide ground must not count.
 const SHARE: f64 = 0.25;
-
 /// Number of a path's arrivals in one place that bring light: more are those between sheets that nearly touch, whose light nothing sees.
 const MAX_ARRIVALS: u32 = 4;
 /// Minimum cosine between the normals of photons of one surface.
@@ -26,11 +29,8 @@ pub(super) struct Spacing {
 impl Spacing {
     /// Side of the square that a photon has for itself in a map of `count` photons, by some of its first.
     pub(super) fn new(first: &[StoredPhoton], count: usize) -> Self {
-        let mut areas: Vec<f64> = first
-            .iter()
-            .step_by(first.len().div_ceil(SAMPLED).max(1))
-            .map(|photon| area(first, photon))
-            .collect();
+        let step = first.len().div_ceil(SAMPLED).max(1);
+        let mut areas: Vec<f64> = first.par_iter().step_by(step).map(|&photon| area(first, photon)).collect();
         areas.sort_by(f64::total_cmp);
         let place = (SHARE * areas.len() as f64) as usize;
         let squared = areas.get(place).map_or(0.0, |area| area * first.len() as f64 / count as f64);
@@ -66,7 +66,7 @@ impl Spacing {
 
     /// True for reflected photons that lie together on one surface.
     fn is_one(self, kept: StoredPhoton, photon: StoredPhoton) -> bool {
-        kept.distance_squared(photon) <= self.squared
+        kept.distance_squared(photon) as f64 <= self.squared
             && !kept.is_direct()
             && !photon.is_direct()
             && kept.normal().dot(photon.normal()) >= MIN_COSINE
@@ -74,9 +74,80 @@ impl Spacing {
 }
 
 /// Area of a photon, square cells, by its nearest neighbours.
-fn area(photons: &[StoredPhoton], photon: &StoredPhoton) -> f64 {
-    let mut distances: Vec<f64> = photons.iter().map(|other| photon.distance_squared(*other)).collect();
-    let nearest = NEIGHBOR.min(distances.len() - 1);
-    let (_, &mut squared, _) = distances.select_nth_unstable_by(nearest, f64::total_cmp);
-    std::f64::consts::PI * squared / NEIGHBOR as f64
+fn area(photons: &[StoredPhoton], photon: StoredPhoton) -> f64 {
+    // The first is the photon itself.
+    let mut nearest = [u64::MAX; NEIGHBOR + 1];
+    for &other in photons {
+        let squared = photon.distance_squared(other);
+        if squared < nearest[NEIGHBOR] {
+            nearest[NEIGHBOR] = squared;
+            nearest.sort_unstable();
+        }
+    }
+    PI * nearest[NEIGHBOR.min(photons.len() - 1)] as f64 / NEIGHBOR as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_shared::layout::{FULL_DISC, Photon, PhotonGrid, Rgbe, encode_normal};
+
+    use super::*;
+
+    const GRID: PhotonGrid = PhotonGrid { origin: [0.0; 3], cell: 1.0 };
+
+    /// Photon of power 1 on a floor or a wall.
+    fn photon(x: f32, normal: [f32; 3], direct: bool) -> StoredPhoton {
+        let (normal, power) = (encode_normal(normal), Rgbe::encode([1.0; 3], 0));
+        let position = [x, 100.0, 100.0];
+        StoredPhoton::new(
+            &GRID,
+            &Photon { position, power, direction: [0; 2], axis: 0, normal, disc: FULL_DISC, direct },
+        )
+    }
+
+    fn merged(photons: Vec<StoredPhoton>, ends: Vec<u32>) -> Traced {
+        Spacing { squared: 100.0 }.merged(Traced { photons, ends, met: 3 })
+    }
+
+    #[test]
+    fn arrivals_of_a_path_in_one_place_are_one_photon_of_at_most_four_times_the_power() {
+        let [up, aside] = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]];
+        for (arrivals, power) in [(1_u32, 1.0), (3, 3.0), (4, 4.0), (90, 4.0)] {
+            let mut photons = vec![photon(500.0, up, true)];
+            for arrival in 0..arrivals {
+                photons.push(photon(500.0 + (arrival % 7) as f32, up, false));
+                photons.push(photon(500.0, aside, false));
+            }
+            let count = photons.len() as u32;
+            let Traced { photons, ends, met } = merged(photons, vec![count, count]);
+            assert_eq!((ends, met), (vec![3, 3], 3));
+            let powers: Vec<f64> = photons.iter().map(|photon| photon.power() / 3.0).collect();
+            assert_eq!(powers, [1.0, power, power], "{arrivals} arrivals");
+        }
+    }
+
+    #[test]
+    fn photons_of_other_paths_and_places_stay() {
+        let up = [0.0, 1.0, 0.0];
+        let photons: Vec<StoredPhoton> =
+            [500.0, 511.0, 522.0, 500.0, 500.0].map(|x| photon(x, up, false)).into();
+        let traced = merged(photons.clone(), vec![3, 4, 5]);
+        assert_eq!((traced.photons, traced.ends), (photons, vec![3, 4, 5]));
+    }
+
+    /// Photons one cell apart, as they are on a floor.
+    #[test]
+    fn the_spacing_is_that_of_all_photons() {
+        let floor = |side: u32| -> Vec<StoredPhoton> {
+            let at = |i: u32| StoredPhoton::at([100 + 8 * (i % side), 100, 100 + 8 * (i / side)], [0; 8]);
+            (0..side * side).map(at).collect()
+        };
+        let first = floor(60);
+        for count in [first.len(), 16 * first.len()] {
+            let side = Spacing::new(&first, count).squared.sqrt();
+            let expected = 8.0 * (first.len() as f64 / count as f64).sqrt();
+            assert!((side / expected - 1.0).abs() < 0.15, "{side}, not {expected}");
+        }
+        assert_eq!(Spacing::new(&[], 100), Spacing { squared: 0.0 });
+    }
 }

@@ -58,11 +58,10 @@ impl StoredPhoton {
         Rgbe([a, b, c, d]).decode().into_iter().map(f64::from).sum()
     }
 
-    /// Square of the distance to another photon, grid cells.
-    pub(crate) fn distance_squared(self, other: Self) -> f64 {
-        let differences =
-            [0, 1, 2].map(|axis| f64::from(self.coordinate(axis)) - f64::from(other.coordinate(axis)));
-        differences.into_iter().map(|difference| difference * difference).sum()
+    /// Square of the distance to another photon, square grid cells.
+    pub(crate) fn distance_squared(self, other: Self) -> u64 {
+        let differences = [0, 1, 2].map(|axis| self.coordinate(axis).abs_diff(other.coordinate(axis)));
+        differences.into_iter().map(|difference| u64::from(difference) * u64::from(difference)).sum()
     }
 
     /// True for a photon that comes from a light.
