@@ -104,10 +104,12 @@ fn check_variants(sampling: Sampling) {
 /// Checks all variants with the sampling and the estimate of radiance of `settings_of`.
 fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
     let PhotonMaps { radiance, caustic_photons, .. } = settings_of.photons;
+    let Picture { width, height, .. } = settings_of.picture;
     let sampling = settings_of.integrator.sampling;
     for (irradiance_error, samples) in [(None, 2), (Some(0.025), 1), (Some(0.025), 2)] {
         let with = |settings: RenderSettings| {
             settings.with(|s| {
+                (s.picture.width, s.picture.height) = (width, height);
                 s.photons.radiance = radiance;
                 s.photons.caustic_photons = caustic_photons;
                 s.integrator.sampling = sampling;
@@ -229,7 +231,11 @@ fn nor_do_they_with_precomputed_irradiance() {
 
 #[test]
 fn nor_do_they_with_textures_cut_outs_mirrors_glass_and_lights_of_every_kind() {
-    check_variants_of(&everything(), &settings().with(|s| s.photons.caustic_photons = Some(3000)));
+    let small = settings().with(|s| {
+        (s.picture.width, s.picture.height) = (25, 19);
+        s.photons.caustic_photons = Some(3000);
+    });
+    check_variants_of(&everything(), &small);
 }
 
 #[test]
@@ -238,12 +244,12 @@ fn nor_do_they_with_adaptive_sampling() {
     for irradiance_error in [None, Some(0.1)] {
         let with = |settings: RenderSettings| {
             settings.with(|s| {
-                (s.picture.width, s.picture.height) = (23, 19);
+                (s.picture.width, s.picture.height) = (18, 13);
                 (s.photons.count, s.photons.caustic_photons) = (3000, Some(500));
                 // Paths that share the rays of a sample have eight or more each: enough for a photon search.
                 s.integrator.gather_rays = if irradiance_error.is_some() { 128 } else { 24 };
                 s.integrator.irradiance_error = irradiance_error;
-                (s.integrator.samples, s.integrator.adaptive_threshold) = (7, Some(0.03));
+                (s.integrator.samples, s.integrator.adaptive_threshold) = (5, Some(0.03));
             })
         };
         let adaptive = render_or_panic(&scene, &with(settings()));

@@ -93,14 +93,12 @@ mod tests {
 
     use super::*;
 
-    const GRID: PhotonGrid = PhotonGrid { origin: [0.0; 3], cell: 1.0 };
-
     /// Photon of power 1 on a floor or a wall.
     fn photon(x: f32, normal: [f32; 3], direct: bool) -> StoredPhoton {
         let (normal, power) = (encode_normal(normal), Rgbe::encode([1.0; 3], 0));
         let position = [x, 100.0, 100.0];
         StoredPhoton::new(
-            &GRID,
+            &PhotonGrid::UNIT,
             &Photon { position, power, direction: [0; 2], axis: 0, normal, disc: FULL_DISC, direct },
         )
     }
