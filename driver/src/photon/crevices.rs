@@ -27,13 +27,15 @@ pub(super) struct Spacing {
 }
 
 impl Spacing {
-    /// Side of the square that a photon has for itself in a map of `count` photons, by some of its first.
-    pub(super) fn new(first: &[StoredPhoton], count: usize) -> Self {
-        let step = first.len().div_ceil(SAMPLED).max(1);
-        let mut areas: Vec<f64> = first.par_iter().step_by(step).map(|&photon| area(first, photon)).collect();
+    /// Side of the square that a photon has for itself in a map of `count` photons, by its first paths.
+    pub(super) fn new(first: &[Traced], count: usize) -> Self {
+        let photons = || first.iter().flat_map(|traced| &traced.photons);
+        let found = photons().count();
+        let sampled: Vec<StoredPhoton> = photons().step_by(found.div_ceil(SAMPLED).max(1)).copied().collect();
+        let mut areas: Vec<f64> = sampled.into_par_iter().map(|photon| area(first, photon)).collect();
         areas.sort_by(f64::total_cmp);
         let place = (SHARE * areas.len() as f64) as usize;
-        let squared = areas.get(place).map_or(0.0, |area| area * first.len() as f64 / count as f64);
+        let squared = areas.get(place).map_or(0.0, |area| area * found as f64 / count as f64);
         Self { squared }
     }
 
@@ -74,17 +76,21 @@ impl Spacing {
 }
 
 /// Area of a photon, square cells, by its nearest neighbours.
-fn area(photons: &[StoredPhoton], photon: StoredPhoton) -> f64 {
+fn area(paths: &[Traced], photon: StoredPhoton) -> f64 {
     // The first is the photon itself.
     let mut nearest = [u64::MAX; NEIGHBOR + 1];
-    for &other in photons {
-        let squared = photon.distance_squared(other);
-        if squared < nearest[NEIGHBOR] {
-            nearest[NEIGHBOR] = squared;
-            nearest.sort_unstable();
+    let mut found = 0;
+    for photons in paths.iter().map(|traced| &traced.photons) {
+        found += photons.len();
+        for &other in photons {
+            let squared = photon.distance_squared(other);
+            if squared < nearest[NEIGHBOR] {
+                nearest[NEIGHBOR] = squared;
+                nearest.sort_unstable();
+            }
         }
     }
-    PI * nearest[NEIGHBOR.min(photons.len() - 1)] as f64 / NEIGHBOR as f64
+    PI * nearest[NEIGHBOR.min(found - 1)] as f64 / NEIGHBOR as f64
 }
 
 #[cfg(test)]
@@ -140,10 +146,12 @@ mod tests {
             let at = |i: u32| StoredPhoton::at([100 + 8 * (i % side), 100, 100 + 8 * (i / side)], [0; 8]);
             (0..side * side).map(at).collect()
         };
-        let first = floor(60);
-        for count in [first.len(), 16 * first.len()] {
+        let photons = floor(60);
+        let found = photons.len();
+        let first = [Traced { photons, ends: Vec::new(), met: 0 }];
+        for count in [found, 16 * found] {
             let side = Spacing::new(&first, count).squared.sqrt();
-            let expected = 8.0 * (first.len() as f64 / count as f64).sqrt();
+            let expected = 8.0 * (found as f64 / count as f64).sqrt();
             assert!((side / expected - 1.0).abs() < 0.15, "{side}, not {expected}");
         }
         assert_eq!(Spacing::new(&[], 100), Spacing { squared: 0.0 });

@@ -162,7 +162,10 @@ fn trace_while(
             })
             .collect();
         let round = round.map_err(PhotonError::Unsound)?;
-        let spacing = *spacing.get_or_insert_with(|| spacing_of(&round, purpose, count));
+        // Caustics are as sharp as their photons.
+        if purpose == Purpose::Indirect && spacing.is_none() {
+            spacing = Some(Spacing::new(&round, count));
+        }
         for traced in round {
             met += traced.met;
             let traced = match spacing {
@@ -179,14 +182,6 @@ fn trace_while(
     let power_unit = (tracer.path_unit / paths.max(1) as f32).max(f32::MIN_POSITIVE);
     let photons = Photons { list, grid: tracer.grid, power_unit };
     Ok(PhotonPass { photons, paths, guiding, met })
-}
-
-/// Distance within which a path has one photon in a map, by the photons of the first round; caustics are as sharp as their photons.
-fn spacing_of(first: &[Traced], purpose: Purpose, count: usize) -> Option<Spacing> {
-    (purpose == Purpose::Indirect).then(|| {
-        let photons: Vec<StoredPhoton> = first.iter().flat_map(|traced| &traced.photons).copied().collect();
-        Spacing::new(&photons, count)
-    })
 }
 
 /// Tracer of the photons of a map, whose paths start at the sources of most use. `towards` are importons, with sources that are aimed at
