@@ -43,8 +43,8 @@ const OPEN_HEIGHT: f32 = 0.1;
 const MARGIN: f32 = 1.15;
 /// Greatest difference of the hidden shares of area and light in that sphere for which a gather takes all photons.
 const MAX_DIFFERENCE: f32 = 0.06;
-/// Greatest difference in the ball around photons, over the area of one photon's sphere, for which none of them is taken to have more
-/// than [`MAX_DIFFERENCE`].
+/// Greatest difference in the ball around photons, over the area of one photon's sphere, for which none of them is
+/// taken to have more than [`MAX_DIFFERENCE`].
 const NEAR_DIFFERENCE: f32 = 0.03;
 /// Radius of gathers over that of a disc with as many photons as a leaf, estimated by the greatest distance from its middle.
 const BY_SPREAD: f32 = 1.2;
@@ -301,8 +301,9 @@ impl<'a> Meter<'a> {
             }
             fractions[photon.photon] = if may_differ {
                 let region = self.region(photon, frame, cluster)?;
-                let [areas, powers] =
-                    self.seen(photon, &region, frame, cluster, (&chords, [radius, MARGIN * radius]));
+                let within = (&chords, [radius, MARGIN * radius]);
+                let [areas, powers] = [&self.surfaces, &self.lights]
+                    .map(|surfaces| self.seen(surfaces, photon, &region, frame, cluster, within));
                 Fraction::new(&areas, &powers)
             } else {
                 let (surfaces, chords) = (&self.surfaces, &chords);
@@ -315,21 +316,21 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Areas within two radii around a photon that its gathers count, and that it sees, and the same of photons' powers.
+    /// Areas of surfaces within two radii around a photon: what its gathers count, and what it sees.
     fn seen(
         &self,
+        surfaces: &OpenSurfaces,
         photon: &DiscPhoton,
         region: &SeenRegion,
         frame: &ChordFrame,
         cluster: &Cluster,
         (chords, [radius, outer_radius]): (&Chords, [f32; 2]),
-    ) -> [Areas; 2] {
+    ) -> Areas {
         let ball = cluster.ball;
         let lift = self.lift(cluster.radius) / ball.radius;
         let centre = frame.along((photon.position - ball.centre) / ball.radius);
         let [radius, outer_radius] = [radius, outer_radius].map(|radius| radius / ball.radius);
-        [&self.surfaces, &self.lights]
-            .map(|surfaces| run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift }))
+        run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift })
     }
 
     /// Adds surfaces below others where photons show that they have light. One within the grid's error below another is the same.
@@ -372,16 +373,16 @@ impl<'a> Meter<'a> {
         self.surfaces.choose(first.normal, self.same);
         let region = self.region(first, frame, cluster)?;
         let Cluster { ball, radius, outer } = *cluster;
-        let whole = [2.0 * ball.radius; 2];
-        self.lights.clear();
-        let [areas, _] = self.seen(first, &region, frame, cluster, (chords, whole));
+        let whole = (chords, [2.0 * ball.radius; 2]);
+        let areas = self.seen(&self.surfaces, first, &region, frame, cluster, whole);
         if areas.hidden <= 0.0 {
+            self.lights.clear();
             return Ok(false);
         }
         self.find_evidence(ball)?;
         self.evidence.powers(ball, frame, &mut self.lights);
         self.lights.choose(first.normal, self.same);
-        let [areas, powers] = self.seen(first, &region, frame, cluster, (chords, whole));
+        let powers = self.seen(&self.lights, first, &region, frame, cluster, whole);
         let spheres = outer / (MARGIN * radius);
         Ok(spheres * spheres * (areas.hidden - powers.hidden).abs() > NEAR_DIFFERENCE)
     }

@@ -54,8 +54,13 @@ impl StoredPhoton {
 
     /// Sum of its power's channels, in units of the map.
     pub(crate) fn power(self) -> f64 {
+        self.colour().into_iter().map(f64::from).sum()
+    }
+
+    /// Its power, in units of the map.
+    fn colour(self) -> [f32; 3] {
         let [a, b, c, d, ..] = self.content();
-        Rgbe([a, b, c, d]).decode().into_iter().map(f64::from).sum()
+        Rgbe([a, b, c, d]).decode()
     }
 
     /// Square of the distance to another photon, square grid cells.
@@ -82,15 +87,12 @@ impl StoredPhoton {
     /// The photon with the power of another one besides its own.
     #[must_use]
     pub(crate) fn with_power_of(self, other: Self) -> Self {
-        let [own, others] = [self, other].map(|photon| {
-            let [a, b, c, d, ..] = photon.content();
-            Vec3::from(Rgbe([a, b, c, d]).decode())
-        });
+        let sum = Vec3::from(self.colour()) + Vec3::from(other.colour());
         let mut content = self.content();
         // Random bits that neither power depends on.
         let dither = hash(self.place as u32 ^ hash(other.place as u32));
         let [power @ .., _, _, _, _] = &mut content;
-        *power = Rgbe::encode((own + others).to_array(), dither).0;
+        *power = Rgbe::encode(sum.to_array(), dither).0;
         Self { content: u64::from_le_bytes(content), ..self }
     }
 
