@@ -63,7 +63,7 @@ pub(crate) struct Descent<'s, const ENTRIES: usize> {
 }
 
 impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
-    /// A traversal from the root of the tree in two sections; `stack` must be empty.
+    /// A traversal from the root of the tree in two sections; `stack` is emptied.
     #[inline(always)]
     pub(crate) fn new(
         scene: &'s SceneImage,
@@ -82,7 +82,8 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         stack: &'s mut Stack<ENTRIES>,
         bits: u32,
     ) -> Self {
-        // Always fits: the root is node 0.
+        // The root is node 0, and an empty stack has room for it.
+        stack.clear();
         let _ = stack.push(u64::from(bits) << 32);
         // A tree visits each record once: more visits mean a cycle in an unsound image.
         let parts = [nodes, leaves].map(|kind| u64::from(scene.header.section(kind).records));
@@ -196,6 +197,7 @@ fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES
 #[inline(always)]
 fn sort(parts: &mut [u64]) {
     for sorted in 1..parts.len() {
+        // Always there: `sorted` is below the length.
         let Some(&part) = parts.get(sorted) else { return };
         let mut hole = sorted;
         while let Some(&before) = hole.checked_sub(1).and_then(|before| parts.get(before)) {

@@ -21,7 +21,7 @@ mod fault;
 mod pixel;
 mod self_test;
 
-pub use self::fault::{Fault, FaultCode, Parameter};
+pub use self::fault::{Fault, FaultCode, Invariant, Parameter};
 pub use self::pixel::{
     ALBEDO_STEPS, DEPTH_STEPS, LAYERED_PIXEL_BYTES, LayerSums, NORMAL_STEPS, PIXEL_BYTES, PIXELS_BYTES,
     PROBES, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, WEIGHT_OF_PROBE, record_bytes,
@@ -37,7 +37,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 15;
+pub const PROTOCOL_VERSION: u16 = 16;
 
 /// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;

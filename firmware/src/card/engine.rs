@@ -5,7 +5,7 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{
-    self, CASES_PER_COMMAND, Command, Fault, FaultCode, FrameParameters, MemoryUse, OPERAND_BYTES,
+    self, CASES_PER_COMMAND, Command, Fault, FaultCode, FrameParameters, Invariant, MemoryUse, OPERAND_BYTES,
     PIXELS_BYTES, PROTOCOL_VERSION, PixelSums, RESULT_BYTES, Reply, Tile, record_bytes,
 };
 use photoncard_shared::transport::Transport;
@@ -144,8 +144,7 @@ impl<K: ChipKind> Engine<K> {
         }
         self.data.clear();
         for case in cases {
-            // There is room for CASES_PER_COMMAND.
-            let _ = self.data.extend_from_slice(&compute_bytes(case));
+            self.data.extend_from_slice(&compute_bytes(case)).map_err(|_| Invariant::Reply.fault())?;
         }
         Ok(Reply::Computed { results: &self.data })
     }
@@ -220,8 +219,8 @@ impl<K: ChipKind> Engine<K> {
         if let Some(checksums) = &mut self.checksums {
             return match checksums.step(memory, self.written) {
                 Ok((checksum, is_last)) => {
-                    // There is room for CHECKSUMS_PER_REPLY.
-                    let _ = self.data.extend_from_slice(&checksum.to_le_bytes());
+                    let bytes = checksum.to_le_bytes();
+                    self.data.extend_from_slice(&bytes).map_err(|_| Invariant::Reply.fault())?;
                     if is_last {
                         send(transport, &Reply::Checksums { first: checksums.first, data: &self.data });
                         self.checksums = None;
@@ -281,7 +280,7 @@ impl<K: ChipKind> Engine<K> {
         let (Some(scene), Some(frame)) = (self.image.scene(), self.frame.as_ref()) else { return Ok(()) };
         if let Some((tile, counters)) = self.finished.take() {
             send(transport, &Reply::TileDone { tile, counters });
-            self.begun = self.begun.saturating_sub(1);
+            self.begun = self.begun.checked_sub(1).ok_or(Invariant::Flight.fault())?;
             return Ok(());
         }
         if !self.has_tiles() {
@@ -291,7 +290,7 @@ impl<K: ChipKind> Engine<K> {
             Progress::Busy => {}
             Progress::Pixel(pixel) => {
                 let sums = pixel.sums(frame);
-                self.add_pixel((pixel.tile, pixel.index), &sums, transport);
+                self.add_pixel((pixel.tile, pixel.index), &sums, transport)?;
             }
             Progress::Tile(tile, counters) => {
                 memory.end_tile(tile);
@@ -310,7 +309,12 @@ impl<K: ChipKind> Engine<K> {
     }
 
     /// Adds a pixel, by tile and index, to those to be sent, which are sent if it is not the next of them or no other fits.
-    fn add_pixel(&mut self, (tile, index): (u32, u32), sums: &PixelSums, transport: &mut Transport) {
+    fn add_pixel(
+        &mut self,
+        (tile, index): (u32, u32),
+        sums: &PixelSums,
+        transport: &mut Transport,
+    ) -> Result<(), Fault> {
         let bytes = record_bytes(sums.layers.is_some());
         let (first_tile, first) = self.first;
         let next = first + (self.data.len() / bytes) as u32;
@@ -320,14 +324,17 @@ impl<K: ChipKind> Engine<K> {
         if self.data.is_empty() {
             self.first = (tile, index);
         }
-        // There is room: what is full is sent.
-        sums.write(&mut |bytes| {
-            let _ = self.data.extend_from_slice(bytes);
-        });
+        // What is full is sent.
+        let mut has_room = true;
+        sums.write(&mut |bytes| has_room &= self.data.extend_from_slice(bytes).is_ok());
+        if !has_room {
+            return Err(Invariant::Reply.fault());
+        }
         // A reply has room for several pixels: the first of a new one does not fill it, so that one reply is sent at most.
         if self.data.len() + bytes > self.data.capacity() {
             self.send_pixels(transport);
         }
+        Ok(())
     }
 
     /// Sends the pixels that wait, if any.

@@ -57,7 +57,7 @@ impl<K: ChipKind> Flight<K> {
         let frame = job.frame;
         self.position.index = pixel;
         let is_plain = self.pass() == Pass::CompletePlain;
-        let stored = self.sum(pixel).map(|number| shared.sums.light(frame, (flight, number)));
+        let stored = self.sum(pixel).map(|number| shared.sums.light(frame, (flight, number))).transpose()?;
         let mut completion = self.completion.take().unwrap_or_else(|| {
             let probes_first = is_plain && adaptive::needs_probes(frame);
             Completion::new(
@@ -71,12 +71,12 @@ impl<K: ChipKind> Flight<K> {
         let as_what = if is_term { Use::Term(weight) } else { Use::Probe };
         let has_rays = self.look_at(job, pixel, (as_what, &mut completion))?;
         if has_rays && is_plain && is_term {
-            self.give_rays(pixel);
+            self.give_rays(pixel)?;
             self.position.index += 1;
             return Ok(None);
         }
         if is_plain && sample + 1 == PROBES {
-            self.end_probes(frame, pixel, &completion.probes);
+            self.end_probes(frame, pixel, &completion.probes)?;
         }
         completion.next_path(self.paths(pixel).of_sample(sample));
         if completion.sample < frame.first_sample.saturating_add(frame.samples) {
@@ -107,15 +107,16 @@ impl<K: ChipKind> Flight<K> {
             self.completion = Some(completion);
             return Ok(());
         }
-        self.end_probes(job.frame, pixel, &completion.probes);
+        self.end_probes(job.frame, pixel, &completion.probes)?;
         self.position.index += 1;
         Ok(())
     }
 
     /// Sets the number of a pixel's paths by its probes.
-    fn end_probes(&mut self, frame: &FrameParameters, pixel: u32, probes: &Probes) {
-        if let Some(threshold) = frame.adaptive_threshold.filter(|_| adaptive::needs_probes(frame)) {
-            self.set_paths(pixel, probes.paths(threshold));
+    fn end_probes(&mut self, frame: &FrameParameters, pixel: u32, probes: &Probes) -> Result<(), Fault> {
+        match frame.adaptive_threshold.filter(|_| adaptive::needs_probes(frame)) {
+            Some(threshold) => self.set_paths(pixel, probes.paths(threshold)),
+            None => Ok(()),
         }
     }
 

@@ -4,7 +4,7 @@ use core::ops::Range;
 
 use heapless::Vec;
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{FrameParameters, Tile};
+use photoncard_shared::message::{Fault, FrameParameters, Invariant, Tile};
 
 use super::adaptive::{self, Paths};
 use super::finished_pixel::Completion;
@@ -89,18 +89,19 @@ impl<K: ChipKind> Flight<K> {
     }
 
     /// Begins the next block.
-    pub(super) fn begin_block(&mut self, frame: &FrameParameters) {
-        self.block = self.blocks.pop().unwrap_or(Block::EMPTY);
-        self.set_all_sums(PLAIN);
+    pub(super) fn begin_block(&mut self, frame: &FrameParameters) -> Result<(), Fault> {
+        self.block = self.blocks.pop().ok_or(Invariant::Block.fault())?;
+        self.set_all_sums(PLAIN)?;
         self.paths.view_mut().clear();
-        // Fits: a tile has at most as many pixels.
-        let _ = self.paths.view_mut().resize(self.block.pixels() as usize, Paths::ONE);
+        let pixels = self.block.pixels() as usize;
+        self.paths.view_mut().resize(pixels, Paths::ONE).map_err(|_| Invariant::Pixels.fault())?;
         match allowed_error(frame) {
             None if frame.gather_rays == 0 => self.position = Position::at(Pass::CompletePlain),
-            None => self.do_without_records(),
+            None => self.do_without_records()?,
             Some(_) if frame.keep_records => self.position = Position::at(Pass::Recall),
-            Some(_) => self.begin_records(),
+            Some(_) => self.begin_records()?,
         }
+        Ok(())
     }
 
     /// True if blocks are left.
@@ -110,30 +111,27 @@ impl<K: ChipKind> Flight<K> {
 
     /// Replaces the block, whose records do not fit into the cache, by its two halves. A block of one pixel always
     /// fits.
-    pub(super) fn divide_block(&mut self) {
-        let Some([first, second]) = self.block.halves().filter(|_| self.blocks.len() + 2 <= MAX_BLOCKS)
-        else {
-            // Never reached: the cache has room for one pixel, and the stack of blocks for all halvings of a tile.
-            // Every sample would then do its own final gather.
-            return self.do_without_records();
-        };
+    pub(super) fn divide_block(&mut self) -> Result<(), Fault> {
+        let [first, second] = self.block.halves().ok_or(Invariant::Halves.fault())?;
         for half in [second, first] {
-            let _ = self.blocks.push(half);
+            self.blocks.push(half).map_err(|_| Invariant::Halves.fault())?;
         }
         self.position = Position::at(Pass::NextBlock);
+        Ok(())
     }
 
     /// Goes on to the gather rays of all pixels.
-    pub(super) fn do_without_records(&mut self) {
+    pub(super) fn do_without_records(&mut self) -> Result<(), Fault> {
         self.cache.forget();
-        self.set_all_sums(UNSUMMED);
+        self.set_all_sums(UNSUMMED)?;
         self.position = Position::at(Pass::NextPixels);
+        Ok(())
     }
 
-    fn set_all_sums(&mut self, sum: u16) {
+    fn set_all_sums(&mut self, sum: u16) -> Result<(), Fault> {
+        let pixels = self.block.pixels() as usize;
         self.sums.view_mut().clear();
-        // Fits: a tile has at most as many pixels.
-        let _ = self.sums.view_mut().resize(self.block.pixels() as usize, sum);
+        self.sums.view_mut().resize(pixels, sum).map_err(|_| Invariant::Pixels.fault())
     }
 
     pub(super) fn window(&self) -> Window {
@@ -160,10 +158,10 @@ impl<K: ChipKind> Flight<K> {
     }
 
     /// Sets the number of paths of the samples of pixel `index` of the block.
-    pub(super) fn set_paths(&mut self, index: u32, paths: Paths) {
-        if let Some(of_pixel) = self.paths.view_mut().get_mut(index as usize) {
-            *of_pixel = paths;
-        }
+    pub(super) fn set_paths(&mut self, index: u32, paths: Paths) -> Result<(), Fault> {
+        let of_pixel = self.paths.view_mut().get_mut(index as usize);
+        *of_pixel.ok_or(Invariant::Pixels.fault())? = paths;
+        Ok(())
     }
 
     /// Begins the passes of the pixels with gather rays.
@@ -190,15 +188,15 @@ impl<K: ChipKind> Flight<K> {
     }
 
     /// Notes that pixel `index` of the block has gather rays of its own.
-    pub(super) fn give_rays(&mut self, index: u32) {
-        self.set_sum(index, UNSUMMED);
+    pub(super) fn give_rays(&mut self, index: u32) -> Result<(), Fault> {
+        self.set_sum(index, UNSUMMED)
     }
 
     /// Sets the number of the sum of pixel `index` of the block.
-    pub(super) fn set_sum(&mut self, index: u32, number: u16) {
-        if let Some(sum) = self.sums.view_mut().get_mut(index as usize) {
-            *sum = number;
-        }
+    pub(super) fn set_sum(&mut self, index: u32, number: u16) -> Result<(), Fault> {
+        let sum = self.sums.view_mut().get_mut(index as usize);
+        *sum.ok_or(Invariant::Pixels.fault())? = number;
+        Ok(())
     }
 }
 

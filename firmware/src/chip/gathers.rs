@@ -64,6 +64,12 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         }
     }
 
+    /// Queues a gather as if its tile had cast a ray for it. Returns whether there is room.
+    #[cfg(test)]
+    pub(super) fn wait_for_test(&mut self, request: GatherRequest) -> bool {
+        self.queue.push(request).is_ok()
+    }
+
     /// Begins a drain. Returns the number of gathers that wait, and the first; `None` if there are none.
     pub(super) fn begin_drain(&mut self, drain: Drain) -> Option<(usize, &GatherRequest)> {
         if self.queue.is_empty() {

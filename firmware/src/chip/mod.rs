@@ -29,11 +29,13 @@ mod records;
 mod stored_point;
 #[cfg(test)]
 mod test_frame;
+#[cfg(test)]
+mod tests;
 
 use core::ops::Range;
 
 use photoncard_shared::counters::Counters;
-use photoncard_shared::message::{Fault, FrameParameters, Tile};
+use photoncard_shared::message::{Fault, FrameParameters, Invariant, Tile};
 
 use self::buffers::Shared;
 pub use self::finished_pixel::{FinishedPixel, PixelView};
@@ -167,7 +169,7 @@ impl<K: ChipKind> Chip<K> {
     /// be short enough for a prompt reply and long enough to make the cost of polling negligible.
     ///
     /// # Errors
-    /// If the image is not sound. All tiles should be dropped then.
+    /// If the image is not sound, or an [`Invariant`] is broken. All tiles should be dropped then.
     pub fn step<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<Progress, Fault> {
         let mut work = 0;
         for _ in 0..PIECES_PER_STEP {
@@ -194,9 +196,9 @@ impl<K: ChipKind> Chip<K> {
         if let Some(number) = self.find(Flight::is_completable) {
             return self.complete(job, number, work);
         }
-        let Some(number) = self.active else { return Ok(self.go_on(job.frame)) };
+        let Some(number) = self.active else { return self.go_on(job.frame) };
         let Self { flights, shared, .. } = self;
-        let Some(flight) = flights.values_mut().get_mut(number) else { return Ok(Progress::Idle) };
+        let flight = flights.values_mut().get_mut(number).ok_or(Invariant::Flight.fault())?;
         let pass = flight.pass();
         if shared.gathers.is_full(job.frame) || pass == Pass::Eye && !flight.has_room(job.frame, shared) {
             self.begin_drain(job.frame);
@@ -222,21 +224,21 @@ impl<K: ChipKind> Chip<K> {
 
     /// Begins the next block of a tile in flight, or the gather rays of its pixels. Without one the chip has room for a tile or must drain
     /// its queue.
-    fn go_on(&mut self, frame: &FrameParameters) -> Progress {
+    fn go_on(&mut self, frame: &FrameParameters) -> Result<Progress, Fault> {
         let of_pass = |pass| self.find(|flight| flight.pass() == pass);
-        if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock))
-            && let Some(flight) = self.flights.values_mut().get_mut(number)
-        {
+        if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock)) {
+            let flight = self.flights.values_mut().get_mut(number).ok_or(Invariant::Flight.fault())?;
             if flight.pass() == Pass::NextPixels {
                 self.shared.sums.begin(number);
                 flight.begin_pixels(frame);
             } else {
-                flight.begin_block(frame);
+                flight.begin_block(frame)?;
             }
             self.active = Some(number);
-            return Progress::Busy;
+            return Ok(Progress::Busy);
         }
-        if self.vacant(frame).is_none() && self.flush(frame) { Progress::Busy } else { Progress::Idle }
+        let must_drain = self.vacant(frame).is_none() && self.flush(frame);
+        Ok(if must_drain { Progress::Busy } else { Progress::Idle })
     }
 
     /// Completes the next sample of a block whose gathers are done. Its last pixels are followed by those with gather rays, by another block
@@ -248,10 +250,10 @@ impl<K: ChipKind> Chip<K> {
         work: &mut u64,
     ) -> Result<Progress, Fault> {
         let Self { flights, shared, .. } = self;
-        let Some(flight) = flights.values_mut().get_mut(number) else { return Ok(Progress::Idle) };
+        let flight = flights.values_mut().get_mut(number).ok_or(Invariant::Flight.fault())?;
         match flight.pass() {
             Pass::WaitForRecords => {
-                flight.end_records(job, shared);
+                flight.end_records(job, shared)?;
                 flight.position = Position::at(Pass::CompletePlain);
             }
             Pass::Wait => flight.position = Position::at(Pass::Complete),
@@ -292,14 +294,14 @@ impl<K: ChipKind> Chip<K> {
         for _ in 0..GATHERS_PER_PIECE {
             let Some(request) = shared.gathers.take() else { break };
             let (number, point) = (request.target.flight(), request.target.point());
-            let Some(flight) = flights.values_mut().get_mut(number) else { continue };
+            let flight = flights.values_mut().get_mut(number).ok_or(Invariant::Flight.fault())?;
+            flight.waiting = flight.waiting.checked_sub(1).ok_or(Invariant::Waiting.fault())?;
             let brought = shared.gathers.gather(&mut job.context(&mut flight.counters), &request)?;
-            flight.waiting = flight.waiting.saturating_sub(1);
             match point {
                 PointIndex::Pixel(pixel) => {
-                    shared.sums.add(job.frame, (number, pixel), Component::Indirect, brought);
+                    shared.sums.add(job.frame, (number, pixel), Component::Indirect, brought)?;
                 }
-                PointIndex::Record(record) => flight.cache.add(record, request.target.cell(), brought),
+                PointIndex::Record(record) => flight.cache.add(record, request.target.cell(), brought)?,
             }
         }
         Ok(())

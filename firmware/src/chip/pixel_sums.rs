@@ -7,7 +7,7 @@ use core::num::NonZeroU32;
 
 use glam::Vec3;
 use photoncard_shared::budget::{MAX_IN_FLIGHT, sums_of_pixel};
-use photoncard_shared::message::FrameParameters;
+use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
 use super::light::{Component, PixelLight};
 use crate::fixed_point::ColourSum;
@@ -75,20 +75,22 @@ impl<C: Capacity> PixelSums<C> {
 
     /// Appends a pixel without light to the run that began last, and returns its number in the run. To be called
     /// only if [`Self::has_room`].
-    pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> u16 {
+    pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> Result<u16, Fault> {
         let count = sums_of_pixel(frame.layers) as usize;
         let first = self.end as usize * count;
-        self.sums.view_mut().get_mut(first..first + count).unwrap_or_default().fill(ColourSum::ZERO);
+        let sums = self.sums.view_mut().get_mut(first..first + count);
+        let (sums, run) = sums.zip(self.runs.get_mut(flight)).ok_or(Invariant::Sums.fault())?;
+        sums.fill(ColourSum::ZERO);
         self.end = (self.end + 1) % Self::places(frame);
-        let Some(run) = self.runs.get_mut(flight) else { return 0 };
         run.count += 1;
         // Below the pixels of a tile, which fit 15 bits.
-        (run.count - 1) as u16
+        Ok((run.count - 1) as u16)
     }
 
-    fn place(&self, frame: &FrameParameters, flight: usize, number: u16) -> usize {
-        let first = self.runs.get(flight).map_or(0, |run| run.first);
-        ((first + u32::from(number)) % Self::places(frame)) as usize
+    fn place(&self, frame: &FrameParameters, flight: usize, number: u16) -> Result<usize, Fault> {
+        let run = self.runs.get(flight).filter(|run| u32::from(number) < run.count);
+        let run = run.ok_or(Invariant::Sums.fault())?;
+        Ok(((run.first + u32::from(number)) % Self::places(frame)) as usize)
     }
 
     /// Adds light, in the image's radiance units, to a component of pixel `number` of a tile in flight.
@@ -99,18 +101,23 @@ impl<C: Capacity> PixelSums<C> {
         (flight, number): (usize, u16),
         component: Component,
         brought: Vec3,
-    ) {
-        let place = self.place(frame, flight, number);
-        if let Some(sum) = self.sums.view_mut().get_mut(component.sum_of(frame, place)) {
-            sum.add_light(brought);
-        }
+    ) -> Result<(), Fault> {
+        let place = component.sum_of(frame, self.place(frame, flight, number)?);
+        let sum = self.sums.view_mut().get_mut(place).ok_or(Invariant::Sums.fault())?;
+        sum.add_light(brought);
+        Ok(())
     }
 
     /// Light of pixel `number` of a tile in flight.
-    pub(super) fn light(&self, frame: &FrameParameters, (flight, number): (usize, u16)) -> PixelLight {
+    pub(super) fn light(
+        &self,
+        frame: &FrameParameters,
+        (flight, number): (usize, u16),
+    ) -> Result<PixelLight, Fault> {
         let count = sums_of_pixel(frame.layers) as usize;
-        let first = self.place(frame, flight, number) * count;
-        PixelLight::of(self.sums.view().get(first..first + count).unwrap_or_default())
+        let first = self.place(frame, flight, number)? * count;
+        let sums = self.sums.view().get(first..first + count).ok_or(Invariant::Sums.fault())?;
+        Ok(PixelLight::of(sums))
     }
 }
 
@@ -143,9 +150,11 @@ mod tests {
                         assert!(used > 0, "an empty ring has room");
                         break;
                     }
-                    assert_eq!(u32::from(sums.push(frame, flight)), number);
+                    assert_eq!(sums.push(frame, flight), Ok(number as u16));
                     let light = (3 * step + number) as f32;
-                    sums.add(frame, (flight, number as u16), Component::Indirect, Vec3::splat(light));
+                    let added =
+                        sums.add(frame, (flight, number as u16), Component::Indirect, Vec3::splat(light));
+                    assert_eq!(added, Ok(()));
                     held[flight].push(light);
                 }
             }
@@ -154,7 +163,7 @@ mod tests {
             sums.begin(1);
             for number in 0..places {
                 assert!(sums.has_room(frame));
-                assert_eq!(sums.push(frame, 1), number);
+                assert_eq!(sums.push(frame, 1), Ok(number));
             }
             assert!(!sums.has_room(frame));
         }
@@ -165,7 +174,7 @@ mod tests {
             for (number, &light) in (0..).zip(lights) {
                 let mut expected = PixelLight::NONE;
                 expected.add(frame, Component::Indirect, Vec3::splat(light));
-                assert_eq!(sums.light(frame, (flight, number)), expected);
+                assert_eq!(sums.light(frame, (flight, number)), Ok(expected));
             }
         }
     }

@@ -3,7 +3,7 @@
 
 use core::ops::Range;
 
-use photoncard_shared::message::{Fault, FrameParameters};
+use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
 use super::buffers::Shared;
 use super::flight::{Flight, allowed_error};
@@ -139,7 +139,7 @@ impl<K: ChipKind> Flight<K> {
             if point.rays > 0 {
                 point.choose_directions(context, shared.gathers.candidates())?;
                 if self.sum(pixel).is_none() {
-                    self.set_sum(pixel, shared.sums.push(frame, flight));
+                    self.set_sum(pixel, shared.sums.push(frame, flight)?)?;
                 }
                 let stored = StoredPoint {
                     seen: view.seen.unwrap_or(Seen::ELSEWHERE),
@@ -147,7 +147,7 @@ impl<K: ChipKind> Flight<K> {
                     rays: StoredRays::new(&point),
                 };
                 let bin = stored.first_bin(point.pattern, frame.bins);
-                shared.points.push(pixel as u16, stored, bin);
+                shared.points.push(pixel as u16, stored, bin)?;
             }
         }
         Ok(())
@@ -160,20 +160,15 @@ impl<K: ChipKind> Flight<K> {
         shared: &mut Shared<K>,
         flight: usize,
     ) -> Result<(), Fault> {
-        let present = shared.points.get(self.position.index);
-        if let Some((pixel, stored)) = present
-            && let Some(number) = self.sum(pixel.into())
-        {
-            let (at, weight) = self.present_path(job.frame, pixel.into());
-            let context = &mut job.context(&mut self.counters);
-            context.memory.enter(Stage::Shadow);
-            let mut point = stored.point(pattern(context.frame, at));
-            if stored.read_surface(context, at, &mut point.surface)? {
-                let light = direct_light(context, at, &point)?;
-                for (component, light) in light {
-                    shared.sums.add(context.frame, (flight, number), component, light * weight);
-                }
-            }
+        let (pixel, stored) = shared.points.get(self.position.index)?;
+        let number = self.sum(pixel.into()).ok_or(Invariant::Sums.fault())?;
+        let (at, weight) = self.present_path(job.frame, pixel.into());
+        let context = &mut job.context(&mut self.counters);
+        context.memory.enter(Stage::Shadow);
+        let mut point = stored.point(pattern(context.frame, at));
+        stored.read_surface(context, at, &mut point.surface)?;
+        for (component, light) in direct_light(context, at, &point)? {
+            shared.sums.add(context.frame, (flight, number), component, light * weight)?;
         }
         if self.position.next_index(shared.points.len()) {
             self.position.pass = Pass::Rays;
@@ -196,32 +191,29 @@ impl<K: ChipKind> Flight<K> {
         };
         let (at, weight) = self.present_path(job.frame, pixel.into());
         let pattern = pattern(job.frame, at);
-        let rays = shared.points.take_rays(&mut self.position, index, pattern, job.frame.bins);
-        let (Some((_, stored)), Some(number)) = (shared.points.get(index), self.sum(pixel.into())) else {
-            return Ok(());
-        };
+        let rays = shared.points.take_rays(&mut self.position, index, pattern, job.frame.bins)?;
+        let (_, stored) = shared.points.get(index)?;
+        let number = self.sum(pixel.into()).ok_or(Invariant::Sums.fault())?;
         let index_in_tile = self.index_in_tile(pixel.into());
         let (context, outlet) = &mut job.context_and_outlet(&mut self.counters);
         context.memory.enter(Stage::GatherRay);
         let mut point = stored.point(pattern);
         point.weight = weight;
-        if !stored.read_surface(context, at, &mut point.surface)? {
-            return Ok(());
-        }
+        stored.read_surface(context, at, &mut point.surface)?;
         let target = GatherTarget::new(flight, PointIndex::Pixel(number));
         let mut ends = final_gather::GatherRayEnds::new();
         for bundle in final_gather::bundles(rays) {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
             for end in &ends {
                 let sum = (flight, number);
-                shared.sums.add(context.frame, sum, Component::Direct, end.direct);
+                shared.sums.add(context.frame, sum, Component::Direct, end.direct)?;
                 match (end.request, outlet.as_deref_mut()) {
                     (None, _) => {}
                     (Some(request), Some(outlet)) => outlet.take(index_in_tile, request),
                     (Some(request), None) => match shared.gathers.submit(context, request)? {
                         None => self.waiting += 1,
                         Some(brought) => {
-                            shared.sums.add(context.frame, sum, Component::Indirect, brought);
+                            shared.sums.add(context.frame, sum, Component::Indirect, brought)?;
                         }
                     },
                 }

@@ -2,6 +2,8 @@
 
 use core::ops::Range;
 
+use photoncard_shared::message::{Fault, Invariant};
+
 use super::position::Position;
 use super::stored_point::StoredPoint;
 use crate::kind::{Buffer, Capacity};
@@ -31,17 +33,19 @@ impl<C: Capacity> Points<C> {
     }
 
     /// Appends a point with the bin of its first ray. There is room for one of each pixel of a stripe, and of each record of a block.
-    pub(super) fn push(&mut self, owner: u16, point: StoredPoint, bin: u32) {
-        let _ = self.points.view_mut().push(point);
-        let _ = self.owners.view_mut().push(owner);
-        let _ = self.bins.view_mut().push(bin as u8);
+    pub(super) fn push(&mut self, owner: u16, point: StoredPoint, bin: u32) -> Result<(), Fault> {
+        let full = Invariant::Points.fault();
+        self.points.view_mut().push(point).map_err(|_| full)?;
+        self.owners.view_mut().push(owner).map_err(|_| full)?;
+        self.bins.view_mut().push(bin as u8).map_err(|_| full)
     }
 
     /// The point of an index, with its owner.
     #[inline(always)]
-    pub(super) fn get(&self, index: u32) -> Option<(u16, &StoredPoint)> {
-        let index = index as usize;
-        Some((*self.owners.view().get(index)?, self.points.view().get(index)?))
+    pub(super) fn get(&self, index: u32) -> Result<(u16, &StoredPoint), Fault> {
+        let at = index as usize;
+        let point = self.owners.view().get(at).copied().zip(self.points.view().get(at));
+        point.ok_or(Invariant::Points.fault())
     }
 
     /// Index and owner of the next point with rays in the present bin; `None` if there is none.
@@ -61,16 +65,13 @@ impl<C: Capacity> Points<C> {
         index: u32,
         pattern: Pattern,
         bins: u32,
-    ) -> Range<u32> {
+    ) -> Result<Range<u32>, Fault> {
         let at = index as usize;
-        let (Some(point), Some(bin)) = (self.points.view().get(at), self.bins.view_mut().get_mut(at)) else {
-            // Never reached: the index is a point's.
-            position.pass_rays(index, 0, true);
-            return 0..0;
-        };
+        let point = self.points.view().get(at).zip(self.bins.view_mut().get_mut(at));
+        let (point, bin) = point.ok_or(Invariant::Points.fault())?;
         let (rays, next) = point.next_rays(pattern, position.rays_cast(), [position.bin, bins]);
         *bin = next.map_or(*bin, |next| next as u8);
         position.pass_rays(index, rays.len() as u32, next != Some(position.bin));
-        rays
+        Ok(rays)
     }
 }

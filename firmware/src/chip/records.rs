@@ -1,6 +1,6 @@
 //! The passes of a block's irradiance records.
 
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, Invariant};
 
 use super::buffers::Shared;
 use super::flight::{Flight, allowed_error};
@@ -24,17 +24,18 @@ impl<K: ChipKind> Flight<K> {
             Recalled::Records => {
                 self.position = Position::at(Pass::CompletePlain);
             }
-            Recalled::Divided => self.divide_block(),
-            Recalled::Nothing => self.begin_records(),
+            Recalled::Divided => self.divide_block()?,
+            Recalled::Nothing => self.begin_records()?,
         }
         Ok(())
     }
 
     /// Begins the survey of the block's records.
-    pub(super) fn begin_records(&mut self) {
+    pub(super) fn begin_records(&mut self) -> Result<(), Fault> {
         self.position = Position::at(Pass::Survey);
-        if self.cache.begin(&self.window()).is_err() {
-            self.divide_block();
+        match self.cache.begin(&self.window()) {
+            Ok(()) => Ok(()),
+            Err(Full) => self.divide_block(),
         }
     }
 
@@ -45,8 +46,7 @@ impl<K: ChipKind> Flight<K> {
         shared: &mut Shared<K>,
     ) -> Result<(), Fault> {
         let Some(allowed) = allowed_error(job.frame) else {
-            self.do_without_records();
-            return Ok(());
+            return self.do_without_records();
         };
         let window = self.window();
         match self.cache.survey(&mut job.context(&mut self.counters), &window, allowed)? {
@@ -59,7 +59,7 @@ impl<K: ChipKind> Flight<K> {
                 if job.frame.keep_records {
                     shared.store.keep_full(job.memory, &window);
                 }
-                self.divide_block();
+                self.divide_block()?;
             }
         }
         Ok(())
@@ -74,10 +74,10 @@ impl<K: ChipKind> Flight<K> {
         let index = self.position.index;
         if let Some(mut point) = self.cache.point(job.frame, index) {
             point.choose_directions(&mut job.context(&mut self.counters), shared.gathers.candidates())?;
-            self.cache.begin_gather(index, &point);
+            self.cache.begin_gather(index, &point)?;
             // An index fits 15 bits, by the check of the kind's capacities.
             let stored = StoredPoint::of_record(&point);
-            shared.points.push(index as u16, stored, stored.first_bin(point.pattern, job.frame.bins));
+            shared.points.push(index as u16, stored, stored.first_bin(point.pattern, job.frame.bins))?;
         }
         if self.position.next_index(self.cache.lattice_points()) {
             self.position = Position::at(Pass::RecordRays);
@@ -101,24 +101,20 @@ impl<K: ChipKind> Flight<K> {
             }
             return Ok(());
         };
-        let Some(mut point) = cache.point(job.frame, record.into()) else {
-            // Never reached: every owner is a record.
-            position.pass_rays(index, 0, true);
-            return Ok(());
-        };
-        let rays = points.take_rays(position, index, point.pattern, bins);
-        point.directions = points.get(index).map_or(point.directions, |(_, stored)| stored.directions);
+        let mut point = cache.point(job.frame, record.into()).ok_or(Invariant::Record.fault())?;
+        let rays = points.take_rays(position, index, point.pattern, bins)?;
+        point.directions = points.get(index)?.1.directions;
         let context = &mut job.context(counters);
         let target = GatherTarget::new(flight, PointIndex::Record(record));
         let mut ends = final_gather::GatherRayEnds::new();
         for bundle in final_gather::bundles(rays) {
             final_gather::cast(context, &point, target, bundle, &mut ends)?;
             for end in &ends {
-                cache.add(record, end.cell, end.direct);
+                cache.add(record, end.cell, end.direct)?;
                 if let Some(request) = end.request {
                     match gathers.submit(context, request)? {
                         None => *waiting += 1,
-                        Some(brought) => cache.add(record, end.cell, brought),
+                        Some(brought) => cache.add(record, end.cell, brought)?,
                     }
                 }
             }
@@ -127,11 +123,17 @@ impl<K: ChipKind> Flight<K> {
     }
 
     /// Ends the gather of the block's records, and keeps them if the frame asks for it.
-    pub(super) fn end_records<M: MemoryPort>(&mut self, job: &mut RenderJob<M>, shared: &mut Shared<K>) {
-        let Some(allowed) = allowed_error(job.frame) else { return };
-        self.cache.end_gather(&mut job.context(&mut self.counters), allowed);
+    pub(super) fn end_records<M: MemoryPort>(
+        &mut self,
+        job: &mut RenderJob<M>,
+        shared: &mut Shared<K>,
+    ) -> Result<(), Fault> {
+        // Records are gathered in frames with an error bound alone.
+        let allowed = allowed_error(job.frame).ok_or(Invariant::Record.fault())?;
+        self.cache.end_gather(&mut job.context(&mut self.counters), allowed)?;
         if job.frame.keep_records {
             shared.store.keep(job.memory, &self.window(), &self.cache);
         }
+        Ok(())
     }
 }

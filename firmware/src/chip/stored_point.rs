@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use photoncard_shared::budget::MAX_GATHER_RAYS;
-use photoncard_shared::message::{Fault, FrameParameters};
+use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
 use crate::importance::DirectionTable;
 use crate::memory::MemoryPort;
@@ -96,23 +96,25 @@ impl StoredPoint {
         }
     }
 
-    /// Reads the surface of a sample of a pixel into `surface`. `false` if there is none.
+    /// Reads the surface of a sample of a pixel into `surface`.
+    ///
+    /// # Errors
+    /// If the image is not sound, or no surface is seen.
     #[inline(always)]
     pub(super) fn read_surface<M: MemoryPort>(
         &self,
         context: &mut Context<M>,
         at: PixelSample,
         surface: &mut Surface,
-    ) -> Result<bool, Fault> {
+    ) -> Result<(), Fault> {
         if self.seen.is_elsewhere() {
             // The way there is followed again.
-            let Some(view) = eye::view(context, at)?.surface() else { return Ok(false) };
-            *surface = view.surface;
+            *surface = eye::view(context, at)?.surface().ok_or(Invariant::Surface.fault())?.surface;
         } else {
             let film = eye::film_position(context, at);
             eye::surface(context, film, &self.seen, surface)?;
         }
-        Ok(true)
+        Ok(())
     }
 }
 

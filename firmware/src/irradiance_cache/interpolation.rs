@@ -25,6 +25,7 @@ impl<'a> Corners<'a> {
     pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
         let mut errors = [f32::INFINITY; 4];
         for (error, record) in errors.iter_mut().zip(self.0) {
+            // The error without a record is infinite.
             let Some(record) = record else { continue };
             let radius = self.records().fold(record.radius, |radius, other| {
                 let distance = libm::sqrtf((other.position - record.position).length_squared());

@@ -42,7 +42,7 @@ pub use store::{Recalled, RecordStore};
 
 use glam::Vec3;
 use heapless::Vec;
-use photoncard_shared::message::FrameParameters;
+use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
 use self::gradient::coefficients;
 use self::record::{Content, GatherSums, Record};
@@ -124,34 +124,74 @@ impl<R: Capacity> IrradianceCache<R> {
     }
 
     /// Begins the gather of a record, by the directions of its gather point, which determine its gradient's coefficients.
-    pub fn begin_gather(&mut self, index: u32, point: &GatherPoint) {
+    ///
+    /// # Errors
+    /// [`Invariant::Record`] if the record is not surveyed.
+    pub fn begin_gather(&mut self, index: u32, point: &GatherPoint) -> Result<(), Fault> {
         if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
             && let Content::Surveyed(distances) = &record.content
         {
             record.content = Content::Gathering(GatherSums::new(&coefficients(point, distances)));
+            return Ok(());
         }
+        Err(Invariant::Record.fault())
     }
 
     /// Adds the radiance of a gather ray in a cell of the hemisphere to a record that is being gathered.
+    ///
+    /// # Errors
+    /// [`Invariant::Record`] if it is not.
     #[inline]
-    pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) {
+    pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) -> Result<(), Fault> {
         if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
             && let Content::Gathering(sums) = &mut record.content
         {
             sums.add(cell, brought);
+            return Ok(());
         }
+        Err(Invariant::Record.fault())
     }
 
     /// Ends the gather of all records: turns their sums into irradiance over pi, W/(sr m^2).
-    pub fn end_gather<M>(&mut self, context: &mut Context<M>, allowed: f32) {
+    ///
+    /// # Errors
+    /// [`Invariant::Record`] if one is not being gathered.
+    pub fn end_gather<M>(&mut self, context: &mut Context<M>, allowed: f32) -> Result<(), Fault> {
         let unit = context.scene.header.radiance_unit;
         for index in 0..self.records.entries() {
+            // A lattice point without a record has nothing to gather.
             let Some((_, Some(record))) = self.records.entry_mut(index) else { continue };
-            let Content::Gathering(sums) = &record.content else { continue };
+            let Content::Gathering(sums) = &record.content else { return Err(Invariant::Record.fault()) };
             context.counters.records += 1;
             let irradiance = sums.irradiance(unit, record.distance);
             let reach = libm::sqrtf(allowed) * record.radius;
             record.content = Content::Gathered(irradiance.limited(max(reach, record.distance)));
         }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::kind::Entries;
+    use crate::scene::Surface;
+
+    #[test]
+    fn light_of_a_record_that_is_not_being_gathered_is_a_fault() {
+        let broken = Err(Invariant::Record.fault());
+        let surface = Surface::white(Vec3::ZERO, Vec3::Y, 1.0);
+        let mut cache = std::boxed::Box::new(IrradianceCache::<Entries<64>>::new());
+        let point = GatherPoint::record(surface, Pattern::new(0, 0, 0, 0, Dimension::Irradiance), 1);
+        assert_eq!(cache.add(0, 0, Vec3::ONE), broken, "there is none");
+        let record = Some(Record::new(&surface, 0.1));
+        assert!(cache.records.insert(LatticePoint { x: 0, y: 0 }, record).is_ok());
+        assert_eq!(cache.add(0, 0, Vec3::ONE), broken, "it is being surveyed");
+        assert_eq!(cache.begin_gather(0, &point), broken, "it is being surveyed");
+        let mut record = Record::new(&surface, 0.1);
+        assert_eq!(record.set_distance(0, 1.0), Ok(()));
+        assert_eq!(record.end_survey(), Ok(()));
+        assert_eq!(record.set_distance(0, 1.0), broken);
+        assert_eq!(record.end_survey(), broken);
     }
 }

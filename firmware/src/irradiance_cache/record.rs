@@ -1,6 +1,7 @@
 //! One irradiance record: position, radius of validity, and irradiance with its gradients.
 
 use glam::Vec3;
+use photoncard_shared::message::{Fault, Invariant};
 
 use super::gradient::{Coefficients, Distances, rotation};
 use super::packed_normal::PackedNormal;
@@ -120,22 +121,25 @@ impl Record {
 
     /// Sets the distance to the surroundings in a cell of the hemisphere, metres; infinite if there are none. Its
     /// inverse is rounded to bfloat16.
-    pub(super) fn set_distance(&mut self, cell: u8, distance: f32) {
+    pub(super) fn set_distance(&mut self, cell: u8, distance: f32) -> Result<(), Fault> {
         if let Content::Surveying(inverses) = &mut self.content
             && let Some(inverse) = inverses.get_mut(cell as usize)
         {
             *inverse = upper_half(1.0 / max(distance, NEAREST));
+            return Ok(());
         }
+        Err(Invariant::Record.fault())
     }
 
     /// Ends the survey: computes the harmonic mean distance and the radius.
-    pub(super) fn end_survey(&mut self) {
-        let Content::Surveying(inverses) = self.content else { return };
+    pub(super) fn end_survey(&mut self) -> Result<(), Fault> {
+        let Content::Surveying(inverses) = self.content else { return Err(Invariant::Record.fault()) };
         let inverses = inverses.map(from_upper_half);
         let mean = inverses.iter().sum::<f32>() * (1.0 / CELLS as f32);
         self.distance = 1.0 / max(mean, 1.0 / FARTHEST);
         self.radius = max(self.distance, self.radius);
         self.content = Content::Surveyed(Distances::new(&inverses, self.distance));
+        Ok(())
     }
 
     /// White Lambertian surface at the record's position.

@@ -14,7 +14,7 @@
 use core::ops::Range;
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::message::{self, Drain, Fault, FrameParameters};
+use photoncard_shared::message::{self, Drain, Fault, FrameParameters, Invariant};
 
 use super::kept_line::{BlockHead, KeptRecord, WORDS, line_of, words_of};
 use super::{IrradianceCache, MAX_ROOTS, Window};
@@ -91,9 +91,10 @@ impl RecordStore {
             return Ok(Recalled::Nothing);
         }
         for address in (at..).skip(1).take(count as usize) {
-            if let Some(KeptRecord { point, record }) = KeptRecord::read(read(context.memory, address)?) {
-                // Fits: their number is checked.
-                let _ = cache.records.insert(point, Some(record));
+            if let Some(KeptRecord { point, record }) = KeptRecord::read(read(context.memory, address)?)
+                && !cache.records.insert(point, Some(record))
+            {
+                return Err(Invariant::Record.fault());
             }
         }
         for ((_, divided), kept) in cache.roots.iter_mut().zip(head.divided) {
@@ -121,6 +122,7 @@ impl RecordStore {
         }
         let count = records().count() as u32;
         let head = BlockHead { window: *window, older: 0, records: Some(count), divided };
+        // Without room the next frame gathers them again.
         let _ = self.append(memory, &head, records());
     }
 
@@ -128,6 +130,7 @@ impl RecordStore {
     #[inline(never)]
     pub fn keep_full<M: MemoryPort>(&mut self, memory: &mut M, window: &Window) {
         let head = BlockHead { window: *window, older: 0, records: None, divided: [0; MAX_ROOTS] };
+        // Without room the next frame finds it again.
         let _ = self.append(memory, &head, core::iter::empty());
     }
 

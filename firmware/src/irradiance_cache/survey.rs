@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 use heapless::Vec;
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, Invariant};
 
 use super::lattice::{Cell, LEVELS};
 use super::record::Record;
@@ -108,7 +108,8 @@ impl<R: Capacity> IrradianceCache<R> {
             if let Some((point, Some(record))) = self.records.entry(index)
                 && let Some(ray) = survey_ray(context, point, &record.surface(), direction)
             {
-                *is_aimed = rays.push(ray).is_ok();
+                rays.push(ray).map_err(|_| Invariant::Bundle.fault())?;
+                *is_aimed = true;
             }
         }
         context.memory.enter(Stage::Survey);
@@ -118,11 +119,12 @@ impl<R: Capacity> IrradianceCache<R> {
         let mut distances =
             hits.iter().map(|hit| hit.as_ref().map_or(f32::INFINITY, |hit| hit.intersection.distance));
         for (index, is_aimed) in (index..end).zip(is_aimed) {
+            // A lattice point without a record has no rays.
             let Some((_, Some(record))) = self.records.entry_mut(index) else { continue };
             let distance = if is_aimed { distances.next() } else { None };
-            record.set_distance(direction, distance.unwrap_or(f32::INFINITY));
+            record.set_distance(direction, distance.unwrap_or(f32::INFINITY))?;
             if is_last {
-                record.end_survey();
+                record.end_survey()?;
             }
         }
         let survey = &mut self.survey;

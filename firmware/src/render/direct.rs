@@ -22,7 +22,7 @@ use core::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 use heapless::Vec;
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, Invariant};
 
 use super::{Context, GatherPoint, PixelSample, Purpose, SHORTER};
 use crate::memory::{MemoryPort, Stage};
@@ -61,7 +61,7 @@ pub fn reflected<M: MemoryPort>(
             && point.surface.is_above(light.direction)
             && max_component(light.irradiance) > 0.0
         {
-            rays.push(receiver.origin, light);
+            rays.push(receiver.origin, light)?;
             if rays.is_full() {
                 sum = rays.cast(context, point, sum)?;
             }
@@ -82,10 +82,11 @@ impl ShadowRays {
     }
 
     /// Adds a ray, for which there is room.
-    fn push(&mut self, origin: Vec3, light: LightSample) {
+    fn push(&mut self, origin: Vec3, light: LightSample) -> Result<(), Fault> {
         let LightSample { direction, distance, .. } = light;
-        let _ = self.rays.push(Ray { origin, direction, max_distance: distance * SHORTER });
-        let _ = self.lights.push(light);
+        let ray = Ray { origin, direction, max_distance: distance * SHORTER };
+        self.rays.push(ray).map_err(|_| Invariant::Bundle.fault())?;
+        self.lights.push(light).map_err(|_| Invariant::Bundle.fault())
     }
 
     fn is_full(&self) -> bool {

@@ -6,7 +6,7 @@ use core::ops::Range;
 
 use glam::Vec3;
 use heapless::Vec;
-use photoncard_shared::message::{Fault, Radiance};
+use photoncard_shared::message::{Fault, Invariant, Radiance};
 
 use super::search::count_reflection;
 use super::specular_path::{Carried, Passes, PathEnd, SpecularPath, surface_choice};
@@ -46,7 +46,7 @@ pub fn bundles(rays: Range<u32>) -> impl Iterator<Item = Range<u32>> {
 /// surface nor the environment. A contribution is one term of the mean over the point's rays; the gather's result goes to the sum `target`.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is not sound, or there are more than [`BUNDLE_RAYS`] rays.
 pub fn cast<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
@@ -61,8 +61,9 @@ pub fn cast<M: MemoryPort>(
     for index in rays {
         let sampled = point.directions.sample(&point.reflector(), point.pattern, index, point.rays);
         if let Some(sampled) = sampled.filter(|sampled| point.surface.is_above(sampled.direction)) {
-            let _ = aimed.push((index, sampled));
-            let _ = bundle.push(Ray::new(point.surface.offset_origin(), sampled.direction));
+            aimed.push((index, sampled)).map_err(|_| Invariant::Bundle.fault())?;
+            let ray = Ray::new(point.surface.offset_origin(), sampled.direction);
+            bundle.push(ray).map_err(|_| Invariant::Bundle.fault())?;
         }
     }
     context.counters.gather_rays += bundle.len() as u64;
@@ -72,7 +73,7 @@ pub fn cast<M: MemoryPort>(
         if let Some(end) =
             arrive(context, point, target.in_cell(sampled.cell), (*index, sampled), (ray, hit))?
         {
-            let _ = ends.push(end);
+            ends.push(end).map_err(|_| Invariant::Bundle.fault())?;
         }
     }
     Ok(())

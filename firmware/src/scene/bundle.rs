@@ -11,7 +11,7 @@ use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, WideNode};
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, Invariant};
 
 use super::bvh::{BvhStack, Passed, Search, closest_hit, meet_leaf, transmittance};
 use super::slabs::Slabs;
@@ -71,7 +71,7 @@ pub struct Bundle<'a, M, S> {
     pub scene: &'a SceneImage,
     /// Card memory.
     pub memory: &'a mut M,
-    /// The rays; those beyond [`BUNDLE_RAYS`] are ignored.
+    /// The rays, up to [`BUNDLE_RAYS`].
     pub rays: &'a [Ray],
     /// The result of each ray, nothing found.
     pub searches: &'a mut [S; BUNDLE_RAYS],
@@ -80,6 +80,9 @@ pub struct Bundle<'a, M, S> {
 /// Runs a kernel, in a frame of its own: a ray alone needs no room on the stack for a bundle.
 #[inline(never)]
 fn cast<M: MemoryPort, S: Search>(bundle: Bundle<M, S>) -> Result<(), Fault> {
+    if bundle.rays.len() > BUNDLE_RAYS {
+        return Err(Invariant::Bundle.fault());
+    }
     simd::run(bundle)
 }
 
@@ -152,6 +155,7 @@ impl<'a, S: Search> Rays<'a, S> {
         let mut until = [0; BUNDLE_RAYS];
         for (ray, until) in rays.iter().zip(&mut until) {
             *until = ray.max_distance.to_bits();
+            // There is room for a bundle.
             let _ = ways.push(Way { ray, frame: RayFrame::new(ray), slabs: Slabs::new(ray) });
         }
         Self { ways, until, searches }
@@ -173,6 +177,7 @@ impl<'a, S: Search> Rays<'a, S> {
         let mut entered = [0; LANES];
         let mut nearest = [BEYOND; LANES];
         while let Some(index) = take(&mut here) {
+            // Always there: a bit is set of rays of the bundle alone.
             let (Some(way), Some(&until)) = (self.ways.get(index), self.until.get(index)) else { continue };
             let distances = way.slabs.enter(isa, node, children, f32::from_bits(until));
             let lanes = entered.iter_mut().zip(&mut nearest).zip(distances);
@@ -203,6 +208,7 @@ impl<'a, S: Search> Rays<'a, S> {
         let mut done = 0;
         while let Some(index) = take(&mut here) {
             let Self { ways, until, searches } = self;
+            // Always there, as in `enter`.
             let (Some(way), Some(until), Some(search)) =
                 (ways.get(index), until.get_mut(index), searches.get_mut(index))
             else {

@@ -45,6 +45,44 @@ pub enum FaultCode {
     Depth,
     /// Operands are not whole triples, none, or too many; detail: their bytes.
     Operands,
+    /// The chip's program or its on-chip memory is at fault; detail: the number of the [`Invariant`].
+    Internal,
+}
+
+/// What holds in a chip whose program is right, by the numbers that [`FaultCode::Internal`] carries. Where it does not hold light would be
+/// lost, and a fault is sent in its place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Invariant {
+    /// There is a tile in flight for each pass, completion and gather.
+    Flight,
+    /// A tile in flight has a block left when one begins.
+    Block,
+    /// A block of several pixels can be halved, and one of one pixel fits into the irradiance cache.
+    Halves,
+    /// The buffers of a tile hold all pixels of a block.
+    Pixels,
+    /// Each pixel with gather rays has sums of its own.
+    Sums,
+    /// There is room for each gather point, and each has its rays.
+    Points,
+    /// A gather's irradiance record is being gathered.
+    Record,
+    /// A gather that ends is one of those that its tile waits for.
+    Waiting,
+    /// A surface that was seen is seen again.
+    Surface,
+    /// There is room for each ray of a bundle.
+    Bundle,
+    /// There is room for each part of a reply.
+    Reply,
+}
+
+impl Invariant {
+    /// The fault of a card where this does not hold.
+    pub const fn fault(self) -> Fault {
+        Fault { code: FaultCode::Internal, detail: self as u32 }
+    }
 }
 
 /// The fields of [`FrameParameters`](super::FrameParameters), by the numbers that [`FaultCode::Parameter`] carries.
@@ -200,6 +238,10 @@ impl fmt::Display for Fault {
             FaultCode::Operands => {
                 write!(f, "{detail} bytes of operands are not whole triples, none, or too many")
             }
+            FaultCode::Internal => write!(
+                f,
+                "invariant {detail} of the chip is broken: its program or its on-chip memory is at fault"
+            ),
         }
     }
 }

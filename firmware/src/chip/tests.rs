@@ -1,0 +1,120 @@
+//! Invariants of a chip that are broken on purpose: each is a fault with its number, never light that is lost.
+
+use std::boxed::Box;
+
+use glam::Vec3;
+use photoncard_shared::image::{Header, Lights};
+use photoncard_shared::layout::PhotonGrid;
+use photoncard_shared::message::{Fault, FrameParameters, Invariant, Tile};
+
+use super::buffers::Shared;
+use super::stored_point::{StoredPoint, pattern};
+use super::test_frame::frame;
+use super::*;
+use crate::gather::{GatherRequest, GatherTarget, HilbertCode};
+use crate::memory::Lines;
+use crate::render::{GatherPoint, PixelSample};
+use crate::scene::{PartialReflection, SceneImage, Surface};
+
+fn scene() -> SceneImage {
+    let lights = Lights {
+        emitters: 0.0,
+        environment: 0.0,
+        distant: 0.0,
+        radiance: [0.0; 3],
+        texture: None,
+        cells: [1; 2],
+    };
+    let header = Header {
+        lines: 0,
+        photon_power_unit: 1.0,
+        caustic_power_unit: 1.0,
+        radiance_unit: 1.0,
+        photon_grid: PhotonGrid::UNIT,
+        lights,
+        sections: Default::default(),
+    };
+    SceneImage { header }
+}
+
+/// Result of a step of a chip without memory.
+fn step(chip: &mut MicroChip, frame: &FrameParameters) -> Result<Progress, Fault> {
+    let (scene, memory) = (scene(), &mut Lines(&[]));
+    chip.step(&mut RenderJob { scene: &scene, memory, frame, outlet: None })
+}
+
+/// A gather of a tile in flight.
+fn request(flight: usize) -> GatherRequest {
+    let surface = Surface::white(Vec3::ZERO, Vec3::Y, 1.0);
+    GatherRequest {
+        position: HilbertCode::new(&PhotonGrid::UNIT, [0.0; 3]),
+        reflection: PartialReflection::encode(&surface.reflector(), Vec3::ONE, 0),
+        target: GatherTarget::new(flight, PointIndex::Pixel(0)),
+    }
+}
+
+#[test]
+fn a_gather_of_no_tile_is_a_fault() {
+    let frame = &frame();
+    // The micro chip has one tile in flight.
+    for (flight, broken) in [(1, Invariant::Flight), (0, Invariant::Waiting)] {
+        let mut chip = Box::new(MicroChip::new());
+        assert!(chip.shared.gathers.wait_for_test(request(flight)));
+        assert!(chip.flush(frame));
+        assert_eq!(step(&mut chip, frame).err(), Some(broken.fault()));
+    }
+}
+
+#[test]
+fn a_pass_of_no_tile_is_a_fault() {
+    let mut chip = Box::new(MicroChip::new());
+    chip.active = Some(1);
+    assert_eq!(step(&mut chip, &frame()).err(), Some(Invariant::Flight.fault()));
+}
+
+#[test]
+fn what_a_tile_in_flight_does_not_hold_is_a_fault() {
+    let mut chip = Box::new(MicroChip::new());
+    let flight = &mut chip.flights.values_mut()[0];
+    assert_eq!(flight.begin_block(&frame()), Err(Invariant::Block.fault()));
+    flight.begin(Tile { id: 0, x: 0, y: 0, width: 1, height: 1 });
+    assert_eq!(flight.begin_block(&frame()), Ok(()));
+    assert_eq!(flight.divide_block(), Err(Invariant::Halves.fault()));
+    assert_eq!(flight.give_rays(1), Err(Invariant::Pixels.fault()));
+    assert_eq!(flight.set_paths(1, adaptive::Paths::ONE), Err(Invariant::Pixels.fault()));
+    flight.begin(Tile { id: 0, x: 0, y: 0, width: 17, height: 16 });
+    assert_eq!(flight.begin_block(&frame()), Err(Invariant::Pixels.fault()));
+}
+
+#[test]
+fn light_of_a_pixel_without_sums_is_a_fault() {
+    let frame = &frame();
+    let mut shared = Box::new(Shared::<Micro>::new());
+    let sums = &mut shared.sums;
+    let broken = Invariant::Sums.fault();
+    assert_eq!(sums.push(frame, 0), Err(broken));
+    sums.begin(0);
+    assert_eq!(sums.push(frame, 0), Ok(0));
+    assert_eq!(sums.add(frame, (0, 0), Component::Direct, Vec3::ONE), Ok(()));
+    assert_eq!(sums.add(frame, (0, 1), Component::Direct, Vec3::ONE), Err(broken));
+    assert_eq!(sums.light(frame, (0, 1)), Err(broken));
+    sums.end(0);
+    assert_eq!(sums.light(frame, (0, 0)), Err(broken));
+}
+
+#[test]
+fn one_gather_point_too_many_is_a_fault() {
+    let frame = &frame();
+    let mut shared = Box::new(Shared::<Micro>::new());
+    let points = &mut shared.points;
+    let pattern = pattern(frame, PixelSample { x: 0, y: 0, sample: 0 });
+    let point = GatherPoint::record(Surface::white(Vec3::ZERO, Vec3::Y, 1.0), pattern, 1);
+    let stored = StoredPoint::of_record(&point);
+    let broken = Invariant::Points.fault();
+    assert_eq!(points.get(0).err(), Some(broken));
+    assert_eq!(points.take_rays(&mut Position::at(Pass::Rays), 0, pattern, 1), Err(broken));
+    for _ in 0..<Micro as ChipKind>::Points::ENTRIES {
+        assert_eq!(points.push(0, stored, 0), Ok(()));
+    }
+    assert_eq!(points.push(0, stored, 0), Err(broken));
+}
