@@ -3,7 +3,7 @@
 //! A page needs to remember one number alone, that of the next tile: tiles that are outdated are gone when it asks. So a slow page gets
 //! fewer and newer tiles, and takes no memory.
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
 
 use photoncard_driver::film::FilmPixel;
@@ -96,12 +96,15 @@ impl Patch {
         Self { origin, card, tile, work }
     }
 
-    /// Returns whether this tile has further samples of the pixels of another one.
+    /// Returns whether this tile has further samples of the pixels of another one of its area.
     fn goes_on(&self, earlier: &Self) -> bool {
-        let area = |patch: &Self| (patch.tile.tile().x, patch.tile.tile().y, patch.tile.tile().pixels());
         earlier.origin.samples < self.origin.samples
             && Origin { samples: self.origin.samples, ..earlier.origin } == self.origin
-            && area(earlier) == area(self)
+    }
+
+    fn area(&self) -> Area {
+        let tile = self.tile.tile();
+        (tile.x, tile.y, tile.pixels())
     }
 
     /// Bytes of the message that shows the tile.
@@ -145,10 +148,15 @@ fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     }
 }
 
+/// Corner and number of pixels of a tile, which differ between the tiles of a picture.
+type Area = (u32, u32, u64);
+
 /// The tiles of the newest wish that has any.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     patches: VecDeque<(u64, Arc<Patch>)>,
+    /// Numbers of the tiles of each area, from the oldest on.
+    by_area: HashMap<Area, Vec<u64>>,
     /// Number of the next tile.
     next: u64,
 }
@@ -160,31 +168,42 @@ impl Canvas {
         if self.patches.front().is_some_and(|(_, oldest)| oldest.origin.version < version) {
             self.keep_version(version);
         }
-        if let Some((_, earlier)) = self.patches.iter().rev().find(|(_, earlier)| patch.goes_on(earlier)) {
+        let of_area = self.by_area.get(&patch.area()).into_iter().flatten().rev();
+        let mut of_area = of_area.filter_map(|&number| self.after(number));
+        if let Some((_, earlier)) = of_area.find(|(_, earlier)| patch.goes_on(earlier)) {
             patch.work = earlier.work.and(patch.work);
         }
+        self.by_area.entry(patch.area()).or_default().push(self.next);
         self.patches.push_back((self.next, Arc::new(patch)));
         self.next += 1;
     }
 
     /// Drops all tiles.
     pub(super) fn clear(&mut self) {
-        self.patches.clear();
+        self.retain(|_| false);
     }
 
     /// Drops the tiles of other wishes.
     pub(super) fn keep_version(&mut self, version: u32) {
-        self.patches.retain(|(_, patch)| patch.origin.version == version);
+        self.retain(|patch| patch.origin.version == version);
     }
 
     /// Drops the tiles of other passes, once the picture of a pass is complete.
     pub(super) fn keep(&mut self, origin: Origin) {
-        self.patches.retain(|(_, patch)| patch.origin == origin);
+        self.retain(|patch| patch.origin == origin);
     }
 
     /// Drops a tile that was revoked.
     pub(super) fn revoke(&mut self, origin: Origin, id: u32) {
-        self.patches.retain(|(_, patch)| !(patch.origin == origin && patch.tile.tile().id == id));
+        self.retain(|patch| !(patch.origin == origin && patch.tile.tile().id == id));
+    }
+
+    fn retain(&mut self, keeps: impl Fn(&Patch) -> bool) {
+        self.patches.retain(|(_, patch)| keeps(patch));
+        self.by_area.clear();
+        for (number, patch) in &self.patches {
+            self.by_area.entry(patch.area()).or_default().push(*number);
+        }
     }
 
     /// The oldest tile from the number `from` on, and its number.
@@ -204,5 +223,43 @@ impl Canvas {
     #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         self.patches.len()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_driver::film::{PixelLayers, PixelValue, SumFormat};
+    use photoncard_shared::message::Tile;
+
+    use super::*;
+
+    fn patch(samples: u32, x: u32, gathers: u64) -> Patch {
+        let tile = Tile { id: x, x, y: 0, width: 1, height: 1 };
+        let pixel = FilmPixel { pixel: PixelValue::default(), layers: PixelLayers::default() };
+        let tile = FinishedTile::of_pixels(tile, [SumFormat::ONE.sums(&pixel)], SumFormat::ONE).unwrap();
+        let origin = Origin { version: 1, is_coarse: false, step: 1, samples };
+        Patch::new(origin, 0, tile, TileWork { gathers, ..TileWork::default() })
+    }
+
+    fn work(canvas: &Canvas) -> Vec<u64> {
+        canvas.patches.iter().map(|(_, patch)| patch.work.gathers).collect()
+    }
+
+    #[test]
+    fn the_work_of_a_tile_is_that_of_all_its_samples() {
+        let mut canvas = Canvas::default();
+        for pass in [1, 2, 4] {
+            (0..3).for_each(|x| canvas.put(patch(pass, x, 10 * u64::from(pass) + u64::from(x))));
+            canvas.keep(patch(pass, 0, 0).origin);
+        }
+        assert_eq!(work(&canvas), [70, 73, 76]);
+        // A tile that is taken back is done again from the pass before.
+        canvas.put(patch(8, 1, 80));
+        canvas.revoke(patch(8, 0, 0).origin, 1);
+        canvas.put(patch(8, 1, 81));
+        assert_eq!(work(&canvas), [70, 73, 76, 154]);
+        canvas.clear();
+        canvas.put(patch(16, 1, 5));
+        assert_eq!(work(&canvas), [5]);
     }
 }

@@ -11,6 +11,8 @@ use super::page_files::{PageFile, page_file};
 
 /// Path of the page.
 const PAGE: &str = "/";
+/// Path of the page's file, which is the page.
+const PAGE_FILE: &str = "/index.html";
 /// Path of the WebSocket.
 const SOCKET: &str = "/socket";
 
@@ -64,7 +66,7 @@ impl Gate {
         }
         let (path, query) = head.target.split_once('?').unwrap_or((&head.target, ""));
         match path {
-            PAGE => {
+            PAGE | PAGE_FILE => {
                 self.check_token(query)?;
                 page_file("index.html").map(Resource::File)
             }

@@ -1,8 +1,12 @@
 //! The server of a page: its files, and its sockets. Each connection has a thread of its own, and there are few.
+//!
+//! A connection is a stranger until the gate lets it in. Strangers have places of their own, and the oldest makes room for a new one:
+//! neither do those that say nothing keep a page out, nor do pages keep out the next.
 
-use std::net::{TcpListener, TcpStream};
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use super::gate::{Gate, Resource};
@@ -10,27 +14,69 @@ use super::http::{Head, Refusal, accept_socket, send_file};
 use super::hub::Hub;
 use super::socket;
 
-/// Maximum number of connections.
+/// Maximum number of connections that the gate has let in.
 const MAX_CONNECTIONS: usize = 16;
+/// Maximum number of others.
+const MAX_STRANGERS: usize = 16;
 /// Pause after an error of accepting a connection, as when the process has too many files open.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// Serves connections until the process ends.
 pub(super) fn serve(listener: &TcpListener, gate: &Arc<Gate>, hub: &Arc<Hub>) {
-    let connections = Arc::new(AtomicUsize::new(0));
+    let (connections, strangers) = (Arc::new(AtomicUsize::new(0)), Strangers::default());
     loop {
-        let Ok((stream, _)) = listener.accept() else {
+        let accepted = listener.accept().and_then(|(stream, _)| Ok((strangers.admit(&stream)?, stream)));
+        let Ok((stranger, stream)) = accepted else {
             std::thread::sleep(PAUSE);
             continue;
         };
-        // The count falls when its thread ends, or if none can be started.
-        let place = Place::take(&connections);
-        let (gate, hub) = (gate.clone(), hub.clone());
+        let (connections, gate, hub) = (connections.clone(), gate.clone(), hub.clone());
         let work = move || {
             // A connection that fails is closed, and no concern of others.
-            let _ = answer(stream, place.as_ref(), &gate, &hub);
+            let _ = answer(stream, stranger, &connections, &gate, &hub);
         };
         let _ = std::thread::Builder::new().name("page".into()).spawn(work);
+    }
+}
+
+/// Connections that the gate has not let in, from the oldest on.
+#[derive(Clone, Default)]
+struct Strangers(Arc<Mutex<Waiting>>);
+
+#[derive(Default)]
+struct Waiting {
+    next: u64,
+    streams: VecDeque<(u64, TcpStream)>,
+}
+
+impl Strangers {
+    /// Adds a connection, and closes the oldest if there are too many.
+    fn admit(&self, stream: &TcpStream) -> std::io::Result<Stranger> {
+        let stream = stream.try_clone()?;
+        let mut waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let number = waiting.next;
+        waiting.next += 1;
+        waiting.streams.push_back((number, stream));
+        if waiting.streams.len() > MAX_STRANGERS
+            && let Some((_, oldest)) = waiting.streams.pop_front()
+        {
+            // Its thread reads the end of it.
+            let _ = oldest.shutdown(Shutdown::Both);
+        }
+        Ok(Stranger { number, of: self.clone() })
+    }
+}
+
+/// One of the strangers, until it is dropped.
+struct Stranger {
+    number: u64,
+    of: Strangers,
+}
+
+impl Drop for Stranger {
+    fn drop(&mut self) {
+        let mut waiting = self.of.0.lock().unwrap_or_else(PoisonError::into_inner);
+        waiting.streams.retain(|(number, _)| *number != self.number);
     }
 }
 
@@ -50,18 +96,26 @@ impl Drop for Place {
     }
 }
 
-fn answer(mut stream: TcpStream, place: Option<&Place>, gate: &Gate, hub: &Arc<Hub>) -> std::io::Result<()> {
+fn answer(
+    mut stream: TcpStream,
+    stranger: Stranger,
+    connections: &Arc<AtomicUsize>,
+    gate: &Gate,
+    hub: &Arc<Hub>,
+) -> std::io::Result<()> {
     stream.set_nodelay(true)?;
-    if place.is_none() {
-        return Refusal::new(503, "Service Unavailable", "there are too many connections").send(&mut stream);
-    }
     let checked = Head::read(&mut stream).and_then(|head| Ok((gate.check(&head)?, head)));
-    match checked {
-        Err(refusal) => refusal.send(&mut stream),
-        Ok((Resource::File(file), head)) => {
-            send_file(&mut stream, file, head.one("host").unwrap_or_default())
-        }
-        Ok((Resource::Socket(key), _)) => {
+    drop(stranger);
+    let (resource, head) = match checked {
+        Ok(checked) => checked,
+        Err(refusal) => return refusal.send(&mut stream),
+    };
+    let Some(_place) = Place::take(connections) else {
+        return Refusal::new(503, "Service Unavailable", "there are too many connections").send(&mut stream);
+    };
+    match resource {
+        Resource::File(file) => send_file(&mut stream, file, head.one("host").unwrap_or_default()),
+        Resource::Socket(key) => {
             accept_socket(&mut stream, &key)?;
             socket::attend(stream, hub)
         }

@@ -1,5 +1,7 @@
 //! Who may connect, what a connection may send, and how many there are.
 
+use std::net::TcpStream;
+
 use serde_json::json;
 use tungstenite::Message;
 
@@ -28,6 +30,7 @@ fn other_sites_are_refused() {
     let page = format!("/?token={token}");
     assert_eq!(view.get(&page, "evil.example").0, 403);
     assert_eq!(view.get("/", host).0, 403);
+    assert_eq!(view.get("/index.html", host).0, 403);
     let (status, text) = view.get(&page, host);
     assert!(status == 200 && text.contains("main.js"), "{text}");
     for header in [
@@ -96,4 +99,19 @@ fn pages_come_and_go() {
         page.wait("state", |state| state["settled"] == true);
         page.leave();
     }
+}
+
+/// Connections that say nothing, more than there are places, neither end a page nor keep out the next one.
+#[test]
+fn silent_connections_keep_no_page_out() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.settle();
+    let silent: Vec<TcpStream> =
+        (0..40).map(|_| TcpStream::connect(&view.host).expect("the server listens")).collect();
+    view.connect().settle();
+    page.send(&camera(0.2, false));
+    page.settle();
+    drop(silent);
 }
