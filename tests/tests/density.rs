@@ -69,7 +69,11 @@ impl Map {
         let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
         let of_disc = radiances.next().expect("what every processor has");
         assert!(radiances.all(|other| other == of_disc), "{position}");
-        let limits = GatherLimits { neighbors: NEIGHBORS, max_distance: self.max_distance };
+        let limits = GatherLimits {
+            neighbors: NEIGHBORS,
+            max_distance: self.max_distance,
+            free_within: f32::INFINITY,
+        };
         let mut searches = 0;
         let mut count = |_: u32, _: &NearestPhotons, _: &Reflected| searches += 1;
         let radiance =

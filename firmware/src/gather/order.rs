@@ -15,8 +15,15 @@ const CELL_BITS: u32 = 4;
 /// Number of buckets that cells are hashed to.
 const BUCKETS: u32 = 256;
 
+/// Place of the bits of a length: above those of three coordinates.
+const LENGTH_SHIFT: u32 = 3 * GRID_BITS;
+/// Greatest code of a length.
+const MAX_LENGTH: u64 = (1 << (u64::BITS - LENGTH_SHIFT)) - 1;
+/// Least length that is told from 0, cells of the grid.
+const LEAST_LENGTH: f32 = 64.0;
+
 /// Position of a gather, rounded to the photons' grid: index along the Hilbert curve through 1024 cells an axis, and
-/// offset within the cell.
+/// offset within the cell. The four bits above tell how long the gather ray is that ends there, by its binary exponent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct HilbertCode(u64);
 
@@ -30,10 +37,35 @@ impl HilbertCode {
         Self(point.into_iter().fold(curve as u64, rest))
     }
 
+    /// The code of the end of a ray of a length, metres.
+    #[inline(always)]
+    #[must_use]
+    pub fn with_length(self, grid: &PhotonGrid, length: f32) -> Self {
+        let lengths = length / (grid.cell * LEAST_LENGTH);
+        let exponent = (lengths.to_bits() >> (f32::MANTISSA_DIGITS - 1)) as u64;
+        let code = (exponent + 1).saturating_sub(f32::MAX_EXP as u64 - 1).min(MAX_LENGTH);
+        Self(self.place() | code << LENGTH_SHIFT)
+    }
+
+    /// A length that the ray has at least, and at most twice of it, metres; 0 below 64 cells of the grid.
+    #[inline(always)]
+    pub fn least_length(self, grid: &PhotonGrid) -> f32 {
+        match self.0 >> LENGTH_SHIFT {
+            0 => 0.0,
+            code => (1_u64 << (code - 1)) as f32 * LEAST_LENGTH * grid.cell,
+        }
+    }
+
+    /// Bits of the position.
+    #[inline(always)]
+    fn place(self) -> u64 {
+        self.0 & ((1 << LENGTH_SHIFT) - 1)
+    }
+
     /// Grid point of the code.
     #[inline(always)]
     fn point(self) -> [u32; 3] {
-        let [x, y, z] = hilbert_cell((self.0 >> (3 * REST_BITS)) as u32, CURVE_BITS);
+        let [x, y, z] = hilbert_cell((self.place() >> (3 * REST_BITS)) as u32, CURVE_BITS);
         let rest = |axis: u32| (self.0 >> (REST_BITS * (2 - axis)) & REST_MASK) as u32;
         [x << REST_BITS | rest(0), y << REST_BITS | rest(1), z << REST_BITS | rest(2)]
     }
@@ -56,7 +88,7 @@ impl HilbertCode {
         match drain {
             Drain::Immediate => 0,
             Drain::Hash => self.bucket() as u64,
-            Drain::Sort => self.0,
+            Drain::Sort => self.place(),
         }
     }
 }
