@@ -195,6 +195,23 @@ mod tests {
     }
 
     #[test]
+    fn a_length_is_told_within_a_factor_of_two_and_moves_no_position() {
+        for cell in [1.0 / 1024.0, 1.0, 16.0] {
+            let grid = PhotonGrid { origin: [-5; 3], cell };
+            let plain = HilbertCode::new(&grid, [1e6, 17.0 * cell, 0.0]);
+            assert_eq!(plain.least_length(&grid), 0.0);
+            for length in [0.0, 0.01, 63.9, 64.0, 65.0, 127.0, 128.0, 1e4, 1e6, f32::INFINITY] {
+                let code = plain.with_length(&grid, length * cell);
+                assert_eq!(code.position(&grid), plain.position(&grid));
+                assert_eq!(code.key(Drain::Sort), plain.key(Drain::Sort));
+                let least = code.least_length(&grid) / cell;
+                assert!(least <= length, "{least} > {length}");
+                assert!(length < 64.0 || least >= (0.5 * length).min(1e6), "{least} of {length}");
+            }
+        }
+    }
+
+    #[test]
     fn positions_outside_the_grid_have_a_key() {
         for coordinate in [-9e9, 9e9, f32::NAN, f32::INFINITY] {
             let code = HilbertCode::new(&PhotonGrid::UNIT, [coordinate; 3]);

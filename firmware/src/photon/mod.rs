@@ -123,7 +123,7 @@ pub fn gathered_radiance(
     let radius = nearest.radius();
     let surface = (position, reflection.normal());
     if of_all.sight == Sight::Free {
-        let may_be_covered = radius > free_within && nearest.len() > 0;
+        let may_be_covered = radius > free_within && !nearest.is_empty();
         if !may_be_covered || !region::is_covered(scene, memory, surface, radius)? {
             return Ok(of_all.radiance);
         }

@@ -48,8 +48,6 @@ pub struct Sectors {
     limits: [f32; SECTORS],
     /// Square of the height that any photon of the surface may have, m^2.
     lift_squared: f32,
-    /// Height below what covers the point, metres.
-    ceiling: f32,
 }
 
 /// Sectors about a point, and the frame that they lie in.
@@ -61,6 +59,8 @@ pub struct VisibleRegion {
     pub sectors: Sectors,
     /// Region outside which nothing is visible.
     pub outer: Sectors,
+    /// Height below what covers the point, metres: photons above are on its far side.
+    ceiling: f32,
 }
 
 impl Sectors {
@@ -68,11 +68,7 @@ impl Sectors {
     #[must_use]
     pub fn scaled(&self, unit: f32) -> Self {
         let per_unit = 1.0 / (unit * unit);
-        Self {
-            limits: self.limits.map(|limit| limit * per_unit),
-            lift_squared: self.lift_squared * per_unit,
-            ceiling: self.ceiling / unit,
-        }
+        Self { limits: self.limits.map(|limit| limit * per_unit), lift_squared: self.lift_squared * per_unit }
     }
 
     /// Area within a radius, by its square.
@@ -103,7 +99,7 @@ impl Sectors {
         for ((outside, limit), ((u, v), w)) in outside.iter_mut().zip(limits).zip(points) {
             let across = u * u + v * v;
             let most = MAX_SLOPE * MAX_SLOPE * across + self.lift_squared;
-            *outside = if (across <= limit) & (w * w <= most) & (*w < self.ceiling) { 0 } else { 1 };
+            *outside = if (across <= limit) & (w * w <= most) { 0 } else { 1 };
         }
     }
 
@@ -112,7 +108,7 @@ impl Sectors {
     fn holds(&self, [u, v, w]: [f32; 3]) -> bool {
         let across = u * u + v * v;
         let limit = self.limits.get(sector(u, v) as usize % SECTORS).copied().unwrap_or(0.0);
-        across <= limit && w * w <= MAX_SLOPE * MAX_SLOPE * across + self.lift_squared && w < self.ceiling
+        across <= limit && w * w <= MAX_SLOPE * MAX_SLOPE * across + self.lift_squared
     }
 }
 
@@ -191,8 +187,9 @@ impl VisibleRegion {
         let ceiling = lift + BELOW * clear;
         Ok(Self {
             axes: [tangent, bitangent, normal],
-            sectors: Sectors { limits: limits(min, WITHIN), lift_squared, ceiling },
-            outer: Sectors { limits: limits(max, BEYOND), lift_squared, ceiling },
+            sectors: Sectors { limits: limits(min, WITHIN), lift_squared },
+            outer: Sectors { limits: limits(max, BEYOND), lift_squared },
+            ceiling,
         })
     }
 
@@ -281,8 +278,8 @@ impl Filter for VisibleRegion {
         let [u, v, w] = &along;
         let mut outside = [0; LANES];
         self.sectors.test(isa, [u, v, w], &mut outside);
-        for (distance, outside) in distances.iter_mut().zip(outside) {
-            *distance = if outside == 0 { *distance } else { u32::MAX };
+        for ((distance, outside), w) in distances.iter_mut().zip(outside).zip(w) {
+            *distance = if (outside == 0) & (*w < self.ceiling) { *distance } else { u32::MAX };
         }
     }
 
@@ -292,6 +289,6 @@ impl Filter for VisibleRegion {
             let [a, b, c] = axis.to_array();
             -(x * a + y * b + z * c)
         });
-        self.sectors.holds(along)
+        self.sectors.holds(along) && along[2] < self.ceiling
     }
 }
