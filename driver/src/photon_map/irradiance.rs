@@ -76,7 +76,12 @@ struct Estimator<'a> {
 impl<'a> Estimator<'a> {
     fn new(image: &'a CardImage, neighbors: u32, max_distance: f32) -> Self {
         let (scene, memory) = image.view();
-        Self { scene, memory, buffer: Box::default(), limits: GatherLimits { neighbors, max_distance } }
+        Self {
+            scene,
+            memory,
+            buffer: Box::default(),
+            limits: GatherLimits { neighbors, max_distance, free_within: f32::INFINITY },
+        }
     }
 
     fn point(&mut self, (point, normal): SurfacePoint) -> Result<StoredPhoton, Fault> {

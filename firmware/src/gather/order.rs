@@ -15,8 +15,14 @@ const CELL_BITS: u32 = 4;
 /// Number of buckets that cells are hashed to.
 const BUCKETS: u32 = 256;
 
+/// Bits of a length, below those of three coordinates.
+const LENGTH_BITS: u32 = u64::BITS - 3 * GRID_BITS;
+const MAX_LENGTH: u64 = (1 << LENGTH_BITS) - 1;
+/// Least length that is told from 0, cells of the grid.
+const LEAST_LENGTH: f32 = 64.0;
+
 /// Position of a gather, rounded to the photons' grid: index along the Hilbert curve through 1024 cells an axis, and
-/// offset within the cell.
+/// offset within the cell. The four bits below tell how long the gather ray is that ends there, by its binary exponent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct HilbertCode(u64);
 
@@ -27,14 +33,34 @@ impl HilbertCode {
         let point = grid.nearest(position);
         let curve = hilbert_index(point.map(|coordinate| coordinate >> REST_BITS), CURVE_BITS);
         let rest = |rest: u64, coordinate: u32| rest << REST_BITS | coordinate as u64 & REST_MASK;
-        Self(point.into_iter().fold(curve as u64, rest))
+        Self(point.into_iter().fold(curve as u64, rest) << LENGTH_BITS)
+    }
+
+    /// The code of the end of a ray of a length, metres.
+    #[inline(always)]
+    #[must_use]
+    pub fn with_length(self, grid: &PhotonGrid, length: f32) -> Self {
+        let lengths = length / (grid.cell * LEAST_LENGTH);
+        let exponent = (lengths.to_bits() >> (f32::MANTISSA_DIGITS - 1)) as u64;
+        let code = (exponent + 1).saturating_sub(f32::MAX_EXP as u64 - 1).min(MAX_LENGTH);
+        Self(self.0 & !MAX_LENGTH | code)
+    }
+
+    /// A length that the ray has at least, and at most twice of it, metres; 0 below 64 cells of the grid.
+    #[inline(always)]
+    pub fn least_length(self, grid: &PhotonGrid) -> f32 {
+        match self.0 & MAX_LENGTH {
+            0 => 0.0,
+            code => (1_u64 << (code - 1)) as f32 * LEAST_LENGTH * grid.cell,
+        }
     }
 
     /// Grid point of the code.
     #[inline(always)]
     fn point(self) -> [u32; 3] {
-        let [x, y, z] = hilbert_cell((self.0 >> (3 * REST_BITS)) as u32, CURVE_BITS);
-        let rest = |axis: u32| (self.0 >> (REST_BITS * (2 - axis)) & REST_MASK) as u32;
+        let place = self.0 >> LENGTH_BITS;
+        let [x, y, z] = hilbert_cell((place >> (3 * REST_BITS)) as u32, CURVE_BITS);
+        let rest = |axis: u32| (place >> (REST_BITS * (2 - axis)) & REST_MASK) as u32;
         [x << REST_BITS | rest(0), y << REST_BITS | rest(1), z << REST_BITS | rest(2)]
     }
 
@@ -159,6 +185,23 @@ mod tests {
             let position = [0, 1, 2].map(|axis| -2.0 + 6.0 * (hash(3 * i + axis) >> 8) as f32 / 16_777_216.0);
             let expected = grid.position(grid.nearest(position));
             assert_eq!(HilbertCode::new(&grid, position).position(&grid), expected, "{position:?}");
+        }
+    }
+
+    #[test]
+    fn a_length_is_told_within_a_factor_of_two_and_moves_no_position() {
+        for cell in [1.0 / 1024.0, 1.0, 16.0] {
+            let grid = PhotonGrid { origin: [-5; 3], cell };
+            let plain = HilbertCode::new(&grid, [1e6, 17.0 * cell, 0.0]);
+            assert_eq!(plain.least_length(&grid), 0.0);
+            for length in [0.0, 0.01, 63.9, 64.0, 65.0, 127.0, 128.0, 1e4, 1e6, f32::INFINITY] {
+                let code = plain.with_length(&grid, length * cell);
+                assert_eq!(code.position(&grid), plain.position(&grid));
+                assert!(code < HilbertCode(plain.0 + MAX_LENGTH + 1) && code >= plain);
+                let least = code.least_length(&grid) / cell;
+                assert!(least <= length, "{least} > {length}");
+                assert!(length < 64.0 || least >= (0.5 * length).min(1e6), "{least} of {length}");
+            }
         }
     }
 

@@ -94,6 +94,8 @@ pub struct GatherLimits {
     pub neighbors: u32,
     /// Maximum distance of photons, metres.
     pub max_distance: f32,
+    /// Radius of gathers, metres, above which the point may be in a narrow gap, whose light is not that of the photons around.
+    pub free_within: f32,
 }
 
 /// Maximum reach of a visible region, over the distance of the k-th of all photons: where most of these are hidden, photons that are
@@ -110,7 +112,7 @@ pub fn gathered_radiance(
     (scene, memory): (&SceneImage, &mut impl MemoryPort),
     position: Vec3,
     reflection: &PartialReflection,
-    GatherLimits { neighbors, max_distance }: GatherLimits,
+    GatherLimits { neighbors, max_distance, free_within }: GatherLimits,
     mut candidates: Candidates,
     count: &mut impl FnMut(u32, &NearestPhotons, &Reflected),
 ) -> Result<Vec3, Fault> {
@@ -118,13 +120,17 @@ pub fn gathered_radiance(
     let tested = gather(scene, memory, PhotonMap::Indirect, position, &mut nearest)?;
     let of_all = reflected_radiance(&nearest, position, None, reflection);
     count(tested, &nearest, &of_all);
-    if of_all.sight == Sight::Free {
-        return Ok(of_all.radiance);
-    }
     let radius = nearest.radius();
+    let surface = (position, reflection.normal());
+    if of_all.sight == Sight::Free {
+        let may_be_covered = radius > free_within && !nearest.is_empty();
+        if !may_be_covered || !region::is_covered(scene, memory, surface, radius)? {
+            return Ok(of_all.radiance);
+        }
+    }
     let reach = crate::vector::min(MAX_REACH * radius, max_distance);
     memory.enter(Stage::GatherRay);
-    let region = VisibleRegion::new(scene, memory, (position, reflection.normal()), radius, reach)?;
+    let region = VisibleRegion::new(scene, memory, surface, radius, reach)?;
     memory.enter(Stage::Gather);
     let mut nearest = NearestPhotons::new(candidates, neighbors, reach);
     nearest.narrow_to(

@@ -6,7 +6,8 @@
 //! estimate is that of the sectors, so that it agrees with the photons that are counted, whatever the rays have met.
 //!
 //! Photons far off the tangent plane belong to other surfaces, as the boards of a shelf: a region is the part of the sphere
-//! outside a cone about the normal.
+//! outside a cone about the normal. It ends below what covers the point: photons on the far side of a wall behind furniture face as
+//! the furniture's back does.
 
 use core::f32::consts::PI;
 
@@ -15,8 +16,8 @@ use photoncard_shared::layout::decode_normal;
 use photoncard_shared::message::Fault;
 
 use super::MIN_NORMAL_COSINE;
-use crate::memory::MemoryPort;
-use crate::scene::{BUNDLE_RAYS, Hit, Ray, SceneImage, closest_hits, magnitude, offset_origin};
+use crate::memory::{MemoryPort, Stage};
+use crate::scene::{BUNDLE_RAYS, Hit, Ray, SceneImage, closest_hit, closest_hits, magnitude, offset_origin};
 use crate::simd::{HALF_LANES, Isa, LANES};
 use crate::vector::{max, max_component, min, tangents, unit};
 
@@ -33,6 +34,8 @@ const MAX_SLOPE: f32 = 0.4;
 const WITHIN: f32 = 0.976;
 /// Radius of a sector that holds all that may be visible, over the greater length of its border rays.
 const BEYOND: f32 = 1.02;
+/// Height of the region over the distance of what covers the point.
+const BELOW: f32 = 0.9;
 /// `tan(pi / 8)`.
 const TAN_PI_8: f32 = 0.414_213_57;
 /// Cosines of the multiples of `pi / 8` up to `pi / 2`.
@@ -56,6 +59,8 @@ pub struct VisibleRegion {
     pub sectors: Sectors,
     /// Region outside which nothing is visible.
     pub outer: Sectors,
+    /// Height below what covers the point, metres: photons above are on its far side.
+    ceiling: f32,
 }
 
 impl Sectors {
@@ -157,8 +162,8 @@ impl VisibleRegion {
         let lift = LIFT * radius + scene.header.photon_grid.cell;
         let most = magnitude(&[position]);
         let above = offset_origin(position, coded, most) + coded * lift;
-        let height = HEIGHT * radius;
-        let (free, normal) = Self::free_height(scene, memory, (above, coded), [2.0 * height, radius])?;
+        let (clear, normal) = Self::clear_height(scene, memory, (above, coded), [MAX_SLOPE * reach, radius])?;
+        let free = min(clear, 2.0 * HEIGHT * radius);
         let origin = offset_origin(position, normal, most) + normal * (lift + 0.5 * free);
         let (tangent, bitangent) = tangents(normal);
         let rays: [Ray; SECTORS] = core::array::from_fn(|ray| {
@@ -179,16 +184,18 @@ impl VisibleRegion {
             })
         };
         let lift_squared = 4.0 * lift * lift;
+        let ceiling = lift + BELOW * clear;
         Ok(Self {
             axes: [tangent, bitangent, normal],
             sectors: Sectors { limits: limits(min, WITHIN), lift_squared },
             outer: Sectors { limits: limits(max, BEYOND), lift_squared },
+            ceiling,
         })
     }
 
-    /// Free height over a point above a surface, up to the first of two distances, and the normal of the triangle below, which the
-    /// coded normal tells apart from others; the coded normal without a triangle within the second distance.
-    fn free_height(
+    /// Free height over a point above a surface, infinite beyond the first of two distances, and the normal of the triangle below,
+    /// which the coded normal tells apart from others; the coded normal without a triangle within the second distance.
+    fn clear_height(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
         (above, coded): (Vec3, Vec3),
@@ -198,11 +205,32 @@ impl VisibleRegion {
         let mut hits = [None; BUNDLE_RAYS];
         closest_hits(scene, memory, &[ray(coded, up), ray(-coded, down)], &mut hits)?;
         let [ceiling, ground, ..] = &hits;
-        let free = ceiling.as_ref().map_or(up, |hit| min(hit.intersection.distance, up));
+        let free = ceiling.as_ref().map_or(f32::INFINITY, |hit| hit.intersection.distance);
         let found = ground.as_ref().map(|hit| normal_of(hit, coded));
         let is_surface = |normal: &Vec3| normal.dot(coded) >= MIN_NORMAL_COSINE;
         Ok((free, found.filter(is_surface).unwrap_or(coded)))
     }
+}
+
+/// True if something covers a point of a surface whose normal has the code `normal`, so low that photons on it may be taken for the surface's
+/// by a gather of the radius `radius`.
+///
+/// # Errors
+/// If the image is not sound.
+#[inline(never)]
+pub(super) fn is_covered(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    (position, normal): (Vec3, u8),
+    radius: f32,
+) -> Result<bool, Fault> {
+    let direction = unit(decode_normal(normal).into());
+    let lift = LIFT * radius + scene.header.photon_grid.cell;
+    let origin = offset_origin(position, direction, magnitude(&[position])) + direction * lift;
+    memory.enter(Stage::GatherRay);
+    let up = closest_hit(scene, memory, &Ray { origin, direction, max_distance: MAX_SLOPE * radius })?;
+    memory.enter(Stage::Gather);
+    Ok(up.is_some())
 }
 
 /// Unit normal of a triangle on the side of `towards`; zero for one without area.
@@ -250,8 +278,8 @@ impl Filter for VisibleRegion {
         let [u, v, w] = &along;
         let mut outside = [0; LANES];
         self.sectors.test(isa, [u, v, w], &mut outside);
-        for (distance, outside) in distances.iter_mut().zip(outside) {
-            *distance = if outside == 0 { *distance } else { u32::MAX };
+        for ((distance, outside), w) in distances.iter_mut().zip(outside).zip(w) {
+            *distance = if (outside == 0) & (*w < self.ceiling) { *distance } else { u32::MAX };
         }
     }
 
@@ -261,6 +289,6 @@ impl Filter for VisibleRegion {
             let [a, b, c] = axis.to_array();
             -(x * a + y * b + z * c)
         });
-        self.sectors.holds(along)
+        self.sectors.holds(along) && along[2] < self.ceiling
     }
 }

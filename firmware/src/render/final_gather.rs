@@ -119,7 +119,8 @@ fn arrive<M: MemoryPort>(
     let weight = weight * path.throughput;
     let header = &context.scene.header;
     let request = (!met.reflection.is_black()).then(|| GatherRequest {
-        position: HilbertCode::new(&header.photon_grid, met.position.to_array()),
+        position: HilbertCode::new(&header.photon_grid, met.position.to_array())
+            .with_length(&header.photon_grid, met.distance),
         reflection: PartialReflection::encode(
             &met.reflector(),
             weight * (header.photon_power_unit / header.radiance_unit),
@@ -211,7 +212,11 @@ pub fn gathered<M: MemoryPort>(
         );
     }
     let Context { scene, memory, frame, counters, .. } = context;
-    let limits = GatherLimits { neighbors: frame.neighbors, max_distance: frame.max_distance };
+    let limits = GatherLimits {
+        neighbors: frame.neighbors,
+        max_distance: frame.max_distance,
+        free_within: request.position.least_length(&scene.header.photon_grid),
+    };
     let reflection = &request.reflection;
     let mut count = |tested: u32, nearest: &NearestPhotons, reflected: &Reflected| {
         counters.count_gather(tested, nearest.taken(), nearest.selections(), nearest.len() as u32);
