@@ -145,6 +145,7 @@ pub mod film;
 mod fold;
 mod foreign;
 mod heading;
+mod intact;
 pub mod layer;
 mod light;
 pub mod link;
