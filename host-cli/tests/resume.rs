@@ -92,14 +92,25 @@ fn only_the_same_picture_is_gone_on_with() {
     refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene-checksum was"]);
     refused(&["--order", "hilbert"], &["--resume with --order hilbert is not possible"]);
     assert!(room.read("a.exr.partial") == kept);
-    // This render has kept no tiles, and has none to resume from.
+    // Without --resume no tile is lost, of this picture or another.
+    for options in [&[][..], &["--seed", "7"], &["--quiet", "--order", "hilbert"]] {
+        let outcome = room.run(&arguments(&cornell, options));
+        assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+        for word in ["a.exr.partial has the finished tiles", "--resume", "remove the file"] {
+            assert!(outcome.stderr.contains(word), "{word}: {}", outcome.stderr);
+        }
+        assert!(room.names() == ["a.exr.partial"] && room.read("a.exr.partial") == kept);
+    }
+    // A file without tiles is written over. This render keeps none, and has none to resume from.
+    let head = kept.iter().position(|&byte| byte == 0x89).unwrap();
+    room.write("a.exr.partial", &kept[..head]);
     let outcome = room.run(&arguments(&cornell, &["--seed", "7", "--card", "unix:absent"]));
     assert_eq!(outcome.status, Some(1), "{}", outcome.stderr);
     assert!(!outcome.stderr.contains("--resume goes on"), "{}", outcome.stderr);
     room.write("a.exr.partial", b"photoncard partial render 3\n{]\n");
     refused(&[], &["is no partial render"]);
     room.write("a.exr.partial", b"photoncard partial render 1\n{}\n");
-    refused(&[], &["of version 1", "the program that began it", "without --resume"]);
+    refused(&[], &["of version 1", "the program that began it", "remove the file"]);
 }
 
 #[test]

@@ -101,7 +101,7 @@ pub enum RenderError {
     #[error(
         "the tile {tile} in the file of finished tiles differs from what two cards render: a card has lied to the render that wrote it"
     )]
-    #[diagnostic(help("render without --resume"))]
+    #[diagnostic(help("remove that file, and render all tiles"))]
     KeptDiffers {
         /// The tile as an argument of `--crop`.
         tile: String,

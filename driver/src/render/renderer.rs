@@ -15,7 +15,7 @@ use super::whole_frame::WholeFrame;
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
 use crate::film::{Film, FilmError};
 use crate::pack::PackedScene;
-use crate::partial::PartialRender;
+use crate::partial::{PartialRender, PartialSettings};
 use crate::photon_map::{PhotonSettings, check_image};
 use crate::scene::{FixedScene, Scene};
 
@@ -167,7 +167,7 @@ impl Renderer {
         };
         let budgets = executor.budgets();
         settings.check_budgets(&budgets)?;
-        settings.outputs.partial.as_ref().map(PartialRender::check_free).transpose()?;
+        settings.outputs.partial.as_ref().map(PartialSettings::check_free).transpose()?;
         let mut times = Times::default();
         let (settings, source) = Source::new(scene, settings, choose, kept, &mut times)?;
         let tile = settings.tile_side(&budgets);
