@@ -131,7 +131,8 @@ impl Observer for Progress {
     }
 
     fn lost(&self, card: &str, error: &CardError) {
-        self.say(format_args!("photoncard: {card} is lost: {error}; any others go on"));
+        let lot = if matches!(error, CardError::Budget { .. }) { "left out" } else { "lost" };
+        self.say(format_args!("photoncard: {card} is {lot}: {error}; any others go on"));
     }
 
     fn not_shown(&self, error: &dyn Error) {

@@ -12,7 +12,7 @@ use photoncard_shared::message::Tile;
 
 use super::card_thread::render_on;
 use super::crew::Crew;
-use super::executor::{Executor, Outcome, Work};
+use super::executor::{BudgetCheck, Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, greet};
 use super::open_card::OpenCard;
 use super::outputs::Outputs;
@@ -37,7 +37,7 @@ pub(super) struct Cards {
     shared: SharedImage,
     /// Image that the cards were last loaded with.
     upload: Option<(Arc<CardImage>, Arc<Upload>)>,
-    /// Number of cards that have not answered the greeting, or were given up in an earlier render.
+    /// Number of cards that have not answered the greeting, were left out for their budget, or given up in an earlier render.
     lost: usize,
     /// Time of the end of the last render, or of the greeting.
     used: Instant,
@@ -93,7 +93,7 @@ impl Cards {
         self.set == settings.cards && !is_modelled && is_fresh && self.cards.len() >= settings.needed_cards()
     }
 
-    /// Reports cards that have not answered the greeting to the observer.
+    /// Reports cards that have not answered the greeting, or have too small a budget, to the observer.
     ///
     /// # Errors
     /// If too few are left: the error of the last lost card.
@@ -221,6 +221,29 @@ impl Executor for Cards {
         let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared image store no copy of it.
         self.shared.give(image.clone(), None);
+    fn leave_out(
+        &mut self,
+        check: BudgetCheck,
+        needed: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError> {
+        let mut misfits = Vec::new();
+        for (name, card) in std::mem::take(&mut self.cards) {
+            match check(&card.budget) {
+                Ok(()) => self.cards.push((name, card)),
+                Err(error) => misfits.push((name, error)),
+            }
+        }
+        self.lost += misfits.len();
+        let is_alike = |(_, error): &(String, RenderError)| error.to_string() == misfits[0].1.to_string();
+        if self.cards.is_empty() && misfits.iter().all(is_alike) {
+            // The setting is at fault, and no card.
+            return misfits.pop().map_or(Ok(()), |(_, error)| Err(error));
+        }
+        let misfits = misfits.into_iter().map(|(name, error)| (name, CardError::of_budget(&error)));
+        self.lose(misfits.collect(), needed, observer)
+    }
+
         let (scene_image, _) = image.view();
         let limits = PixelLimits::new(&scene_image.header, frame);
         let job = Job { upload: self.upload(image), frame: *frame, limits };

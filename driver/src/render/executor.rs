@@ -7,7 +7,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
 
 use super::outputs::Outputs;
-use super::{RenderError, RenderSettings};
+use super::{Observer, RenderError, RenderSettings};
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::film::Film;
 use crate::pack::CardImage;
@@ -15,10 +15,27 @@ use crate::scheduler::TileCounts;
 use crate::session::LinkBytes;
 use crate::sink::TileSink;
 
+/// Check that a chip with a budget can render a picture.
+pub(super) type BudgetCheck<'a> = &'a dyn Fn(&Budget) -> Result<(), RenderError>;
+
+/// Application of a check to all chips.
+pub(super) type FitChips<'a> = dyn FnMut(BudgetCheck) -> Result<(), RenderError> + 'a;
+
 /// Executor of a picture's tiles.
 pub(super) trait Executor {
     /// Budget of each chip.
     fn budgets(&self) -> Vec<Budget>;
+
+    /// Leaves out chips whose budgets fail the check, as long as `needed` others are left, and names them to the observer.
+    ///
+    /// # Errors
+    /// The failure of a chip, if too few are left.
+    fn leave_out(
+        &mut self,
+        check: BudgetCheck,
+        needed: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError>;
 
     /// Returns whether tiles are finished one after another, so that a render that ends early has finished tiles.
     fn finishes_tiles_early(&self) -> bool;

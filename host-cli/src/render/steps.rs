@@ -81,9 +81,9 @@ pub(super) fn chosen(
     (settings.photons, settings.integrator)
 }
 
-/// Memory of every card, bytes: the image must fit.
+/// Memory of the largest card, bytes: cards that are too small are left out.
 pub(super) fn dram_bytes(settings: &RenderSettings) -> u32 {
-    settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX)
+    settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX)
 }
 
 /// The scene with the options' assignments; it has light.
