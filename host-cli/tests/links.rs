@@ -164,7 +164,8 @@ fn cards_that_are_not_there() {
         let name = card.split('@').next().unwrap();
         let words = [words[0], words[1], name, "card 0", "help:"];
         let options = ["-o", "a.exr", "--stats", "a.json", "--card", card];
-        check_failed(&room, &room.render(&cornell, &options), &words, &["file"]);
+        check_failed(&room, &room.render(&cornell, &options), &words, &["a.json", "file"]);
+        assert!(room.read("a.json").starts_with(b"{\n  \"error\": \"card 0"));
         // Beside another card it counts as lost.
         let options = [&options[..], &["--card", "emulated:1"]].concat();
         let outcome = room.render(&cornell, &options);

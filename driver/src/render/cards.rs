@@ -147,7 +147,7 @@ impl Cards {
         scheduler: Scheduler,
         sinks: Vec<&dyn TileSink>,
         outputs: &Outputs,
-    ) -> Result<Outcome, RenderError> {
+    ) -> Outcome {
         let begun = self.start.elapsed();
         let count = self.cards.len();
         let names: Vec<String> = self.cards.iter().map(|(name, _)| name.clone()).collect();
@@ -169,27 +169,35 @@ impl Cards {
         );
         let ended = self.start.elapsed();
         let links = self.cards.iter_mut().map(|(_, card)| card.count_bytes()).collect();
-        let loaded = latest(results)?.max(begun);
         let scheduler = crew.dispatcher.scheduler();
+        let (loaded, failure) = match latest(results) {
+            Ok(loaded) => (loaded.max(begun), None),
+            Err(error) => (ended, Some(error)),
+        };
+        let outcome = Outcome {
+            counters: scheduler.counters(),
+            links,
+            traffic: None,
+            cards: count + self.lost,
+            cards_given_up: self.lost,
+            tiles: scheduler.counts(),
+            failure,
+            load_seconds: (loaded - begun).as_secs_f64(),
+            render_seconds: (ended - loaded).as_secs_f64(),
+        };
+        if outcome.failure.is_some() {
+            let given_up = (0..count).filter(|&card| scheduler.standing(card) == Standing::GivenUp).count();
+            return Outcome { cards_given_up: self.lost + given_up, ..outcome };
+        }
         for (number, (_, card)) in self.cards.iter_mut().enumerate() {
             card.tiles = scheduler.rendered_by(number).copied().collect();
         }
         let is_given_up = |card: usize| scheduler.standing(card) == Standing::GivenUp;
         let given_up: Vec<bool> = (0..count).map(is_given_up).collect();
-        let given_up_before = self.lost;
         self.lost += given_up.iter().filter(|&&given_up| given_up).count();
         let mut is_kept = given_up.iter().map(|given_up| !given_up);
         self.cards.retain(|_| is_kept.next().unwrap_or(true));
-        Ok(Outcome {
-            counters: scheduler.counters(),
-            links,
-            traffic: None,
-            cards: count + given_up_before,
-            cards_given_up: self.lost,
-            tiles: scheduler.counts(),
-            load_seconds: (loaded - begun).as_secs_f64(),
-            render_seconds: (ended - loaded).as_secs_f64(),
-        })
+        Outcome { cards_given_up: self.lost, ..outcome }
     }
 
     /// Ends cards whose memory is modelled. Returns the sum of their traffic.
@@ -213,14 +221,6 @@ impl Executor for Cards {
         self.cards.iter().map(|(_, card)| card.budget).collect()
     }
 
-    fn finishes_tiles_early(&self) -> bool {
-        true
-    }
-
-    fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
-        let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
-        // Emulated cards that receive the shared image store no copy of it.
-        self.shared.give(image.clone(), None);
     fn leave_out(
         &mut self,
         check: BudgetCheck,
@@ -244,6 +244,14 @@ impl Executor for Cards {
         self.lose(misfits.collect(), needed, observer)
     }
 
+    fn finishes_tiles_early(&self) -> bool {
+        true
+    }
+
+    fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
+        let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
+        // Emulated cards that receive the shared image store no copy of it.
+        self.shared.give(image.clone(), None);
         let (scene_image, _) = image.view();
         let limits = PixelLimits::new(&scene_image.header, frame);
         let job = Job { upload: self.upload(image), frame: *frame, limits };
@@ -256,10 +264,10 @@ impl Executor for Cards {
         let outcome = self.render(&job, scheduler, sinks, outputs);
         self.used = Instant::now();
         if settings.modelled_caches().is_none() {
-            return outcome;
+            return Ok(outcome);
         }
-        let traffic = self.finish_models();
-        Ok(Outcome { traffic: Some(traffic?), ..outcome? })
+        let traffic = Some(self.finish_models()?);
+        Ok(Outcome { traffic, ..outcome })
     }
 }
 

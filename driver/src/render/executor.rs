@@ -43,7 +43,7 @@ pub(super) trait Executor {
     /// Renders the tiles into the sinks.
     ///
     /// # Errors
-    /// If the tiles cannot be rendered, or the observer stops the render.
+    /// If the tiles cannot be rendered, or the observer stops the render; as [`Outcome::failure`] if the outcome until then is known.
     fn run(&mut self, work: Work) -> Result<Outcome, RenderError>;
 }
 
@@ -82,6 +82,8 @@ pub(super) struct Outcome {
     pub(super) cards_given_up: usize,
     /// Numbers of tiles that were rendered more than once or taken over.
     pub(super) tiles: TileCounts,
+    /// Error that has ended the work; the rest is what was done until then.
+    pub(super) failure: Option<RenderError>,
     /// Time until the last card was loaded, seconds.
     pub(super) load_seconds: f64,
     /// Time after the last card was loaded, seconds.

@@ -202,12 +202,17 @@ impl Renderer {
             outputs: &outputs,
         };
         let budgets = executor.budgets();
-        let outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
+        let mut outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
         times.load = outcome.load_seconds;
         times.render = outcome.render_seconds;
         times.total = start.elapsed().as_secs_f64();
         let provenance = Provenance::new(settings, scene, &camera, &frame, &budgets);
         let statistics = Statistics::new(settings, &frame, prepared, &outcome, times, provenance);
+        if let Some(error) = outcome.failure.take() {
+            outputs.report_kept();
+            observer.failed(serde_json::to_value(&statistics).unwrap_or_default());
+            return Err(error);
+        }
         let mut film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
         outputs.base.as_ref().map_or(Ok(()), |base| film.add(base)).map_err(not_more(settings))?;
         let partial = outputs.finish(&film);

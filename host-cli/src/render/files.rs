@@ -53,8 +53,15 @@ pub(super) fn write(
     for picture in &outputs.pictures {
         write_picture(picture, &rendering.film, &provenance, &form)?;
     }
+    write_statistics(outputs, serde_json::to_string_pretty(&rendering.statistics))
+}
+
+/// Writes statistics, if the outputs have a place for them.
+pub(super) fn write_statistics(
+    outputs: &OutputOptions,
+    text: serde_json::Result<String>,
+) -> Result<(), Failure> {
     let Some(stats) = &outputs.stats else { return Ok(()) };
-    let text = serde_json::to_string_pretty(&rendering.statistics);
     let text = text.map_err(|error| Failure::work_error(&error))?;
     match stats {
         TextOutput::StandardOutput => print_json(&text),
