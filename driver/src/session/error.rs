@@ -107,9 +107,9 @@ pub enum SessionError {
         /// Wrong value.
         value: f64,
     },
-    /// Error of a tile that two other cards render differently.
+    /// Error of a tile that other cards render differently.
     #[error(
-        "the card lies: its tile {},{},{},{} differs from what two other cards render",
+        "the card lies: its tile {},{},{},{} differs from what other cards render",
         .tile.x, .tile.x + .tile.width, .tile.y, .tile.y + .tile.height
     )]
     #[diagnostic(help(
@@ -158,6 +158,12 @@ impl SessionError {
             Self::Value { tile, .. } | Self::Outvoted { tile } => Some(tile),
             _ => None,
         }
+    }
+
+    /// Returns whether the card is wrong about what it was asked, so that nothing of what it has rendered can be trusted: it lies, or its
+    /// messages are none that a sound card sends.
+    pub fn is_wrong(&self) -> bool {
+        self.lie().is_some() || matches!(self, Self::Unexpected(_))
     }
 
     /// Returns whether the card may be retried: it has been silent, slow or disconnected, but not wrong.
