@@ -117,7 +117,8 @@ impl<'a> Dispatcher<'a> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, and revokes all tiles that it alone has rendered.
+    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, and revokes all tiles
+    /// that it alone has rendered.
     pub fn distrust(&self, card: CardNumber, about: Option<Tile>) {
         let _alone = self.order.write().unwrap_or_else(PoisonError::into_inner);
         let revoked = self.scheduler().expel(card, about);

@@ -1,10 +1,11 @@
 //! `OpenEXR` files: writing of films, and reading of radiance for comparisons.
 //!
-//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers are in
-//! channels like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data window is the film's
-//! crop window, the display window the full picture. The picture's provenance is JSON in the one attribute
-//! `photoncard`: the `exr` crate keeps attributes in a hash map, so several would change the file's bytes from run to
-//! run. The standard attribute `comments` has the file's checksum, by which [`is_intact`] knows a file that was cut off or damaged.
+//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers
+//! are in channels like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data
+//! window is the film's crop window, the display window the full picture. The picture's provenance is JSON in
+//! the one attribute `photoncard`: the `exr` crate keeps attributes in a hash map, so several would change
+//! the file's bytes from run to run. The standard attribute `comments` has the file's checksum, by which
+//! [`is_intact`] knows a file that was cut off or damaged.
 
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};

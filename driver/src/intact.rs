@@ -1,7 +1,7 @@
 //! Checks that files of finished pictures are as they were written.
 //!
-//! An `OpenEXR` file has no checksum of its own: this program's have the CRC-32C of the file in the standard attribute `comments`, whose
-//! digits count as zeros in the sum. A PNG has a CRC-32 for each of its chunks.
+//! An `OpenEXR` file has no checksum of its own: this program's have the CRC-32C of the file in the standard
+//! attribute `comments`, whose digits count as zeros in the sum. A PNG has a CRC-32 for each of its chunks.
 
 use photoncard_shared::checksum::Checksum;
 
@@ -28,7 +28,8 @@ pub(crate) fn is_intact_exr(bytes: &[u8]) -> bool {
     })
 }
 
-/// Place of the checksum's digits. No text attribute has zero bytes, so that the first match is that of the attribute.
+/// Place of the checksum's digits. No text attribute has zero bytes, so that the first match is that of the
+/// attribute.
 fn digits_at(bytes: &[u8]) -> Option<usize> {
     let text = &BLANK[..BLANK.len() - DIGITS];
     let mut mark = b"comments\0string\0".to_vec();

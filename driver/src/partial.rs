@@ -13,8 +13,8 @@
 //! a resumed render may use other tiles, another order and other cards. They do not hold the number of samples: a picture of more
 //! samples takes over complete ranges of samples from the first on, and renders the others.
 //!
-//! The render that writes the file locks it. A file of this name that is no partial render is refused and left unchanged, and so is one
-//! with tiles that the render is not to go on from.
+//! The render that writes the file locks it. A file of this name that is no partial render is refused and
+//! left unchanged, and so is one with tiles that the render is not to go on from.
 
 mod error;
 mod file;
@@ -35,7 +35,7 @@ use serde_json::Value;
 
 pub use self::error::PartialError;
 pub use self::head::PartialSettings;
-use self::head::{check_empty, differences, read_head, title};
+use self::head::{Head, check_empty, differences, read_head, title};
 use self::records::{HEAD_BYTES, read_tiles, record};
 use self::samples::{KeptSamples, Split};
 use crate::film::Film;
@@ -72,8 +72,8 @@ impl PartialRender {
     /// samples, these are the second result, and the film is of the others.
     ///
     /// # Errors
-    /// If the file is no partial render, in use by another render or unreadable; if it is to be resumed and has other settings, or is not
-    /// and has tiles.
+    /// If the file is no partial render, in use by another render or unreadable; if it is to be resumed and
+    /// has other settings, or is not and has tiles.
     pub(crate) fn begin(
         partial: &PartialSettings,
         settings: Value,
@@ -111,10 +111,11 @@ impl PartialRender {
         if !differences.is_empty() {
             return Err(PartialError::Differs { path: self.path.clone(), differences });
         }
-        let head = head.bytes;
         let asked = film.format().samples;
         let mut found = KeptSamples::new(film);
-        let sound = read_tiles(&mut reader, head, &mut found).map_err(|error| self.error(error))?;
+        let sound = read_tiles(&mut reader, head.bytes, &mut found).map_err(|error| self.error(error))?;
+        self.check_unchanged(&mut reader, &head)?;
+        let head = head.bytes;
         let Split { base, rest } = found.split().map_err(|samples| PartialError::Differs {
             path: self.path.clone(),
             differences: vec![format!("spp was {samples}, and not all of them are finished, and is {asked}")],
@@ -129,6 +130,16 @@ impl PartialRender {
         kept.holds_tiles = kept.holds_earlier;
         kept.is_begun = true;
         Ok(base)
+    }
+
+    /// Checks that a file that was read still has its settings: its records have checksums, and those of
+    /// another picture as well.
+    fn check_unchanged(&self, reader: &mut BufReader<&File>, head: &Head) -> Result<(), PartialError> {
+        reader.rewind().map_err(|error| self.error(error))?;
+        let is_same = read_head(reader, &self.path)?.is_some_and(|again| again.settings == head.settings);
+        let differences = || vec!["it was written over while it was read".to_owned()];
+        let differs = || PartialError::Differs { path: self.path.clone(), differences: differences() };
+        is_same.then_some(()).ok_or_else(differs)
     }
 
     fn append(&self, kept: &mut KeptTiles, tile: &FinishedTile) -> Result<(), PartialError> {

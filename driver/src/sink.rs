@@ -60,8 +60,9 @@ impl FinishedTile {
         pixel_positions(&self.tile).zip(records.map(|record| PixelSums::read(record).unwrap_or_default()))
     }
 
-    /// Returns whether the light of a pixel is far beyond that of its scene: its samples have more than 2^16 radiance units in the mean, where
-    /// the brightest surface has at most 2^7. A lamp without extent that touches a surface makes such pixels, and they are rare.
+    /// Returns whether the light of a pixel is far beyond that of its scene: its samples have more than 2^16
+    /// radiance units in the mean, where the brightest surface has at most 2^7. A lamp without extent that
+    /// touches a surface makes such pixels, and they are rare.
     pub fn is_dazzling(&self) -> bool {
         let most = (i64::from(self.format.samples) << DAZZLING_SAMPLE).min(DAZZLING);
         self.sums().any(|(_, sums)| sums.light.into_iter().any(|light| light > most))

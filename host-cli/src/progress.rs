@@ -222,7 +222,8 @@ pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     Ok(stopped)
 }
 
-/// Returns whether the process was started to go on without its terminal, as by `nohup`: it ignores SIGHUP, by the mask in `/proc`.
+/// Returns whether the process was started to go on without its terminal, as by `nohup`: it ignores SIGHUP,
+/// by the mask in `/proc`.
 #[cfg(target_os = "linux")]
 fn is_hang_up_ignored() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

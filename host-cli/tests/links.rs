@@ -124,7 +124,8 @@ fn who_is_no_host_does_not_hold_a_card() {
     });
 }
 
-/// A card that cannot take the scene or the settings is left out beside one that can; alone it is the setting that is refused.
+/// A card that cannot take the scene or the settings is left out beside one that can; alone it is the setting
+/// that is refused.
 #[test]
 fn a_card_that_is_too_small_is_left_out() {
     let room = Room::new();

@@ -48,7 +48,8 @@ pub enum PartialError {
     /// Error of finished tiles that would be lost, as the render is not to go on from them.
     #[error("{} has the finished tiles of an earlier render", path.display())]
     #[diagnostic(help(
-        "go on from them with --resume and that render's settings; or remove the file to begin anew, or choose another output"
+        "go on from them with --resume and that render's settings; or remove the file to begin anew, or \
+         choose another output"
     ))]
     Unfinished {
         /// Path of the file.

@@ -46,8 +46,8 @@ impl PartialSettings {
     /// Checks that the file may be written: it has no tiles, or the render goes on from them.
     ///
     /// # Errors
-    /// [`PartialError::Unfinished`] if tiles would be lost; if the file is no partial render of this version, in use by another render or
-    /// unreadable.
+    /// [`PartialError::Unfinished`] if tiles would be lost; if the file is no partial render of this version,
+    /// in use by another render or unreadable.
     pub fn check_free(&self) -> Result<(), PartialError> {
         let file = file::open(&self.path, false)?;
         file.filter(|_| !self.resume).map_or(Ok(()), |file| check_empty(&file, &self.path))

@@ -356,6 +356,27 @@ fn finished_tiles_are_not_lost_without_resume() {
     }
 }
 
+/// Records of another picture have checksums as well: a file that takes the place of one that is read is
+/// refused.
+#[test]
+fn a_file_that_changes_while_it_is_read_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = written(&folder);
+    let settings = partial(&folder, true);
+    let render = begin_render(&settings, json!({ "seed": 1 }), &mut film()).unwrap();
+    let file = File::open(&settings.path).unwrap();
+    let mut reader = BufReader::new(&file);
+    let head = read_head(&mut reader, &settings.path).unwrap().unwrap();
+    render.check_unchanged(&mut reader, &head).unwrap();
+    let place = bytes.windows(9).position(|window| window == b"\"seed\":1}").unwrap();
+    let mut other = bytes.clone();
+    other[place + 7] = b'2';
+    for changed in [&other[..], &bytes[..place], b"notes"] {
+        fs::write(&settings.path, changed).unwrap();
+        assert!(render.check_unchanged(&mut reader, &head).is_err());
+    }
+}
+
 #[test]
 fn another_version_is_told_and_stays() {
     let folder = tempfile::tempdir().unwrap();

@@ -80,8 +80,8 @@ impl PartFile {
         Err(PartError::Damaged { path: self.path.clone(), fault })
     }
 
-    /// Reads the `patches` of the part. The head is read again before and after them: pixels of a file that is written over meanwhile
-    /// are those of another picture, and have checksums as well.
+    /// Reads the `patches` of the part. The head is read again before and after them: pixels of a file that
+    /// is written over meanwhile are those of another picture, and have checksums as well.
     ///
     /// # Errors
     /// If the file is damaged, unreadable or no longer that of the head, and those of `put`.

@@ -53,7 +53,8 @@ fn refused(paths: &[PathBuf]) -> PartError {
     }
 }
 
-/// A file of other settings that takes the place of one whose head was read: its pixels have checksums as well.
+/// A file of other settings that takes the place of one whose head was read: its pixels have checksums as
+/// well.
 #[test]
 fn a_part_that_changes_after_its_head_was_read_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -37,7 +37,8 @@ pub(super) struct Cards {
     shared: SharedImage,
     /// Image that the cards were last loaded with.
     upload: Option<(Arc<CardImage>, Arc<Upload>)>,
-    /// Number of cards that have not answered the greeting, were left out for their budget, or given up in an earlier render.
+    /// Number of cards that have not answered the greeting, were left out for their budget, or given up in an
+    /// earlier render.
     lost: usize,
     /// Time of the end of the last render, or of the greeting.
     used: Instant,

@@ -26,7 +26,8 @@ pub(super) trait Executor {
     /// Budget of each chip.
     fn budgets(&self) -> Vec<Budget>;
 
-    /// Leaves out chips whose budgets fail the check, as long as `needed` others are left, and names them to the observer.
+    /// Leaves out chips whose budgets fail the check, as long as `needed` others are left, and names them to
+    /// the observer.
     ///
     /// # Errors
     /// The failure of a chip, if too few are left.
@@ -43,7 +44,8 @@ pub(super) trait Executor {
     /// Renders the tiles into the sinks.
     ///
     /// # Errors
-    /// If the tiles cannot be rendered, or the observer stops the render; as [`Outcome::failure`] if the outcome until then is known.
+    /// If the tiles cannot be rendered, or the observer stops the render; as [`Outcome::failure`] if the
+    /// outcome until then is known.
     fn run(&mut self, work: Work) -> Result<Outcome, RenderError>;
 }
 
@@ -78,7 +80,7 @@ pub(super) struct Outcome {
     pub(super) traffic: Option<MemoryTraffic>,
     /// Number of cards.
     pub(super) cards: usize,
-    /// Number of cards that were given up, or have never answered the greeting.
+    /// Number of cards that were given up, left out for their budget, or have never answered the greeting.
     pub(super) cards_given_up: usize,
     /// Numbers of tiles that were rendered more than once or taken over.
     pub(super) tiles: TileCounts,

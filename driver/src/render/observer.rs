@@ -51,7 +51,8 @@ pub trait Observer: Sync {
         None
     }
 
-    /// Reports the [statistics](super::Statistics) of a render that ends with an error after its cards have begun, up to then, as JSON.
+    /// Reports the [statistics](super::Statistics) of a render that ends with an error after its cards have
+    /// begun, up to then, as JSON.
     fn failed(&self, _statistics: Value) {}
 
     /// Tells that a viewer does not show the picture, or no more; the render goes on.

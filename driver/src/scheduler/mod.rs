@@ -5,8 +5,8 @@
 //!
 //! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; the tiles
 //!   that the outvoted card alone has rendered are rendered again.
-//! - A tile that is brighter than any but a lamp beside a surface makes it is verified as well, if there is another card. A tile that is not
-//!   is believed against one that is.
+//! - A tile that is brighter than any but a lamp beside a surface makes it is verified as well, if there is
+//!   another card. A tile that is not is believed against one that is.
 //! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the cards that have
 //!   crashed at it the minimum number of times, and is abandoned after five crashes.
 //! - A tile of a picture by passes waits for the card that rendered it before, which has kept its irradiance records. Idle cards take tiles
@@ -121,7 +121,7 @@ impl Scheduler {
         }
     }
 
-    /// Enables idle cards to duplicate tiles that other cards have had for too long.
+    /// Enables other cards to render tiles as well that a card has had for too long, or that are dazzling.
     #[must_use]
     pub fn with_helpers(self) -> Self {
         Self { has_helpers: true, ..self }
@@ -163,7 +163,7 @@ impl Scheduler {
         let Some((index, since)) = self.remove_copy(card, tile.tile().id, now) else {
             return Answered::default();
         };
-        let has_others = self.living().any(|other| other != card);
+        let has_others = self.has_helpers && self.living().any(|other| other != card);
         let took = now.saturating_sub(since);
         self.times.count(took);
         let at = &mut self.cards[card];
@@ -307,8 +307,9 @@ impl Scheduler {
         self.cards[card].lie
     }
 
-    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, with all tiles that it alone has rendered. Returns
-    /// the tiles for the sinks to revoke. None of its tiles may be in transit to the sinks.
+    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, with all tiles that it
+    /// alone has rendered. Returns the tiles for the sinks to revoke. None of its tiles may be in transit to
+    /// the sinks.
     pub fn expel(&mut self, card: CardNumber, about: Option<Tile>) -> Vec<Tile> {
         self.set_standing(card, Standing::GivenUp);
         self.cards[card].lie = about;

@@ -180,7 +180,7 @@ fn dazzling_light_is_verified_where_there_is_another_card() {
     for (cards, second, liars, end) in
         [(1, None, vec![], dazzling), (2, Some(7), vec![0], 7), (2, Some(dazzling), vec![], dazzling)]
     {
-        let mut scheduler = scheduler(1, cards);
+        let mut scheduler = scheduler(1, cards).with_helpers();
         assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
         let mut answered = scheduler.answer(0, lit(0, dazzling), SECOND);
         if let Some(light) = second {
@@ -194,7 +194,7 @@ fn dazzling_light_is_verified_where_there_is_another_card() {
     }
     // The other card ends before it is asked, or while it renders.
     for is_at_work in [false, true] {
-        let mut scheduler = scheduler(1, 2);
+        let mut scheduler = scheduler(1, 2).with_helpers();
         assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
         assert!(scheduler.answer(0, lit(0, dazzling), SECOND).found.is_none());
         if is_at_work {
@@ -206,6 +206,10 @@ fn dazzling_light_is_verified_where_there_is_another_card() {
         assert_eq!(take(&mut scheduler, 0, SECOND), Some(0));
         assert_eq!(scheduler.answer(0, lit(0, dazzling), SECOND).found, Some(lit(0, dazzling)));
     }
+    // Modelled memory counts the reads of each tile once.
+    let mut alone = scheduler(1, 2);
+    assert_eq!(take(&mut alone, 0, Duration::ZERO), Some(0));
+    assert!(alone.answer(0, lit(0, dazzling), SECOND).found.is_some());
     // What any scene has is not dazzling, with many samples nor with one.
     for (samples, light, is_dazzling) in
         [(1, 1 << 56, false), (1, i64::MAX, true), (64, 1 << 61, false), (64, 1 << 62, true)]

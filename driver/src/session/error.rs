@@ -56,8 +56,8 @@ pub enum SessionError {
     /// Error of a line on which bytes come, but no frame.
     #[error("{bytes} bytes have come from the card in {} s, and no message among them", time.as_secs())]
     #[diagnostic(help(
-        "another bit rate garbles all (`serial:PATH@BAUD`, as the card's firmware sets it); or the firmware writes log text on this line, \
-         or another device or program is at the address, or the cable is bad"
+        "another bit rate garbles all (`serial:PATH@BAUD`, as the card's firmware sets it); or the firmware \
+         writes log text on this line, or another device or program is at the address, or the cable is bad"
     ))]
     Garbled {
         /// Time without a frame.
@@ -82,8 +82,8 @@ pub enum SessionError {
     /// Error of the link.
     #[error("the link to the card {}", ending(.0))]
     #[diagnostic(help(
-        "the card's process or the machine between has ended, another host has taken the card, or a cable was pulled: check them, and begin \
-         the command again"
+        "the card's process or the machine between has ended, another host has taken the card, or a cable \
+         was pulled: check them, and begin the command again"
     ))]
     Port(PortError),
     /// Error of a pixel value that no chip can produce.
@@ -160,8 +160,8 @@ impl SessionError {
         }
     }
 
-    /// Returns whether the card is wrong about what it was asked, so that nothing of what it has rendered can be trusted: it lies, or its
-    /// messages are none that a sound card sends.
+    /// Returns whether the card is wrong about what it was asked, so that nothing of what it has rendered can
+    /// be trusted: it lies, or its messages are none that a sound card sends.
     pub fn is_wrong(&self) -> bool {
         self.lie().is_some() || matches!(self, Self::Unexpected(_))
     }

@@ -18,10 +18,10 @@ const GRID_CELLS: f32 = (1 << 20) as f32;
 ///
 /// | sum | range |
 /// |---|---|
-/// | light, direct, indirect, caustic | at least 0; a lamp without extent beside a surface has no upper limit |
+/// | light, direct, indirect, caustic | at least 0; beside a lamp without extent there is no upper limit |
 /// | albedo | 0 to s |
 /// | normals | length 0 to s, and 2^-19 s for the rounding of normals |
-/// | depths | 0 to s times the distance from the eye to the scene's farthest corner, and 2^-19 s times the maximum coordinate beyond both |
+/// | depths | 0 to s times the distance to the scene's farthest corner; 2^-19 s maximum coordinates beyond |
 /// | surfaces s, gathers | 0 to n |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
@@ -89,8 +89,8 @@ impl PixelLimits {
     }
 }
 
-/// Distance from the eye to the farthest corner of the photon grid, which holds the scene, metres; an axis of another length than 1
-/// counts.
+/// Distance from the eye to the farthest corner of the photon grid, which holds the scene, metres; an axis of
+/// another length than 1 counts.
 fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
     let grid = &header.photon_grid;
     let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();

@@ -17,7 +17,8 @@ use crate::console::{print_json, printable_json};
 use crate::failure::Failure;
 use crate::input;
 
-/// Checks that all files can be written, that none replaces the scene, the environment or another one, and that no finished tiles are lost.
+/// Checks that all files can be written, that none replaces the scene, the environment or another one, and
+/// that no finished tiles are lost.
 pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     part::check(options.parts.part, &outputs.pictures)?;
     let mut written: Vec<&Path> = outputs.pictures.iter().map(|picture| &*picture.path).collect();

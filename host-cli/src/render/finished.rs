@@ -21,8 +21,8 @@ pub(super) fn may_be(outputs: &OutputOptions) -> bool {
     outputs.resumes() && files.all(Path::is_file)
 }
 
-/// Returns whether the pictures of a frame are those of these settings, and of `inputs`, which the library does not know, and its files are
-/// whole. Names a file that is not.
+/// Returns whether the pictures of a frame are those of these settings, and of `inputs`, which the library
+/// does not know, and its files are whole. Names a file that is not.
 pub(super) fn is_finished(
     options: &RenderOptions,
     outputs: &OutputOptions,
@@ -47,11 +47,7 @@ pub(super) fn is_finished(
     if expected.is_none() || outputs.pictures.iter().any(|picture| of_picture(picture) != expected) {
         return false;
     }
-    let damaged = damaged(outputs);
-    if let Some(path) = damaged.filter(|_| !options.quiet) {
-        messages::say_damaged(path);
-    }
-    damaged.is_none()
+    damaged(outputs).inspect(|path| messages::say_damaged(path)).is_none()
 }
 
 /// The first file of a frame that is not as it was written.

@@ -14,7 +14,8 @@ use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
-/// Says where the finished tiles of a render are that was ended by an error, and writes its statistics up to then.
+/// Says where the finished tiles of a render are that was ended by an error, and writes its statistics up to
+/// then.
 pub(super) fn end_early(error: &RenderError, progress: &Progress, outputs: &OutputOptions) {
     if error.is_input() {
         return;

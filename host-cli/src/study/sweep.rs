@@ -97,7 +97,8 @@ fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
     let (taken, all) = (sizes.map(u64::from).iter().sum::<u64>(), u64::from(chip.budget().sram_bytes));
     (taken > all).then(|| {
         format!(
-            "cache={caches} takes {taken} bytes, and the chip {} has {all} in all: its traffic is that of a larger chip",
+            "cache={caches} takes {taken} bytes, and the chip {} has {all} in all: its traffic is that of a \
+             larger chip",
             chip.name()
         )
     })

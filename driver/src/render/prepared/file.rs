@@ -106,7 +106,8 @@ fn empty(count: u32) -> Result<Vec<Line>, OutOfMemory> {
     Ok(lines)
 }
 
-/// Reads lines into memory, and returns their CRC-32C. It is that of the bytes that are used, whatever becomes of the file.
+/// Reads lines into memory, and returns their CRC-32C. It is that of the bytes that are used, whatever
+/// becomes of the file.
 fn read_lines(reader: &mut impl BufRead, count: u32, lines: &mut Vec<Line>) -> io::Result<u32> {
     let mut sum = Checksum::default();
     for _ in 0..count {

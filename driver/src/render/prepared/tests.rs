@@ -64,7 +64,8 @@ fn pictures_of_a_prepared_scene_are_those_of_the_scene() {
     }
 }
 
-/// The file of an open scene is written over in place, cut off and removed: pictures are those of the scene that was opened.
+/// The file of an open scene is written over in place, cut off and removed: pictures are those of the scene
+/// that was opened.
 #[test]
 fn a_file_that_changes_later_changes_no_picture() {
     let folder = tempfile::tempdir().unwrap();

@@ -27,7 +27,8 @@ struct Frame {
     cost: Cost,
     /// Counted arithmetic, and the cost by it; `None` for a frame of the table's own counts.
     counted: Option<(Arithmetic, Cost)>,
-    /// Errors of the counts; zeros for a frame of the table's own counts, or all of whose tiles were rendered.
+    /// Errors of the counts; zeros for a frame of the table's own counts, or all of whose tiles were
+    /// rendered.
     errors: Errors,
     /// The photon map.
     map: PhotonMapSize,
