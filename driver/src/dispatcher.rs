@@ -85,7 +85,10 @@ impl<'a> Dispatcher<'a> {
         let result = self.scheduler().check(now);
         if let Err(SchedulerError::Disagreement { tile, sources }) = &result {
             // Either of two cards that disagree may be wrong: tiles that only they have rendered are revoked.
-            sources.iter().filter_map(|source| source.card()).for_each(|card| self.distrust(card, *tile));
+            sources
+                .iter()
+                .filter_map(|source| source.card())
+                .for_each(|card| self.distrust(card, Some(*tile)));
         }
         result
     }
@@ -100,7 +103,7 @@ impl<'a> Dispatcher<'a> {
         } else {
             drop(order);
             // The tile is not complete yet, so the render cannot end before the wrong card's tiles are revoked.
-            liars.into_iter().for_each(|liar| self.distrust(liar, rectangle));
+            liars.into_iter().for_each(|liar| self.distrust(liar, Some(rectangle)));
             self.order.read().unwrap_or_else(PoisonError::into_inner)
         };
         if let Some(tile) = found {
@@ -114,8 +117,9 @@ impl<'a> Dispatcher<'a> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Gives up a card that sent wrong pixels of the tile `about`, and revokes all tiles that it alone has rendered.
-    pub fn distrust(&self, card: CardNumber, about: Tile) {
+    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, and revokes all tiles
+    /// that it alone has rendered.
+    pub fn distrust(&self, card: CardNumber, about: Option<Tile>) {
         let _alone = self.order.write().unwrap_or_else(PoisonError::into_inner);
         let revoked = self.scheduler().expel(card, about);
         for tile in revoked {

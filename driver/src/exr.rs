@@ -1,10 +1,11 @@
 //! `OpenEXR` files: writing of films, and reading of radiance for comparisons.
 //!
-//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers are in
-//! channels like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data window is the film's
-//! crop window, the display window the full picture. The picture's provenance is JSON in the one attribute
-//! `photoncard`: the `exr` crate keeps attributes in a hash map, so several would change the file's bytes from run to
-//! run.
+//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers
+//! are in channels like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data
+//! window is the film's crop window, the display window the full picture. The picture's provenance is JSON in
+//! the one attribute `photoncard`: the `exr` crate keeps attributes in a hash map, so several would change
+//! the file's bytes from run to run. The standard attribute `comments` has the file's checksum, by which
+//! [`is_intact`] knows a file that was cut off or damaged.
 
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
@@ -22,6 +23,7 @@ use crate::allocation::{self, OutOfMemory};
 use crate::choice::choices;
 use crate::film::Film;
 use crate::foreign;
+use crate::intact::{self, BLANK};
 use crate::layer::{Channel, Layers};
 use crate::output::{self, OutputError};
 
@@ -153,7 +155,9 @@ pub fn write(
         .ok_or_else(|| fault("the provenance is not text".to_owned()))?;
     let mut bytes = Cursor::new(Vec::new());
     image.write().to_buffered(&mut bytes).map_err(|error| fault(error.to_string()))?;
-    Ok(output::write(path, bytes.get_ref())?)
+    let mut bytes = bytes.into_inner();
+    intact::seal_exr(&mut bytes);
+    Ok(output::write(path, &bytes)?)
 }
 
 fn image_of(
@@ -169,7 +173,8 @@ fn image_of(
     attributes.other.insert(Text::new_or_none(PROVENANCE)?, AttributeValue::Text(provenance));
     let size = Vec2(window.width() as usize, window.height() as usize);
     let position = Vec2(i32::try_from(window.x0).ok()?, i32::try_from(window.y0).ok()?);
-    let own = LayerAttributes::default().with_position(position);
+    let comments = Text::new_or_none(BLANK);
+    let own = LayerAttributes { comments, ..LayerAttributes::default() }.with_position(position);
     let encoding = Encoding {
         compression: Compression::ZIP16,
         blocks: exr::image::Blocks::ScanLines,
@@ -257,6 +262,11 @@ pub fn read_form(path: &Path) -> Option<(String, SampleFormat)> {
         None => return None,
     };
     Some((provenance(&header.own_attributes)?, format))
+}
+
+/// Returns whether a file is, to the byte, one that [`write()`] has written; an unreadable one is not.
+pub fn is_intact(path: &Path) -> bool {
+    std::fs::read(path).is_ok_and(|bytes| intact::is_intact_exr(&bytes))
 }
 
 /// [`read_rgb`] from the bytes of a file, with at most `most_pixels` pixels.

@@ -128,7 +128,7 @@
 //! ```
 //!
 //! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in `docs/architecture.md`.
-#![deny(unsafe_code)]
+#![forbid(unsafe_code)]
 
 mod allocation;
 pub mod bvh;
@@ -145,6 +145,7 @@ pub mod film;
 mod fold;
 mod foreign;
 mod heading;
+mod intact;
 pub mod layer;
 mod light;
 pub mod link;

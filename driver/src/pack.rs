@@ -21,8 +21,6 @@ mod card_image;
 mod corners;
 mod error;
 mod flat_glass;
-mod image_lines;
-mod mapped;
 mod materials;
 mod textures;
 mod writer;
@@ -31,7 +29,6 @@ pub use self::card_image::CardImage;
 use self::corners::PackedCorners;
 pub use self::error::PackError;
 use self::flat_glass::Glazing;
-pub(crate) use self::mapped::MappedLines;
 pub(crate) use self::writer::ImageWriter;
 
 /// Bytes of memory that packing takes per triangle beside the scene, mainly for binary trees.

@@ -13,7 +13,8 @@
 //! a resumed render may use other tiles, another order and other cards. They do not hold the number of samples: a picture of more
 //! samples takes over complete ranges of samples from the first on, and renders the others.
 //!
-//! The render that writes the file locks it. A file of this name that is no partial render is refused and left unchanged.
+//! The render that writes the file locks it. A file of this name that is no partial render is refused and
+//! left unchanged, and so is one with tiles that the render is not to go on from.
 
 mod error;
 mod file;
@@ -34,7 +35,7 @@ use serde_json::Value;
 
 pub use self::error::PartialError;
 pub use self::head::PartialSettings;
-use self::head::{differences, read_head, title};
+use self::head::{Head, check_empty, differences, read_head, title};
 use self::records::{HEAD_BYTES, read_tiles, record};
 use self::samples::{KeptSamples, Split};
 use crate::film::Film;
@@ -66,21 +67,13 @@ struct KeptTiles {
 }
 
 impl PartialRender {
-    /// Checks that the file may be opened by [`Self::begin`], before there are settings.
-    ///
-    /// # Errors
-    /// If the file is no partial render, in use by another render or unreadable.
-    pub(crate) fn check_free(partial: &PartialSettings) -> Result<(), PartialError> {
-        file::open(&partial.path, false).map(drop)
-    }
-
     /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on but the number of samples,
     /// which `film` states. With [`PartialSettings::resume`] the file's tiles are written into the film. If it has all tiles of fewer
     /// samples, these are the second result, and the film is of the others.
     ///
     /// # Errors
-    /// If the file is no partial render, in use by another render or unreadable, or if it is to be resumed and has other
-    /// settings.
+    /// If the file is no partial render, in use by another render or unreadable; if it is to be resumed and
+    /// has other settings, or is not and has tiles.
     pub(crate) fn begin(
         partial: &PartialSettings,
         settings: Value,
@@ -89,7 +82,12 @@ impl PartialRender {
         let path = partial.path.clone();
         let mut this = Self { path, settings, first_sample: 0, kept: Mutex::default() };
         let Some(file) = file::open(&this.path, false)? else { return Ok((this, None)) };
-        let base = if partial.resume { this.resume(&file, film)? } else { None };
+        let base = if partial.resume {
+            this.resume(&file, film)?
+        } else {
+            check_empty(&file, &this.path)?;
+            None
+        };
         this.lock().file = Some(file);
         this.first_sample = base.as_ref().map_or(0, |base| base.format().samples);
         Ok((this, base))
@@ -113,10 +111,11 @@ impl PartialRender {
         if !differences.is_empty() {
             return Err(PartialError::Differs { path: self.path.clone(), differences });
         }
-        let head = head.bytes;
         let asked = film.format().samples;
         let mut found = KeptSamples::new(film);
-        let sound = read_tiles(&mut reader, head, &mut found).map_err(|error| self.error(error))?;
+        let sound = read_tiles(&mut reader, head.bytes, &mut found).map_err(|error| self.error(error))?;
+        self.check_unchanged(&mut reader, &head)?;
+        let head = head.bytes;
         let Split { base, rest } = found.split().map_err(|samples| PartialError::Differs {
             path: self.path.clone(),
             differences: vec![format!("spp was {samples}, and not all of them are finished, and is {asked}")],
@@ -133,9 +132,21 @@ impl PartialRender {
         Ok(base)
     }
 
+    /// Checks that a file that was read still has its settings: its records have checksums, and those of
+    /// another picture as well.
+    fn check_unchanged(&self, reader: &mut BufReader<&File>, head: &Head) -> Result<(), PartialError> {
+        reader.rewind().map_err(|error| self.error(error))?;
+        let is_same = read_head(reader, &self.path)?.is_some_and(|again| again.settings == head.settings);
+        let differences = || vec!["it was written over while it was read".to_owned()];
+        let differs = || PartialError::Differs { path: self.path.clone(), differences: differences() };
+        is_same.then_some(()).ok_or_else(differs)
+    }
+
     fn append(&self, kept: &mut KeptTiles, tile: &FinishedTile) -> Result<(), PartialError> {
         if kept.file.is_none() {
-            kept.file = file::open(&self.path, true)?;
+            let file = file::open(&self.path, true)?;
+            file.as_ref().map_or(Ok(()), |file| check_empty(file, &self.path))?;
+            kept.file = file;
         }
         let Some(file) = &mut kept.file else { return Ok(()) };
         if !kept.is_begun {

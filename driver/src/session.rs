@@ -30,7 +30,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use photoncard_shared::budget::Budget;
-use photoncard_shared::frame::MAX_PAYLOAD;
+use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
 use photoncard_shared::message::{self, Command, MemoryUse, OPERAND_BYTES};
 use photoncard_shared::transport::Event as LineEvent;
 
@@ -70,6 +70,8 @@ pub struct Session {
     left_suspect: bool,
     /// True after a [`Command::Flush`], until the next tile.
     is_flushed: bool,
+    /// Number of bytes received since the last frame of the session.
+    unheard_bytes: u64,
 }
 
 impl Session {
@@ -94,6 +96,7 @@ impl Session {
             failures: Failures::default(),
             left_suspect: false,
             is_flushed: false,
+            unheard_bytes: 0,
         };
         session.greet_card();
         session
@@ -287,13 +290,17 @@ impl Session {
     /// If they violate the protocol, report a fault of the card, or show that it has failed too often.
     pub fn receive(&mut self, mut bytes: &[u8], now: Duration) -> Result<(), SessionError> {
         self.channel.bytes.wire += bytes.len() as u64;
+        self.unheard_bytes += bytes.len() as u64;
         while !bytes.is_empty() {
             let passed = self.channel.transport.passed();
             let (taken, event) = self.channel.transport.receive(bytes);
             bytes = &bytes[taken..];
             match event {
                 None => {}
-                Some(LineEvent::Heard) => self.clock.heard(now),
+                Some(LineEvent::Heard) => {
+                    self.clock.heard(now);
+                    self.unheard_bytes = bytes.len() as u64;
+                }
                 Some(LineEvent::Unknown) if self.clock.has_heard() => self.reset(now)?,
                 // The greeting was lost.
                 Some(LineEvent::Unknown) => self.channel.transport.send_again(),
@@ -340,10 +347,20 @@ impl Session {
         }
         let rays = self.job.as_ref().map_or(0, |job| self.tiles.most_rays(self.at_work(), &job.frame));
         let result = self.clock.check(rays, slowest, now);
-        if matches!(result, Err(SessionError::Standstill(_))) {
-            self.fail()?;
+        match result {
+            Err(SessionError::Standstill(_)) => self.fail()?,
+            Err(SessionError::Silent(time)) if self.is_garbled() => {
+                return Err(SessionError::Garbled { time, bytes: self.unheard_bytes });
+            }
+            _ => {}
         }
         result
+    }
+
+    /// Returns whether bytes have come in place of frames, and not a frame alone that was cut off.
+    fn is_garbled(&self) -> bool {
+        let least = if self.clock.has_heard() { MAX_FRAME as u64 } else { 1 };
+        self.unheard_bytes >= least
     }
 
     /// Returns the unfinished tiles of a card that is lost or was reset, as events.
@@ -382,6 +399,7 @@ impl Session {
     }
 
     fn greet_card(&mut self) {
+        self.unheard_bytes = 0;
         self.state = State::Greeting;
         self.stale_replies = 0;
         self.channel.greet();

@@ -5,6 +5,11 @@ use photoncard_shared::message::{PixelSums, Tile};
 
 use crate::sums::{FilmPixel, SumFormat};
 
+/// Logarithm of the light of a sample, 2^-40 radiance units, beyond which a pixel is dazzling.
+const DAZZLING_SAMPLE: u32 = 40 + 16;
+/// Light beyond which a pixel is dazzling whatever its number of samples: a fourth of the range of sums.
+const DAZZLING: i64 = 1 << 61;
+
 /// Tile with all its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FinishedTile {
@@ -53,6 +58,14 @@ impl FinishedTile {
     pub fn sums(&self) -> impl Iterator<Item = ((u32, u32), PixelSums)> {
         let records = self.records.chunks_exact(self.format.record_bytes());
         pixel_positions(&self.tile).zip(records.map(|record| PixelSums::read(record).unwrap_or_default()))
+    }
+
+    /// Returns whether the light of a pixel is far beyond that of its scene: its samples have more than 2^16
+    /// radiance units in the mean, where the brightest surface has at most 2^7. A lamp without extent that
+    /// touches a surface makes such pixels, and they are rare.
+    pub fn is_dazzling(&self) -> bool {
+        let most = (i64::from(self.format.samples) << DAZZLING_SAMPLE).min(DAZZLING);
+        self.sums().any(|(_, sums)| sums.light.into_iter().any(|light| light > most))
     }
 
     /// Column, row and values of each pixel.

@@ -14,6 +14,7 @@ use thiserror::Error;
 use crate::choice::{Choice, choices};
 use crate::exr::{PROVENANCE, ascii};
 use crate::foreign;
+use crate::intact;
 use crate::output::{self, OutputError};
 
 /// Tone curve that compresses scaled radiance to the range of a screen.
@@ -158,6 +159,11 @@ pub fn read_form(path: &Path, mapping: ToneMapping) -> Option<String> {
     text(PROVENANCE).filter(|_| text(TONE_MAPPING) == Some(&mapping.to_json())).cloned()
 }
 
+/// Returns whether a file is a PNG that is neither cut off nor damaged; an unreadable one is not.
+pub fn is_intact(path: &Path) -> bool {
+    std::fs::read(path).is_ok_and(|bytes| intact::is_intact_png(&bytes))
+}
+
 /// Bytes of a PNG file with text chunks.
 fn encode_png(
     [width, height]: [u32; 2],
@@ -243,6 +249,28 @@ mod tests {
             assert_eq!(codes[0], 0);
             assert!(codes.is_sorted_by(|a, b| a < b), "{curve:?} {codes:?}");
         }
+    }
+
+    #[test]
+    fn a_file_that_is_cut_off_or_damaged_is_not_intact() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.png");
+        let picture = grey(|x, y| (x * y) as f32);
+        write_png(&path, [4, 3], picture.iter().copied(), ToneMapping::default(), Some("{}")).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        assert!(is_intact(&path));
+        let is_kept = |changed: &[u8]| {
+            std::fs::write(&path, changed).unwrap();
+            is_intact(&path)
+        };
+        for place in 0..bytes.len() {
+            let mut changed = bytes.clone();
+            changed[place] ^= 1 << (place % 8);
+            assert!(!is_kept(&changed), "byte {place}");
+            assert!(!is_kept(&bytes[..place]), "the first {place} bytes");
+        }
+        assert!(!is_kept(&[&bytes[..], &[0]].concat()));
+        assert!(is_kept(&bytes));
     }
 
     #[test]

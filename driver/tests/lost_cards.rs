@@ -14,6 +14,7 @@ use photoncard_driver::render::{
     Rendering, render,
 };
 use photoncard_driver::scene::gltf;
+use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{Command, PROTOCOL_VERSION, Reply};
 use rustix::net::{AddressFamily, SocketAddrUnix, SocketType, bind, listen, socket};
 use scripted_card::{Answer, Card, sound};
@@ -140,6 +141,41 @@ fn a_card_that_fails_its_first_hello_is_lost_beside_another_and_told_once() {
     let listener = UnixListener::bind(&path).unwrap();
     std::thread::spawn(move || serve(listener.accept().unwrap().0, other_version));
     for (path, said) in [(path, "speaks protocol"), (folder.path().join("absent"), "absent")] {
+        let losses = Losses::new(usize::MAX);
+        let rendering = render_with(&path, 32, &losses).unwrap();
+        assert!(rendering.film.is_complete());
+        assert_eq!((rendering.statistics.cards, rendering.statistics.cards_given_up), (2, 1));
+        let told = losses.told.into_inner().unwrap();
+        assert!(told.len() == 1 && told[0].contains(said), "{told:?}");
+    }
+}
+
+/// Answers of a card of a budget that the settings or the scene exceed.
+macro_rules! small {
+    ($($field:ident: $value:expr),+) => {
+        |command: &Command| match sound(command)? {
+            Reply::Hello { protocol, layout, budget, written_lines, memory_use, build } => {
+                let budget = Budget { $($field: $value),+, ..budget };
+                Some(Reply::Hello { protocol, layout, budget, written_lines, memory_use, build })
+            }
+            reply => Some(reply),
+        }
+    };
+}
+
+#[test]
+fn a_card_of_a_small_budget_is_left_out_beside_another_and_named() {
+    let cases: [(Answer, &str); 4] = [
+        (small!(neighbors: 7), "--neighbors 100 is not possible"),
+        (small!(gather_rays: 3, samples: 2), "--gather-rays 10 is not possible"),
+        (small!(tile_pixels: 0), "--tile 1 is not possible"),
+        (small!(dram_bytes: 20_000), "bytes"),
+    ];
+    for (answer, said) in cases {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("card");
+        let listener = UnixListener::bind(&path).unwrap();
+        std::thread::spawn(move || serve(listener.accept().unwrap().0, answer));
         let losses = Losses::new(usize::MAX);
         let rendering = render_with(&path, 32, &losses).unwrap();
         assert!(rendering.film.is_complete());

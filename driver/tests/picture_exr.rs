@@ -8,7 +8,7 @@ use exr::prelude::{
     Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels,
     Vec2, WritableImage,
 };
-use photoncard_driver::exr::{ExrError, SampleFormat, read_rgb, write};
+use photoncard_driver::exr::{ExrError, SampleFormat, is_intact, read_rgb, write};
 use photoncard_driver::film::{Film, FilmPixel, PixelLayers, PixelValue, SumFormat, SumScale, Window};
 use photoncard_driver::layer::Layers;
 use proptest::prelude::{ProptestConfig, any, proptest};
@@ -53,6 +53,30 @@ fn written(format: SampleFormat, provenance: &str) -> (tempfile::TempDir, std::p
     let path = folder.path().join("picture.exr");
     write(&path, &film(), &Layers::default(), provenance, format).unwrap();
     (folder, path)
+}
+
+/// No byte of a file can be changed, added or removed unnoticed.
+#[test]
+fn a_file_is_intact_only_as_it_was_written() {
+    for format in [SampleFormat::Float, SampleFormat::Half] {
+        // The provenance has the text of the checksum itself.
+        let (_folder, path) = written(format, r#"{"name": "photoncard checksum 00000000"}"#);
+        let bytes = fs::read(&path).unwrap();
+        assert!(is_intact(&path));
+        let is_kept = |changed: &[u8]| {
+            fs::write(&path, changed).unwrap();
+            is_intact(&path)
+        };
+        for place in (0..bytes.len()).step_by(97).chain((0..600).step_by(5)) {
+            let mut changed = bytes.clone();
+            changed[place] ^= 1 << (place % 8);
+            assert!(!is_kept(&changed), "byte {place}");
+            assert!(!is_kept(&bytes[..place]), "the first {place} bytes");
+        }
+        assert!(!is_kept(&[&bytes[..], &[0]].concat()));
+        assert!(is_kept(&bytes));
+    }
+    assert!(!is_intact(Path::new("absent.exr")));
 }
 
 #[test]

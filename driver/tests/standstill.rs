@@ -214,6 +214,33 @@ fn the_hosts_own_absence_is_not_the_cards_silence() {
     }
 }
 
+/// A wrong bit rate, or log text in place of messages, from the start or after the card has answered.
+#[test]
+fn a_line_of_bytes_without_messages_is_no_silence() {
+    let frame = frame();
+    for noise in [&b"I (312) boot: ready\r\n"[..], &[0x80; 40], &[0; 7]] {
+        for answers_first in [false, true] {
+            let (mut bench, mut card) = (Bench::new(&frame), Card::new(sound));
+            if answers_first {
+                bench.go(&mut card, Duration::from_secs(5)).unwrap();
+            }
+            let begin = bench.now;
+            let error = loop {
+                bench.outgoing();
+                if let Err(error) = bench.take(noise) {
+                    break error;
+                }
+            };
+            assert!(bench.now - begin < Duration::from_secs(11));
+            // A frame that was cut off is no noise, if it is the last that comes.
+            let is_noise = !answers_first || noise.len() > 7;
+            assert_eq!(matches!(error, SessionError::Garbled { .. }), is_noise, "{error}");
+            assert!(error.may_pass());
+            assert!(!is_noise || error.to_string().contains("bytes have come"), "{error}");
+        }
+    }
+}
+
 #[test]
 fn a_flapping_link_is_not_the_cards_fault() {
     let frame = frame();

@@ -11,6 +11,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use photoncard_driver::render::{CardError, Observer, Phase};
+use serde_json::Value;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
 use self::openjd::Percent;
@@ -18,10 +19,12 @@ use self::remaining::Remaining;
 use crate::arguments::ProgressForm;
 use crate::console::say;
 
-/// Display of the progress of a render or of a card's self-test; SIGINT and SIGTERM stop it.
+/// Display of the progress of a render or of a card's self-test; SIGINT, SIGTERM and SIGHUP stop it.
 pub(crate) struct Progress {
     stopped: Arc<AtomicBool>,
     kept: AtomicBool,
+    /// Statistics of the last render that has failed.
+    failed: Mutex<Option<Value>>,
     display: Option<Mutex<Display>>,
     /// Progress as a farm's engine reads it.
     percent: Option<Percent>,
@@ -56,7 +59,8 @@ impl Progress {
             told: 0,
         };
         let display = (!quiet).then_some(Mutex::new(display));
-        Ok(Self { stopped: stop_on_signals()?, kept: AtomicBool::new(false), display, percent: None })
+        let (stopped, kept) = (stop_on_signals()?, AtomicBool::new(false));
+        Ok(Self { stopped, kept, failed: Mutex::default(), display, percent: None })
     }
 
     /// Progress in a form, of which a phase is most of the work.
@@ -83,6 +87,11 @@ impl Progress {
     /// Returns whether finished tiles are in the partial file.
     pub(crate) fn has_kept(&self) -> bool {
         self.kept.load(Ordering::Relaxed)
+    }
+
+    /// Statistics of the render that has failed, as JSON; `None` if it has failed before its cards began.
+    pub(crate) fn take_failed(&self) -> Option<Value> {
+        self.failed.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
 
     /// Removes the bar.
@@ -130,8 +139,13 @@ impl Observer for Progress {
         self.kept.store(true, Ordering::Relaxed);
     }
 
+    fn failed(&self, statistics: Value) {
+        *self.failed.lock().unwrap_or_else(PoisonError::into_inner) = Some(statistics);
+    }
+
     fn lost(&self, card: &str, error: &CardError) {
-        self.say(format_args!("photoncard: {card} is lost: {error}; any others go on"));
+        let lot = if matches!(error, CardError::Budget { .. }) { "left out" } else { "lost" };
+        self.say(format_args!("photoncard: {card} is {lot}: {error}; any others go on"));
     }
 
     fn not_shown(&self, error: &dyn Error) {
@@ -193,14 +207,30 @@ impl Display {
     }
 }
 
-/// Flag that SIGINT and SIGTERM set; a second signal ends the process.
+/// Flag that SIGINT, SIGTERM and SIGHUP set; a second SIGINT or SIGTERM ends the process.
 pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     let stopped = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
         signal_hook::flag::register_conditional_shutdown(signal, 130, stopped.clone())?;
         signal_hook::flag::register(signal, stopped.clone())?;
     }
+    #[cfg(target_os = "linux")]
+    if !is_hang_up_ignored() {
+        // A terminal that is closed sends several.
+        signal_hook::flag::register(signal_hook::consts::SIGHUP, stopped.clone())?;
+    }
     Ok(stopped)
+}
+
+/// Returns whether the process was started to go on without its terminal, as by `nohup`: it ignores SIGHUP,
+/// by the mask in `/proc`.
+#[cfg(target_os = "linux")]
+fn is_hang_up_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    // If it is not known, a hang-up ends the process as it does by default.
+    mask.is_none_or(|mask| mask & 1 << (signal_hook::consts::SIGHUP - 1) != 0)
 }
 
 /// Seconds in words: `8 s`, `2 min 05 s`, `3 h 20 min`.

@@ -22,7 +22,7 @@ use photoncard_driver::scene::{FixedScene, Scene};
 
 use self::end::{End, at_once};
 pub(crate) use self::steps::on_threads;
-use self::steps::{Finished, assigned, chosen, dram_bytes, finish, say_kept, view};
+use self::steps::{Finished, assigned, chosen, dram_bytes, end_early, finish, view};
 use crate::arguments::RenderOptions;
 use crate::failure::Failure;
 use crate::input;
@@ -66,7 +66,7 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
         Ok((rendering, Some(End { aim, noise, passes: count, samples, ending })))
     })?;
     progress.finish();
-    let (rendering, end) = result.inspect_err(|error| say_kept(error, &progress, &options.outputs))?;
+    let (rendering, end) = result.inspect_err(|error| end_early(error, &progress, &options.outputs))?;
     let fit = found.into_inner().flatten();
     let (inputs, quality) = (input::provenance(&options.scene), options.quality);
     let at_once = at_once(options, &rendering.statistics, fit.is_some());

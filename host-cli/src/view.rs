@@ -135,7 +135,7 @@ fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
 
 /// Loads the scene, before its assignments.
 fn load(options: &ViewOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
-    let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX);
+    let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX);
     let scene = input::load(&options.scene, dram_bytes)?;
     let camera = settings.camera(&scene)?;
     let misfit = options.picture.fit(&camera, &mut settings.picture);

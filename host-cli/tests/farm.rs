@@ -305,6 +305,7 @@ fn what_is_of_no_job_is_refused() {
     let room = Room::new();
     for (options, words) in [
         (&["-o", "a.exr", "--stats", "-"][..], ["--stats is not for a farm's job", "help: leave it out"]),
+        (&["-o", "a.exr", "--counters"], ["--counters is not for a farm's job", "help: leave it out"]),
         (&["-o", "a.exr", "--part", "1/2"], ["--part is not for a farm's job", "help: leave it out"]),
         (&["-o", "a.part"], ["parts of its own", "help: give -o"]),
         (&["-o", "a.exr", "--frames", "1-2"], ["no place for the number of a frame", "out.####.exr"]),

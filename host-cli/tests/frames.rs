@@ -198,6 +198,14 @@ fn a_sequence_that_is_resumed_renders_what_is_not_finished() {
         std::fs::copy(room.path("a.2.exr"), room.path("a.1.exr")).unwrap();
         assert_eq!(again(&[]), [false, true, true]);
         assert!(read() == whole, "{animation}");
+        // Damage behind the heads, which say what the files are of.
+        let mut flipped = whole[0][1].clone();
+        let place = flipped.len() * 3 / 4;
+        flipped[place] ^= 4;
+        room.write("a.2.exr", &flipped);
+        room.write("a.3.png", &whole[1][2][..whole[1][2].len() - 20]);
+        assert_eq!(again(&[]), [true, false, false]);
+        assert!(read() == whole, "{animation}");
         assert_eq!(of(&["--frames", "1-3"]), [false; 3]);
     }
     let room = Room::new();

@@ -124,6 +124,29 @@ fn who_is_no_host_does_not_hold_a_card() {
     });
 }
 
+/// A card that cannot take the scene or the settings is left out beside one that can; alone it is the setting
+/// that is refused.
+#[test]
+fn a_card_that_is_too_small_is_left_out() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    let options = ["-o", "a.exr", "--size", "16x16", "--photons", "1000", "--neighbors", "200"];
+    room.rendered(&cornell, &[&options[..], &["--card", "emulated:1"]].concat());
+    let expected = room.read("a.exr");
+    let both = [&options[..], &["--quiet", "--card", "emulated-micro:1", "--card", "emulated:1"]].concat();
+    let outcome = room.render(&cornell, &both);
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    assert!(
+        outcome.stderr.contains("card 0 is left out: --neighbors 200 is not possible"),
+        "{}",
+        outcome.stderr
+    );
+    assert!(room.read("a.exr") == expected);
+    let outcome = room.render(&cornell, &[&options[..], &["--card", "emulated-micro:2"]].concat());
+    assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+    assert!(!outcome.stderr.contains("left out"), "{}", outcome.stderr);
+}
+
 #[test]
 fn cards_that_are_not_there() {
     let room = Room::new();
@@ -142,7 +165,8 @@ fn cards_that_are_not_there() {
         let name = card.split('@').next().unwrap();
         let words = [words[0], words[1], name, "card 0", "help:"];
         let options = ["-o", "a.exr", "--stats", "a.json", "--card", card];
-        check_failed(&room, &room.render(&cornell, &options), &words, &["file"]);
+        check_failed(&room, &room.render(&cornell, &options), &words, &["a.json", "file"]);
+        assert!(room.read("a.json").starts_with(b"{\n  \"error\": \"card 0"));
         // Beside another card it counts as lost.
         let options = [&options[..], &["--card", "emulated:1"]].concat();
         let outcome = room.render(&cornell, &options);

@@ -7,6 +7,7 @@ use std::fs;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use serde_json::Value;
 use support::{Emulator, Room, shipped};
 
 /// A picture of 64 tiles that takes a second or two.
@@ -36,6 +37,14 @@ fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
         std::thread::sleep(Duration::from_millis(5));
     }
     host
+}
+
+/// Signal of a terminal that is closed; that of a stop if tests run without one, whose programs ignore it.
+fn hang_up() -> &'static str {
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    if mask.is_some_and(|mask| mask & 1 == 0) { "-HUP" } else { "-TERM" }
 }
 
 /// The picture of an undisturbed render.
@@ -76,9 +85,17 @@ fn a_host_that_is_killed_loses_the_tiles_in_flight_alone() {
 #[test]
 fn only_the_same_picture_is_gone_on_with() {
     let room = Room::new();
-    let mut host = begun(&room, &[], 1);
-    host.kill().unwrap();
-    host.wait().unwrap();
+    // A terminal that is closed ends a render as an interrupt does.
+    let host = begun(&room, &["--stats", "a.json"], 1);
+    assert!(Command::new("kill").args([hang_up(), &host.id().to_string()]).status().unwrap().success());
+    let outcome = host.wait_with_output().unwrap();
+    let said = String::from_utf8(outcome.stderr).unwrap();
+    assert_eq!(outcome.status.code(), Some(130), "{said}");
+    assert!(said.contains("finished tiles are kept in a.exr.partial; --resume goes on"), "{said}");
+    let statistics: Value = serde_json::from_slice(&room.read("a.json")).unwrap();
+    assert!(statistics["error"].as_str().is_some_and(|error| error.contains("stopped")), "{statistics}");
+    assert!(statistics["rays"]["eye"].as_u64().is_some_and(|rays| rays > 0), "{statistics}");
+    fs::remove_file(room.path("a.json")).unwrap();
     let kept = room.read("a.exr.partial");
     let cornell = shipped("cornell.gltf");
     let refused = |options: &[&str], words: &[&str]| {
@@ -92,14 +109,25 @@ fn only_the_same_picture_is_gone_on_with() {
     refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene-checksum was"]);
     refused(&["--order", "hilbert"], &["--resume with --order hilbert is not possible"]);
     assert!(room.read("a.exr.partial") == kept);
-    // This render has kept no tiles, and has none to resume from.
+    // Without --resume no tile is lost, of this picture or another.
+    for options in [&[][..], &["--seed", "7"], &["--quiet", "--order", "hilbert"]] {
+        let outcome = room.run(&arguments(&cornell, options));
+        assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+        for word in ["a.exr.partial has the finished tiles", "--resume", "remove the file"] {
+            assert!(outcome.stderr.contains(word), "{word}: {}", outcome.stderr);
+        }
+        assert!(room.names() == ["a.exr.partial"] && room.read("a.exr.partial") == kept);
+    }
+    // A file without tiles is written over. This render keeps none, and has none to resume from.
+    let head = kept.iter().position(|&byte| byte == 0x89).unwrap();
+    room.write("a.exr.partial", &kept[..head]);
     let outcome = room.run(&arguments(&cornell, &["--seed", "7", "--card", "unix:absent"]));
     assert_eq!(outcome.status, Some(1), "{}", outcome.stderr);
     assert!(!outcome.stderr.contains("--resume goes on"), "{}", outcome.stderr);
     room.write("a.exr.partial", b"photoncard partial render 3\n{]\n");
     refused(&[], &["is no partial render"]);
     room.write("a.exr.partial", b"photoncard partial render 1\n{}\n");
-    refused(&[], &["of version 1", "the program that began it", "without --resume"]);
+    refused(&[], &["of version 1", "the program that began it", "remove the file"]);
 }
 
 #[test]
@@ -199,11 +227,15 @@ fn without_any_card_the_finished_tiles_are_kept() {
     for listen in ["tcp:", "pty"] {
         let room = Room::new();
         let card = Emulator::start(&room, listen, &[]);
-        let host = begun(&room, &["--card", &card.address], 5);
+        let host = begun(&room, &["--card", &card.address, "--stats", "a.json"], 5);
         card.end("-KILL");
         let outcome = host.wait_with_output().unwrap();
         let said = String::from_utf8(outcome.stderr).unwrap();
         assert_eq!(outcome.status.code(), Some(1), "{listen}: {said}");
+        let statistics: Value = serde_json::from_slice(&room.read("a.json")).unwrap();
+        assert!(statistics["error"].as_str().is_some_and(|error| error.contains("card")), "{statistics}");
+        assert!(statistics["link"]["damaged_frames"].is_u64(), "{statistics}");
+        fs::remove_file(room.path("a.json")).unwrap();
         assert!(said.contains("finished tiles are kept in a.exr.partial; --resume goes on"), "{said}");
         assert_eq!(room.names(), ["a.exr.partial"]);
         resumes(&room, &[], &expected);

@@ -170,6 +170,9 @@ fn sweeps_that_are_not_possible_are_refused_with_value_and_remedy() {
         (&["--vary", "set=flor.diffuse=1"], &["flor", "floor"]),
         (&["--vary", "camera=eye,back"], &["back", "eye"]),
         (&["--cache", "8K"], &["--cache", "photon=128K/128/4"]),
+        (&["--vary", "cache=photon=8K/128/4,scene=8K/128/4"], &["parts of one cache", "by semicolons"]),
+        (&["--latency", "50"], &["unexpected argument", "--latency"]),
+        (&["--tasks", "3"], &["unexpected argument", "--tasks"]),
     ] {
         let room = room_with_a_scene();
         let outcome = room.run(&[&["study"], &SWEEP[..], arguments].concat());

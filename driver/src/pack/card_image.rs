@@ -9,9 +9,6 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{Header, HeaderError, Lights, Section, SectionKind};
 use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, WideNode};
 
-use super::image_lines::ImageLines;
-use super::mapped::MappedLines;
-
 /// Sections of lights.
 const LIGHT_SECTIONS: [SectionKind; 4] = [
     SectionKind::Emitters,
@@ -25,7 +22,7 @@ const LIGHT_SECTIONS: [SectionKind; 4] = [
 pub struct CardImage {
     /// Header, as encoded in the first lines.
     pub(super) header: Header,
-    pub(super) lines: ImageLines,
+    pub(super) lines: Vec<Line>,
 }
 
 impl AsRef<[Line]> for CardImage {
@@ -35,11 +32,11 @@ impl AsRef<[Line]> for CardImage {
 }
 
 impl CardImage {
-    /// Image of lines that are mapped from a file.
+    /// Image of lines that were read from a file.
     ///
     /// # Errors
     /// If they do not begin with a header of as many lines.
-    pub(crate) fn mapped(lines: MappedLines) -> Result<Self, &'static str> {
+    pub(crate) fn of_lines(lines: Vec<Line>) -> Result<Self, &'static str> {
         let header = lines.first_chunk().map(Header::read);
         let header = match header {
             Some(Ok(header)) => header,
@@ -49,7 +46,7 @@ impl CardImage {
         if header.lines as usize != lines.len() {
             return Err("its card image has another length");
         }
-        Ok(Self { header, lines: ImageLines::Mapped(lines.into()) })
+        Ok(Self { header, lines })
     }
 
     /// All lines, the header's first.
@@ -75,7 +72,7 @@ impl CardImage {
     /// The lines of a section, mutable.
     pub(crate) fn section_mut(&mut self, kind: SectionKind) -> &mut [Line] {
         let range = self.range(kind);
-        &mut self.lines.make_mut()[range]
+        &mut self.lines[range]
     }
 
     /// Indices of a section's lines.
@@ -95,7 +92,7 @@ impl CardImage {
             dark.header.sections[kind as usize] = Section::default();
         }
         let header = dark.header.to_lines();
-        dark.lines.make_mut().iter_mut().zip(header).for_each(|(line, header)| *line = header);
+        dark.lines.iter_mut().zip(header).for_each(|(line, header)| *line = header);
         let materials = dark.header.section(SectionKind::Materials).records as usize;
         let lines = dark.section_mut(SectionKind::Materials);
         for index in 0..materials {

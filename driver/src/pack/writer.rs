@@ -6,7 +6,6 @@ use photoncard_shared::layout::PhotonGrid;
 
 use super::card_image::CardImage;
 use super::error::PackError;
-use super::image_lines::ImageLines;
 
 /// Writer of a card image: appends sections after the last line.
 pub(crate) struct ImageWriter {
@@ -22,7 +21,7 @@ impl ImageWriter {
 
     /// Writer that appends to a finished image.
     pub(crate) fn resume(CardImage { header, lines }: CardImage) -> Self {
-        Self { header, lines: lines.into_vec() }
+        Self { header, lines }
     }
 
     /// Sets the grid of photon positions, and the power of a stored photon of value 1, watts.
@@ -101,7 +100,7 @@ impl ImageWriter {
         // `section` has checked that the number of lines fits.
         header.lines = lines.len() as u32;
         lines[..HEADER_LINES].copy_from_slice(&header.to_lines());
-        CardImage { header, lines: ImageLines::Own(lines) }
+        CardImage { header, lines }
     }
 }
 

@@ -27,7 +27,7 @@ pub enum PartialError {
     },
     /// Error of a file of another version of the format.
     #[error("{} is a partial render of version {found}, and this program goes on with version {VERSION}", path.display())]
-    #[diagnostic(help("go on with the program that began it, or render without --resume to begin anew"))]
+    #[diagnostic(help("go on with the program that began it; or remove the file to begin anew"))]
     Version {
         /// Path of the file.
         path: PathBuf,
@@ -36,12 +36,24 @@ pub enum PartialError {
     },
     /// Error of a partial render of another picture.
     #[error("{} is of another picture: {}", path.display(), differences.join("; "))]
-    #[diagnostic(help("render with the same settings, or without --resume to begin anew"))]
+    #[diagnostic(help(
+        "render with the same settings; or remove the file to begin anew, or choose another output"
+    ))]
     Differs {
         /// Path of the file.
         path: PathBuf,
         /// Descriptions of the settings that differ.
         differences: Vec<String>,
+    },
+    /// Error of finished tiles that would be lost, as the render is not to go on from them.
+    #[error("{} has the finished tiles of an earlier render", path.display())]
+    #[diagnostic(help(
+        "go on from them with --resume and that render's settings; or remove the file to begin anew, or \
+         choose another output"
+    ))]
+    Unfinished {
+        /// Path of the file.
+        path: PathBuf,
     },
     /// Error of a file that another render is writing.
     #[error("another render is writing {}", path.display())]

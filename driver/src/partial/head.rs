@@ -1,5 +1,6 @@
 //! Head of a partial render: title and settings.
 
+use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
@@ -7,6 +8,7 @@ use serde_json::{Map, Value};
 
 use super::error::{PartialError, VERSION};
 use super::file::{self, FAMILY, Title, read_title};
+use super::records::has_record;
 
 /// Maximum size of the settings, bytes.
 const MAX_SETTINGS: u64 = 1 << 20;
@@ -24,7 +26,7 @@ pub(super) struct Head {
 pub struct PartialSettings {
     /// Path of the file.
     pub path: PathBuf,
-    /// True to take over its tiles.
+    /// True to take over its tiles; otherwise a file with tiles is an error.
     pub resume: bool,
 }
 
@@ -39,6 +41,16 @@ impl PartialSettings {
         };
         (&file).rewind().map_err(failed(&self.path))?;
         Ok(read_head(&mut BufReader::new(&file), &self.path)?.map(|head| head.settings))
+    }
+
+    /// Checks that the file may be written: it has no tiles, or the render goes on from them.
+    ///
+    /// # Errors
+    /// [`PartialError::Unfinished`] if tiles would be lost; if the file is no partial render of this version,
+    /// in use by another render or unreadable.
+    pub fn check_free(&self) -> Result<(), PartialError> {
+        let file = file::open(&self.path, false)?;
+        file.filter(|_| !self.resume).map_or(Ok(()), |file| check_empty(&file, &self.path))
     }
 }
 
@@ -59,6 +71,18 @@ pub(super) fn read_head(reader: &mut impl BufRead, path: &Path) -> Result<Option
     let bytes = (title().len() + settings.len()) as u64;
     let settings = serde_json::from_slice(&settings).map_err(|_| foreign())?;
     Ok(Some(Head { settings, bytes }))
+}
+
+/// Checks that a file has no tiles.
+///
+/// # Errors
+/// If it has, or is no partial render of this version.
+pub(super) fn check_empty(mut file: &File, path: &Path) -> Result<(), PartialError> {
+    file.rewind().map_err(failed(path))?;
+    let mut reader = BufReader::new(file);
+    let has_tiles =
+        read_head(&mut reader, path)?.is_some() && has_record(&mut reader).map_err(failed(path))?;
+    if has_tiles { Err(PartialError::Unfinished { path: path.to_owned() }) } else { Ok(()) }
 }
 
 /// Error of a file that cannot be read.

@@ -83,6 +83,11 @@ pub(super) fn read_tiles(
     Ok(sound)
 }
 
+/// Returns whether the file has a record from the reader's place on.
+pub(super) fn has_record(reader: &mut impl BufRead) -> io::Result<bool> {
+    Ok(skip_magic(reader)?.is_some())
+}
+
 /// Skips to the end of the next magic number. Returns the number of bytes skipped; `None` if the file ends before.
 fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     let (mut skipped, mut matched) = (0, 0);

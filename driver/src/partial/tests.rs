@@ -330,20 +330,65 @@ fn a_foreign_file_is_refused_and_stays() {
     }
 }
 
+/// Without `resume` a file of tiles is neither written over nor removed, whoever wrote it and whenever.
 #[test]
-fn another_version_is_told_and_begun_anew_without_resume() {
+fn finished_tiles_are_not_lost_without_resume() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = partial(&folder, false);
+    let film = &mut film();
+    // The file appears after the render has begun.
+    let begun = begin_render(&settings, json!({ "seed": 1 }), film).unwrap();
+    let bytes = written(&folder);
+    begun.put(&blank(&tile(0)));
+    assert!(matches!(begun.check(), Err(PartialError::Unfinished { .. })));
+    begun.remove().unwrap();
+    for identity in [json!({ "seed": 1 }), json!({ "seed": 2 })] {
+        assert!(matches!(settings.check_free(), Err(PartialError::Unfinished { .. })));
+        let begun = begin_render(&settings, identity, film);
+        assert!(matches!(begun, Err(PartialError::Unfinished { .. })));
+    }
+    assert!(fs::read(&settings.path).unwrap() == bytes);
+    partial(&folder, true).check_free().unwrap();
+    let head = bytes.len() - TILES as usize * RECORD_BYTES;
+    for length in [0, 10, head, head + MAGIC.len() - 1] {
+        fs::write(&settings.path, &bytes[..length]).unwrap();
+        settings.check_free().unwrap();
+    }
+}
+
+/// Records of another picture have checksums as well: a file that takes the place of one that is read is
+/// refused.
+#[test]
+fn a_file_that_changes_while_it_is_read_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = written(&folder);
+    let settings = partial(&folder, true);
+    let render = begin_render(&settings, json!({ "seed": 1 }), &mut film()).unwrap();
+    let file = File::open(&settings.path).unwrap();
+    let mut reader = BufReader::new(&file);
+    let head = read_head(&mut reader, &settings.path).unwrap().unwrap();
+    render.check_unchanged(&mut reader, &head).unwrap();
+    let place = bytes.windows(9).position(|window| window == b"\"seed\":1}").unwrap();
+    let mut other = bytes.clone();
+    other[place + 7] = b'2';
+    for changed in [&other[..], &bytes[..place], b"notes"] {
+        fs::write(&settings.path, changed).unwrap();
+        assert!(render.check_unchanged(&mut reader, &head).is_err());
+    }
+}
+
+#[test]
+fn another_version_is_told_and_stays() {
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;
     let old = b"photoncard partial render 1\n{}\nsomething";
     fs::write(&path, old).unwrap();
     let film = &mut film();
-    let begun = begin_render(&partial(&folder, true), json!({}), film);
-    assert!(matches!(begun, Err(PartialError::Version { found: 1, .. })));
+    for resume in [false, true] {
+        let begun = begin_render(&partial(&folder, resume), json!({}), film);
+        assert!(matches!(begun, Err(PartialError::Version { found: 1, .. })));
+    }
     assert_eq!(fs::read(&path).unwrap(), old);
-    let begun = begin_render(&partial(&folder, false), json!({}), film).unwrap();
-    begun.put(&blank(&tile(0)));
-    begun.check().unwrap();
-    assert!(fs::read(&path).unwrap().starts_with(b"photoncard partial render 3\n{}\n\x89TILE"));
 }
 
 /// Links lead to others' files, and a pipe would block: neither is opened.

@@ -1,7 +1,7 @@
 //! The file of a part.
 
 use std::fs::File;
-use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufReader, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use photoncard_shared::message::Tile;
@@ -80,10 +80,11 @@ impl PartFile {
         Err(PartError::Damaged { path: self.path.clone(), fault })
     }
 
-    /// Reads the `patches` of the part.
+    /// Reads the `patches` of the part. The head is read again before and after them: pixels of a file that
+    /// is written over meanwhile are those of another picture, and have checksums as well.
     ///
     /// # Errors
-    /// If the file is damaged or unreadable, and those of `put`.
+    /// If the file is damaged, unreadable or no longer that of the head, and those of `put`.
     pub(super) fn read(
         &self,
         patches: &[Tile],
@@ -92,10 +93,8 @@ impl PartFile {
         let unreadable = |source| PartError::Unreadable { path: self.path.clone(), source };
         let fault = "pixels of it have another checksum, or are those of another part";
         let damaged = || PartError::Damaged { path: self.path.clone(), fault };
-        let mut file = File::open(&self.path).map_err(unreadable)?;
-        let [head, _] = self.bytes;
-        file.seek(SeekFrom::Start(head)).map_err(unreadable)?;
-        let mut reader = BufReader::new(file);
+        let mut reader = BufReader::new(File::open(&self.path).map_err(unreadable)?);
+        self.check_head(&mut reader)?;
         for patch in patches {
             let mut bytes = vec![0; record_bytes(patch, &self.picture.format) as usize];
             match reader.read_exact(&mut bytes) {
@@ -104,6 +103,17 @@ impl PartFile {
             }
             put(decode(&bytes, patch, self.picture.format).ok_or_else(damaged)?)?;
         }
-        Ok(())
+        self.check_head(&mut reader)
+    }
+
+    /// Checks that the file still begins with the head, and reads up to its end.
+    fn check_head(&self, reader: &mut BufReader<File>) -> Result<(), PartError> {
+        reader.rewind().map_err(|source| PartError::Unreadable { path: self.path.clone(), source })?;
+        match KIND.read::<PartHead>(reader) {
+            Ok((head, _)) if head == self.head => Ok(()),
+            _ => {
+                Err(PartError::Damaged { path: self.path.clone(), fault: "it has changed while it was read" })
+            }
+        }
     }
 }

@@ -74,6 +74,14 @@ impl Parts {
         self.files.first().map(|file| &file.head)
     }
 
+    /// Reads the pixels of all files.
+    ///
+    /// # Errors
+    /// If one is damaged or unreadable.
+    pub fn check_pixels(&self) -> Result<(), PartError> {
+        self.files.iter().try_for_each(|file| file.read(self.patches_of(file), |_| Ok(())))
+    }
+
     /// Merges the parts. Several files of a part must have equal pixels.
     ///
     /// # Errors

@@ -53,6 +53,28 @@ fn refused(paths: &[PathBuf]) -> PartError {
     }
 }
 
+/// A file of other settings that takes the place of one whose head was read: its pixels have checksums as
+/// well.
+#[test]
+fn a_part_that_changes_after_its_head_was_read_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = written(folder.path(), "1.part", part(1, 1), &film(0));
+    let parts = Parts::open(std::slice::from_ref(&path)).unwrap();
+    assert!(parts.check_pixels().is_ok() && parts.merge().is_ok());
+    let mut other = head(part(1, 1), 4);
+    other.settings.insert("seed".into(), json!(4));
+    write(&path, &other, &film(9)).unwrap();
+    for refused in [parts.check_pixels().err(), parts.merge().err()] {
+        assert!(matches!(refused, Some(PartError::Damaged { .. })), "{refused:?}");
+    }
+    write(&path, &head(part(1, 1), 4), &film(0)).unwrap();
+    let mut damaged = fs::read(&path).unwrap();
+    let last = damaged.len() - 9;
+    damaged[last] ^= 1;
+    fs::write(&path, damaged).unwrap();
+    assert!(matches!(parts.check_pixels(), Err(PartError::Damaged { .. })));
+}
+
 fn equal(a: &Film, b: &Film) -> bool {
     a.is_complete() && b.is_complete() && a.format() == b.format() && a.sums().eq(b.sums())
 }

@@ -68,8 +68,8 @@ impl CardAtWork<'_> {
     /// Returns a card's tiles to the scheduler after an error. Returns whether the card is retried.
     fn recover(&mut self, error: SessionError) -> Result<bool, RenderError> {
         let Self { number, crew, .. } = *self;
-        if let Some(tile) = error.lie() {
-            crew.dispatcher.distrust(number, tile);
+        if error.is_wrong() {
+            crew.dispatcher.distrust(number, error.lie());
         }
         if !error.may_pass() {
             self.greeted.session.give_back();

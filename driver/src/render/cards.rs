@@ -12,7 +12,7 @@ use photoncard_shared::message::Tile;
 
 use super::card_thread::render_on;
 use super::crew::Crew;
-use super::executor::{Executor, Outcome, Work};
+use super::executor::{BudgetCheck, Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, greet};
 use super::open_card::OpenCard;
 use super::outputs::Outputs;
@@ -37,7 +37,8 @@ pub(super) struct Cards {
     shared: SharedImage,
     /// Image that the cards were last loaded with.
     upload: Option<(Arc<CardImage>, Arc<Upload>)>,
-    /// Number of cards that have not answered the greeting, or were given up in an earlier render.
+    /// Number of cards that have not answered the greeting, were left out for their budget, or given up in an
+    /// earlier render.
     lost: usize,
     /// Time of the end of the last render, or of the greeting.
     used: Instant,
@@ -93,7 +94,7 @@ impl Cards {
         self.set == settings.cards && !is_modelled && is_fresh && self.cards.len() >= settings.needed_cards()
     }
 
-    /// Reports cards that have not answered the greeting to the observer.
+    /// Reports cards that have not answered the greeting, or have too small a budget, to the observer.
     ///
     /// # Errors
     /// If too few are left: the error of the last lost card.
@@ -147,7 +148,7 @@ impl Cards {
         scheduler: Scheduler,
         sinks: Vec<&dyn TileSink>,
         outputs: &Outputs,
-    ) -> Result<Outcome, RenderError> {
+    ) -> Outcome {
         let begun = self.start.elapsed();
         let count = self.cards.len();
         let names: Vec<String> = self.cards.iter().map(|(name, _)| name.clone()).collect();
@@ -169,27 +170,35 @@ impl Cards {
         );
         let ended = self.start.elapsed();
         let links = self.cards.iter_mut().map(|(_, card)| card.count_bytes()).collect();
-        let loaded = latest(results)?.max(begun);
         let scheduler = crew.dispatcher.scheduler();
+        let (loaded, failure) = match latest(results) {
+            Ok(loaded) => (loaded.max(begun), None),
+            Err(error) => (ended, Some(error)),
+        };
+        let outcome = Outcome {
+            counters: scheduler.counters(),
+            links,
+            traffic: None,
+            cards: count + self.lost,
+            cards_given_up: self.lost,
+            tiles: scheduler.counts(),
+            failure,
+            load_seconds: (loaded - begun).as_secs_f64(),
+            render_seconds: (ended - loaded).as_secs_f64(),
+        };
+        if outcome.failure.is_some() {
+            let given_up = (0..count).filter(|&card| scheduler.standing(card) == Standing::GivenUp).count();
+            return Outcome { cards_given_up: self.lost + given_up, ..outcome };
+        }
         for (number, (_, card)) in self.cards.iter_mut().enumerate() {
             card.tiles = scheduler.rendered_by(number).copied().collect();
         }
         let is_given_up = |card: usize| scheduler.standing(card) == Standing::GivenUp;
         let given_up: Vec<bool> = (0..count).map(is_given_up).collect();
-        let given_up_before = self.lost;
         self.lost += given_up.iter().filter(|&&given_up| given_up).count();
         let mut is_kept = given_up.iter().map(|given_up| !given_up);
         self.cards.retain(|_| is_kept.next().unwrap_or(true));
-        Ok(Outcome {
-            counters: scheduler.counters(),
-            links,
-            traffic: None,
-            cards: count + given_up_before,
-            cards_given_up: self.lost,
-            tiles: scheduler.counts(),
-            load_seconds: (loaded - begun).as_secs_f64(),
-            render_seconds: (ended - loaded).as_secs_f64(),
-        })
+        Outcome { cards_given_up: self.lost, ..outcome }
     }
 
     /// Ends cards whose memory is modelled. Returns the sum of their traffic.
@@ -213,6 +222,29 @@ impl Executor for Cards {
         self.cards.iter().map(|(_, card)| card.budget).collect()
     }
 
+    fn leave_out(
+        &mut self,
+        check: BudgetCheck,
+        needed: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError> {
+        let mut misfits = Vec::new();
+        for (name, card) in std::mem::take(&mut self.cards) {
+            match check(&card.budget) {
+                Ok(()) => self.cards.push((name, card)),
+                Err(error) => misfits.push((name, error)),
+            }
+        }
+        self.lost += misfits.len();
+        let is_alike = |(_, error): &(String, RenderError)| error.to_string() == misfits[0].1.to_string();
+        if self.cards.is_empty() && misfits.iter().all(is_alike) {
+            // The setting is at fault, and no card.
+            return misfits.pop().map_or(Ok(()), |(_, error)| Err(error));
+        }
+        let misfits = misfits.into_iter().map(|(name, error)| (name, CardError::of_budget(&error)));
+        self.lose(misfits.collect(), needed, observer)
+    }
+
     fn finishes_tiles_early(&self) -> bool {
         true
     }
@@ -233,10 +265,10 @@ impl Executor for Cards {
         let outcome = self.render(&job, scheduler, sinks, outputs);
         self.used = Instant::now();
         if settings.modelled_caches().is_none() {
-            return outcome;
+            return Ok(outcome);
         }
-        let traffic = self.finish_models();
-        Ok(Outcome { traffic: Some(traffic?), ..outcome? })
+        let traffic = Some(self.finish_models()?);
+        Ok(Outcome { traffic, ..outcome })
     }
 }
 

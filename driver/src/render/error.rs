@@ -1,5 +1,6 @@
 //! Errors of a render.
 
+use miette::Diagnostic;
 use photoncard_shared::message::Fault;
 
 use crate::emulator::direct::TileError;
@@ -30,6 +31,15 @@ pub enum CardError {
         "another host may be using the card: wait until it is done; or check that a card listens at the address"
     ))]
     Refused,
+    /// Error of a card whose budget is too small for the picture.
+    #[error("{reason}")]
+    #[diagnostic(help("{remedy}; or leave the card out"))]
+    Budget {
+        /// Description of what has no room.
+        reason: String,
+        /// Remedy.
+        remedy: String,
+    },
     /// Error of a card that was reset during its self-test.
     #[error("it was reset during its self-test")]
     #[diagnostic(help("watch the card's own messages, and check its power supply and its watchdog"))]
@@ -38,6 +48,14 @@ pub enum CardError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Session(#[from] SessionError),
+}
+
+impl CardError {
+    /// Error of a card whose budget fails a check.
+    pub(super) fn of_budget(error: &RenderError) -> Self {
+        let remedy = error.help().map_or("choose other settings".to_owned(), |help| help.to_string());
+        Self::Budget { reason: error.to_string(), remedy }
+    }
 }
 
 /// Error of a render.
@@ -101,7 +119,7 @@ pub enum RenderError {
     #[error(
         "the tile {tile} in the file of finished tiles differs from what two cards render: a card has lied to the render that wrote it"
     )]
-    #[diagnostic(help("render without --resume"))]
+    #[diagnostic(help("remove that file, and render all tiles"))]
     KeptDiffers {
         /// The tile as an argument of `--crop`.
         tile: String,
@@ -182,8 +200,8 @@ impl RenderError {
             Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,
             Self::Partial(error) => !matches!(error, PartialError::File { .. }),
             Self::Trace(error) => !matches!(error, OutputError::Write { .. }),
+            Self::Card { source, .. } => matches!(source, CardError::Budget { .. }),
             Self::Image(_)
-            | Self::Card { .. }
             | Self::Disagreement { .. }
             | Self::KeptDiffers { .. }
             | Self::Unverified { .. }

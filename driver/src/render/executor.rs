@@ -7,7 +7,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
 
 use super::outputs::Outputs;
-use super::{RenderError, RenderSettings};
+use super::{Observer, RenderError, RenderSettings};
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::film::Film;
 use crate::pack::CardImage;
@@ -15,10 +15,28 @@ use crate::scheduler::TileCounts;
 use crate::session::LinkBytes;
 use crate::sink::TileSink;
 
+/// Check that a chip with a budget can render a picture.
+pub(super) type BudgetCheck<'a> = &'a dyn Fn(&Budget) -> Result<(), RenderError>;
+
+/// Application of a check to all chips.
+pub(super) type FitChips<'a> = dyn FnMut(BudgetCheck) -> Result<(), RenderError> + 'a;
+
 /// Executor of a picture's tiles.
 pub(super) trait Executor {
     /// Budget of each chip.
     fn budgets(&self) -> Vec<Budget>;
+
+    /// Leaves out chips whose budgets fail the check, as long as `needed` others are left, and names them to
+    /// the observer.
+    ///
+    /// # Errors
+    /// The failure of a chip, if too few are left.
+    fn leave_out(
+        &mut self,
+        check: BudgetCheck,
+        needed: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError>;
 
     /// Returns whether tiles are finished one after another, so that a render that ends early has finished tiles.
     fn finishes_tiles_early(&self) -> bool;
@@ -26,7 +44,8 @@ pub(super) trait Executor {
     /// Renders the tiles into the sinks.
     ///
     /// # Errors
-    /// If the tiles cannot be rendered, or the observer stops the render.
+    /// If the tiles cannot be rendered, or the observer stops the render; as [`Outcome::failure`] if the
+    /// outcome until then is known.
     fn run(&mut self, work: Work) -> Result<Outcome, RenderError>;
 }
 
@@ -61,10 +80,12 @@ pub(super) struct Outcome {
     pub(super) traffic: Option<MemoryTraffic>,
     /// Number of cards.
     pub(super) cards: usize,
-    /// Number of cards that were given up, or have never answered the greeting.
+    /// Number of cards that were given up, left out for their budget, or have never answered the greeting.
     pub(super) cards_given_up: usize,
     /// Numbers of tiles that were rendered more than once or taken over.
     pub(super) tiles: TileCounts,
+    /// Error that has ended the work; the rest is what was done until then.
+    pub(super) failure: Option<RenderError>,
     /// Time until the last card was loaded, seconds.
     pub(super) load_seconds: f64,
     /// Time after the last card was loaded, seconds.

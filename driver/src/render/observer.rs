@@ -3,6 +3,7 @@
 use std::error::Error;
 
 use photoncard_shared::message::Tile;
+use serde_json::Value;
 
 use super::error::CardError;
 use crate::sink::TileSink;
@@ -49,6 +50,10 @@ pub trait Observer: Sync {
     fn tiles(&self) -> Option<&dyn TileSink> {
         None
     }
+
+    /// Reports the [statistics](super::Statistics) of a render that ends with an error after its cards have
+    /// begun, up to then, as JSON.
+    fn failed(&self, _statistics: Value) {}
 
     /// Tells that a viewer does not show the picture, or no more; the render goes on.
     fn not_shown(&self, _error: &dyn Error) {}

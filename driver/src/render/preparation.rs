@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use photoncard_shared::budget::Budget;
 use photoncard_shared::message::CausticGather;
 
+use super::executor::FitChips;
 use super::times::Times;
 use super::{Observer, Phase, RenderError, RenderSettings};
 use crate::pack::{CardImage, PackedScene};
@@ -29,20 +29,18 @@ pub(super) struct Prepared {
 /// Maps the photons of a packed scene.
 ///
 /// # Errors
-/// If the image does not fit a budget, the photons cannot be traced, or the observer stops the render.
+/// If the image does not fit the chips, the photons cannot be traced, or the observer stops the render.
 pub(super) fn prepare(
     scene: &FixedScene,
     packed: PackedScene,
     settings: &RenderSettings,
-    budgets: &[Budget],
+    fit: &mut FitChips,
     times: &mut Times,
     observer: &dyn Observer,
 ) -> Result<Prepared, RenderError> {
     let start = Instant::now();
     let photon_settings = settings.photon_settings_of(scene);
-    for budget in budgets {
-        photon_map::check_packed(&packed, &photon_settings, budget)?;
-    }
+    fit(&|budget| Ok(photon_map::check_packed(&packed, &photon_settings, budget)?))?;
     let total = settings.photons.count as u64;
     let progress = |stored: usize| {
         observer.progress(Phase::Photons, stored as u64, total);
@@ -52,9 +50,7 @@ pub(super) fn prepare(
         !observer.is_stopped()
     };
     let mapped = map_photons(packed, &photon_settings, &progress)?;
-    for budget in budgets {
-        photon_map::check_image(&mapped.image, budget)?;
-    }
+    fit(&|budget| Ok(photon_map::check_image(&mapped.image, budget)?))?;
     let PhotonTimes { tracing, building, measuring, estimating } = mapped.times;
     times.photons = tracing.as_secs_f64();
     times.pack += start.elapsed().as_secs_f64() - times.photons;

@@ -3,11 +3,10 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{FrameParameters, SumScale};
 
 use super::cards::Cards;
-use super::executor::{Executor, Work};
+use super::executor::{BudgetCheck, Executor, FitChips, Work};
 use super::outputs::Outputs;
 use super::preparation::{Prepared, prepare};
 use super::times::Times;
@@ -15,7 +14,7 @@ use super::whole_frame::WholeFrame;
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
 use crate::film::{Film, FilmError};
 use crate::pack::PackedScene;
-use crate::partial::PartialRender;
+use crate::partial::{PartialRender, PartialSettings};
 use crate::photon_map::{PhotonSettings, check_image};
 use crate::scene::{FixedScene, Scene};
 
@@ -165,22 +164,24 @@ impl Renderer {
         } else {
             connected(cards, settings, observer)?
         };
-        let budgets = executor.budgets();
-        settings.check_budgets(&budgets)?;
-        settings.outputs.partial.as_ref().map(PartialRender::check_free).transpose()?;
+        let needed = settings.needed_cards();
+        executor.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
+        settings.outputs.partial.as_ref().map(PartialSettings::check_free).transpose()?;
         let mut times = Times::default();
         let (settings, source) = Source::new(scene, settings, choose, kept, &mut times)?;
-        let tile = settings.tile_side(&budgets);
+        executor.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
+        let tile = settings.tile_side(&executor.budgets());
         let settings = &settings.with(|s| s.schedule.tile = Some(tile));
         settings.check()?;
-        settings.check_budgets(&budgets)?;
+        settings.check_budgets(&executor.budgets())?;
         // A film may be large: it is allocated after the settings are checked.
         let mut film = settings.film(source.sum_scale())?;
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
         let tiles = settings.tiles(tile);
         let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
         let is_image_kept = matches!(source, Source::Kept(_));
-        let made = source.prepare(scene, settings, &budgets, &mut times, observer)?;
+        let fit = &mut |check: BudgetCheck| executor.leave_out(check, needed, observer);
+        let made = source.prepare(scene, settings, fit, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;
         let frame = FrameParameters {
             first_sample: outputs.base.as_ref().map_or(0, |base| base.format().samples),
@@ -200,12 +201,18 @@ impl Renderer {
             sinks,
             outputs: &outputs,
         };
-        let outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
+        let budgets = executor.budgets();
+        let mut outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
         times.load = outcome.load_seconds;
         times.render = outcome.render_seconds;
         times.total = start.elapsed().as_secs_f64();
         let provenance = Provenance::new(settings, scene, &camera, &frame, &budgets);
         let statistics = Statistics::new(settings, &frame, prepared, &outcome, times, provenance);
+        if let Some(error) = outcome.failure.take() {
+            outputs.report_kept();
+            observer.failed(serde_json::to_value(&statistics).unwrap_or_default());
+            return Err(error);
+        }
         let mut film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
         outputs.base.as_ref().map_or(Ok(()), |base| film.add(base)).map_err(not_more(settings))?;
         let partial = outputs.finish(&film);
@@ -296,28 +303,26 @@ impl Source {
     /// The card image.
     ///
     /// # Errors
-    /// If it does not fit a budget, the photons cannot be traced, or the observer stops the render.
+    /// If it does not fit the chips, the photons cannot be traced, or the observer stops the render.
     pub(super) fn prepare(
         self,
         scene: &FixedScene,
         settings: &RenderSettings,
-        budgets: &[Budget],
+        fit: &mut FitChips,
         times: &mut Times,
         observer: &dyn Observer,
     ) -> Result<Kept, RenderError> {
         let packed = match self {
             Self::Packed(packed) => *packed,
             Self::Kept(kept) => {
-                for budget in budgets {
-                    check_image(&kept.prepared.image, budget)?;
-                }
+                fit(&|budget| Ok(check_image(&kept.prepared.image, budget)?))?;
                 return Ok(kept);
             }
         };
         Ok(Kept {
             scene: scene.checksum_without_cameras().to_owned(),
             photons: settings.photon_settings_of(scene),
-            prepared: prepare(scene, packed, settings, budgets, times, observer)?,
+            prepared: prepare(scene, packed, settings, fit, times, observer)?,
         })
     }
 }

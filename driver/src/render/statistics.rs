@@ -33,7 +33,7 @@ pub struct Statistics {
     pub max_distance: f32,
     /// Number of cards, one chip each.
     pub cards: usize,
-    /// Number of cards that were given up, or have never answered the greeting.
+    /// Number of cards that were given up, left out for their budget, or have never answered the greeting.
     pub cards_given_up: usize,
     /// Number of tiles that two cards have rendered equally.
     pub verified_tiles: usize,

@@ -6,8 +6,8 @@ use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::budget::Budget;
 
 use super::address::CardAddress;
-use super::executor::{Executor, Outcome, Work};
-use super::{Phase, RenderError, RenderSettings};
+use super::executor::{BudgetCheck, Executor, Outcome, Work};
+use super::{Observer, Phase, RenderError, RenderSettings};
 use crate::emulator::EmulatedKind;
 use crate::emulator::memory_model::CacheSettings;
 use crate::emulator::whole_frame::{CurveJob, CurveOutcome, render_along_curve};
@@ -32,6 +32,10 @@ impl WholeFrame {
 impl Executor for WholeFrame {
     fn budgets(&self) -> Vec<Budget> {
         vec![REFERENCE]
+    }
+
+    fn leave_out(&mut self, check: BudgetCheck, _: usize, _: &dyn Observer) -> Result<(), RenderError> {
+        check(&REFERENCE)
     }
 
     fn finishes_tiles_early(&self) -> bool {

@@ -56,6 +56,8 @@ pub(super) struct Entry {
     pub(super) progress: Progress,
     /// True if two cards must agree on the tile.
     pub(super) is_verified: bool,
+    /// True if the first answer is dazzling: another card is asked, as for a verified tile.
+    pub(super) is_doubted: bool,
     pub(super) copies: Vec<Copy>,
     pub(super) answers: Vec<Answer>,
     /// Cards that were reset or lost while they rendered the tile, once per crash.
@@ -65,7 +67,8 @@ pub(super) struct Entry {
 impl Entry {
     pub(super) fn new(tile: Tile) -> Self {
         let (copies, answers, crashes) = (Vec::new(), Vec::new(), Vec::new());
-        Self { tile, progress: Progress::Open, is_verified: false, copies, answers, crashes }
+        let progress = Progress::Open;
+        Self { tile, progress, is_verified: false, is_doubted: false, copies, answers, crashes }
     }
 
     pub(super) fn is_open(&self) -> bool {
@@ -103,20 +106,44 @@ impl Entry {
 
     /// Removes all answers if two of them agree, and returns the verdict.
     pub(super) fn judge(&mut self) -> Option<Judgement> {
-        let [first, second] = self.agreeing()?;
+        let Some([first, second]) = self.agreeing() else { return self.judge_by_light() };
         let answers = std::mem::take(&mut self.answers);
         let is_other = |answer: &&Answer| !answer.agrees_with(&answers[first]);
         let liars = answers.iter().filter(is_other).map(|answer| answer.source).collect();
         let was_kept = [first, second].iter().any(|&index| answers[index].source == Source::Kept);
         let tile = answers.into_iter().nth(first)?.tile;
-        Some(Judgement { tile, was_kept, liars })
+        let agreed = if was_kept { Agreement::WithKept } else { Agreement::OfCards };
+        Some(Judgement { tile, agreed, liars })
+    }
+
+    /// Believes one of two cards that differ, if the other's tile alone is dazzling.
+    fn judge_by_light(&mut self) -> Option<Judgement> {
+        let [a, b] = &self.answers[..] else { return None };
+        let (believed, liar) = match [a, b].map(|answer| answer.tile.is_dazzling()) {
+            [false, true] => (0, b.source),
+            [true, false] => (1, a.source),
+            _ => return None,
+        };
+        let agreed = Agreement::ByLight(self.answers[believed].source.card()?);
+        let tile = std::mem::take(&mut self.answers).swap_remove(believed).tile;
+        Some(Judgement { tile, agreed, liars: vec![liar] })
     }
 }
 
-/// Verdict on a verified tile: the tile of the majority, whether a partial file has it already, and the sources of other
-/// answers.
+/// Verdict on a verified tile: the tile that is believed, why, and the sources of other answers.
 pub(super) struct Judgement {
     pub(super) tile: FinishedTile,
-    pub(super) was_kept: bool,
+    pub(super) agreed: Agreement,
     pub(super) liars: Vec<Source>,
+}
+
+/// Reason why a tile is believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Agreement {
+    /// Two cards agree on it.
+    OfCards,
+    /// A card agrees with the partial file, which has it already.
+    WithKept,
+    /// The card's tile is not dazzling, and the other's is.
+    ByLight(CardNumber),
 }

@@ -5,6 +5,8 @@
 //!
 //! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; the tiles
 //!   that the outvoted card alone has rendered are rendered again.
+//! - A tile that is brighter than any but a lamp beside a surface makes it is verified as well, if there is
+//!   another card. A tile that is not is believed against one that is.
 //! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the cards that have
 //!   crashed at it the minimum number of times, and is abandoned after five crashes.
 //! - A tile of a picture by passes waits for the card that rendered it before, which has kept its irradiance records. Idle cards take tiles
@@ -37,7 +39,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::Tile;
 
 use self::card::{Card, TileTimes};
-use self::entry::{Answer, Entry, Judgement, Progress};
+use self::entry::{Agreement, Answer, Entry, Judgement, Progress};
 use crate::film::Film;
 use crate::sink::FinishedTile;
 
@@ -119,7 +121,7 @@ impl Scheduler {
         }
     }
 
-    /// Enables idle cards to duplicate tiles that other cards have had for too long.
+    /// Enables other cards to render tiles as well that a card has had for too long, or that are dazzling.
     #[must_use]
     pub fn with_helpers(self) -> Self {
         Self { has_helpers: true, ..self }
@@ -161,6 +163,7 @@ impl Scheduler {
         let Some((index, since)) = self.remove_copy(card, tile.tile().id, now) else {
             return Answered::default();
         };
+        let has_others = self.has_helpers && self.living().any(|other| other != card);
         let took = now.saturating_sub(since);
         self.times.count(took);
         let at = &mut self.cards[card];
@@ -170,7 +173,8 @@ impl Scheduler {
             self.counts.repeated += 1;
             return Answered::default();
         }
-        if !entry.is_verified {
+        entry.is_doubted |= has_others && tile.is_dazzling();
+        if !entry.is_verified && !entry.is_doubted {
             entry.progress = Progress::Found(Some(card));
             at.counters.add(&tile.counters);
             return Answered { found: Some(tile), ..Answered::default() };
@@ -187,14 +191,23 @@ impl Scheduler {
     /// Compares the answers to a tile.
     fn judge(&mut self, index: usize) -> Answered {
         let entry = &mut self.entries[index];
-        let Some(Judgement { tile, was_kept, liars }) = entry.judge() else { return Answered::default() };
-        self.counts.verified += 1;
-        entry.progress = Progress::Found(None);
+        let Some(Judgement { tile, agreed, liars }) = entry.judge() else { return Answered::default() };
+        let was_kept = agreed == Agreement::WithKept;
+        match agreed {
+            Agreement::ByLight(card) => {
+                entry.progress = Progress::Found(Some(card));
+                self.cards[card].counters.add(&tile.counters);
+            }
+            Agreement::OfCards | Agreement::WithKept => {
+                self.counts.verified += 1;
+                entry.progress = Progress::Found(None);
+            }
+        }
         let fault = liars.contains(&Source::Kept).then_some(SchedulerError::KeptDiffers { tile: entry.tile });
         if was_kept {
             entry.progress = Progress::Done(None);
             self.done += 1;
-        } else {
+        } else if agreed == Agreement::OfCards {
             self.verified_work.add(&tile.counters);
         }
         let liars = liars.into_iter().filter_map(Source::card).collect();
@@ -230,6 +243,7 @@ impl Scheduler {
                 self.set_apart.push(index);
             }
         }
+        self.release_doubted();
     }
 
     /// Removes a tile from a card. Returns its index and the time since which the card had it.
@@ -258,6 +272,23 @@ impl Scheduler {
         }
         if standing != Standing::Living {
             self.release_homes(card);
+            self.release_doubted();
+        }
+    }
+
+    /// Has the last card render doubted tiles again, as no other card is left to be asked.
+    fn release_doubted(&mut self) {
+        if self.living().nth(1).is_some() {
+            return;
+        }
+        for (index, entry) in self.entries.iter_mut().enumerate() {
+            let is_waiting = entry.is_open() && entry.copies.is_empty() && entry.answers.len() == 1;
+            if entry.is_doubted && !entry.is_verified && is_waiting {
+                entry.is_doubted = false;
+                entry.answers.clear();
+                self.compared.retain(|&compared| compared != index);
+                self.waiting.push_back(index);
+            }
         }
     }
 
@@ -276,11 +307,12 @@ impl Scheduler {
         self.cards[card].lie
     }
 
-    /// Gives up a card that sent wrong pixels of the tile `about`, with all tiles that it alone has rendered. Returns the
-    /// tiles for the sinks to revoke. None of its tiles may be in transit to the sinks.
-    pub fn expel(&mut self, card: CardNumber, about: Tile) -> Vec<Tile> {
+    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, with all tiles that it
+    /// alone has rendered. Returns the tiles for the sinks to revoke. None of its tiles may be in transit to
+    /// the sinks.
+    pub fn expel(&mut self, card: CardNumber, about: Option<Tile>) -> Vec<Tile> {
         self.set_standing(card, Standing::GivenUp);
-        self.cards[card].lie = Some(about);
+        self.cards[card].lie = about;
         self.cards[card].counters = Counters::ZERO;
         let mut revoked = Vec::new();
         for (index, entry) in self.entries.iter_mut().enumerate() {
@@ -292,6 +324,7 @@ impl Scheduler {
             } else if entry.is_open() && entry.has_answer_of(card) {
                 entry.answers.retain(|answer| answer.source != Source::Card(card));
                 if entry.answers.is_empty() {
+                    entry.is_doubted = false;
                     self.compared.retain(|&compared| compared != index);
                     if entry.copies.is_empty() {
                         self.waiting.push_back(index);

@@ -1,4 +1,4 @@
-use photoncard_shared::message::PIXEL_BYTES;
+use photoncard_shared::message::{PIXEL_BYTES, PixelSums};
 
 use crate::sums::SumFormat;
 
@@ -17,7 +17,15 @@ fn tile(id: u32) -> Tile {
 
 fn finished(id: u32, value: u8) -> FinishedTile {
     let counters = Counters { eye_rays: 10, drains: u64::from(value), ..Counters::ZERO };
-    FinishedTile::new(tile(id), vec![value; PIXEL_BYTES], SumFormat::ONE, counters).unwrap()
+    let mut records = vec![0; PIXEL_BYTES];
+    records[0] = value;
+    FinishedTile::new(tile(id), records, SumFormat::ONE, counters).unwrap()
+}
+
+/// A tile of so much green light.
+fn lit(id: u32, light: i64) -> FinishedTile {
+    let sums = PixelSums { light: [0, light, 0], ..PixelSums::default() };
+    FinishedTile::of_pixels(tile(id), [sums], SumFormat::ONE).unwrap()
 }
 
 /// Assigns the next tile to a card.
@@ -141,7 +149,7 @@ fn a_majority_of_three_tells_who_lies_and_all_its_tiles_are_rendered_again() {
         assert!(scheduler.check(SECOND).is_ok(), "a third card is left");
         assert_eq!(take(&mut scheduler, third, SECOND), Some(verified));
         assert_eq!(answer(&mut scheduler, third, verified, 0, SECOND), [liar]);
-        assert_eq!(scheduler.expel(liar, tile(verified)), [tile(1 - verified)]);
+        assert_eq!(scheduler.expel(liar, Some(tile(verified))), [tile(1 - verified)]);
         assert_eq!((scheduler.progress(), scheduler.lie_of(liar)), ((1, 2), Some(tile(verified))));
         assert_eq!(
             [take(&mut scheduler, liar, SECOND), take(&mut scheduler, third, SECOND)],
@@ -163,6 +171,54 @@ fn two_cards_that_differ_cannot_be_told_apart() {
     }
     let sources = vec![Source::Card(0), Source::Card(1)];
     assert_eq!(scheduler.check(SECOND), Err(SchedulerError::Disagreement { tile: tile(0), sources }));
+}
+
+/// A card alone is believed; of two, the one with less light; two that agree are right.
+#[test]
+fn dazzling_light_is_verified_where_there_is_another_card() {
+    let dazzling = 1 << 57;
+    for (cards, second, liars, end) in
+        [(1, None, vec![], dazzling), (2, Some(7), vec![0], 7), (2, Some(dazzling), vec![], dazzling)]
+    {
+        let mut scheduler = scheduler(1, cards).with_helpers();
+        assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
+        let mut answered = scheduler.answer(0, lit(0, dazzling), SECOND);
+        if let Some(light) = second {
+            assert!(answered.found.is_none());
+            assert_eq!(take(&mut scheduler, 1, SECOND), Some(0));
+            answered = scheduler.answer(1, lit(0, light), SECOND);
+        }
+        assert_eq!((answered.found, answered.liars), (Some(lit(0, end)), liars));
+        scheduler.complete(0);
+        assert!(scheduler.is_complete());
+    }
+    // The other card ends before it is asked, or while it renders.
+    for is_at_work in [false, true] {
+        let mut scheduler = scheduler(1, 2).with_helpers();
+        assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
+        assert!(scheduler.answer(0, lit(0, dazzling), SECOND).found.is_none());
+        if is_at_work {
+            assert_eq!(take(&mut scheduler, 1, SECOND), Some(0));
+        }
+        scheduler.set_standing(1, Standing::GivenUp);
+        scheduler.give_back(1, 0, true, SECOND);
+        assert!(scheduler.check(SECOND).is_ok());
+        assert_eq!(take(&mut scheduler, 0, SECOND), Some(0));
+        assert_eq!(scheduler.answer(0, lit(0, dazzling), SECOND).found, Some(lit(0, dazzling)));
+    }
+    // Modelled memory counts the reads of each tile once.
+    let mut alone = scheduler(1, 2);
+    assert_eq!(take(&mut alone, 0, Duration::ZERO), Some(0));
+    assert!(alone.answer(0, lit(0, dazzling), SECOND).found.is_some());
+    // What any scene has is not dazzling, with many samples nor with one.
+    for (samples, light, is_dazzling) in
+        [(1, 1 << 56, false), (1, i64::MAX, true), (64, 1 << 61, false), (64, 1 << 62, true)]
+    {
+        let format = SumFormat { samples, ..SumFormat::ONE };
+        let sums = PixelSums { light: [light, 0, 0], ..PixelSums::default() };
+        let tile = FinishedTile::of_pixels(tile(0), [sums], format).unwrap();
+        assert_eq!(tile.is_dazzling(), is_dazzling, "{light} of {samples}");
+    }
 }
 
 #[test]

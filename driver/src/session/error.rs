@@ -53,6 +53,18 @@ pub enum SessionError {
     #[error("the card has not answered for {} s", .0.as_secs())]
     #[diagnostic(help("check that the card is powered and its firmware runs"))]
     Silent(Duration),
+    /// Error of a line on which bytes come, but no frame.
+    #[error("{bytes} bytes have come from the card in {} s, and no message among them", time.as_secs())]
+    #[diagnostic(help(
+        "another bit rate garbles all (`serial:PATH@BAUD`, as the card's firmware sets it); or the firmware \
+         writes log text on this line, or another device or program is at the address, or the cable is bad"
+    ))]
+    Garbled {
+        /// Time without a frame.
+        time: Duration,
+        /// Number of bytes since the last frame.
+        bytes: u64,
+    },
     /// Error of a card that answers without progress.
     #[error("the card answers, but has come no further for {} s", .0.as_secs())]
     #[diagnostic(help(
@@ -68,7 +80,11 @@ pub enum SessionError {
     ))]
     Failures(u32),
     /// Error of the link.
-    #[error("the link to the card is closed ({0:?})")]
+    #[error("the link to the card {}", ending(.0))]
+    #[diagnostic(help(
+        "the card's process or the machine between has ended, another host has taken the card, or a cable \
+         was pulled: check them, and begin the command again"
+    ))]
     Port(PortError),
     /// Error of a pixel value that no chip can produce.
     #[error(
@@ -91,9 +107,9 @@ pub enum SessionError {
         /// Wrong value.
         value: f64,
     },
-    /// Error of a tile that two other cards render differently.
+    /// Error of a tile that other cards render differently.
     #[error(
-        "the card lies: its tile {},{},{},{} differs from what two other cards render",
+        "the card lies: its tile {},{},{},{} differs from what other cards render",
         .tile.x, .tile.x + .tile.width, .tile.y, .tile.y + .tile.height
     )]
     #[diagnostic(help(
@@ -103,6 +119,14 @@ pub enum SessionError {
         /// The disputed tile.
         tile: Tile,
     },
+}
+
+/// What has happened to a link, after its name.
+fn ending(error: &PortError) -> String {
+    match error {
+        PortError::Closed => "was closed by the other end".to_owned(),
+        PortError::Device(code) => format!("has failed (error {code} of its device)"),
+    }
 }
 
 /// Checks a card's versions. They are decoded before the rest of a hello, whose format may differ between versions.
@@ -136,8 +160,14 @@ impl SessionError {
         }
     }
 
+    /// Returns whether the card is wrong about what it was asked, so that nothing of what it has rendered can
+    /// be trusted: it lies, or its messages are none that a sound card sends.
+    pub fn is_wrong(&self) -> bool {
+        self.lie().is_some() || matches!(self, Self::Unexpected(_))
+    }
+
     /// Returns whether the card may be retried: it has been silent, slow or disconnected, but not wrong.
     pub fn may_pass(&self) -> bool {
-        matches!(self, Self::Silent(_) | Self::Standstill(_) | Self::Port(_))
+        matches!(self, Self::Silent(_) | Self::Garbled { .. } | Self::Standstill(_) | Self::Port(_))
     }
 }

@@ -18,16 +18,16 @@ const GRID_CELLS: f32 = (1 << 20) as f32;
 ///
 /// | sum | range |
 /// |---|---|
-/// | light, direct, indirect, caustic | at least 0 |
+/// | light, direct, indirect, caustic | at least 0; beside a lamp without extent there is no upper limit |
 /// | albedo | 0 to s |
 /// | normals | length 0 to s, and 2^-19 s for the rounding of normals |
-/// | depths | at least -2^-19 s times the maximum coordinate, for a surface in the eye's plane |
+/// | depths | 0 to s times the distance to the scene's farthest corner; 2^-19 s maximum coordinates beyond |
 /// | surfaces s, gathers | 0 to n |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     format: SumFormat,
-    /// Minimum depth of a sample, multiples of 1 / [`DEPTH_STEPS`] units.
-    least_depth: f64,
+    /// Minimum and maximum depth of a sample, multiples of 1 / [`DEPTH_STEPS`] units.
+    depths: [f64; 2],
 }
 
 /// Invalid value of a channel.
@@ -46,7 +46,8 @@ impl PixelLimits {
         let eye = frame.camera.origin.iter().fold(0.0, |most: f32, coordinate| most.max(coordinate.abs()));
         let format = SumFormat::new(header, frame);
         let steps = f64::from(DEPTH_STEPS) / f64::from(format.scale.depth);
-        Self { format, least_depth: -f64::from(DEPTH_ROUNDING * (farthest + eye)) * steps - 1.0 }
+        let rounding = f64::from(DEPTH_ROUNDING * (farthest + eye)) * steps + 1.0;
+        Self { format, depths: [-rounding, farthest_corner(header, frame) * steps + rounding] }
     }
 
     /// Format of the sums.
@@ -71,7 +72,8 @@ impl PixelLimits {
             (!is_possible).then_some(BadValue { channel, value: f64::from(count) })
         };
         let is_albedo = |value: f64| value <= seen * f64::from(ALBEDO_STEPS);
-        let is_deep = (depth as f64) >= self.least_depth * seen && (surfaces > 0 || depth == 0);
+        let [least, most] = self.depths.map(|depth| depth * seen);
+        let is_deep = (least..=most).contains(&(depth as f64)) && (surfaces > 0 || depth == 0);
         find_count("surfaces", surfaces)
             .or_else(|| find_light("radiance", light))
             .or_else(|| find("albedo", albedo.map(f64::from), &is_albedo))
@@ -85,4 +87,18 @@ impl PixelLimits {
                     .or_else(|| find_count("gathers", gathers))
             })
     }
+}
+
+/// Distance from the eye to the farthest corner of the photon grid, which holds the scene, metres; an axis of
+/// another length than 1 counts.
+fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
+    let grid = &header.photon_grid;
+    let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();
+    let ways = std::array::from_fn(|axis| {
+        let first = f64::from(grid.origin[axis]) * f64::from(grid.cell);
+        let last = first + f64::from(GRID_CELLS * grid.cell);
+        let eye = f64::from(frame.camera.origin[axis]);
+        (first - eye).abs().max((last - eye).abs())
+    });
+    length(ways) * length(frame.camera.forward.map(f64::from)).max(1.0)
 }

@@ -13,12 +13,14 @@ pub(crate) enum Lie {
     Impossible(fn(&mut PixelSums)),
     /// Red increased by a factor.
     Brighter(f32),
+    /// Green of a value.
+    Dazzling(i64),
 }
 
 impl Lie {
     /// Falsification that the pixel itself reveals.
     pub(crate) fn impossible(random: &mut Random) -> Self {
-        const LIES: [fn(&mut PixelSums); 9] = [
+        const LIES: [fn(&mut PixelSums); 11] = [
             |sums| sums.light[1] = -1,
             |sums| sums.light[2] = i64::MIN,
             |sums| sums.albedo[0] = u32::MAX,
@@ -27,6 +29,8 @@ impl Lie {
             |sums| sums.normal = [sums.surfaces as i32 * NORMAL_STEPS as i32 * 7 / 10; 3],
             |sums| (sums.surfaces, sums.depth) = (0, 1),
             |sums| sums.depth = i64::MIN,
+            |sums| sums.depth = i64::MAX,
+            |sums| sums.depth = 1 << 56,
             |sums| sums.surfaces = u32::MAX,
         ];
         Self::Impossible(LIES[random.below(LIES.len())])
@@ -40,6 +44,7 @@ impl Lie {
                 lie(&mut sums);
                 sums.surfaces += u32::from(sums.surfaces == 0 && sums.depth == 0) * u32::MAX;
             }
+            Self::Dazzling(light) => sums.light[1] = light,
             Self::Brighter(factor) => {
                 // A factor would not change a black pixel.
                 sums.light[0] = ((sums.light[0] as f64 + 1e9) * f64::from(factor)) as i64;

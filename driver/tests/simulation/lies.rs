@@ -143,6 +143,28 @@ fn verified_lies_are_outvoted_or_named() {
     });
 }
 
+/// Light that a chip's sums can hold, and that is next to impossible: an honest card is believed, without
+/// `--verify`.
+#[test]
+fn dazzling_lies_never_reach_the_picture() {
+    with_room_for_a_card(|| {
+        let mut caught = 0;
+        check_seeds(0xda22, |fixture, alone, seed, random| {
+            let light = [i64::MAX, 1 << 62, 1 << 58][random.below(3)];
+            let lies = [(0, (Lie::Dazzling(light), 1 << random.below(4)))];
+            let run = Run { liars: lies.into(), ..Run::new(fixture, 2 + random.below(3), seed) };
+            let outcome = run.go();
+            assert_eq!(outcome.end, End::Complete, "seed {seed}: honest cards are left");
+            check_tiles(&outcome, alone, seed);
+            assert!(outcome.pixels == alone.pixels, "seed {seed}");
+            assert_eq!(outcome.counters, alone.counters, "seed {seed}: work is counted twice");
+            assert!(outcome.caught.is_empty() || outcome.caught == [0], "seed {seed}");
+            caught += outcome.caught.len();
+        });
+        assert!(caught > 0);
+    });
+}
+
 /// No pixel of a detected card stays in the picture, whatever share of its tiles was verified.
 #[test]
 fn what_a_caught_liar_has_rendered_is_rendered_again() {

@@ -201,9 +201,9 @@ impl Station {
         dispatcher: &Dispatcher,
         now: Duration,
     ) -> Result<(), SchedulerError> {
-        if let Some(tile) = error.lie() {
+        if error.is_wrong() {
             assert!(self.voice.lie.is_some(), "seed {}: an honest card lies: {error}", run.seed);
-            dispatcher.distrust(self.number, tile);
+            dispatcher.distrust(self.number, error.lie());
         }
         if error.may_pass() {
             self.is_lost = true;
@@ -215,7 +215,7 @@ impl Station {
         let standing = if error.may_pass() { Standing::Lost } else { Standing::GivenUp };
         dispatcher.scheduler().set_standing(self.number, standing);
         if !error.may_pass() {
-            let is_expected = error.lie().is_some() || matches!(error, SessionError::Failures(_));
+            let is_expected = error.is_wrong() || matches!(error, SessionError::Failures(_));
             assert!(is_expected, "seed {}: {error}", run.seed);
             self.given_up = Some(error);
         }

@@ -6,16 +6,24 @@ use std::str::FromStr;
 use clap::Args;
 use photoncard_driver::cost_model::Machine;
 
-/// Machine of a study's times and numbers of chips. What is measured does not depend on it.
+/// Rates of the machine of a study's times. What is measured does not depend on them.
 #[derive(Args)]
 #[command(next_help_heading = "Chip of the report's times")]
-pub(crate) struct MachineOptions {
+pub(crate) struct RateOptions {
     /// Bandwidth of a chip's DRAM, GB/s
     #[arg(long, value_name = "GB/S", default_value = "90", value_parser = giga, allow_negative_numbers = true)]
     bandwidth: f64,
     /// Arithmetic of a chip, GFLOPS
     #[arg(long, value_name = "GFLOPS", default_value = "500", value_parser = giga, allow_negative_numbers = true)]
     flops: f64,
+}
+
+/// Machine of a study's times and numbers of chips. What is measured does not depend on it.
+#[derive(Args)]
+#[command(next_help_heading = "Chip of the report's times")]
+pub(crate) struct MachineOptions {
+    #[command(flatten)]
+    rates: RateOptions,
     /// Latency of a read from DRAM, nanoseconds, in the times of reordering and interactive
     #[arg(long, value_name = "NS", default_value = "100", value_parser = latency, allow_negative_numbers = true)]
     latency: f64,
@@ -31,16 +39,17 @@ const LATENCY: RangeInclusive<f64> = 0.0..=10_000.0;
 /// Tasks in flight.
 const TASKS: RangeInclusive<u32> = 1..=65_536;
 
+impl RateOptions {
+    /// The machine of these rates.
+    pub(crate) fn machine(&self) -> Machine {
+        Machine { bandwidth: 1e9 * self.bandwidth, flops: 1e9 * self.flops, ..Machine::NOMINAL }
+    }
+}
+
 impl MachineOptions {
     /// The machine.
     pub(crate) fn machine(&self) -> Machine {
-        Machine {
-            bandwidth: 1e9 * self.bandwidth,
-            flops: 1e9 * self.flops,
-            latency: self.latency / 1e9,
-            tasks: self.tasks,
-            ..Machine::NOMINAL
-        }
+        Machine { latency: self.latency / 1e9, tasks: self.tasks, ..self.rates.machine() }
     }
 }
 

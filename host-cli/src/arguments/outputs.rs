@@ -23,8 +23,9 @@ pub(crate) struct OutputOptions {
     pub(crate) pictures: Vec<PictureOutput>,
     /// Continue a render that was stopped or has failed
     ///
-    /// Finished tiles are kept beside the picture, in OUT.exr.partial, until the picture is written. Frames whose files are there and of these
-    /// settings are not rendered again.
+    /// Finished tiles are kept beside the picture, in OUT.exr.partial, until the picture is written. Without
+    /// this option such a file is refused: remove it to begin anew. Frames whose files are there, whole and
+    /// of these settings, are not rendered again.
     #[arg(long)]
     resume: bool,
     /// Type of the EXR's samples; Z and gathers are always float [default: float]

@@ -10,7 +10,7 @@ use photoncard_driver::study::{Axis, MAX_POINTS, Point, Scale, Task};
 
 use super::choice::choice;
 use super::integrator::IntegratorOptions;
-use super::machine::MachineOptions;
+use super::machine::RateOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
 use super::scene::SceneOptions;
@@ -34,7 +34,7 @@ pub(crate) struct SweepArguments {
     #[command(flatten)]
     pub(crate) output: StudyOutput,
     #[command(flatten)]
-    pub(crate) machine: MachineOptions,
+    pub(crate) machine: RateOptions,
     #[command(flatten)]
     settings: SweepSettings,
 }
@@ -117,5 +117,47 @@ fn axis(text: &str) -> Result<Axis, String> {
     if values.iter().any(String::is_empty) {
         return Err(format!("a value is empty; {form}"));
     }
+    if name == CACHE && separator == ',' {
+        check_parts(&values)?;
+    }
     Ok(Axis { name: name.to_owned(), values })
+}
+
+/// Checks that values between commas are caches, and not the parts of one.
+fn check_parts(values: &[String]) -> Result<(), String> {
+    let part = |value: &String| value.split_once('=').map(|(part, _)| part.to_owned());
+    let parts: Vec<_> = values.iter().map(part).collect();
+    if parts.iter().all(|part| *part == parts[0]) {
+        return Ok(());
+    }
+    Err(format!(
+        "{} are parts of one cache, or several caches; separate caches by semicolons, such as \
+         cache=photon=64K/128/4,scene=75K/128/4;photon=128K/128/4, and give one alone by --cache",
+        values.join(" and ")
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_of_a_cache_are_not_taken_for_caches() {
+        for (text, count) in [
+            ("cache=64K,128K", 2),
+            ("cache=photon=64K/128/4,photon=128K/128/4", 2),
+            ("cache=photon=64K/128/4,scene=75K/128/4;unified=256K/128/8", 2),
+            ("order=naive,sort,hash", 3),
+        ] {
+            assert_eq!(axis(text).map(|axis| axis.values.len()), Ok(count), "{text}");
+        }
+        for text in [
+            "cache=photon=64K/128/4,scene=75K/128/4",
+            "cache=photon=64K/128/4,index=hash",
+            "cache=64K,scene=75K/128/4",
+        ] {
+            let said = axis(text).unwrap_err();
+            assert!(said.contains("separate caches by semicolons") && said.contains("--cache"), "{said}");
+        }
+    }
 }

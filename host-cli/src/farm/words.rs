@@ -12,12 +12,14 @@ const OF_MERGE: [&str; 4] = ["pictures", "sample_type", "exposure", "curve"];
 /// Options of the job itself.
 const OF_JOB: [&str; 2] = ["parts", "frames"];
 /// Options that a job states itself, or that are of one render alone.
-const OF_NO_JOB: [&str; 10] = [
+const OF_NO_JOB: [&str; 12] = [
     "photons_for",
     "part",
     "prepared",
     "resume",
     "stats",
+    "counters",
+    "cache",
     "time",
     "noise",
     "keep_samples",
@@ -113,9 +115,17 @@ mod tests {
 
     #[test]
     fn options_of_one_render_are_of_no_job() {
-        for option in
-            ["--part=1/2", "--prepared", "--resume", "--stats", "--time", "--noise=0.1", "--keep-samples"]
-        {
+        for option in [
+            "--part=1/2",
+            "--prepared",
+            "--resume",
+            "--stats",
+            "--counters",
+            "--cache=photon=64K/128/4",
+            "--time",
+            "--noise=0.1",
+            "--keep-samples",
+        ] {
             let name = option.split('=').next().unwrap();
             assert_eq!(sorted(&format!("a.gltf {option}")), Err(name.to_owned()));
         }

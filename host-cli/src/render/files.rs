@@ -6,6 +6,7 @@ use photoncard_driver::exr::{self, SampleFormat};
 use photoncard_driver::film::Film;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::output;
+use photoncard_driver::partial::PartialError;
 use photoncard_driver::parts::{self, PartHead};
 use photoncard_driver::render::Rendering;
 use photoncard_driver::tone_mapping::{ToneMapping, write_png};
@@ -16,13 +17,19 @@ use crate::console::{print_json, printable_json};
 use crate::failure::Failure;
 use crate::input;
 
-/// Checks that all files can be written, and that none replaces the scene, the environment or another one.
+/// Checks that all files can be written, that none replaces the scene, the environment or another one, and
+/// that no finished tiles are lost.
 pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     part::check(options.parts.part, &outputs.pictures)?;
     let mut written: Vec<&Path> = outputs.pictures.iter().map(|picture| &*picture.path).collect();
     written.extend(outputs.stats.as_ref().and_then(TextOutput::path));
     written.extend(options.cards.trace.as_deref());
-    crate::outputs::check(&input::files(&options.scene), &written, &[&outputs.partial_path()])
+    crate::outputs::check(&input::files(&options.scene), &written, &[&outputs.partial_path()])?;
+    match options.tile_outputs(outputs).partial.map_or(Ok(()), |partial| partial.check_free()) {
+        // Any other fault of the file of a frame is told when it is rendered: the frames before are written.
+        Err(error @ PartialError::Unfinished { .. }) => Err(Failure::input(error)),
+        _ => Ok(()),
+    }
 }
 
 /// Writes pictures and statistics.
@@ -47,8 +54,15 @@ pub(super) fn write(
     for picture in &outputs.pictures {
         write_picture(picture, &rendering.film, &provenance, &form)?;
     }
+    write_statistics(outputs, serde_json::to_string_pretty(&rendering.statistics))
+}
+
+/// Writes statistics, if the outputs have a place for them.
+pub(super) fn write_statistics(
+    outputs: &OutputOptions,
+    text: serde_json::Result<String>,
+) -> Result<(), Failure> {
     let Some(stats) = &outputs.stats else { return Ok(()) };
-    let text = serde_json::to_string_pretty(&rendering.statistics);
     let text = text.map_err(|error| Failure::work_error(&error))?;
     match stats {
         TextOutput::StandardOutput => print_json(&text),

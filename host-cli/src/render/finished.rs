@@ -1,4 +1,4 @@
-//! Frames that are finished: their files say that a render would write them again as they are.
+//! Frames that are finished: their files say that a render would write them again as they are, and are whole.
 
 use std::path::Path;
 
@@ -8,6 +8,7 @@ use photoncard_driver::scene::FixedScene;
 use photoncard_driver::{exr, tone_mapping};
 use serde_json::Value;
 
+use super::messages;
 use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 
 /// Settings in a picture that follow from the others: a render finds them when it traces photons and places the camera.
@@ -20,7 +21,8 @@ pub(super) fn may_be(outputs: &OutputOptions) -> bool {
     outputs.resumes() && files.all(Path::is_file)
 }
 
-/// Returns whether the pictures of a frame are those of these settings, and of `inputs`, which the library does not know.
+/// Returns whether the pictures of a frame are those of these settings, and of `inputs`, which the library
+/// does not know, and its files are whole. Names a file that is not.
 pub(super) fn is_finished(
     options: &RenderOptions,
     outputs: &OutputOptions,
@@ -42,7 +44,25 @@ pub(super) fn is_finished(
     };
     let expected = without_found(stated);
     let of_picture = |picture| without_found(provenance(options, outputs, picture)?);
-    expected.is_some() && outputs.pictures.iter().all(|picture| of_picture(picture) == expected)
+    if expected.is_none() || outputs.pictures.iter().any(|picture| of_picture(picture) != expected) {
+        return false;
+    }
+    damaged(outputs).inspect(|path| messages::say_damaged(path)).is_none()
+}
+
+/// The first file of a frame that is not as it was written.
+fn damaged(outputs: &OutputOptions) -> Option<&Path> {
+    let is_intact = |PictureOutput { path, format }: &PictureOutput| match format {
+        PictureFormat::Exr => exr::is_intact(path),
+        PictureFormat::Png => tone_mapping::is_intact(path),
+        PictureFormat::Part => {
+            Parts::open(std::slice::from_ref(path)).is_ok_and(|part| part.check_pixels().is_ok())
+        }
+    };
+    let is_json =
+        |path: &Path| std::fs::read(path).is_ok_and(|text| serde_json::from_slice::<Value>(&text).is_ok());
+    let stats = outputs.stats.as_ref().and_then(TextOutput::path).filter(|path| !is_json(path));
+    outputs.pictures.iter().find(|picture| !is_intact(picture)).map(|picture| &*picture.path).or(stats)
 }
 
 /// Provenance of a picture that has the form of the outputs.

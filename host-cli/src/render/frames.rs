@@ -11,7 +11,7 @@ use photoncard_driver::render::{
 use photoncard_driver::scene::Scene;
 
 use super::moments::Moments;
-use super::steps::{Finished, chosen, dram_bytes, finish, on_threads, say_kept, view};
+use super::steps::{Finished, chosen, dram_bytes, end_early, finish, on_threads, view};
 use super::{files, finished, messages};
 use crate::arguments::{OutputOptions, RenderOptions};
 use crate::failure::Failure;
@@ -107,7 +107,7 @@ impl<'a> Sequence<'a> {
         }
         let result = on_threads(self.options.threads, || self.picture(settings))?;
         self.progress.finish();
-        let result = result.inspect_err(|error| say_kept(error, &self.progress, outputs));
+        let result = result.inspect_err(|error| end_early(error, &self.progress, outputs));
         let (rendering, fit) = result.map_err(|error| match error {
             RenderError::Stopped => Failure::Stopped("stopped; the frames before are written"),
             error => error.into(),

@@ -169,6 +169,11 @@ pub(super) fn say_finished(outputs: &OutputOptions, number: u32) {
     say(format_args!("photoncard: {}: frame {number} is finished", path.display()));
 }
 
+/// Prints that a file of a frame cannot stay.
+pub(super) fn say_damaged(path: &Path) {
+    say(format_args!("photoncard: {} is not as it was written: its frame is rendered again", path.display()));
+}
+
 /// Costs of a frame, and of what it does not share with the one before.
 fn cost(statistics: &Statistics) -> String {
     let Statistics { time_s, link, .. } = statistics;

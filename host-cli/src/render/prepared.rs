@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::finished::is_finished;
 use super::frames::outputs_of;
-use super::steps::{Finished, finish, on_threads, say_kept};
+use super::steps::{Finished, end_early, finish, on_threads};
 use super::{files, messages};
 use crate::arguments::{OutputOptions, RenderOptions, last_numbered};
 use crate::failure::Failure;
@@ -129,7 +129,7 @@ impl OpenScene {
         progress.begin_frame();
         let result = on_threads(options.threads, || renderer.render_fixed(scene, &settings, progress))?;
         progress.finish();
-        let result = result.inspect_err(|error| say_kept(error, progress, outputs));
+        let result = result.inspect_err(|error| end_early(error, progress, outputs));
         let rendering = result.map_err(|error| match (frame, error) {
             (Some(_), RenderError::Stopped) => Failure::Stopped("stopped; the frames before are written"),
             (_, error) => error.into(),

@@ -14,11 +14,21 @@ use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
-/// Says where the finished tiles of a render are that was ended by an error.
-pub(super) fn say_kept(error: &RenderError, progress: &Progress, outputs: &OutputOptions) {
-    if !error.is_input() && progress.has_kept() {
+/// Says where the finished tiles of a render are that was ended by an error, and writes its statistics up to
+/// then.
+pub(super) fn end_early(error: &RenderError, progress: &Progress, outputs: &OutputOptions) {
+    if error.is_input() {
+        return;
+    }
+    if progress.has_kept() {
         let path = outputs.partial_path();
         say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
+    }
+    let mut statistics = progress.take_failed().unwrap_or_else(|| json!({}));
+    statistics["error"] = json!(error.to_string());
+    // The error that has ended the render is the one to report.
+    if let Err(failure) = files::write_statistics(outputs, serde_json::to_string_pretty(&statistics)) {
+        say(format_args!("photoncard: {}", failure.line()));
     }
 }
 
@@ -81,9 +91,9 @@ pub(super) fn chosen(
     (settings.photons, settings.integrator)
 }
 
-/// Memory of every card, bytes: the image must fit.
+/// Memory of the largest card, bytes: cards that are too small are left out.
 pub(super) fn dram_bytes(settings: &RenderSettings) -> u32 {
-    settings.cards.addresses.iter().map(CardAddress::dram_bytes).min().unwrap_or(u32::MAX)
+    settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX)
 }
 
 /// The scene with the options' assignments; it has light.

@@ -5,6 +5,8 @@ use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches};
 use miette::{MietteDiagnostic, Report};
+use photoncard_driver::choice::Choice;
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::study::report::Provenance;
@@ -57,6 +59,9 @@ fn point(
     if let (Some((_, text)), Task::Traffic { caches: behind, .. }) = (caches.first(), &mut point.task) {
         *behind = cache(text).map_err(|reason| refused(&caches, &reason))?;
     }
+    if let Task::Traffic { chip, caches, .. } = &point.task {
+        notices.extend(beyond_chip(*chip, caches));
+    }
     let camera = point.settings.camera(scene)?;
     notices.extend(arguments.picture().fit(&camera, &mut point.settings.picture));
     Ok(point)
@@ -81,6 +86,22 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
         Command::Study(StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. }) => Ok(Some(*sweep)),
         _ => Ok(None),
     }
+}
+
+/// Notice on caches that take more than the on-chip memory of the chip.
+fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
+    let sizes = match caches {
+        CacheSettings::Split { photon, scene } => [photon.bytes, scene.bytes],
+        CacheSettings::Unified(both) => [both.bytes, 0],
+    };
+    let (taken, all) = (sizes.map(u64::from).iter().sum::<u64>(), u64::from(chip.budget().sram_bytes));
+    (taken > all).then(|| {
+        format!(
+            "cache={caches} takes {taken} bytes, and the chip {} has {all} in all: its traffic is that of a \
+             larger chip",
+            chip.name()
+        )
+    })
 }
 
 /// Caches of `--vary cache=`: as of `--cache`, or those of the photon map alone as SIZE/LINE/WAYS or SIZE.
@@ -113,5 +134,23 @@ struct PointError(Failure);
 impl From<AxisError> for PointError {
     fn from(error: AxisError) -> Self {
         Self(Failure::input(error))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn caches_beyond_the_memory_of_a_chip_are_told() {
+        for (chip, caches, is_beyond) in [
+            (EmulatedKind::Reference, "photon=128K/128/4", false),
+            (EmulatedKind::Reference, "unified=1M/128/16", false),
+            (EmulatedKind::Reference, "photon=1M/128/16,scene=75K/128/4", true),
+            (EmulatedKind::Micro, "unified=512K/128/16", true),
+        ] {
+            let said = beyond_chip(chip, &caches.parse().unwrap());
+            assert_eq!(said.is_some_and(|said| said.contains(chip.name())), is_beyond, "{caches}");
+        }
     }
 }

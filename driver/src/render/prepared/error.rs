@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
+use crate::allocation;
 use crate::output::OutputError;
 use crate::render::PROGRAM;
 
@@ -58,6 +59,15 @@ pub enum PreparedError {
         /// The operating system's error.
         #[source]
         source: io::Error,
+    },
+    /// Error of a card image for which the system gives no memory.
+    #[error("{} takes {bytes} bytes of memory, which the system does not give", path.display())]
+    #[diagnostic(help("{}", allocation::REMEDY))]
+    Memory {
+        /// Path of the file.
+        path: PathBuf,
+        /// Size of its card image, bytes.
+        bytes: u64,
     },
     /// Error of writing.
     #[error(transparent)]

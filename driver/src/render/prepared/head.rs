@@ -106,7 +106,7 @@ impl Head {
 }
 
 /// CRC-32C of lines.
-pub(super) fn checksum(lines: &[Line]) -> u32 {
+fn checksum(lines: &[Line]) -> u32 {
     let mut sum = Checksum::default();
     lines.iter().for_each(|line| sum.update(&line.0));
     sum.value()

@@ -9,6 +9,7 @@ use serde_json::{Map, Value};
 use crate::choice::Choice;
 use crate::pack::PackedScene;
 use crate::photon_map::PhotonsFor;
+use crate::render::executor::BudgetCheck;
 use crate::render::renderer::{Chosen, Kept, Renderer, Source};
 use crate::render::times::Times;
 use crate::render::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
@@ -54,7 +55,8 @@ impl PreparedScene {
         settings.photons.photons_for = settings.photons.photons_for.resolved();
         settings.check()?;
         settings.check_budgets(budgets)?;
-        let kept = source.prepare(scene, &settings, budgets, &mut times, observer)?;
+        let fit = &mut |check: BudgetCheck| budgets.iter().try_for_each(check);
+        let kept = source.prepare(scene, &settings, fit, &mut times, observer)?;
         let RenderSettings { photons, integrator, .. } = settings;
         let scene = FixedScene::of_cameras(
             scene.cameras.clone(),

@@ -64,6 +64,26 @@ fn pictures_of_a_prepared_scene_are_those_of_the_scene() {
     }
 }
 
+/// The file of an open scene is written over in place, cut off and removed: pictures are those of the scene
+/// that was opened.
+#[test]
+fn a_file_that_changes_later_changes_no_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = prepared(folder.path());
+    let bytes = fs::read(&path).unwrap();
+    let expected = sums(&render(&scene(), &settings(), &Unobserved).unwrap().film);
+    let changed: Vec<u8> = bytes.iter().map(|byte| byte.rotate_left(3)).collect();
+    for (name, later) in [("other bytes", &changed[..]), ("cut off", &bytes[..5000]), ("empty", &[])] {
+        fs::write(&path, &bytes).unwrap();
+        let prepared = PreparedScene::open(&path).unwrap();
+        // Writes into the file that is open, as `rsync --inplace` does.
+        fs::write(&path, later).unwrap();
+        let own = prepared.settings(settings());
+        let found = prepared.renderer().render_fixed(prepared.scene(), &own, &Unobserved).unwrap();
+        assert!(sums(&found.film) == expected, "{name}");
+    }
+}
+
 /// Frames are seen by cameras of their own. What is not of the prepared scene is no frame of it.
 #[test]
 fn frames_of_a_prepared_scene_are_those_of_the_scene() {
@@ -142,6 +162,7 @@ fn a_hostile_prepared_scene_is_refused() {
     for (name, value) in [
         ("program", json!("photoncard 0.0.0")),
         ("lines", json!(u32::MAX)),
+        ("lines", json!(u32::MAX / 128 + 1)),
         ("lines", json!(0)),
         ("max_distance", json!(-1.0)),
         ("max_distance", json!(null)),

@@ -2,6 +2,7 @@
 
 use super::super::laboratory::Results;
 use super::super::load_balance::Balance;
+use super::super::measure::{Measurement, TileMeasurement};
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Figure, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
@@ -26,10 +27,35 @@ struct Frame {
     cost: Cost,
     /// Counted arithmetic, and the cost by it; `None` for a frame of the table's own counts.
     counted: Option<(Arithmetic, Cost)>,
+    /// Errors of the counts; zeros for a frame of the table's own counts, or all of whose tiles were
+    /// rendered.
+    errors: Errors,
     /// The photon map.
     map: PhotonMapSize,
     /// The machine that renders it.
     machine: Machine,
+}
+
+/// Half the widths of confidence intervals.
+#[derive(Clone, Copy, Default)]
+struct Errors {
+    rays: f64,
+    gathers: f64,
+    /// Bytes from DRAM.
+    scene: f64,
+    /// Bytes from DRAM.
+    photon_map: f64,
+}
+
+impl Errors {
+    fn of(measured: &Measurement) -> Self {
+        let rays = measured.total(|TileMeasurement { counters, .. }| {
+            (counters.eye_rays + counters.shadow_rays + counters.gather_rays + counters.survey_rays) as f64
+        });
+        let estimates = [rays, measured.gathers(), measured.scene_bytes(), measured.photon_map_bytes()];
+        let [rays, gathers, scene, photon_map] = estimates.map(|estimate| estimate.half_width);
+        Self { rays, gathers, scene, photon_map }
+    }
 }
 
 impl Frame {
@@ -86,6 +112,7 @@ fn table_frames(machine: Machine) -> [Frame; 2] {
             cost: Cost::naive(&naive_workload, &nominal),
             workload: naive_workload,
             counted: None,
+            errors: Errors::default(),
             map,
             machine,
         },
@@ -94,6 +121,7 @@ fn table_frames(machine: Machine) -> [Frame; 2] {
             cost: Cost::new(&all_workload, &nominal),
             workload: all_workload,
             counted: None,
+            errors: Errors::default(),
             map,
             machine,
         },
@@ -120,6 +148,7 @@ fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
                 workload,
                 cost,
                 counted,
+                errors: Errors::of(measured),
                 map: measured.map,
                 machine: scale.machine,
             }
@@ -227,11 +256,11 @@ fn workloads(frames: &[Frame]) -> Table {
         ("photon map", "MB"),
     ];
     let mut table = Table::new("Counts of a frame, in millions but for photons a gather", columns(&heads));
-    for Frame { name, workload, map, .. } in frames {
+    for Frame { name, workload, map, errors, .. } in frames {
         table.push(vec![
             name.as_str().into(),
-            (workload.rays() / 1e6).into(),
-            (workload.gathers() / 1e6).into(),
+            within(workload.rays(), errors.rays, 1e6),
+            within(workload.gathers(), errors.gathers, 1e6),
             (workload.table_gathers / 1e6).into(),
             (workload.records / 1e6).into(),
             workload.photons_per_gather.into(),
@@ -241,6 +270,11 @@ fn workloads(frames: &[Frame]) -> Table {
         ]);
     }
     table
+}
+
+/// A count with its error, in units of `unit`.
+fn within(value: f64, error: f64, unit: f64) -> Cell {
+    if error > 0.0 { Cell::interval(value / unit, error / unit) } else { (value / unit).into() }
 }
 
 fn units(frames: &[Frame]) -> Table {
@@ -257,7 +291,7 @@ fn units(frames: &[Frame]) -> Table {
         "FLOPs of each unit and bytes from DRAM of a frame, on all chips together",
         columns(&heads),
     );
-    for Frame { name, cost, counted, .. } in frames {
+    for Frame { name, cost, counted, errors, .. } in frames {
         let by_table = [("Table 7.1", cost)].into_iter();
         for (source, cost) in by_table.chain(counted.iter().map(|(_, cost)| ("counted", cost))) {
             table.push(vec![
@@ -266,8 +300,8 @@ fn units(frames: &[Frame]) -> Table {
                 (cost.ray_caster.flops / 1e9).into(),
                 (cost.controller.flops / 1e9).into(),
                 (cost.gather_unit.flops / 1e9).into(),
-                (cost.ray_caster.dram_bytes / 1e9).into(),
-                (cost.gather_unit.dram_bytes / 1e9).into(),
+                within(cost.ray_caster.dram_bytes, errors.scene, 1e9),
+                within(cost.gather_unit.dram_bytes, errors.photon_map, 1e9),
             ]);
         }
     }
