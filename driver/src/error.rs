@@ -60,6 +60,18 @@ pub enum SceneError {
         reason: String,
     },
 
+    /// Error of a file of another format, a folder or an address.
+    #[error("{} is {what}, not a glTF 2.0 scene", file.display())]
+    #[diagnostic(code(scene::other_format), help("{remedy}"))]
+    OtherFormat {
+        /// Path of the file.
+        file: PathBuf,
+        /// Format of the file.
+        what: &'static str,
+        /// Remedy, with the command that makes glTF of it where there is one.
+        remedy: String,
+    },
+
     /// Error of a GLB file that is shorter than the lengths in its headers.
     #[error("{} is truncated: {what} needs {needed} bytes and {available} are there", file.display())]
     #[diagnostic(code(scene::truncated), help("copy or export the file again; it was cut off on the way"))]
@@ -74,7 +86,7 @@ pub enum SceneError {
         available: u64,
     },
 
-    /// Error of a text that is not JSON, or does not follow glTF's schema.
+    /// Error of a text that is not JSON.
     #[error("{file} is not glTF JSON: {message}")]
     #[diagnostic(
         code(scene::json),
@@ -299,6 +311,16 @@ pub enum SceneError {
         /// Requested name.
         name: String,
         /// Remedy, with the names of the scene's cameras.
+        remedy: String,
+    },
+
+    /// Error of an orthographic camera.
+    #[error("the camera '{name}' is orthographic, and only perspective cameras are rendered")]
+    #[diagnostic(code(scene::orthographic), help("{remedy}"))]
+    OrthographicCamera {
+        /// Name of the camera.
+        name: String,
+        /// Remedy, with the names of the scene's other cameras.
         remedy: String,
     },
 

@@ -7,6 +7,8 @@
 //! the file's bytes from run to run. The standard attribute `comments` has the file's checksum, by which
 //! [`is_intact`] knows a file that was cut off or damaged.
 
+mod dwa;
+
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
@@ -302,6 +304,11 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<(RgbImage, Opti
         let names: Vec<_> = names.take(20).map(|channel| channel.name.to_string()).collect();
         return Err(ExrError::NoColour { path: path.to_owned(), channels: names.join(", ") });
     }
+    let has_dwa = meta.headers.iter().any(|header| dwa::is_dwa(header.compression));
+    if has_dwa && !dwa::states_possible_sizes(bytes).map_err(malformed)? {
+        let reason = "a block states more samples than it has".to_owned();
+        return Err(ExrError::Malformed { path: path.to_owned(), reason });
+    }
     let image = reader()
         .no_deep_data()
         .largest_resolution_level()
@@ -356,13 +363,17 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
         });
     };
     let held = length.saturating_mul(most);
+    // A picture of one colour is smaller than any that shows something.
+    let held = if dwa::is_dwa(header.compression) { held.max(dwa::PLAIN_BYTES) } else { held };
     let stated = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
     if stated > held {
         return contradiction(format!("{width} x {height} pixels do not fit into {length} bytes"));
     }
     // The picture, and one block while it is unpacked and reordered.
     let block = stated.min(header.max_block_byte_size() as u64);
-    allocation::check(pixels.saturating_mul(size_of::<[f32; 3]>() as u64).saturating_add(3 * block))
+    let transform = if dwa::is_dwa(header.compression) { dwa::transform_bytes(header) } else { 0 };
+    let unpacked = transform.saturating_add(3 * block);
+    allocation::check(pixels.saturating_mul(size_of::<[f32; 3]>() as u64).saturating_add(unpacked))
         .map_err(|OutOfMemory { bytes }| ExrError::Memory { path: path.to_owned(), bytes })?;
     let BlockDescription::Tiles(tiles) = header.blocks else { return Ok(()) };
     let tile = (tiles.tile_size.width() as u64).saturating_mul(tiles.tile_size.height() as u64);
@@ -373,9 +384,6 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
 }
 
 /// Upper bound of the compression ratio; `None` for compressions that are not read.
-///
-/// Blocks of DWA state the sizes of their parts, and the `exr` crate allocates as much as they state. A few bytes could end
-/// the process, since a failed allocation aborts and cannot be caught like a panic.
 fn most_compressed(compression: Compression) -> Option<u64> {
     match compression {
         Compression::Uncompressed => Some(1),
@@ -383,6 +391,8 @@ fn most_compressed(compression: Compression) -> Option<u64> {
         // Deflate reaches 1032 to 1; the others stay below.
         Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => Some(1100),
         Compression::PIZ | Compression::B44 | Compression::B44A => Some(1100),
+        // A code of a bit or more for 64 samples of two bytes, but for runs of equal codes.
+        Compression::DWAA(_) | Compression::DWAB(_) => Some(1100),
         _ => None,
     }
 }

@@ -133,6 +133,21 @@ pub fn write_png(
     mapping: ToneMapping,
     provenance_json: Option<&str>,
 ) -> Result<(), PngError> {
+    let bytes = png_bytes(path, [width, height], radiance, mapping, provenance_json)?;
+    Ok(output::write(path, &bytes)?)
+}
+
+/// Bytes of the file that [`write_png`] writes; `path` is its name in errors.
+///
+/// # Errors
+/// As [`write_png`], but for those of files.
+pub fn png_bytes(
+    path: &Path,
+    [width, height]: [u32; 2],
+    radiance: impl Iterator<Item = [f32; 3]> + Clone,
+    mapping: ToneMapping,
+    provenance_json: Option<&str>,
+) -> Result<Vec<u8>, PngError> {
     if let Some(index) = radiance.clone().position(|pixel| pixel.iter().any(|value| value.is_nan())) {
         let [x, y] = [index % width.max(1) as usize, index / width.max(1) as usize];
         return Err(PngError::NotANumber { path: path.to_owned(), x, y });
@@ -146,17 +161,27 @@ pub fn write_png(
     let mut texts = vec![(TONE_MAPPING, mapping.to_json())];
     texts.extend(provenance_json.map(|json| (PROVENANCE, ascii(json))));
     let encoded = encode_png([width, height], &pixels, texts);
-    let bytes = encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })?;
-    Ok(output::write(path, &bytes)?)
+    encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })
+}
+
+/// Returns whether a file is a PNG that has a provenance of this program.
+pub fn is_of_photoncard(path: &Path) -> bool {
+    texts(path).is_some_and(|texts| texts.iter().any(|(keyword, _)| keyword == PROVENANCE))
 }
 
 /// Reads the provenance of a PNG of this mapping, without its pixels; `None` if the file is none.
 pub fn read_form(path: &Path, mapping: ToneMapping) -> Option<String> {
+    let texts = texts(path)?;
+    let text = |name: &str| texts.iter().find(|(keyword, _)| keyword == name).map(|(_, text)| text);
+    text(PROVENANCE).filter(|_| text(TONE_MAPPING) == Some(&mapping.to_json())).cloned()
+}
+
+/// Keywords and texts of a PNG before its pixels; `None` if the file is none.
+fn texts(path: &Path) -> Option<Vec<(String, String)>> {
     let file = BufReader::new(File::open(path).ok()?);
     let reader = foreign::decode(|| png::Decoder::new(file).read_info().map_err(drop), || ()).ok()?;
-    let texts = &reader.info().uncompressed_latin1_text;
-    let text = |keyword: &str| texts.iter().find(|chunk| chunk.keyword == keyword).map(|chunk| &chunk.text);
-    text(PROVENANCE).filter(|_| text(TONE_MAPPING) == Some(&mapping.to_json())).cloned()
+    let chunks = &reader.info().uncompressed_latin1_text;
+    Some(chunks.iter().map(|chunk| (chunk.keyword.clone(), chunk.text.clone())).collect())
 }
 
 /// Returns whether a file is a PNG that is neither cut off nor damaged; an unreadable one is not.

@@ -95,17 +95,58 @@ fn radiance_is_read_back_to_the_format_s_precision() {
     }
 }
 
-/// Blocks of DWA state sizes that are allocated unchecked: no such picture may reach its decoder.
+/// A picture of 40 x 40 pixels whose blocks are of DWA, and its bytes.
+fn dwa(folder: &std::path::Path, compression: Compression) -> (std::path::PathBuf, Vec<u8>) {
+    let path = folder.join("picture.exr");
+    let channels = SpecificChannels::rgb(|Vec2(x, y)| {
+        (x as f32 * 0.1, (y as f32 * 0.3).sin() + 1.5, if (x / 7 + y / 5) % 2 == 0 { 4.0_f32 } else { 0.5 })
+    });
+    let encoding = Encoding { compression, ..Encoding::default() };
+    let layer = exr::prelude::Layer::new((40, 40), LayerAttributes::default(), encoding, channels);
+    Image::from_layer(layer).write().to_file(&path).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    (path, bytes)
+}
+
 #[test]
-fn compressions_whose_sizes_cannot_be_checked_are_refused() {
+fn pictures_of_dwa_are_read() {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("picture.exr");
     for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
-        let channels = SpecificChannels::rgb(|Vec2(x, y)| (x as f32, y as f32, 0.5_f32));
-        let encoding = Encoding { compression, ..Encoding::default() };
-        let layer = exr::prelude::Layer::new((16, 16), LayerAttributes::default(), encoding, channels);
-        Image::from_layer(layer).write().to_file(&path).unwrap();
-        assert!(matches!(read_rgb(&path), Err(ExrError::Compression { .. })), "{compression}");
+        let (path, _) = dwa(folder.path(), compression);
+        let picture = read_rgb(&path).unwrap();
+        for (index, pixel) in picture.pixels.iter().enumerate() {
+            let (x, y) = (index % 40, index / 40);
+            let blue = if (x / 7 + y / 5) % 2 == 0 { 4.0 } else { 0.5 };
+            let expected = [x as f32 * 0.1, (y as f32 * 0.3).sin() + 1.5, blue];
+            let is_near = |(found, expected): (&f32, f32)| (found - expected).abs() < 0.15;
+            assert!(pixel.iter().zip(expected).all(is_near), "{compression}: {x} {y} {pixel:?}");
+        }
+    }
+}
+
+/// The decoder allocates as much as a block states.
+#[test]
+fn blocks_of_dwa_that_state_too_much_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
+        let (path, bytes) = dwa(folder.path(), compression);
+        // The version of a block, the first of its counters, follows its coordinate and size.
+        let start = (0..bytes.len() - 88).rev().find(|&at| {
+            let counter = |index: usize| u64::from_le_bytes(bytes[at + 8 * index..][..8].try_into().unwrap());
+            counter(0) == 2 && (1..11).all(|index| counter(index) < 1 << 20) && counter(8) > 0
+        });
+        let start = start.unwrap();
+        for counter in [1, 6, 7, 8, 9] {
+            for stated in [1_u64 << 30, 1 << 40, i64::MAX as u64] {
+                let mut hostile = bytes.clone();
+                hostile[start + 8 * counter..][..8].copy_from_slice(&stated.to_le_bytes());
+                std::fs::write(&path, &hostile).unwrap();
+                let error = read_rgb(&path).unwrap_err();
+                let is_refused =
+                    matches!(&error, ExrError::Malformed { reason, .. } if reason.contains("more samples"));
+                assert!(is_refused, "{compression} {counter} {stated}: {error}");
+            }
+        }
     }
 }
 

@@ -66,7 +66,7 @@ fn a_sheet_of_the_same_material_leaves_a_solid_of_blenders_solid() {
     ] {
         let mixed = glass(BLENDER, &Value::Null, meshes);
         assert_eq!((volumes(&mixed), mixed.materials.len()), (expected, 3));
-        let [notice] = &mixed.notices[..] else { panic!("{:?}", mixed.notices) };
+        let [notice] = &mixed.remarks[..] else { panic!("{:?}", mixed.remarks) };
         assert!(notice.contains("solid") && notice.contains("'glass'"), "{notice}");
         assert!(mixed.materials[1..].iter().all(|material| material.name == "glass"), "--set names both");
     }
@@ -75,7 +75,7 @@ fn a_sheet_of_the_same_material_leaves_a_solid_of_blenders_solid() {
 #[test]
 fn solids_of_other_programs_are_walls_without_a_thickness() {
     let scene = glass("another", &Value::Null, &[&SOLID, &SOLID[..1]]);
-    assert_eq!((volumes(&scene), scene.notices.len()), (vec![false; 5], 0));
+    assert_eq!((volumes(&scene), scene.remarks.len()), (vec![false; 5], 0));
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn a_flat_sheet_with_a_thickness_is_a_wall_of_it_and_leaves_a_solid_solid() {
         let Reflection::MetallicRoughness { base_colour, .. } = wall.reflection else { panic!("{wall:?}") };
         let expected = glam::Vec3::new(0.5_f32.sqrt(), 1.0, 0.5);
         assert!((base_colour - expected).length() < 1e-6, "{base_colour}");
-        let [notice] = &scene.notices[..] else { panic!("{:?}", scene.notices) };
+        let [notice] = &scene.remarks[..] else { panic!("{:?}", scene.remarks) };
         assert!(notice.contains("flat sheets") && notice.contains("'glass'"), "{notice}");
     }
 }
@@ -103,7 +103,7 @@ fn a_sheet_of_great_thickness_and_an_open_mesh_stay_surfaces_of_a_volume() {
     for (thickness, mesh) in [(1.0, &SOLID[..1]), (0.01, &SOLID[..2])] {
         let scene = glass("another", &volume(thickness), &[mesh]);
         assert!(volumes(&scene).iter().all(|is_volume| *is_volume));
-        let [notice] = &scene.notices[..] else { panic!("{:?}", scene.notices) };
+        let [notice] = &scene.remarks[..] else { panic!("{:?}", scene.remarks) };
         assert!(notice.contains("open meshes") && notice.contains("'glass'"), "{notice}");
     }
 }

@@ -71,6 +71,29 @@ fn a_spot_without_a_penumbra_gets_the_narrowest() {
 }
 
 #[test]
+fn angles_of_spot_lights_are_clamped_and_lights_without_any_left_out() {
+    let cosines = |spot: Value| {
+        let scene = lit(&json!({"name": "stage", "type": "spot", "spot": spot})).unwrap();
+        let PunctualKind::Spot { inner_cosine, outer_cosine, .. } = scene.lights[0].kind else {
+            panic!("{scene:?}")
+        };
+        (inner_cosine, outer_cosine, scene.remarks.iter().any(|remark| remark.contains("'stage'")))
+    };
+    let sharp = |outer: f32| (libm::cosf(outer), libm::cosf(outer) - 0.001, true);
+    let quarter = std::f32::consts::FRAC_PI_4;
+    assert_eq!(cosines(json!({"innerConeAngle": 0.9})), sharp(quarter));
+    assert_eq!(cosines(json!({"innerConeAngle": 1, "outerConeAngle": 0.5})), sharp(0.5));
+    assert_eq!(cosines(json!({"innerConeAngle": -1, "outerConeAngle": 0.5})), (1.0, libm::cosf(0.5), true));
+    let wide = cosines(json!({"innerConeAngle": 0.5, "outerConeAngle": 2}));
+    assert_eq!(wide, (libm::cosf(0.5), libm::cosf(std::f32::consts::FRAC_PI_2), true));
+    assert!(!cosines(json!({"innerConeAngle": 0.5, "outerConeAngle": 0.5})).2);
+    for outer in [0, -1] {
+        let scene = lit(&json!({"type": "spot", "spot": {"outerConeAngle": outer}})).unwrap();
+        assert!(scene.lights.is_empty() && scene.notices[0].contains("left out"), "{:?}", scene.notices);
+    }
+}
+
+#[test]
 fn lights_that_are_not_possible_are_refused() {
     for (light, part) in [
         (json!({"type": "point", "intensity": -1}), "intensity"),
@@ -78,9 +101,6 @@ fn lights_that_are_not_possible_are_refused() {
         (json!({"type": "point", "color": [-1, 1, 1]}), "intensity"),
         (json!({"type": "area"}), "type"),
         (json!({"type": "spot"}), "spot"),
-        (json!({"type": "spot", "spot": {"outerConeAngle": 0}}), "spot"),
-        (json!({"type": "spot", "spot": {"outerConeAngle": 2}}), "spot"),
-        (json!({"type": "spot", "spot": {"innerConeAngle": 1, "outerConeAngle": 0.5}}), "spot"),
     ] {
         let error = lit(&light).unwrap_err();
         let text = error.to_string();
@@ -138,9 +158,9 @@ fn units_of_lights_are_the_exporters_unless_they_are_stated() {
         assert_eq!((found, spot.intensity), (expected, point.intensity), "{generator} {units:?}");
         assert_eq!(scene.generator.as_deref(), Some(generator));
         let on_units: Vec<_> =
-            scene.notices.iter().filter(|notice| notice.contains("--light-units")).collect();
+            scene.remarks.iter().filter(|notice| notice.contains("--light-units")).collect();
         match notice {
-            Some(part) => assert!(on_units.len() == 1 && scene.notices[0].contains(part), "{on_units:?}"),
+            Some(part) => assert!(on_units.len() == 1 && scene.remarks[0].contains(part), "{on_units:?}"),
             None => assert!(on_units.is_empty(), "{generator} {units:?}: {on_units:?}"),
         }
     }
@@ -154,7 +174,7 @@ fn penumbras_of_blenders_spots_alone_are_adapted() {
     let inner = |generator: &str| {
         let scene = of_exporter(generator, LightUnits::Photometric);
         let PunctualKind::Spot { inner_cosine, .. } = scene.lights[2].kind else { panic!("{scene:?}") };
-        (inner_cosine, scene.notices.iter().any(|notice| notice.contains("light 'stage'")))
+        (inner_cosine, scene.remarks.iter().any(|notice| notice.contains("light 'stage'")))
     };
     let edge = 0.5_f32.cos();
     // The blend is half, and 3/4 of its width has the flux of Blender's smooth step.
@@ -183,7 +203,7 @@ fn errors_on_files_of_blender_say_what_to_tick() {
         let unknown = help(scene.camera(Some("hall")).unwrap_err());
         assert_eq!(unknown.contains("Include > Data > Cameras"), is_of_blender, "{unknown}");
         assert!(unknown.contains("choose one of: 'framed'"), "{unknown}");
-        let framed = scene.notices.iter().find(|notice| notice.contains("no perspective camera")).unwrap();
+        let framed = scene.notices.iter().find(|notice| notice.contains("no camera")).unwrap();
         assert_eq!(framed.contains("Include > Data > Cameras"), is_of_blender, "{framed}");
     }
 }
@@ -243,11 +263,46 @@ fn environments_that_are_none_are_refused() {
     refused(&write(folder.path(), "text.hdr", b"text"), "neither");
     refused(&write(folder.path(), "cut.hdr", &HDR[..HDR.len() - 1]), "ends before");
     refused(&write(folder.path(), "cut.exr", &[0x76, 0x2f, 0x31, 0x01, 2]), "cut.exr");
-    let path = folder.path().join("bad.exr");
-    for bad in [-1.0, f32::NAN, f32::INFINITY, 1e30] {
-        exr(&path, &[[0.0; 3], [0.0, bad, 0.0]]);
-        refused(&path, "texel (1, 0)");
-    }
+}
+
+#[test]
+fn texels_that_are_no_radiance_are_clamped_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sky.exr");
+    let good = [[0.5, 2.0, 0.0]; 2];
+    exr(
+        &path,
+        &[&good[..], &[[-1.0, 0.25, 3.0], [f32::NAN, 1.0, f32::INFINITY], [1.0, f32::NEG_INFINITY, 0.0]]]
+            .concat(),
+    );
+    let (sky, notice) = Environment::load_with_notice(&path).unwrap();
+    assert_eq!(sky.texels, [&good[..], &[[0.0, 0.25, 3.0], [0.0, 1.0, 3.0], [1.0, 0.0, 0.0]]].concat());
+    assert!(notice.is_some_and(|notice| notice.starts_with("3 of 5 texels")));
+    exr(&path, &good);
+    assert_eq!(Environment::load_with_notice(&path).unwrap().1, None);
+    exr(&path, &[[1e30, 1.0, 0.0]]);
+    assert_eq!(Environment::load(&path).unwrap().texels, [[1e20, 1.0, 0.0]]);
+}
+
+#[test]
+fn environments_are_turned_counter_clockwise_seen_from_above() {
+    let texels: Vec<[f32; 3]> = (0..8).map(|index| [index as f32, 0.0, 1.0]).collect();
+    let sky = Environment { width: 4, height: 2, texels, strength: 1.0 };
+    let red = |degrees: f32| -> Vec<f32> {
+        sky.clone().turned(degrees).texels.iter().map(|texel| texel[0]).collect()
+    };
+    assert_eq!(red(0.0), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
+    // The east, +x, which is three quarters to the right, comes to the middle, the north.
+    assert_eq!(red(90.0), [1.0, 2.0, 3.0, 0.0, 5.0, 6.0, 7.0, 4.0]);
+    assert_eq!((red(-270.0), red(450.0)), (red(90.0), red(90.0)));
+    assert_eq!(red(45.0), [0.5, 1.5, 2.5, 1.5, 4.5, 5.5, 6.5, 5.5]);
+    assert_eq!(Environment::constant(Vec3::ONE).turned(33.0), Environment::constant(Vec3::ONE));
+    let turn = |generator: &str| lit_by(generator).environment_turn();
+    assert_eq!((turn(BLENDER), turn("another")), (-90.0, 0.0));
+}
+
+fn lit_by(generator: &str) -> Scene {
+    load_changed(|json| json["asset"]["generator"] = json!(generator)).unwrap()
 }
 
 #[test]

@@ -8,6 +8,8 @@ use std::path::Path;
 use miette::Diagnostic;
 use photoncard_driver::error::SceneError;
 use photoncard_driver::scene::{Encoding, Scene, Wrap, gltf};
+use photoncard_firmware::scene::decode_texel;
+use photoncard_shared::layout::TexelFormat;
 use scene_support::{Extended, check_left_out, embedded, glb, pbr, push, textured};
 use serde_json::{Value, json};
 
@@ -394,4 +396,37 @@ fn a_scene_in_a_linked_folder_reads_what_is_beside_it() {
     let linked = folder.path().join("linked");
     std::os::unix::fs::symlink(Path::new("scene"), &linked).unwrap();
     assert_eq!(gltf::load(&linked.join("scene.gltf")).unwrap().images.len(), 1);
+}
+
+/// A texel of 16 bits a channel, grey.
+fn deep(grey: u16) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Sixteen);
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&grey.to_be_bytes()).unwrap();
+    writer.finish().unwrap();
+    bytes
+}
+
+#[test]
+fn emission_keeps_more_than_eight_bits() {
+    let loaded = |bytes: &[u8], has_base: bool| {
+        let mut scene = embedded(bytes, "image/png");
+        let base = pbr(&mut scene.json).as_object_mut().unwrap().remove("baseColorTexture");
+        if has_base {
+            pbr(&mut scene.json)["baseColorTexture"] = base.unwrap();
+        }
+        scene.json["materials"][0]["emissiveTexture"] = json!({"index": 0});
+        let image = scene.load().unwrap().images.remove(0);
+        (image.encoding, image.texels[0])
+    };
+    let (encoding, texel) = loaded(&deep(0x8000), false);
+    assert_eq!(encoding, Encoding::SharedExponent);
+    let [red, green, blue, _] = decode_texel(TexelFormat::SharedExponent, texel);
+    assert!((red / 0.214_05 - 1.0).abs() < 1e-3 && green == red && blue == red, "{red}");
+    // An image of the base colour as well has one form.
+    assert_eq!(loaded(&deep(0x8000), true), (Encoding::Srgb, [128, 128, 128, 255]));
+    assert_eq!(loaded(TEXEL, false).0, Encoding::Srgb);
 }

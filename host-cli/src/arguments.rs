@@ -21,6 +21,7 @@ mod scene;
 mod schedule;
 mod study;
 mod study_output;
+mod suggestions;
 mod sweep;
 mod threads;
 mod tone;
@@ -28,7 +29,8 @@ mod tonemap;
 mod view;
 mod without_effect;
 
-use std::path::PathBuf;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use clap::{Args, Parser, Subcommand};
@@ -93,12 +95,25 @@ impl Command {
 impl Arguments {
     /// Parses the arguments of the process. Invalid ones end it with a message in which they are escaped.
     pub(crate) fn parse_printably() -> Self {
-        let given = std::env::args_os();
-        Self::try_parse().unwrap_or_else(|error| {
-            let escaped = given.map(|argument| printable(&argument.to_string_lossy()).into_owned());
-            prepared::with_remedy(Self::try_parse_from(escaped).err().unwrap_or(error)).exit()
+        let given = of_scene_alone(std::env::args_os().collect());
+        Self::try_parse_from(&given).unwrap_or_else(|error| {
+            let escaped = given.iter().map(|argument| printable(&argument.to_string_lossy()).into_owned());
+            let error = Self::try_parse_from(escaped).err().unwrap_or(error);
+            suggestions::with_suggestion(prepared::with_remedy(error)).exit()
         })
     }
+}
+
+/// The arguments, of which those of a scene without a command are those of a view that is opened.
+fn of_scene_alone(mut given: Vec<OsString>) -> Vec<OsString> {
+    let is_scene = |word: &OsString| {
+        let ending = Path::new(word).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+        matches!(ending.as_deref(), Some("gltf" | "glb"))
+    };
+    if given.get(1).is_some_and(is_scene) {
+        given.splice(1..1, ["view".into(), "--open".into()]);
+    }
+    given
 }
 
 #[derive(Subcommand)]
@@ -207,4 +222,50 @@ pub(crate) struct DiffOptions {
     /// Leave out blocks in which the reference exceeds this radiance: those that see an emitter
     #[arg(long, value_name = "RADIANCE", allow_negative_numbers = true)]
     pub(crate) exclude_above: Option<f32>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_without_a_command_is_viewed() {
+        for (line, expected) in [
+            ("photoncard a.glb", "photoncard view --open a.glb"),
+            ("photoncard b/a.GLTF --quality draft", "photoncard view --open b/a.GLTF --quality draft"),
+            ("photoncard render a.glb", "photoncard render a.glb"),
+            ("photoncard a.png", "photoncard a.png"),
+            ("photoncard", "photoncard"),
+        ] {
+            let words = of_scene_alone(line.split(' ').map(OsString::from).collect());
+            assert_eq!(words.join(" ".as_ref()), expected);
+        }
+    }
+
+    fn said(line: &str) -> String {
+        let error = Arguments::try_parse_from(line.split(' ')).err().map(suggestions::with_suggestion);
+        error.map_or_else(String::new, |error| error.to_string())
+    }
+
+    #[test]
+    fn words_of_other_renderers_are_answered() {
+        for (line, part) in [
+            ("photoncard render a.glb --samples 64", "--spp"),
+            ("photoncard render a.glb --samples=64", "--spp"),
+            ("photoncard render a.glb --width 640", "--size"),
+            ("photoncard render a.glb --denoise", "denoising.md"),
+            ("photoncard render a.glb --gpu", "--card"),
+            ("photoncard tonemap a.exr --threads 4 -o b.png", "emulated:N"),
+            ("photoncard view a.glb --output a.png", "--help"),
+            ("photoncard render a.glb --transparent", "background"),
+            ("photoncard render a.glb a.png", "-o a.png"),
+        ] {
+            let text = said(line);
+            assert!(text.contains("unexpected argument") && text.contains(part), "{line}: {text}");
+            assert!(!text.contains("a similar argument exists"), "{line}: {text}");
+        }
+        // What is near to an option of this program is still told.
+        assert!(said("photoncard render a.glb --qualty draft").contains("--quality"));
+        assert!(said("photoncard render a.glb b.glb").contains("unexpected argument"));
+    }
 }

@@ -34,11 +34,11 @@ impl FromStr for EnvironmentOption {
 }
 
 impl EnvironmentOption {
-    /// Loads the environment.
-    pub(crate) fn load(&self) -> Result<Environment, Failure> {
+    /// Loads the environment, and a notice on its texels if there is one.
+    pub(crate) fn load(&self) -> Result<(Environment, Option<String>), Failure> {
         match self {
-            Self::Constant(radiance) => Ok(Environment::constant((*radiance).into())),
-            Self::File(path) => Environment::load(path).map_err(Failure::input),
+            Self::Constant(radiance) => Ok((Environment::constant((*radiance).into()), None)),
+            Self::File(path) => Environment::load_with_notice(path).map_err(Failure::input),
         }
     }
 

@@ -23,15 +23,18 @@ pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
 
 /// Loads the scene for cards of `dram_bytes`, before the assignments to its materials.
 pub(crate) fn load(options: &SceneOptions, dram_bytes: u32) -> Result<Scene, Failure> {
-    let Input { file, environment, compensates_energy } = Input::open(options, dram_bytes)?;
+    let Input { file, environment, rotation, compensates_energy } = Input::open(options, dram_bytes)?;
     let scene = file.into_rest().map_err(Failure::input)?;
-    Ok(completed(scene, environment, compensates_energy))
+    Ok(completed(scene, (environment, rotation), compensates_energy))
 }
 
 /// Scene file and environment, which are read once for scenes at several moments.
 pub(crate) struct Input {
     pub(crate) file: SceneFile,
-    environment: Option<Environment>,
+    /// Environment, and the notice on its texels.
+    environment: Option<(Environment, Option<String>)>,
+    /// Rotation of the environment, degrees.
+    rotation: f32,
     compensates_energy: bool,
 }
 
@@ -43,6 +46,7 @@ impl Input {
         Ok(Self {
             file: SceneFile::open(&options.path, &load).map_err(Failure::input)?,
             environment: options.environment.as_ref().map(EnvironmentOption::load).transpose()?,
+            rotation: options.environment_rotation.unwrap_or_default(),
             compensates_energy: options.energy_compensation,
         })
     }
@@ -50,21 +54,36 @@ impl Input {
     /// The scene as it stands, before the assignments to its materials.
     pub(crate) fn at_rest(&self) -> Result<Scene, Failure> {
         let scene = self.file.at_rest().map_err(Failure::input)?;
-        Ok(completed(scene, self.environment.clone(), self.compensates_energy))
+        Ok(self.completed(scene))
     }
 
     /// The scene at a moment of its animations, before the assignments to its materials.
     pub(crate) fn at(&self, moment: &Moment) -> Result<Scene, Failure> {
         let scene = self.file.at(moment).map_err(Failure::input)?;
-        Ok(completed(scene, self.environment.clone(), self.compensates_energy))
+        Ok(self.completed(scene))
+    }
+
+    fn completed(&self, scene: Scene) -> Scene {
+        completed(scene, (self.environment.clone(), self.rotation), self.compensates_energy)
     }
 }
 
-fn completed(mut scene: Scene, environment: Option<Environment>, compensates_energy: bool) -> Scene {
+/// The scene with an environment and its notice.
+fn completed(
+    mut scene: Scene,
+    (environment, rotation): (Option<(Environment, Option<String>)>, f32),
+    compensates_energy: bool,
+) -> Scene {
     if compensates_energy {
         scene.compensate_energy();
     }
-    scene.environment = environment;
+    let (environment, notice) = environment.unzip();
+    let turn = scene.environment_turn();
+    if turn != 0.0 && environment.as_ref().is_some_and(|map| map.width > 1) {
+        scene.remarks.push("the middle of the environment map is +x, as in Blender".to_owned());
+    }
+    scene.environment = environment.map(|environment| environment.turned(turn + rotation));
+    scene.notices.extend(notice.flatten());
     scene
 }
 
@@ -82,6 +101,7 @@ pub(crate) fn provenance(options: &SceneOptions) -> NamedSettings {
         ("set", json!(options.assignments)),
         ("energy-compensation", json!(options.energy_compensation)),
         ("environment", json!(options.environment.as_ref().map(EnvironmentOption::name))),
+        ("environment-rotation", json!(options.environment_rotation)),
     ];
     inputs.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
 }

@@ -9,6 +9,7 @@
 //! | `failure` | errors with their exit status |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `input` | scene and environment of a render |
+//! | `notices` | what is ignored of a scene |
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress` | progress of a render |
@@ -31,6 +32,7 @@ mod failure;
 mod farm;
 mod input;
 mod merge;
+mod notices;
 mod outputs;
 mod progress;
 mod render;
@@ -48,9 +50,9 @@ use crate::progress::openjd;
 
 fn main() -> ExitCode {
     // Invalid arguments end the process here, with status 2.
-    let arguments = Arguments::parse_printably();
+    let mut arguments = Arguments::parse_printably();
     report::lay_out_errors();
-    let result = match &arguments.command {
+    let result = match &mut arguments.command {
         Command::Render(options) => render::run(options),
         Command::Prepare(options) => render::prepare::run(options),
         Command::Merge(options) => merge::run(options),

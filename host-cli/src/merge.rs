@@ -4,12 +4,12 @@ use std::path::Path;
 
 use photoncard_driver::parts::{Part, PartError, Parts};
 
-use crate::arguments::{MergeOptions, PictureFormat};
+use crate::arguments::{MergeOptions, PictureFormat, PictureOutput};
 use crate::console::{printable_json, say};
 use crate::failure::Failure;
 use crate::outputs;
 use crate::render::files::{Form, write_picture};
-use crate::render::part;
+use crate::render::{part, video};
 
 /// Maximum number of missing parts whose commands are printed.
 const MAX_COMMANDS: usize = 100;
@@ -20,8 +20,11 @@ pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
     if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
         return Err(part::needless());
     }
+    if pictures.iter().any(|picture| picture.format == PictureFormat::Video) {
+        return Err(video::needless());
+    }
     let inputs: Vec<(&Path, &str)> = paths.iter().map(|path| (path.as_path(), "a part")).collect();
-    let written: Vec<&Path> = pictures.iter().map(|picture| &*picture.path).collect();
+    let written: Vec<&Path> = pictures.iter().filter_map(PictureOutput::file).collect();
     outputs::check(&inputs, &written, &[])?;
     let parts = Parts::open(paths).map_err(Failure::input)?;
     say_missing(&parts);

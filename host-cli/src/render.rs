@@ -1,5 +1,6 @@
 //! `photoncard render`.
 
+mod darkness;
 mod end;
 pub(crate) mod files;
 mod finished;
@@ -10,6 +11,7 @@ pub(crate) mod part;
 pub(crate) mod prepare;
 mod prepared;
 mod steps;
+pub(crate) mod video;
 
 use std::sync::OnceLock;
 use std::time::Instant;
@@ -20,6 +22,7 @@ use photoncard_driver::render::{
 };
 use photoncard_driver::scene::{FixedScene, Scene};
 
+use self::darkness::Circumstances;
 use self::end::{End, at_once};
 pub(crate) use self::steps::on_threads;
 use self::steps::{Finished, assigned, chosen, dram_bytes, end_early, finish, view};
@@ -29,14 +32,18 @@ use crate::input;
 use crate::progress::Progress;
 
 /// Renders a scene, and writes the pictures and all other requested outputs.
-pub(crate) fn run(options: &RenderOptions) -> Result<(), Failure> {
-    if options.prepared.prepared {
-        return prepared::run(options);
+pub(crate) fn run(options: &mut RenderOptions) -> Result<(), Failure> {
+    if let Some(outputs) = files::beside_scene(options)? {
+        options.outputs = outputs;
     }
+    let videos = video::take(options)?;
+    let options = &*options;
     match options.frames.numbers() {
-        Some(numbers) => frames::run(options, numbers),
-        None => run_one(options),
+        _ if options.prepared.prepared => prepared::run(options)?,
+        Some(numbers) => frames::run(options, numbers)?,
+        None => run_one(options)?,
     }
+    videos.iter().try_for_each(|video| video.write(options))
 }
 
 /// Renders the scene as it stands.
@@ -45,6 +52,7 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     files::check(options, &options.outputs)?;
     let start = Instant::now();
     let scene = read_scene(options, &mut settings)?;
+    let circumstances = Circumstances::of(&scene, &settings.camera(&scene)?);
     let scene_seconds = start.elapsed().as_secs_f64();
     let progress = Progress::start(options.quiet, settings.cards.count())
         .map_err(|error| Failure::work_error(&error))?
@@ -70,7 +78,7 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     let fit = found.into_inner().flatten();
     let (inputs, quality) = (input::provenance(&options.scene), options.quality);
     let at_once = at_once(options, &rendering.statistics, fit.is_some());
-    let finished = Finished { rendering, scene_seconds, inputs, quality, fit, frame: None };
+    let finished = Finished { rendering, scene_seconds, inputs, quality, fit, frame: None, circumstances };
     finish(options, &options.outputs, finished)?;
     let Some(end) = end else { return Ok(()) };
     if !options.quiet {

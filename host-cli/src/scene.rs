@@ -33,6 +33,7 @@ pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(),
         ("Images", scene.images.iter().map(image).collect()),
         ("Variants", scene.variants.clone()),
         ("Ignored", scene.notices.clone()),
+        ("Remarks", scene.remarks.clone()),
     ] {
         if !rows.is_empty() {
             lines.push(String::new());
@@ -77,6 +78,7 @@ fn image(image: &Image) -> String {
     let encoding = match image.encoding {
         Encoding::Srgb => "sRGB",
         Encoding::Linear => "linear",
+        Encoding::SharedExponent => "linear of 16 bits, with a shared exponent",
     };
     format!("{}: {} x {}, {encoding}", image.name, image.width, image.height)
 }

@@ -110,7 +110,7 @@ fn differences_and_damage_are_named() {
     for (options, words) in [
         (&["--spp", "4"][..], "parts differ in spp: 2 in a.part, 4 in b.part"),
         (&["--set", "white.diffuse=0.1,0.1,0.1"], "; scene-checksum: "),
-        (&["--aov", "none"], "parts differ in layers: albedo,N,Z in a.part, none in b.part"),
+        (&["--aov", "none"], "layers: albedo,N,Z in a.part, none in b.part"),
     ] {
         let given: Vec<&str> = if options[0] == "--spp" {
             vec!["--size", "64x48", "--crop", "3,64,0,47", "--photons", "800", "--gather-rays", "8"]

@@ -18,11 +18,12 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--fov", "12.5"], "fov", json!(12.5)),
         (&["--quality", "draft"], "spp", json!(8)),
         (&["--filter", "gaussian"], "filter", json!("gaussian")),
-        (&["--aov", "direct"], "aov", json!("direct,indirect,caustic,gathers")),
+        (&["--aov", "direct,Z"], "aov", json!("direct,Z")),
         (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),
         (&["--light-units", "watts"], "light-units", json!("watts")),
         (&["--energy-compensation"], "energy-compensation", json!(true)),
         (&["--environment", "1,2,3"], "environment", json!("1,2,3")),
+        (&["--environment-rotation", "-9.5", "--environment", "1,2,3"], "environment-rotation", json!(-9.5)),
         (&["--seed", "5"], "seed", json!(5)),
         (&["--photons", "300"], "photons", json!(300)),
         (&["--photons-for", "camera"], "photons-for", json!("camera")),
@@ -42,7 +43,8 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
 }
 
 /// Options that no pixel depends on.
-const OTHERS: [&[&str]; 22] = [
+const OTHERS: [&[&str]; 23] = [
+    &["--strict"],
     &["--photon-map", "jensen"],
     &["--tile", "3"],
     &["--order", "naive"],
@@ -102,7 +104,7 @@ fn rendered(room: &Room, options: &[&str]) -> Value {
 fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
     let room = Room::new();
     let plain = rendered(&room, &[]);
-    assert_eq!(plain["scene"], "cornell-spheres.glb");
+    assert_eq!((&plain["scene"], &plain["aov"]), (&json!("cornell-spheres.glb"), &json!("albedo,N,Z")));
     let mut keys = BTreeSet::from(["program", "layout", "scene", "scene-checksum", "variant", "view"]);
     for (options, key, value) in options_of_pixels() {
         let found = rendered(&room, options);

@@ -42,7 +42,7 @@ cube-classic easy-gltf easy-gltf-1.1.4/tests/cube_classic.gltf own
 cube-colour easy-gltf easy-gltf-1.1.4/tests/cube_color.glb white
 head easy-gltf easy-gltf-1.1.4/tests/head.glb own
 complete easy-gltf easy-gltf-1.1.4/tests/complete.glb own
-box-sparse easy-gltf easy-gltf-1.1.4/tests/box_sparse.glb refused only 0 photons were stored
+box-sparse easy-gltf easy-gltf-1.1.4/tests/box_sparse.glb white
 chopping-board genesis-world genesis/assets/meshes/chopping-board/source/chopping_board.glb white
 trash-bag genesis-world genesis/assets/meshes/trashbag_rope.glb white
 camera genesis-world genesis/assets/meshes/camera/camera.glb white

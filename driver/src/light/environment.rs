@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::environment_parts::{Parts, SIDE, luminance};
 use super::thresholds::thresholds;
-use crate::scene::Environment;
+use crate::scene::{Environment, shared_exponent};
 
 /// Maximum number of columns of cells.
 const MAX_COLUMNS: u32 = 128;
@@ -110,19 +110,6 @@ fn scale(brightest: f32) -> f32 {
     libm::ldexpf(1.0, exponent.clamp(-126, 127))
 }
 
-/// The nearest `RGB9_E5` texel: nine bits a channel with a shared exponent (OpenGL's `EXT_texture_shared_exponent`).
-fn shared_exponent(texel: [f32; 3]) -> [u8; 4] {
-    const GREATEST: f32 = 65408.0;
-    let [red, green, blue] = texel.map(|channel| channel.clamp(0.0, GREATEST));
-    let greatest = red.max(green).max(blue);
-    let exponent = if greatest > 0.0 { libm::ilogbf(greatest).max(-16) + 16 } else { 0 };
-    let mantissa = |channel: f32, exponent: i32| libm::ldexpf(channel, 24 - exponent).round() as u32;
-    // A mantissa that rounds up to 512 takes the next exponent.
-    let exponent = if mantissa(greatest, exponent) > 511 { exponent + 1 } else { exponent };
-    let [red, green, blue] = [red, green, blue].map(|channel| mantissa(channel, exponent).min(511));
-    (red | green << 9 | blue << 18 | (exponent as u32) << 27).to_le_bytes()
-}
-
 impl Cells {
     /// The cells of an environment that is not black.
     fn new(environment: &Environment) -> Self {
@@ -202,23 +189,6 @@ mod tests {
 
     use super::*;
 
-    fn decode(texel: [u8; 4]) -> [f32; 3] {
-        let bits = u32::from_le_bytes(texel);
-        [0, 9, 18].map(|shift| libm::ldexpf((bits >> shift & 511) as f32, (bits >> 27) as i32 - 24))
-    }
-
-    #[test]
-    fn texels_keep_eight_bits_of_their_greatest_channel() {
-        for value in [1e-7_f32, 1e-4, 0.3, 0.999, 1.0, 511.5, 1023.0, 40_000.0, 65_408.0] {
-            let [red, green, blue] = decode(shared_exponent([value, value * 0.25, 0.0]));
-            let step = (value / 256.0).max(1.0 / 16_777_216.0);
-            assert!((red - value).abs() <= 0.5 * step, "{value}: {red}");
-            assert!((green - value * 0.25).abs() <= 0.5 * step, "{value}: {green}");
-            assert_eq!(blue, 0.0);
-        }
-        assert_eq!(decode(shared_exponent([0.0; 3])), [0.0; 3]);
-    }
-
     #[test]
     fn texels_of_any_brightness_are_held() {
         for brightest in [1e-30_f32, 1e-3, 1.0, 3e4, 1e20, f32::MAX] {
@@ -248,7 +218,7 @@ mod tests {
     fn a_constant_environment_is_one_cell_of_exact_radiance() {
         let map = EnvironmentMap::new(&Environment::constant(Vec3::new(0.3, 0.2, 0.1))).expect("lit");
         assert_eq!(map.radiance, [0.3, 0.2, 0.1]);
-        assert_eq!(decode(map.texel(0, 0)), [1.0; 3]);
+        assert_eq!(map.texel(0, 0), shared_exponent([1.0; 3]));
         assert!((map.fluence / (4.0 * PI * 0.2) - 1.0).abs() < 1e-6);
         assert!(EnvironmentMap::new(&Environment::constant(Vec3::ZERO)).is_none());
     }

@@ -75,6 +75,7 @@ pub(super) fn decode(encoding: Encoding, texel: [u8; 4]) -> Vec3 {
     let format = match encoding {
         Encoding::Srgb => TexelFormat::Srgb,
         Encoding::Linear => TexelFormat::Linear,
+        Encoding::SharedExponent => TexelFormat::SharedExponent,
     };
     let [red, green, blue, _] = decode_texel(format, texel);
     Vec3::new(red, green, blue)

@@ -80,6 +80,7 @@ fn bare(image: &Image) -> layout::Texture {
         format: match image.encoding {
             Encoding::Srgb => TexelFormat::Srgb,
             Encoding::Linear => TexelFormat::Linear,
+            Encoding::SharedExponent => TexelFormat::SharedExponent,
         },
         matrix: [[1.0, 0.0], [0.0, 1.0]],
         offset: [0.0; 2],

@@ -43,7 +43,7 @@ impl Spacing {
 
     /// Traced paths with one photon where several lie within the distance, on surfaces of about one normal.
     pub(super) fn merged(self, traced: Traced) -> Traced {
-        let Traced { photons: all, ends, met } = traced;
+        let Traced { photons: all, ends } = traced;
         let (mut photons, mut merged_ends) = (Vec::with_capacity(all.len()), Vec::with_capacity(ends.len()));
         let mut begin = 0;
         let mut arrivals = Vec::new();
@@ -65,7 +65,7 @@ impl Spacing {
             begin = end;
             merged_ends.push(photons.len() as u32);
         }
-        Traced { photons, ends: merged_ends, met }
+        Traced { photons, ends: merged_ends }
     }
 
     /// True for reflected photons that lie together on one surface.
@@ -112,7 +112,7 @@ mod tests {
     }
 
     fn merged(photons: Vec<StoredPhoton>, ends: Vec<u32>) -> Traced {
-        Spacing { squared: 100.0 }.merged(Traced { photons, ends, met: 3 })
+        Spacing { squared: 100.0 }.merged(Traced { photons, ends })
     }
 
     #[test]
@@ -125,8 +125,8 @@ mod tests {
                 photons.push(photon(500.0, aside, false));
             }
             let count = photons.len() as u32;
-            let Traced { photons, ends, met } = merged(photons, vec![count, count]);
-            assert_eq!((ends, met), (vec![3, 3], 3));
+            let Traced { photons, ends } = merged(photons, vec![count, count]);
+            assert_eq!(ends, vec![3, 3]);
             let powers: Vec<f64> = photons.iter().map(|photon| photon.power() / 3.0).collect();
             assert_eq!(powers, [1.0, power, power], "{arrivals} arrivals");
         }
@@ -150,7 +150,7 @@ mod tests {
         };
         let photons = floor(60);
         let found = photons.len();
-        let first = [Traced { photons, ends: Vec::new(), met: 0 }];
+        let first = [Traced { photons, ends: Vec::new() }];
         for count in [found, 16 * found] {
             let side = Spacing::new(&first, count).squared.sqrt();
             let expected = 8.0 * (found as f64 / count as f64).sqrt();

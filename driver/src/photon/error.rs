@@ -7,20 +7,6 @@ use crate::pack::PackError;
 /// Error that prevents a photon map.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum PhotonError {
-    /// Error of paths of which hardly any meets a surface.
-    #[error(
-        "only {stored} photons were stored of {paths} traced from the lights: they meet hardly any surface"
-    )]
-    #[diagnostic(help(
-        "the back of a one-sided triangle neither shines nor reflects: turn the triangles of lamps and of what they light \
-         so that their fronts face each other, or make them double-sided; and check that surfaces reflect"
-    ))]
-    Lost {
-        /// Number of photons stored.
-        stored: usize,
-        /// Number of paths traced.
-        paths: u64,
-    },
     /// Error of a photon grid that is too coarse for the maximum distance of gathers: the scene is too wide.
     #[error(
         "the scene is too wide: a cell of the grid of photon positions has a side of {cell} m, and a gather reaches only \

@@ -22,8 +22,6 @@ pub struct PhotonPass {
     pub paths: u64,
     /// Guiding of the paths towards what a camera uses; `None` for paths that are not guided.
     pub guiding: Option<Guiding>,
-    /// Number of paths that met a surface that reflects or transmits light.
-    met: u64,
 }
 
 /// Number of paths after which at least one photon per thousand further paths must be stored.
@@ -38,12 +36,12 @@ const MIN_PATHS_TO_CAUSTICS: u64 = 125_000;
 /// proportionally fewer.
 const FULL_CAUSTIC_SHARE: f64 = 0.1;
 
-/// Traces paths until `count` photons are stored; none if no surface stores photons, and fewer if most light ends on surfaces that
-/// store none. `progress` is called with the number
+/// Traces paths until `count` photons are stored; none if no surface stores photons, and fewer if most light
+/// passes all surfaces by, or ends on surfaces that store none. `progress` is called with the number
 /// of photons, and returns whether to go on.
 ///
 /// # Errors
-/// If hardly any path meets a surface, or `progress` returns false.
+/// If `progress` returns false.
 pub fn trace(
     packed: &PackedScene,
     seed: u32,
@@ -72,10 +70,7 @@ pub(crate) fn trace_for(
     if !is_fruitless(stored, traced.paths) {
         return Err(PhotonError::Stopped);
     }
-    // The fewer photons are all that there is to gather, unless light passes the surfaces by.
-    if is_fruitless(traced.met as usize, traced.paths) {
-        return Err(PhotonError::Lost { stored, paths: traced.paths });
-    }
+    // The fewer photons are all that there is to gather: light passes the surfaces by, or ends on them.
     Ok(traced)
 }
 
@@ -136,7 +131,7 @@ fn trace_while(
     };
     if !keeps_photons {
         let photons = Photons { list: Vec::new(), grid: packed.photon_grid(), power_unit: 1.0 };
-        return Ok(PhotonPass { photons, paths: 0, guiding: None, met: 0 });
+        return Ok(PhotonPass { photons, paths: 0, guiding: None });
     }
     let aimed = importons.map(|importons| packed.sources().aimed_at(importons.targets()));
     let towards = importons.zip(aimed.as_ref());
@@ -146,7 +141,6 @@ fn trace_while(
     let tracer = tracer.guided(guide.as_ref());
     let mut list: Vec<StoredPhoton> = Vec::with_capacity(count);
     let mut paths = 0_u64;
-    let mut met = 0_u64;
     let mut spacing = None;
     while list.len() < count {
         let further = further(list.len(), paths).map_err(PhotonError::Unsound)?;
@@ -167,7 +161,6 @@ fn trace_while(
             spacing = Some(Spacing::new(&round, count));
         }
         for traced in round {
-            met += traced.met;
             let traced = match spacing {
                 Some(spacing) => spacing.merged(traced),
                 None => traced,
@@ -181,7 +174,7 @@ fn trace_while(
     }
     let power_unit = (tracer.path_unit / paths.max(1) as f32).max(f32::MIN_POSITIVE);
     let photons = Photons { list, grid: tracer.grid, power_unit };
-    Ok(PhotonPass { photons, paths, guiding, met })
+    Ok(PhotonPass { photons, paths, guiding })
 }
 
 /// Tracer of the photons of a map, whose paths start at the sources of most use. `towards` are importons, with sources that are aimed at

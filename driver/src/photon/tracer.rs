@@ -26,8 +26,6 @@ pub(super) struct Traced {
     pub(super) photons: Vec<StoredPhoton>,
     /// Number of photons at the end of each path.
     pub(super) ends: Vec<u32>,
-    /// Number of paths that met a surface that reflects or transmits light.
-    pub(super) met: u64,
 }
 
 impl Traced {
@@ -82,28 +80,26 @@ impl<'s> Tracer<'s> {
 
     /// Traces the paths of a task.
     pub(super) fn trace(&self, memory: &mut impl MemoryPort, first: u64) -> Result<Traced, Fault> {
-        let mut traced =
-            Traced { photons: Vec::new(), ends: Vec::with_capacity(PATHS_PER_TASK as usize), met: 0 };
+        let mut traced = Traced { photons: Vec::new(), ends: Vec::with_capacity(PATHS_PER_TASK as usize) };
         for path in first..first + PATHS_PER_TASK {
-            traced.met += u64::from(self.follow(memory, path, &mut traced.photons)?);
+            self.follow(memory, path, &mut traced.photons)?;
             traced.ends.push(traced.photons.len() as u32);
         }
         Ok(traced)
     }
 
-    /// Traces a path. Returns whether it met a surface that reflects or transmits light.
+    /// Traces a path.
     fn follow(
         &self,
         memory: &mut impl MemoryPort,
         path: u64,
         photons: &mut Vec<StoredPhoton>,
-    ) -> Result<bool, Fault> {
+    ) -> Result<(), Fault> {
         let scene = &self.scene;
         let random = PathRandom::new(self.seed, path);
         let Some(emission) = emit(scene, memory, (self.sources, self.guide), random)? else {
-            return Ok(false);
+            return Ok(());
         };
-        let mut met = false;
         let mut power = emission.power;
         let passes = match self.purpose {
             Purpose::Indirect => Passes::NarrowLobes,
@@ -122,7 +118,6 @@ impl<'s> Tracer<'s> {
             match arrival {
                 Arrival::Lost | Arrival::Absorbed => break,
                 Arrival::GoesOn => {
-                    met = true;
                     let left = arrived * shading_share(&surface, path.ray.direction);
                     match survive(power, left, random.survival()) {
                         Some(left) => power = left,
@@ -136,7 +131,6 @@ impl<'s> Tracer<'s> {
                     if !is_of_map || !is_lit(&surface, emission.has_extent) {
                         break;
                     }
-                    met = true;
                     let flag = match self.purpose {
                         Purpose::Indirect => is_direct,
                         Purpose::Caustics => emission.has_extent,
@@ -159,7 +153,7 @@ impl<'s> Tracer<'s> {
                 }
             }
         }
-        Ok(met)
+        Ok(())
     }
 
     /// Record of a photon that arrives at a surface. Of photons that reach the surface some meet its base, and gathers are there as

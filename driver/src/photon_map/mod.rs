@@ -71,7 +71,7 @@ pub struct PhotonTimes {
 /// photons stored, also while the map is measured, and returns whether to go on.
 ///
 /// # Errors
-/// If hardly any path meets a surface, the image grows too large, or `progress` returns false.
+/// If the scene is too wide, the image grows too large, or `progress` returns false.
 pub fn map_photons(
     packed: PackedScene,
     settings: &PhotonSettings,

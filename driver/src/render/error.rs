@@ -188,7 +188,7 @@ impl From<PhotonError> for RenderError {
             PhotonError::Stopped => Self::Stopped,
             PhotonError::Unsound(fault) => Self::Image(fault),
             PhotonError::Pack(error) => Self::Pack(error),
-            error @ (PhotonError::Lost { .. } | PhotonError::TooWide { .. }) => Self::Photons(error),
+            error @ PhotonError::TooWide { .. } => Self::Photons(error),
         }
     }
 }

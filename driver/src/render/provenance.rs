@@ -31,6 +31,8 @@ impl Provenance {
         budgets: &[Budget],
     ) -> Self {
         let mut pixels = settings.identity_of(scene);
+        // All layers of the picture: those of the host are in the identity of no tile.
+        pixels.insert("aov".to_owned(), json!(settings.picture.layers.to_string()));
         // The automatic distance, if none is given.
         pixels.insert("max-distance".to_owned(), json!(frame.max_distance));
         pixels.insert("view".to_owned(), view(camera));

@@ -1,5 +1,7 @@
 //! Statistics of a render: the keys of `--stats`.
 
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{LEAF_PHOTONS, Photon, PhotonLeaf, Record};
 use photoncard_shared::message::FrameParameters;
 use serde::Serialize;
 
@@ -107,7 +109,7 @@ impl Statistics {
             width: frame.width,
             height: frame.height,
             samples: settings.integrator.samples,
-            photons: settings.photons.count as u64,
+            photons: photons(settings.photons.count as u64, prepared),
             photon_paths: prepared.paths,
             photon_guiding: prepared.guiding,
             max_distance: frame.max_distance,
@@ -147,6 +149,19 @@ impl Statistics {
             peak_memory_bytes: peak_memory_bytes(),
         }
     }
+}
+
+/// Number of photons in the map of an image that `count` were requested for. They are counted where leaves
+/// have no room for as many.
+fn photons(count: u64, prepared: &Prepared) -> u64 {
+    let leaves = prepared.image.section(SectionKind::PhotonLeaves);
+    let nodes = prepared.image.section(SectionKind::Photons).len() * Photon::PER_LINE;
+    let room = leaves.len() * LEAF_PHOTONS + nodes;
+    if room as u64 >= count {
+        return count;
+    }
+    let in_leaves: u64 = leaves.iter().map(|line| u64::from(PhotonLeaf::read(&line.0).photons())).sum();
+    in_leaves + nodes as u64
 }
 
 /// Rays by kind.

@@ -44,11 +44,21 @@ impl Environment {
     /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that has the
     /// channels R, G and B. The first bytes of the file determine its format.
     ///
+    /// Channels that are no radiance are clamped: negative ones and those that are not a number to 0, others
+    /// to [`BRIGHTEST`], and infinite ones to the brightest channel of the map.
+    ///
     /// # Errors
-    /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged, larger
-    /// than [`MAX_SIDE`] texels a side or [`MAX_ENVIRONMENT_TEXELS`] in all, or holds a radiance that is negative,
-    /// infinite, not a number, or above [`BRIGHTEST`].
+    /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged,
+    /// or larger than [`MAX_SIDE`] texels a side or [`MAX_ENVIRONMENT_TEXELS`] in all.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
+        Self::load_with_notice(path).map(|(environment, _)| environment)
+    }
+
+    /// [`Self::load`], and a sentence on the texels that were clamped, if there are any.
+    ///
+    /// # Errors
+    /// As [`Self::load`].
+    pub fn load_with_notice(path: &Path) -> Result<(Self, Option<String>), SceneError> {
         let unreadable = |source| SceneError::Unreadable { file: path.to_owned(), source };
         if !fs::metadata(path).map_err(unreadable)?.is_file() {
             let error = io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file");
@@ -67,22 +77,58 @@ impl Environment {
         };
         let fault =
             |Fault { reason, remedy, .. }| SceneError::Environment { file: path.to_owned(), reason, remedy };
-        read.and_then(Self::checked).map_err(fault)
+        let mut environment = read.map_err(fault)?;
+        let clamped = environment.clamp();
+        let notice = (clamped > 0).then(|| {
+            format!(
+                "{clamped} of {} texels of the environment are no radiance: negative channels and NaN count as 0, infinite ones as \
+                 the brightest of the others",
+                environment.texels.len()
+            )
+        });
+        Ok((environment, notice))
     }
 
     fn of([width, height]: [u32; 2], texels: Vec<[f32; 3]>) -> Self {
         Self { width, height, texels, strength: 1.0 }
     }
 
-    fn checked(self) -> Result<Self, Fault> {
-        let is_bad = |texel: &[f32; 3]| !texel.iter().all(|value| (0.0..=BRIGHTEST).contains(value));
-        let Some(index) = self.texels.iter().position(is_bad) else { return Ok(self) };
-        let (x, y) = (index % self.width as usize, index / self.width as usize);
-        let reason = format!("texel ({x}, {y}) is {:?}, which is no radiance", self.texels[index]);
-        Err(Fault::unreadable(
-            reason,
-            "limit every channel to the range of 0 to 1e20, and store the map again",
-        ))
+    /// Clamps channels that are no radiance. Returns the number of texels that have any.
+    fn clamp(&mut self) -> usize {
+        let is_bad = |texel: &&mut [f32; 3]| !texel.iter().all(|value| (0.0..=BRIGHTEST).contains(value));
+        let finite = self.texels.iter().flatten().filter(|value| value.is_finite());
+        let brightest = finite.fold(0.0_f32, |brightest, value| brightest.max(*value)).min(BRIGHTEST);
+        let mut clamped = 0;
+        for texel in self.texels.iter_mut().filter(is_bad) {
+            clamped += 1;
+            // The maximum of 0 and NaN is 0.
+            *texel = texel.map(|value| value.max(0.0).min(brightest));
+        }
+        clamped
+    }
+
+    /// The environment turned about +y, counter-clockwise seen from above. By fractions of a column texels
+    /// are interpolated.
+    #[must_use]
+    pub fn turned(mut self, degrees: f32) -> Self {
+        let width = self.width as usize;
+        let columns = (f64::from(degrees) / 360.0 * width as f64).rem_euclid(width as f64);
+        let (whole, share) = (columns.floor() as usize, columns.fract() as f32);
+        if width < 2 || whole == 0 && share == 0.0 {
+            return self;
+        }
+        for row in self.texels.chunks_exact_mut(width) {
+            row.rotate_left(whole % width);
+            if share > 0.0 {
+                let first = row.first().copied().unwrap_or_default();
+                for column in 0..width {
+                    let next = row.get(column + 1).copied().unwrap_or(first);
+                    let mixed = |channel: usize| row[column][channel] * (1.0 - share) + next[channel] * share;
+                    row[column] = [0, 1, 2].map(mixed);
+                }
+            }
+        }
+        self
     }
 
     /// Returns whether any texel emits light.

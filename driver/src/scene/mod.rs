@@ -22,6 +22,7 @@ mod parts;
 mod radiance;
 mod raster;
 mod settings;
+mod shared_exponent;
 mod texture;
 mod triangle;
 
@@ -37,6 +38,7 @@ pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{Material, Reflection, Transmission};
 pub(crate) use self::parts::parts;
+pub(crate) use self::shared_exponent::shared_exponent;
 pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
 use crate::error::SceneError;
@@ -75,8 +77,14 @@ pub struct Scene {
     pub generator: Option<String>,
     /// Names of the file's variants of materials.
     pub variants: Vec<String>,
-    /// Sentences on contents of the file that the renderer does not use, each once.
+    /// Orthographic cameras of the file, which are not rendered: the number of other cameras before each, and
+    /// its name.
+    pub orthographic: Vec<(usize, String)>,
+    /// Sentences on contents of the file that the renderer does not use or that are missing, each once.
     pub notices: Vec<String>,
+    /// Sentences on contents of the file that the renderer takes in another way than they are stated, each
+    /// once.
+    pub remarks: Vec<String>,
     /// Number of triangles of zero area that were left out.
     pub skipped_triangles: usize,
 }
@@ -104,8 +112,14 @@ impl Scene {
     /// The camera of a name, or the first one for `None`.
     ///
     /// # Errors
-    /// If no camera has the name; the error lists the cameras' names.
+    /// If no camera has the name, or the camera is orthographic; the error lists the cameras' names.
     pub fn camera(&self, name: Option<&str>) -> Result<&Camera, SceneError> {
+        if let Some(name) = self.orthographic_camera(name) {
+            return Err(SceneError::OrthographicCamera {
+                name: name.to_owned(),
+                remedy: self.orthographic_remedy(),
+            });
+        }
         let found = match name {
             None => self.cameras.first(),
             Some(name) => self.cameras.iter().find(|camera| camera.name == name),
@@ -119,10 +133,29 @@ impl Scene {
         })
     }
 
+    /// The orthographic camera of a name, or the first camera of the file for `None`, if it is one.
+    fn orthographic_camera(&self, name: Option<&str>) -> Option<&str> {
+        let is_meant = |(before, camera): &&(usize, String)| match name {
+            None => *before == 0,
+            Some(name) => camera == name,
+        };
+        self.orthographic.iter().find(is_meant).map(|(_, name)| &**name)
+    }
+
+    fn orthographic_remedy(&self) -> String {
+        let others = self.cameras.iter().filter(|camera| camera.name != FRAMED);
+        let others: Vec<_> = others.map(|camera| format!("'{}'", camera.name)).collect();
+        let place = "place a perspective one by --camera-at X,Y,Z and --look-at X,Y,Z";
+        if others.is_empty() {
+            return format!("{place}, or export the camera as a perspective one");
+        }
+        format!("choose a perspective one by --camera: {}; or {place}", others.join(", "))
+    }
+
     fn camera_remedy(&self, names: &str) -> String {
         let choice = format!("choose one of: {names}");
         let is_framed = self.cameras.iter().all(|camera| camera.name == FRAMED);
-        if is_framed && blender::is_exporter(self.generator.as_deref()) {
+        if is_framed && self.is_of_blender() {
             format!("{choice}; or {}", blender::NO_CAMERA)
         } else {
             choice
@@ -143,6 +176,18 @@ impl Scene {
         self.lights.iter().any(|light| light.intensity.max_element() > 0.0)
             || self.environment.as_ref().is_some_and(Environment::is_lit)
             || self.triangles.iter().any(|triangle| self.emits(triangle))
+    }
+
+    /// Returns whether Blender's exporter wrote the file.
+    pub fn is_of_blender(&self) -> bool {
+        blender::is_exporter(self.generator.as_deref())
+    }
+
+    /// Angle by which an environment map is turned about +y in scenes of the program that wrote the file,
+    /// counter-clockwise seen from above, degrees: the middle of a map is +x in Blender, and -z in glTF's
+    /// viewers.
+    pub fn environment_turn(&self) -> f32 {
+        if self.is_of_blender() { -90.0 } else { 0.0 }
     }
 
     /// Returns whether any triangle focuses light: [`Self::specular_materials`].
@@ -204,8 +249,7 @@ impl Scene {
     /// # Errors
     /// [`SceneError::NoLight`].
     pub fn check_light(&self) -> Result<(), SceneError> {
-        let is_of_blender = blender::is_exporter(self.generator.as_deref());
-        let remedy = if is_of_blender { blender::NO_LIGHT } else { NO_LIGHT };
+        let remedy = if self.is_of_blender() { blender::NO_LIGHT } else { NO_LIGHT };
         if self.has_light() { Ok(()) } else { Err(SceneError::NoLight { remedy }) }
     }
 }

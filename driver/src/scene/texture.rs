@@ -77,4 +77,7 @@ pub enum Encoding {
     Srgb,
     /// Linear, for roughness and metalness.
     Linear,
+    /// Linear, of nine bits a channel with a shared exponent (OpenGL's `RGB9_E5`), without alpha: for
+    /// emission of more than 8 bits.
+    SharedExponent,
 }

@@ -30,13 +30,60 @@ pub(crate) enum PictureFormat {
     Png,
     /// Part of a picture, for `photoncard merge`.
     Part,
+    /// Video of frames.
+    Video,
 }
+
+/// Name of standard output.
+const STANDARD_OUTPUT: &str = "-";
 
 /// Output for a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct PictureOutput {
+    /// Path of the file; `-` for standard output, which takes a PNG.
     pub(crate) path: PathBuf,
     pub(crate) format: PictureFormat,
+}
+
+impl PictureOutput {
+    /// Path of the file; `None` for standard output.
+    pub(crate) fn file(&self) -> Option<&Path> {
+        (self.path.as_os_str() != STANDARD_OUTPUT).then_some(&self.path)
+    }
+
+    /// Name for messages.
+    pub(crate) fn name(&self) -> String {
+        self.file().map_or("standard output".to_owned(), |path| path.display().to_string())
+    }
+}
+
+/// Formats of pictures that are not written, by the endings of their names, each with its name and the end of
+/// the command that makes one of a PNG or an EXR.
+const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
+    (&["jpg", "jpeg", "jpe"], "JPEG", "out.png, then: magick out.png out.jpg"),
+    (&["webp"], "WebP", "out.png, then: magick out.png out.webp"),
+    (&["tif", "tiff"], "TIFF", "out.exr, then: oiiotool out.exr -o out.tif"),
+    (&["hdr", "pic", "rgbe"], "Radiance HDR", "out.exr, then: oiiotool out.exr -o out.hdr"),
+    (&["avif", "heic", "jxl"], "this format", "out.png, then: magick out.png out.avif"),
+    (
+        &["bmp", "gif", "tga", "ppm", "pfm"],
+        "this format",
+        "out.png, then convert it, such as: magick out.png out.bmp",
+    ),
+    (&["glb", "gltf"], "a glTF scene", "out.png"),
+    (&["card"], "a prepared scene", "SCENE.card to photoncard prepare"),
+];
+
+/// Error of an ending that is none of a picture that is written.
+fn other_format(ending: Option<&str>) -> String {
+    let other =
+        OTHER_FORMATS.iter().find(|(endings, ..)| ending.is_some_and(|ending| endings.contains(&ending)));
+    match other {
+        Some((_, name, instead)) => format!("{name} is not written: give -o {instead}"),
+        None => "a picture is a file OUT.exr, linear radiance with layers, or OUT.png, tone-mapped, and a part of one OUT.part; give \
+                 its name one of these endings, or - for a PNG on standard output"
+            .to_owned(),
+    }
 }
 
 /// Parser of outputs for pictures, by the ending of their names.
@@ -47,7 +94,9 @@ pub(super) fn picture() -> impl TypedValueParser<Value = PictureOutput> {
             Some("exr") => PictureFormat::Exr,
             Some("png") => PictureFormat::Png,
             Some("part") => PictureFormat::Part,
-            _ => return Err("a picture is a file OUT.exr, linear radiance with layers, or OUT.png, tone-mapped, and a part of one OUT.part; give its name one of these endings"),
+            Some("mp4" | "mov" | "mkv" | "webm") => PictureFormat::Video,
+            None if path.as_os_str() == STANDARD_OUTPUT => PictureFormat::Png,
+            ending => return Err(other_format(ending)),
         };
         Ok(PictureOutput { path, format })
     })
@@ -55,11 +104,9 @@ pub(super) fn picture() -> impl TypedValueParser<Value = PictureOutput> {
 
 /// Parser of outputs that are a PNG picture.
 pub(super) fn png() -> impl TypedValueParser<Value = PathBuf> {
-    picture().try_map(|PictureOutput { path, format }| match format {
-        PictureFormat::Png => Ok(path),
-        PictureFormat::Exr | PictureFormat::Part => {
-            Err("a tone-mapped picture is a PNG; give its name the ending .png")
-        }
+    picture().try_map(|output| match output {
+        PictureOutput { path, format: PictureFormat::Png } if path.as_os_str() != STANDARD_OUTPUT => Ok(path),
+        _ => Err("a tone-mapped picture is a PNG; give its name the ending .png"),
     })
 }
 
@@ -104,7 +151,7 @@ mod tests {
             ("./-.png", Some(PictureFormat::Png)),
             ("a.exr.Png", Some(PictureFormat::Png)),
             ("a.exr.part", Some(PictureFormat::Part)),
-            ("-", None),
+            ("a.mp4", Some(PictureFormat::Video)),
             ("a", None),
             (".exr", None),
             ("a.exr/", Some(PictureFormat::Exr)),
@@ -118,7 +165,27 @@ mod tests {
     }
 
     #[test]
-    fn a_dash_is_standard_output_for_text_alone() {
+    fn formats_that_are_not_written_are_named_with_what_makes_them() {
+        for (ending, parts) in [
+            ("jpg", ["JPEG", "magick"]),
+            ("tiff", ["TIFF", "oiiotool"]),
+            ("bmp", ["format", "magick"]),
+            ("card", ["prepared", "photoncard prepare"]),
+            ("docx", ["OUT.exr", "OUT.png"]),
+        ] {
+            let text = other_format(Some(ending));
+            assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_dash_is_standard_output_for_text_and_pictures() {
+        let picture = parsed(picture(), "-").unwrap();
+        assert_eq!(
+            (picture.format, picture.file(), &*picture.name()),
+            (PictureFormat::Png, None, "standard output")
+        );
+        assert_eq!(parsed(png(), "-"), None);
         assert_eq!(parsed(text(), "-"), Some(TextOutput::StandardOutput));
         assert_eq!(parsed(text(), "./-"), Some(TextOutput::File("./-".into())));
         assert_eq!((parsed(file(), "-"), parsed(file(), "./-")), (None, Some("./-".into())));

@@ -53,7 +53,8 @@ impl FrameOptions {
         named.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
     }
 
-    fn fps(&self) -> f64 {
+    /// Frames in a second.
+    pub(crate) fn fps(&self) -> f64 {
         self.fps.unwrap_or(FPS)
     }
 

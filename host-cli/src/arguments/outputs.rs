@@ -15,11 +15,12 @@ use super::tone::ToneOptions;
 #[derive(Args, Clone)]
 #[command(next_help_heading = "Outputs")]
 pub(crate) struct OutputOptions {
-    /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated
+    /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated [default:
+    /// SCENE's name with .png]
     ///
     /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures. With --part the file is OUT.part, for
-    /// photoncard merge.
-    #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", required = true, value_parser = picture())]
+    /// photoncard merge. - is a PNG on standard output.
+    #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", value_parser = picture())]
     pub(crate) pictures: Vec<PictureOutput>,
     /// Continue a render that was stopped or has failed
     ///
@@ -47,8 +48,21 @@ impl OutputOptions {
         self.resume
     }
 
-    /// File of finished tiles.
+    /// Outputs with the PNG beside a scene, or the numbered ones of its frames, if no picture is stated;
+    /// `None` if one is.
+    pub(crate) fn beside(&self, scene: &Path, has_frames: bool) -> Option<Self> {
+        if !self.pictures.is_empty() {
+            return None;
+        }
+        // Frames of a prepared scene may be numbered as it is.
+        let is_numbered = numbered(scene, 0).is_some();
+        let path = scene.with_extension(if has_frames && !is_numbered { "####.png" } else { "png" });
+        Some(Self { pictures: vec![PictureOutput { path, format: PictureFormat::Png }], ..self.clone() })
+    }
+
+    /// File of finished tiles; none beside standard output.
     pub(super) fn partial(&self) -> Option<PartialSettings> {
+        self.main()?.file()?;
         Some(PartialSettings { path: self.partial_path(), resume: self.resume })
     }
 
@@ -84,10 +98,14 @@ impl OutputOptions {
         self.pictures.iter().any(|picture| picture.format == format)
     }
 
-    /// Path of the picture that the render is named after: the first EXR, or the first picture without one.
-    fn main_path(&self) -> &Path {
+    /// Picture that the render is named after: the first EXR, or the first picture without one.
+    fn main(&self) -> Option<&PictureOutput> {
         let exr = self.pictures.iter().find(|picture| picture.format == PictureFormat::Exr);
-        exr.or(self.pictures.first()).map_or(Path::new(""), |picture| &picture.path)
+        exr.or(self.pictures.first())
+    }
+
+    fn main_path(&self) -> &Path {
+        self.main().map_or(Path::new(""), |picture| &picture.path)
     }
 
     /// Display server, and the picture's name on it: that of its file.

@@ -11,14 +11,44 @@ use super::choice::choice;
 /// Longer side of a picture without a given size, pixels.
 const SIDE: u32 = 512;
 
+/// Aspect ratio of video.
+const WIDE: f32 = 16.0 / 9.0;
+
+/// Size of a picture, pixels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Size {
+    Exact(u32, u32),
+    /// The longer side.
+    Longer(u32),
+    /// The height, as of video.
+    Height(u32),
+}
+
+impl Size {
+    /// Width and height with a camera's aspect ratio, as far as both state nothing else.
+    fn of(self, camera: Option<&Camera>) -> (u32, u32) {
+        let aspect = camera.and_then(|camera| camera.aspect);
+        match self {
+            Self::Exact(width, height) => (width, height),
+            Self::Longer(side) => camera.and_then(|camera| camera.size(side)).unwrap_or((side, side)),
+            Self::Height(height) => {
+                let width = height as f32 * aspect.unwrap_or(WIDE);
+                ((width + 0.5).max(1.0) as u32, height)
+            }
+        }
+    }
+}
+
 #[derive(Args)]
 #[command(next_help_heading = "Picture and camera")]
 pub(crate) struct PictureOptions {
-    /// Width and height of the picture, pixels [default: 512 on the longer side]
+    /// Width and height of the picture, pixels; or 800 on the longer side, 1080p, or 50% [default: 512 on the
+    /// longer side]
     ///
-    /// By default the picture has the aspect ratio that the file states for the camera, or is square if it states none.
+    /// Where not both are stated the picture has the aspect ratio that the file states for the camera. If it
+    /// states none, the picture is square, and 16 to 9 by 1080p. A percentage is of the default.
     #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true)]
-    size: Option<(u32, u32)>,
+    size: Option<Size>,
     /// Render only the columns X0 up to X1 and the rows Y0 up to Y1
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true, hide_short_help = true)]
     crop: Option<Window>,
@@ -56,7 +86,7 @@ impl PictureOptions {
     /// Settings of these options; `base` gives those that are not stated.
     pub(super) fn settings(&self, base: &Picture) -> Picture {
         let Self { size, crop, camera, camera_at, look_at, fov, aov: _, filter } = self;
-        let (width, height) = size.unwrap_or((SIDE, SIDE));
+        let (width, height) = size.unwrap_or(Size::Longer(SIDE)).of(None);
         Picture {
             width,
             height,
@@ -80,34 +110,47 @@ impl PictureOptions {
         self.aov.clone().unwrap_or_default()
     }
 
-    /// Gives the picture the camera's aspect ratio, if no size is given. Returns a notice if the one that is given is of another.
+    /// Gives the picture the camera's aspect ratio, if width and height are not both stated. Returns a notice
+    /// if those that are have another.
     pub(crate) fn fit(&self, camera: &Camera, picture: &mut Picture) -> Option<String> {
-        match (self.size, camera.size(SIDE)) {
-            (None, Some((width, height))) => {
-                (picture.width, picture.height) = (width, height);
-                None
-            }
-            (Some((width, height)), Some(_)) if camera.is_cropped(width, height) => {
-                let (width, height) = camera.size(width.max(height))?;
-                let Camera { name, aspect, .. } = camera;
-                Some(format!(
-                    "the camera '{name}' has an aspect ratio of {}, and the picture another; the vertical field of view is kept: \
-                     --size {width}x{height} shows what the file means",
-                    aspect.unwrap_or(1.0)
-                ))
-            }
-            _ => None,
+        let size = self.size.unwrap_or(Size::Longer(SIDE));
+        (picture.width, picture.height) = size.of(Some(camera));
+        let Size::Exact(width, height) = size else { return None };
+        if !camera.is_cropped(width, height) {
+            return None;
         }
+        let (width, height) = camera.size(width.max(height))?;
+        let Camera { name, aspect, .. } = camera;
+        Some(format!(
+            "the camera '{name}' has an aspect ratio of {}, and the picture another; the vertical field of view is kept: \
+             --size {width}x{height} shows what the file means",
+            aspect.unwrap_or(1.0)
+        ))
     }
 }
 
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let sides =
-        text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
-    match sides {
-        Some((width, height)) if width > 0 && height > 0 => Ok((width, height)),
-        _ => Err("a size is WIDTHxHEIGHT, both at least 1, such as 512x512".into()),
-    }
+fn size(text: &str) -> Result<Size, String> {
+    let number = |text: &str| text.parse().ok().filter(|number: &u32| *number > 0);
+    let stated = match text.to_ascii_lowercase() {
+        text if text == "4k" => Some(Size::Height(2160)),
+        text if text.contains('x') => text
+            .split_once('x')
+            .and_then(|(width, height)| Some(Size::Exact(number(width)?, number(height)?))),
+        text => match (text.strip_suffix('p'), text.strip_suffix('%')) {
+            (Some(height), _) => number(height).map(Size::Height),
+            (_, Some(percent)) => percent_of_side(percent).map(Size::Longer),
+            _ => number(&text).map(Size::Longer),
+        },
+    };
+    stated.ok_or_else(|| {
+        "a size is WIDTHxHEIGHT, both at least 1, such as 512x512; 800 for the longer side; 1080p; or 50% of the default".into()
+    })
+}
+
+/// Longer side of a percentage of the default, at least a pixel.
+fn percent_of_side(percent: &str) -> Option<u32> {
+    let percent = percent.parse().ok().filter(|percent: &f32| *percent > 0.0 && percent.is_finite())?;
+    Some(((SIDE as f32 * percent / 100.0 + 0.5) as u32).max(1))
 }
 
 fn crop(text: &str) -> Result<Window, String> {
@@ -123,4 +166,38 @@ fn place(text: &str) -> Result<[f64; 3], String> {
     let place = numbers.and_then(|numbers| <[f64; 3]>::try_from(numbers).ok());
     let place = place.filter(|place| place.iter().all(|number| number.is_finite()));
     place.ok_or_else(|| "a place is X,Y,Z: three numbers of metres, such as 0,1.5,4".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_those_of_the_camera_where_they_state_less() {
+        let camera = |aspect| {
+            let [origin, right, up, forward] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
+            let [origin, right, up, forward] = [origin, right, up, forward].map(Into::into);
+            Camera { name: "eye".to_owned(), origin, right, up, forward, vertical_fov: 1.0, aspect }
+        };
+        for (text, plain, wide) in [
+            ("640x360", (640, 360), (640, 360)),
+            ("1080p", (1920, 1080), (2160, 1080)),
+            ("4K", (3840, 2160), (4320, 2160)),
+            ("800", (800, 800), (800, 400)),
+            ("50%", (256, 256), (256, 128)),
+            ("0.01%", (1, 1), (1, 1)),
+        ] {
+            let size = size(text).unwrap();
+            assert_eq!(
+                [None, Some(2.0)].map(|aspect| size.of(Some(&camera(aspect)))),
+                [plain, wide],
+                "{text}"
+            );
+        }
+        for text in
+            ["", "0", "x", "0x5", "5x", "-5", "p", "0p", "%", "-5%", "nan%", "1.5", "12x12x12", "4294967296"]
+        {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
 }

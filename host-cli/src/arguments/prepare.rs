@@ -45,7 +45,7 @@ pub(crate) struct PrepareOptions {
     /// Threads for the work [default: one per core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true, hide_short_help = true)]
     pub(crate) threads: Option<usize>,
-    /// Show no progress
+    /// Show no progress; what is ignored or missing in the scene is told
     #[arg(long)]
     pub(crate) quiet: bool,
     /// Form of the progress, and of the message of a failure

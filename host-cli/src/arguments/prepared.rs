@@ -4,12 +4,14 @@ use clap::Args;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
 /// Options of what is prepared.
-pub(crate) const OF_PREPARATION: [&str; 27] = [
+pub(crate) const OF_PREPARATION: [&str; 29] = [
     "assignments",
     "energy_compensation",
     "variant",
     "light_units",
     "environment",
+    "environment_rotation",
+    "strict",
     "quality",
     "photons",
     "photon_map",

@@ -30,7 +30,22 @@ pub(crate) struct SceneOptions {
     pub(crate) lights: LightOptions,
     /// Light from infinitely far: an equirectangular map, .hdr or .exr, or a constant radiance
     ///
-    /// The middle of the map is -z and its top is y.
+    /// The top of the map is +y. Its middle is -z, and +x in files of Blender, as there. Of an EXR of DWA
+    /// compression the last bits depend on the vector instructions of the processor: for a farm of several
+    /// kinds store it with ZIP.
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true, help_heading = "Scene")]
     pub(crate) environment: Option<EnvironmentOption>,
+    /// Turn the environment map about +y, counter-clockwise seen from above [default: 0]
+    ///
+    /// A rotation of A degrees about Z in Blender's Mapping node is -A.
+    #[arg(long, value_name = "DEGREES", requires = "environment", allow_negative_numbers = true, value_parser = degrees, help_heading = "Scene", hide_short_help = true)]
+    pub(crate) environment_rotation: Option<f32>,
+    /// Fail if anything in the scene is ignored or missing, such as a texture
+    #[arg(long, help_heading = "Scene", hide_short_help = true)]
+    pub(crate) strict: bool,
+}
+
+fn degrees(text: &str) -> Result<f32, String> {
+    let degrees = text.parse().ok().filter(|degrees: &f32| degrees.is_finite());
+    degrees.ok_or_else(|| "a rotation is a number of degrees, such as 90 or -22.5".into())
 }

@@ -39,7 +39,11 @@ impl Job {
     /// If an option is of no job, a name is not text, or frames have no place in one.
     pub(super) fn new(options: &FarmOptions, given: impl Iterator<Item = OsString>) -> Result<Self, Failure> {
         let pictures = &options.render.outputs.pictures;
-        if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
+        if pictures.is_empty() || pictures.iter().any(|picture| picture.file().is_none()) {
+            return Err(refusal("a job writes its pictures to files", "give -o OUT.exr or -o OUT.png"));
+        }
+        if pictures.iter().any(|picture| matches!(picture.format, PictureFormat::Part | PictureFormat::Video))
+        {
             return Err(refusal(
                 "a job makes pictures, of parts of its own",
                 "give -o OUT.exr or -o OUT.png",

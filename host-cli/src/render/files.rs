@@ -1,7 +1,9 @@
 //! Output files of a render.
 
+use std::io::IsTerminal;
 use std::path::Path;
 
+use miette::{MietteDiagnostic, Report};
 use photoncard_driver::exr::{self, SampleFormat};
 use photoncard_driver::film::Film;
 use photoncard_driver::layer::Layers;
@@ -9,11 +11,11 @@ use photoncard_driver::output;
 use photoncard_driver::partial::PartialError;
 use photoncard_driver::parts::{self, PartHead};
 use photoncard_driver::render::Rendering;
-use photoncard_driver::tone_mapping::{ToneMapping, write_png};
+use photoncard_driver::tone_mapping::{ToneMapping, is_of_photoncard, png_bytes, write_png};
 
-use super::part;
-use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
-use crate::console::{print_json, printable_json};
+use super::{part, video};
+use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput, numbered};
+use crate::console::{print_json, printable_json, say, write_bytes};
 use crate::failure::Failure;
 use crate::input;
 
@@ -21,7 +23,8 @@ use crate::input;
 /// that no finished tiles are lost.
 pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     part::check(options.parts.part, &outputs.pictures)?;
-    let mut written: Vec<&Path> = outputs.pictures.iter().map(|picture| &*picture.path).collect();
+    check_standard_output(outputs)?;
+    let mut written: Vec<&Path> = outputs.pictures.iter().filter_map(PictureOutput::file).collect();
     written.extend(outputs.stats.as_ref().and_then(TextOutput::path));
     written.extend(options.cards.trace.as_deref());
     crate::outputs::check(&input::files(&options.scene), &written, &[&outputs.partial_path()])?;
@@ -30,6 +33,41 @@ pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<
         Err(error @ PartialError::Unfinished { .. }) => Err(Failure::input(error)),
         _ => Ok(()),
     }
+}
+
+/// Checks that standard output takes one picture or the statistics, and is no terminal if it takes a picture.
+fn check_standard_output(outputs: &OutputOptions) -> Result<(), Failure> {
+    let pictures = outputs.pictures.iter().filter(|picture| picture.file().is_none()).count();
+    let texts = usize::from(outputs.stats == Some(TextOutput::StandardOutput));
+    let [text, help] = if pictures + texts > 1 {
+        ["standard output takes one output alone", "give the other ones files"]
+    } else if pictures > 0 && std::io::stdout().is_terminal() {
+        ["a picture is not written to a terminal", "direct it to a file or a pipe, such as: -o - | feh -"]
+    } else {
+        return Ok(());
+    };
+    Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
+}
+
+/// Outputs with a picture beside the scene, if none is stated and no part is rendered. A file of that name
+/// that photoncard did not write stays.
+pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptions>, Failure> {
+    let has_frames = options.frames.numbers().is_some();
+    let outputs = options.outputs.beside(&options.scene.path, has_frames);
+    let Some(outputs) = outputs.filter(|_| options.parts.part.is_none()) else { return Ok(None) };
+    let path = outputs.pictures.first().map_or(Path::new(""), |picture| &picture.path);
+    let numbers = options.frames.numbers().into_iter().flatten();
+    let of_frames = numbers.filter_map(|number| numbered(path, number));
+    let mut paths = of_frames.chain((!has_frames).then(|| path.to_owned()));
+    if let Some(other) = paths.find(|path| path.exists() && !is_of_photoncard(path)) {
+        let text = format!("{} is there, and photoncard did not write it", other.display());
+        let report = MietteDiagnostic::new(text).with_help("name the picture by -o OUT.png or -o OUT.exr");
+        return Err(Failure::Input(Report::new(report)));
+    }
+    if !options.quiet {
+        say(format_args!("photoncard: without -o the picture is written to {}", path.display()));
+    }
+    Ok(Some(outputs))
 }
 
 /// Writes pictures and statistics.
@@ -97,9 +135,14 @@ pub(crate) fn write_picture(
         PictureFormat::Png => {
             let size = [film.window().width(), film.window().height()];
             let radiance = film.pixels().map(|pixel| pixel.radiance);
+            if picture.file().is_none() {
+                let bytes = png_bytes(path, size, radiance, form.tone, Some(provenance));
+                return write_bytes(&bytes.map_err(|error| Failure::work_error(&error))?);
+            }
             write_png(path, size, radiance, form.tone, Some(provenance))
                 .map_err(|error| Failure::work_error(&error))
         }
+        PictureFormat::Video => Err(video::needless()),
         PictureFormat::Part => {
             let head = form.part.as_ref().ok_or_else(part::needless)?;
             parts::write(path, head, film).map_err(Failure::work)

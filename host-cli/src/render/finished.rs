@@ -34,6 +34,7 @@ pub(super) fn is_finished(
         return false;
     }
     let mut stated = settings.identity_of(scene);
+    stated.insert("aov".to_owned(), Value::from(settings.picture.layers.to_string()));
     stated.extend(inputs.clone());
     let found: Vec<&str> =
         FOUND.into_iter().filter(|name| stated.get(*name).is_none_or(Value::is_null)).collect();
@@ -78,6 +79,7 @@ fn provenance(
             (samples == outputs.sample_type()).then_some(text)?
         }
         PictureFormat::Png => tone_mapping::read_form(path, outputs.tone.mapping())?,
+        PictureFormat::Video => return None,
         PictureFormat::Part => {
             let parts = Parts::open(std::slice::from_ref(path)).ok()?;
             let head = parts.any().filter(|head| Some(head.part) == options.parts.part)?;

@@ -10,6 +10,7 @@ use photoncard_driver::render::{
 };
 use photoncard_driver::scene::Scene;
 
+use super::darkness::Circumstances;
 use super::moments::Moments;
 use super::steps::{Finished, chosen, dram_bytes, end_early, finish, on_threads, view};
 use super::{files, finished, messages};
@@ -119,6 +120,7 @@ impl<'a> Sequence<'a> {
             quality: self.options.quality,
             fit,
             frame: Some(number),
+            circumstances: Circumstances::of(self.moments.scene(), &settings.camera(self.moments.scene())?),
         };
         finish(self.options, outputs, finished)
     }

@@ -11,38 +11,53 @@ use photoncard_driver::render::{
 use photoncard_driver::scene::{Camera, Scene};
 use serde_json::Value;
 
-use crate::arguments::{OutputOptions, RenderOptions};
+use crate::arguments::{OutputOptions, PictureOutput, RenderOptions};
 use crate::console::say;
+use crate::failure::Failure;
+use crate::notices;
 use crate::progress::duration;
 
-/// Maximum number of ignored contents that are named, besides their number.
-const NAMED: usize = 3;
-
-/// Prints what was loaded, what is ignored of it, and options without effect.
+/// Prints what was loaded, what is ignored of it, and options without effect; if `options` are quiet, only
+/// what is ignored.
+///
+/// # Errors
+/// If anything is ignored, and `options` are strict.
 pub(super) fn say_loaded(
     options: &RenderOptions,
     settings: &RenderSettings,
     scene: &Scene,
     camera: &Camera,
     misfit: Option<String>,
-) {
-    say(format_args!("photoncard: {}", loaded(&options.scene.path, &settings.picture, scene, camera)));
-    if let Some(line) = ignored(&options.scene.path, &scene.notices) {
-        say(format_args!("photoncard: ignored: {line}"));
+) -> Result<(), Failure> {
+    let path = &options.scene.path;
+    if !options.quiet {
+        say(format_args!("photoncard: {}", loaded(path, &settings.picture, scene, camera)));
     }
+    notices::say_ignored(path, scene, options.scene.strict)?;
+    if options.quiet {
+        return Ok(());
+    }
+    notices::say_remarks(path, scene);
     for notice in options.without_effect(scene).into_iter().chain(misfit) {
         say(format_args!("photoncard: {notice}"));
+    }
+    Ok(())
+}
+
+/// Prints that fewer photons were stored than were requested.
+pub(super) fn say_sparse(statistics: &Statistics) {
+    let requested = statistics.provenance.pixels.get("photons").and_then(Value::as_u64);
+    let Statistics { photons, photon_paths, .. } = statistics;
+    if *photon_paths > 0 && requested.is_some_and(|requested| *photons < requested) {
+        say(format_args!(
+            "photoncard: only {photons} photons were stored of {photon_paths} paths from the lights, which pass the surfaces by or end \
+             on them: indirect light is of these alone (the back of a one-sided triangle neither shines nor reflects)"
+        ));
     }
 }
 
 /// Prints what was prepared, and the view of it.
-pub(super) fn say_prepared(
-    path: &Path,
-    settings: &RenderSettings,
-    inputs: &NamedSettings,
-    camera: &Camera,
-    misfit: Option<&String>,
-) {
+pub(super) fn say_prepared(path: &Path, settings: &RenderSettings, inputs: &NamedSettings, camera: &Camera) {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let scene = inputs.get("scene").and_then(Value::as_str).unwrap_or_default();
     let RenderSettings { picture: Picture { width, height, .. }, photons, .. } = settings;
@@ -50,7 +65,6 @@ pub(super) fn say_prepared(
         "photoncard: {name}: {scene} with {} photons, prepared; seen by '{}', {width} x {height} pixels",
         photons.count, camera.name
     ));
-    misfit.into_iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
 }
 
 /// Origin of settings that a quality has found for a scene.
@@ -129,19 +143,6 @@ fn lights(scene: &Scene) -> String {
     format!("light of {}", kinds.into_iter().flatten().collect::<Vec<_>>().join(" and "))
 }
 
-/// Contents that are not rendered: the first ones, and the number of the others.
-fn ignored(path: &Path, notices: &[String]) -> Option<String> {
-    let mut said = notices.get(..NAMED.min(notices.len()))?.join("; ");
-    if said.is_empty() {
-        return None;
-    }
-    if notices.len() > NAMED {
-        let more = notices.len() - NAMED;
-        said += &format!("; and {more} more, see photoncard scene info {}", path.display());
-    }
-    Some(said)
-}
-
 /// Prints the end of a picture: its files, its time, and its samples or what a frame has cost.
 pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Option<u32>) {
     let statistics = &rendering.statistics;
@@ -149,8 +150,7 @@ pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Op
         say_memory(memory, statistics);
     }
     let pixels = rendering.film.pixels().len() - rendering.film.missing();
-    let pictures = outputs.pictures.iter().map(|picture| picture.path.display().to_string());
-    let pictures = pictures.collect::<Vec<_>>().join(", ");
+    let pictures = outputs.pictures.iter().map(PictureOutput::name).collect::<Vec<_>>().join(", ");
     let summary = match frame {
         Some(frame) => format!("frame {frame}, {}", cost(statistics)),
         None => summary(statistics, pixels),
@@ -244,17 +244,6 @@ fn counted(count: usize, noun: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_first_ignored_contents_are_named_and_the_others_counted() {
-        let line = |count: usize| {
-            let notices: Vec<String> = (0..count).map(|index| format!("n{index}")).collect();
-            ignored(Path::new("a.glb"), &notices)
-        };
-        assert_eq!(line(0), None);
-        assert_eq!(line(3).as_deref(), Some("n0; n1; n2"));
-        assert_eq!(line(5).as_deref(), Some("n0; n1; n2; and 2 more, see photoncard scene info a.glb"));
-    }
 
     #[test]
     fn the_end_states_time_samples_and_limits() {

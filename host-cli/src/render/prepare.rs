@@ -17,7 +17,7 @@ use crate::arguments::{PrepareOptions, numbered};
 use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
-use crate::{input, outputs};
+use crate::{input, notices, outputs};
 
 /// Prepares a scene, as it stands or in frames, and writes it.
 pub(crate) fn run(options: &PrepareOptions) -> Result<(), Failure> {
@@ -95,6 +95,10 @@ impl<'a> Preparation<'a> {
         let mut settings = options.settings();
         let camera = settings.camera(scene)?;
         options.picture.fit(&camera, &mut settings.picture);
+        notices::say_ignored(&options.scene.path, scene, options.scene.strict)?;
+        if !options.quiet {
+            notices::say_remarks(&options.scene.path, scene);
+        }
         let progress = Progress::start(options.quiet, 1)
             .map_err(|error| Failure::work_error(&error))?
             .in_form(options.progress, Phase::Photons);

@@ -9,11 +9,13 @@ use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{NamedSettings, Phase, PreparedScene, RenderError, Renderer};
 use serde_json::{Value, json};
 
+use super::darkness::Circumstances;
 use super::finished::is_finished;
 use super::frames::outputs_of;
 use super::steps::{Finished, end_early, finish, on_threads};
 use super::{files, messages};
 use crate::arguments::{OutputOptions, RenderOptions, last_numbered};
+use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
@@ -117,7 +119,8 @@ impl OpenScene {
         let misfit = options.picture.fit(&camera, &mut settings.picture);
         let mut inputs = inputs.clone();
         if !options.quiet && *seconds > 0.0 {
-            messages::say_prepared(path, &settings, &inputs, &camera, misfit.as_ref());
+            messages::say_prepared(path, &settings, &inputs, &camera);
+            misfit.iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
         }
         inputs.extend(frame.map(|frame| ("frame".to_owned(), json!(frame))));
         if let Some(frame) = frame.filter(|_| is_finished(options, outputs, &settings, scene, &inputs)) {
@@ -135,7 +138,9 @@ impl OpenScene {
             (_, error) => error.into(),
         })?;
         let (scene_seconds, quality) = (std::mem::take(seconds), *quality);
-        let finished = Finished { rendering, scene_seconds, inputs, quality, fit: None, frame };
+        let circumstances = Circumstances::default();
+        let finished =
+            Finished { rendering, scene_seconds, inputs, quality, fit: None, frame, circumstances };
         finish(options, outputs, finished)
     }
 }

@@ -8,6 +8,7 @@ use photoncard_driver::render::{
 use photoncard_driver::scene::Scene;
 use serde_json::json;
 
+use super::darkness::{Circumstances, say_dark};
 use super::{files, messages};
 use crate::arguments::{OutputOptions, RenderOptions, SceneOptions, Unfitted};
 use crate::console::say;
@@ -44,6 +45,7 @@ pub(super) struct Finished {
     pub(super) fit: Option<Fit>,
     /// Number of the frame, if it is one.
     pub(super) frame: Option<u32>,
+    pub(super) circumstances: Circumstances,
 }
 
 /// Writes the outputs of a finished picture, and says so.
@@ -52,7 +54,7 @@ pub(super) fn finish(
     outputs: &OutputOptions,
     finished: Finished,
 ) -> Result<(), Failure> {
-    let Finished { mut rendering, scene_seconds, inputs, quality, fit, frame } = finished;
+    let Finished { mut rendering, scene_seconds, inputs, quality, fit, frame, circumstances } = finished;
     rendering.statistics.time_s.scene = scene_seconds;
     rendering.statistics.time_s.total += scene_seconds;
     let provenance = &mut rendering.statistics.provenance;
@@ -66,6 +68,10 @@ pub(super) fn finish(
     }
     if !options.quiet {
         messages::say_done(outputs, &rendering, frame);
+    }
+    messages::say_sparse(&rendering.statistics);
+    if options.parts.part.is_none() {
+        say_dark(&rendering.film, circumstances);
     }
     Ok(())
 }
@@ -113,10 +119,7 @@ pub(super) fn view(
 ) -> Result<(), Failure> {
     let camera = settings.camera(scene)?;
     let misfit = options.picture.fit(&camera, &mut settings.picture);
-    if !options.quiet {
-        messages::say_loaded(options, settings, scene, &camera, misfit);
-    }
-    Ok(())
+    messages::say_loaded(options, settings, scene, &camera, misfit)
 }
 
 /// Runs `work` on a pool of `threads` threads.

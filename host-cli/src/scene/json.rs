@@ -24,6 +24,7 @@ pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
         "variants": scene.variants,
         "generator": scene.generator,
         "ignored": scene.notices,
+        "remarks": scene.remarks,
     })
 }
 
@@ -104,6 +105,7 @@ fn image(image: &Image) -> Value {
     let encoding = match image.encoding {
         Encoding::Srgb => "srgb",
         Encoding::Linear => "linear",
+        Encoding::SharedExponent => "shared-exponent",
     };
     json!({"name": image.name, "width": image.width, "height": image.height, "encoding": encoding})
 }

@@ -17,7 +17,7 @@ use crate::arguments::{
 };
 use crate::console::say;
 use crate::failure::Failure;
-use crate::input;
+use crate::{input, notices};
 
 /// Name and value of an axis.
 type Value<'a> = (&'a str, &'a str);
@@ -25,6 +25,7 @@ type Value<'a> = (&'a str, &'a str);
 /// Loads the scene of a sweep, and makes its points.
 pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Result<SweepOptions, Failure> {
     let scene = input::load(&arguments.scene, u32::MAX)?;
+    notices::say_ignored(&arguments.scene.path, &scene, arguments.scene.strict)?;
     let name = input::name(&arguments.scene);
     let mut notices = BTreeSet::new();
     let sweep = Sweep::new(arguments.axes(), |values| {

@@ -54,7 +54,16 @@ impl Words {
 }
 
 fn of_scene(scene: &SceneOptions, wish: &Wish, words: &mut Words) {
-    let SceneOptions { path: _, assignments: _, energy_compensation, variant, lights, environment } = scene;
+    let SceneOptions {
+        path: _,
+        assignments: _,
+        energy_compensation,
+        variant,
+        lights,
+        environment,
+        environment_rotation,
+        strict,
+    } = scene;
     wish.assignments().iter().for_each(|assignment| words.add("--set", assignment));
     if *energy_compensation {
         words.0.push("--energy-compensation".into());
@@ -70,6 +79,10 @@ fn of_scene(scene: &SceneOptions, wish: &Wish, words: &mut Words) {
             EnvironmentOption::File(file) => path(&file.to_string_lossy()),
         }),
     );
+    words.add_some("--environment-rotation", *environment_rotation);
+    if *strict {
+        words.0.push("--strict".into());
+    }
 }
 
 fn of_picture(picture: &Picture, words: &mut Words) {

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 
 use super::{Picture, RenderSettings};
+use crate::error::SceneError;
 use crate::render::error::RenderError;
 use crate::scene::{Camera, Scene};
 
@@ -17,7 +18,13 @@ impl RenderSettings {
     /// If the scene has no camera of the name, or the values are not those of a camera.
     pub fn camera(&self, scene: &Scene) -> Result<Camera, RenderError> {
         let Picture { camera, camera_at, look_at, fov, .. } = &self.picture;
-        let mut camera = scene.camera(camera.as_deref())?.clone();
+        // Of an orthographic camera that is placed and turned anew nothing is left.
+        let is_placed = camera.is_none() && camera_at.is_some() && look_at.is_some();
+        let found = match (scene.camera(camera.as_deref()), scene.cameras.first()) {
+            (Err(SceneError::OrthographicCamera { .. }), Some(other)) if is_placed => other,
+            (found, _) => found?,
+        };
+        let mut camera = found.clone();
         if let Some(at) = camera_at {
             camera.origin = placed("--camera-at", *at, scene)?;
         }

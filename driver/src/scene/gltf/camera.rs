@@ -7,6 +7,7 @@ use gltf::json::camera::Type;
 use gltf::json::validation::Checked;
 
 use super::document::Document;
+use super::inside::{self, Framed};
 use super::notices::Notices;
 use crate::error::SceneError;
 use crate::scene::{Camera, FRAMED, Scene};
@@ -16,6 +17,9 @@ const MARGIN: f32 = 1.05;
 
 /// Tangent of half the default camera's field of view, 45 degrees.
 const HALF_VIEW_TANGENT: f32 = std::f32::consts::SQRT_2 - 1.0;
+
+/// Vertical field of view in a room, 65 degrees, radians.
+const WIDE_VIEW: f32 = 65.0 / 180.0 * std::f32::consts::PI;
 
 /// Conversion of glTF's cameras to the scene's.
 pub(super) struct CameraPlacer<'a> {
@@ -42,6 +46,7 @@ impl<'a> CameraPlacer<'a> {
         let name = self.name(index, node);
         let (Checked::Valid(Type::Perspective), Some(perspective)) = (source.type_, &source.perspective)
         else {
+            scene.orthographic.push((scene.cameras.len(), name.clone()));
             notices.orthographic.push(name);
             return Ok(());
         };
@@ -91,8 +96,20 @@ fn axes(world: &DMat4) -> Option<(Vec3, Vec3, Vec3, Vec3)> {
     placed.0.is_finite().then_some(placed)
 }
 
-/// Default camera in front of the scene's bounding box, which sees the whole scene in a square or wider picture.
-pub(super) fn frame(scene: &Scene) -> Camera {
+/// Default camera: in a closed room that lamps light from inside, or before the scene's bounding box.
+pub(super) fn frame(scene: &Scene) -> (Camera, Framed) {
+    match inside::view(scene) {
+        Some((origin, forward)) => {
+            let right = forward.cross(Vec3::Y);
+            let camera = Camera { origin, right, forward, vertical_fov: WIDE_VIEW, ..from_front(scene) };
+            (camera, Framed::FromInside)
+        }
+        None => (from_front(scene), Framed::FromFront),
+    }
+}
+
+/// Camera in front of the scene's bounding box, which sees the whole scene in a square or wider picture.
+fn from_front(scene: &Scene) -> Camera {
     let (low, high) = scene.bounds();
     let centre = low + (high - low) * 0.5;
     let half = (high - low) * 0.5;

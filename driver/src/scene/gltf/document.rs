@@ -1,5 +1,6 @@
 //! A glTF file: the chunks of a GLB, the parsed JSON, and its validation.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,10 +10,13 @@ use gltf::json::extensions::scene::khr_lights_punctual::Light;
 use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
 use miette::{NamedSource, SourceSpan};
+use serde::Deserialize as _;
 
 use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use super::files::{Files, read_file};
+use super::other_kinds;
 use super::parse_cost;
+use super::schema;
 use super::specular_glossiness::{self, Conversions};
 use crate::error::{Location, SceneError};
 use crate::printable::printable;
@@ -37,6 +41,8 @@ pub(super) struct Document {
     blob: Option<Range<usize>>,
     /// Materials and images that were converted from another model.
     pub(super) conversions: Conversions,
+    /// Animations with channels that extensions define, which were removed.
+    pub(super) shortened: BTreeSet<usize>,
     /// Files in its folder that were read.
     pub(super) files: Files,
 }
@@ -51,13 +57,18 @@ impl Document {
     }
 
     pub(super) fn read(path: &Path) -> Result<Self, SceneError> {
+        other_kinds::refused_path(path).map_or(Ok(()), Err)?;
         let bytes =
             read_file(path).map_err(|source| SceneError::Unreadable { file: path.to_owned(), source })?;
         let (text, blob) =
             if bytes.starts_with(GLB_MAGIC) { split_glb(path, &bytes)? } else { (0..bytes.len(), None) };
-        let root = parse(path, &bytes[text.clone()])?;
-        let (conversions, files) = (Conversions::default(), Files::default());
-        let mut document = Self { path: path.to_owned(), root, bytes, text, blob, conversions, files };
+        let parsed = parse(path, &bytes[text.clone()]);
+        // Whatever its name, a file is what can be read.
+        let (mut root, mut shortened) =
+            parsed.map_err(|error| other_kinds::refused_file(path, &bytes).unwrap_or(error))?;
+        shortened.extend(schema::remove_unknown_paths(&mut root));
+        let (path, conversions, files) = (path.to_owned(), Conversions::default(), Files::default());
+        let mut document = Self { path, root, bytes, text, blob, conversions, shortened, files };
         document.check()?;
         document.conversions = specular_glossiness::convert(&mut document.root);
         Ok(document)
@@ -179,8 +190,13 @@ impl Document {
             let is_bound = path.as_str().ends_with(".min") || path.as_str().ends_with(".max");
             // An accessor without a buffer view is all zeros: exporters write such morph targets.
             let is_zeros = fault == Fault::Missing && is_accessors_view(path.as_str());
+            // Primitives without positions and attributes of unknown names are not rendered.
+            let is_attribute = ["POSITION", "<invalid semantic name>"]
+                .iter()
+                .any(|name| ends_in_attribute(path.as_str(), name));
             // `extensionsRequired` was checked before.
-            if !is_bound && !is_zeros && fault != Fault::Unsupported {
+            let is_taken = is_bound || is_zeros || is_attribute && fault != Fault::IndexOutOfBounds;
+            if !is_taken && fault != Fault::Unsupported {
                 first = Some((path, fault));
             }
         };
@@ -193,6 +209,13 @@ impl Document {
         )?;
         Ok(first)
     }
+}
+
+/// Returns whether a JSON path, as the `gltf` crate writes it, ends in this vertex attribute.
+fn ends_in_attribute(path: &str, name: &str) -> bool {
+    path.strip_suffix("\"]")
+        .and_then(|path| path.strip_suffix(name))
+        .is_some_and(|path| path.ends_with(".attributes[\""))
 }
 
 /// Returns whether a JSON path names the buffer view of an accessor, not of its sparse elements.
@@ -220,6 +243,9 @@ fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<us
     let (Some(version), Some(length)) = header else {
         return Err(truncated("the GLB header", GLB_HEADER as u64, bytes.len()));
     };
+    if version == 1 {
+        return Err(other_kinds::version_1(path));
+    }
     if version != 2 {
         return Err(not_gltf(&format!("it is a GLB of version {version}")));
     }
@@ -249,10 +275,11 @@ fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<us
     text.map(|text| (text, blob)).ok_or_else(|| not_gltf("the GLB has no JSON chunk"))
 }
 
-fn parse(path: &Path, bytes: &[u8]) -> Result<json::Root, SceneError> {
+/// The parsed JSON, and the animations from which channels were removed.
+fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, BTreeSet<usize>), SceneError> {
     let not_gltf = |reason: &str| SceneError::NotGltf { file: path.to_owned(), reason: reason.to_owned() };
     let text = str::from_utf8(bytes).map_err(|_| not_gltf("it is neither a GLB nor UTF-8 text"))?;
-    let text = without_mark(text);
+    let text = without_padding(text);
     if text.trim().is_empty() {
         return Err(not_gltf("it is empty"));
     }
@@ -265,20 +292,46 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<json::Root, SceneError> {
         ),
         remedy: "leave out what is empty: most of its nodes, materials, meshes or extras say nothing",
     })?;
-    allocation::check(bytes).map_err(|error| SceneError::memory(path, "reading its JSON", error))?;
-    let parsed = foreign::decode(|| Ok(serde_json::from_str(text)), || not_gltf(CONTRADICTION))?;
-    parsed.map_err(|error| json_error(path, text, &error))
+    let check =
+        |bytes| allocation::check(bytes).map_err(|error| SceneError::memory(path, "reading its JSON", error));
+    check(bytes)?;
+    let strict = foreign::decode(|| Ok(serde_json::from_str(text)), || not_gltf(CONTRADICTION))?;
+    match strict {
+        Ok(root) => Ok((root, BTreeSet::new())),
+        Err(error) if error.is_data() && !error.to_string().starts_with("duplicate field") => {
+            // The document as values, and as the crate's types.
+            check(bytes.saturating_mul(2))?;
+            foreign::decode(|| Ok(parse_amended(path, text)), || not_gltf(CONTRADICTION))?
+        }
+        Err(error) => Err(json_error(path, text, &error)),
+    }
+}
+
+/// [`parse`] of a text that is JSON and not in the form of the `gltf` crate.
+fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, BTreeSet<usize>), SceneError> {
+    let mut document = serde_json::from_str(text).map_err(|error| json_error(path, text, &error))?;
+    if schema::is_of_version_1(&document) {
+        return Err(other_kinds::version_1(path));
+    }
+    let shortened = schema::amend(&mut document);
+    let root = json::Root::deserialize(&document).map_err(|_| {
+        let (item, reason) = schema::violation(&document);
+        let remedy = "export the scene again, or correct this item of the file: it violates glTF's schema";
+        SceneError::Invalid { location: Location::new(path, item), reason, remedy }
+    })?;
+    Ok((root, shortened))
 }
 
 const CONTRADICTION: &str = "its structure contradicts itself";
 
 /// JSON of bytes in UTF-8; empty for others.
 fn json_text(bytes: &[u8]) -> &str {
-    str::from_utf8(bytes).map_or("", without_mark)
+    str::from_utf8(bytes).map_or("", without_padding)
 }
 
-fn without_mark(text: &str) -> &str {
-    text.strip_prefix('\u{feff}').unwrap_or(text)
+/// JSON without a byte order mark, and without the zeros to which some exporters pad a chunk.
+fn without_padding(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text).trim_end_matches('\0')
 }
 
 /// Syntax error with an excerpt of the text: a line of glTF may contain a whole buffer in base64.

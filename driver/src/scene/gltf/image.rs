@@ -20,6 +20,16 @@ const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
 /// Maximum size of all image files together, bytes: in every format a texel takes at most eight.
 const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
 
+/// Image that textures take.
+#[derive(Clone, Copy)]
+pub(super) struct Wanted {
+    pub(super) origin: Origin,
+    /// Encoding of an image of 8 bits a channel.
+    pub(super) encoding: Encoding,
+    /// True if nothing but emission is taken from it.
+    pub(super) is_of_emission: bool,
+}
+
 /// An image file whose header is read.
 struct File<'a> {
     origin: Origin,
@@ -39,6 +49,8 @@ enum Found<'a> {
 struct Decoded {
     size: [u32; 2],
     texels: Option<Vec<[u8; 4]>>,
+    /// True for texels of [`Encoding::SharedExponent`].
+    is_deep: bool,
     faults: Vec<(Origin, Fault)>,
 }
 
@@ -62,13 +74,13 @@ impl From<Fault> for Failure {
 /// If the images exceed a limit, or the memory of process or card.
 pub(super) fn load(
     source: &Source<'_>,
-    wanted: &[(Origin, Encoding)],
+    wanted: &[Wanted],
     room: &mut Room,
     unreadable: &mut Vec<String>,
 ) -> Result<Vec<Option<Image>>, SceneError> {
     let (mut texels, mut bytes) = (0, 0);
     let mut found = Vec::with_capacity(wanted.len());
-    for &(origin, _) in wanted {
+    for &Wanted { origin, .. } in wanted {
         let image = find(source, origin, unreadable)?;
         if let Some(image) = &image {
             let size = image.size();
@@ -87,10 +99,17 @@ pub(super) fn load(
         }
         found.push(image);
     }
-    let decoded: Vec<_> = found.into_par_iter().map(|image| image.map(|image| image.decode())).collect();
+    let decoded: Vec<_> = found
+        .into_par_iter()
+        .zip(wanted)
+        .map(|(image, wanted)| image.map(|image| image.decode(wanted.is_of_emission)))
+        .collect();
     // The first error in the order of the file is returned, whichever thread failed first.
-    let images = decoded.into_iter().zip(wanted).map(|(decoded, &(origin, encoding))| {
-        let Some(Decoded { size: [width, height], texels, faults }) = decoded else { return Ok(None) };
+    let images = decoded.into_iter().zip(wanted).map(|(decoded, &Wanted { origin, encoding, .. })| {
+        let Some(Decoded { size: [width, height], texels, faults, is_deep }) = decoded else {
+            return Ok(None);
+        };
+        let encoding = if is_deep { Encoding::SharedExponent } else { encoding };
         for (origin, fault) in faults {
             unreadable.push(description(source, origin, fault)?);
         }
@@ -117,11 +136,16 @@ impl Found<'_> {
         }
     }
 
-    fn decode(&self) -> Decoded {
+    /// Texels; emission keeps more than 8 bits a channel.
+    fn decode(&self, is_of_emission: bool) -> Decoded {
         let size = self.size();
+        let is_deep = match self {
+            Self::File(file) => is_of_emission && file.kind.is_deep(&file.bytes),
+            Self::Converted(..) => false,
+        };
         let mut faults = Vec::new();
         let mut decode = |file: &File<'_>| {
-            let texels = file.kind.decode(&file.bytes, file.size);
+            let texels = file.kind.decode(&file.bytes, file.size, is_deep);
             texels.map_err(|fault| faults.push((file.origin, fault))).ok()
         };
         let texels = match self {
@@ -138,7 +162,7 @@ impl Found<'_> {
                 Some(conversion.texels(size, grids))
             }
         };
-        Decoded { size, texels, faults }
+        Decoded { size, texels, is_deep, faults }
     }
 }
 

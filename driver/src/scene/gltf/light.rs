@@ -1,7 +1,7 @@
 //! Lights of `KHR_lights_punctual` with the transforms of their nodes.
 
 use glam::{DMat4, DVec3, Vec3};
-use gltf::json::extensions::scene::khr_lights_punctual::{Light, Type};
+use gltf::json::extensions::scene::khr_lights_punctual::{Light, Spot, Type};
 use gltf::json::validation::Checked;
 
 use super::document::Document;
@@ -46,11 +46,18 @@ impl<'a> LightPlacer<'a> {
         let light = &self.document.lights()[index];
         let name = light.name.clone().unwrap_or_else(|| format!("light {index}"));
         let intensity = self.intensity(index)?;
-        let kind = self.kind(index, node, world)?;
         notices.blender_units = self.found;
-        if self.document.is_of_blender() && has_penumbra(light) {
-            notices.blender_spots.push(name.clone());
+        if let Some(spot) = spot(light) {
+            let Cone { inner, outer, is_clamped } = Cone::of(spot);
+            if outer <= 0.0 {
+                notices.closed_spots.push(name);
+                return Ok(());
+            }
+            notices.clamped_spots.extend(is_clamped.then(|| name.clone()));
+            let has_penumbra = self.document.is_of_blender() && inner < outer;
+            notices.blender_spots.extend(has_penumbra.then(|| name.clone()));
         }
+        let kind = self.kind(index, node, world)?;
         scene.lights.push(PunctualLight { name, kind, intensity });
         Ok(())
     }
@@ -89,11 +96,7 @@ impl<'a> LightPlacer<'a> {
                 PunctualKind::Directional { direction: direction.ok_or_else(misplaced)? }
             }
             Checked::Valid(Type::Spot) => {
-                let (inner_cosine, outer_cosine) = self.cones(light).ok_or_else(|| {
-                    let reason = "the angles of the light's cones are not possible";
-                    let remedy = "state 0 <= innerConeAngle < outerConeAngle <= pi / 2";
-                    self.document.invalid(format!("{}.spot", place(index)), reason, remedy)
-                })?;
+                let (inner_cosine, outer_cosine) = self.cones(light);
                 let direction = direction.ok_or_else(misplaced)?;
                 PunctualKind::Spot { position, direction, inner_cosine, outer_cosine }
             }
@@ -103,26 +106,41 @@ impl<'a> LightPlacer<'a> {
     }
 
     /// Cosines of the inner and the outer cone angle of a spot light.
-    fn cones(&self, light: &Light) -> Option<(f32, f32)> {
-        let spot = light.spot.as_ref()?;
-        let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
-        let right = std::f32::consts::FRAC_PI_2;
-        if !(outer > 0.0 && outer <= right + ANGLE_TOLERANCE && inner >= 0.0 && inner <= outer) {
-            return None;
-        }
-        let outer_cosine = libm::cosf(outer.min(right));
+    fn cones(&self, light: &Light) -> (f32, f32) {
+        let Cone { inner, outer, .. } = spot(light).map(Cone::of).unwrap_or_default();
+        let outer_cosine = libm::cosf(outer);
         let inner_cosine = if self.document.is_of_blender() {
             blender::inner_cosine(inner, outer, outer_cosine)
         } else {
             libm::cosf(inner)
         };
-        Some((inner_cosine, outer_cosine.min(inner_cosine - MIN_PENUMBRA)))
+        (inner_cosine, outer_cosine.min(inner_cosine - MIN_PENUMBRA))
     }
 }
 
-fn has_penumbra(light: &Light) -> bool {
-    let has_cones = light.spot.as_ref().is_some_and(|spot| spot.inner_cone_angle < spot.outer_cone_angle);
-    has_cones && matches!(light.type_, Checked::Valid(Type::Spot))
+/// Cone of a light, if it is a spot light.
+fn spot(light: &Light) -> Option<&Spot> {
+    light.spot.as_ref().filter(|_| matches!(light.type_, Checked::Valid(Type::Spot)))
+}
+
+/// Half angles of a spot light's cones, radians: `0 <= inner <= outer <= pi / 2`. No `outer` is a light that
+/// reaches nothing.
+#[derive(Default)]
+struct Cone {
+    inner: f32,
+    outer: f32,
+    /// True if the file states other angles, rounding aside.
+    is_clamped: bool,
+}
+
+impl Cone {
+    fn of(spot: &Spot) -> Self {
+        let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
+        let right = std::f32::consts::FRAC_PI_2;
+        let is_clamped = !(0.0..=outer).contains(&inner) || outer > right + ANGLE_TOLERANCE;
+        let outer = outer.clamp(0.0, right);
+        Self { inner: inner.clamp(0.0, outer), outer, is_clamped }
+    }
 }
 
 /// Place of a light in the file.

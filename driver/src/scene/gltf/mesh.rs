@@ -118,7 +118,7 @@ impl<'a> MeshPlacer<'a> {
     fn prepare(&self, mesh: usize, scene: &mut Scene) -> Result<Vec<Primitive<'a>>, SceneError> {
         let mut prepared = Vec::new();
         for (index, primitive) in self.source.document.root.meshes[mesh].primitives.iter().enumerate() {
-            let Some(topology) = Topology::of(primitive) else { continue };
+            let Some(topology) = Topology::of_rendered(primitive) else { continue };
             // The default material follows the materials of the file.
             let default = self.source.document.root.materials.len();
             let material = primitive.material.map_or(default, |material| material.value());

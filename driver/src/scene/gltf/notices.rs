@@ -1,17 +1,20 @@
-//! Notices: contents of a file that the renderer does not use, one sentence for each feature, with the names of the
-//! objects.
+//! Notices: contents of a file that the renderer does not use, or takes in another way, one sentence for each
+//! feature, with the names of the objects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use gltf::json;
+use gltf::json::validation::Checked;
 
+use super::animation;
 use super::document::Document;
 use super::extensions::SUPPORTED_EXTENSIONS;
+use super::inside::Framed;
 use super::material::has_dark_texture;
 use super::names::mesh_name;
 use super::not_finite::NotFinite;
 use super::solid_glass::Resolved;
-use super::topology::Topology;
+use super::topology::{Topology, has_positions};
 use crate::scene::{LightUnits, blender};
 
 /// Maximum number of names in a notice; further ones are counted.
@@ -30,10 +33,14 @@ pub(super) struct Notices {
     pub(super) blender_units: Option<LightUnits>,
     /// Names of Blender's spot lights with a penumbra.
     pub(super) blender_spots: Vec<String>,
+    /// Names of spot lights whose angles were clamped.
+    pub(super) clamped_spots: Vec<String>,
+    /// Names of spot lights that light nothing.
+    pub(super) closed_spots: Vec<String>,
     /// Images that cannot be read, each with its reason.
     pub(super) unreadable: Vec<String>,
-    /// True if the scene has no camera and received a default one.
-    pub(super) framed: bool,
+    /// The default camera of a scene that has none.
+    pub(super) framed: Option<Framed>,
     /// Meshes with normals or colours that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
 }
@@ -72,23 +79,41 @@ fn meshes(root: &json::Root, holds: impl Fn(&json::mesh::Primitive) -> bool) -> 
     names("mesh", &root.meshes, |mesh| mesh.name.as_ref(), |mesh| mesh.primitives.iter().any(&holds))
 }
 
+/// Sentences of two kinds, each in a fixed order.
+#[derive(Default)]
+pub(super) struct Sentences {
+    /// Contents that are not used, or that are missing.
+    pub(super) ignored: Vec<String>,
+    /// Contents that are used in another way than they are stated.
+    pub(super) remarks: Vec<String>,
+}
+
+/// Adds a sentence with names, if there are any.
+fn note(sentences: &mut Vec<String>, sentence: &str, kind: &str, names: &[String]) {
+    if !names.is_empty() {
+        sentences.push(format!("{sentence}: {}", list(kind, names)));
+    }
+}
+
 impl Notices {
-    /// All notices of a document, in a fixed order.
-    pub(super) fn finish(self, document: &Document) -> Vec<String> {
+    /// All sentences on a document.
+    pub(super) fn finish(&self, document: &Document) -> Sentences {
+        Sentences { ignored: self.ignored(document), remarks: self.remarks() }
+    }
+
+    fn ignored(&self, document: &Document) -> Vec<String> {
         let root = &document.root;
-        let mut sentences = Vec::from_iter(self.blender_units.and_then(of_units).map(str::to_owned));
+        let mut sentences = Vec::new();
         if !self.unreadable.is_empty() {
             let images = several(&self.unreadable);
             sentences.push(format!(
                 "textures are left out whose image cannot be read, the factors alone count: image {images}"
             ));
         }
+        note_materials(root, &mut sentences);
         let mut note = |sentence: &str, kind: &str, names: &[String]| {
-            if !names.is_empty() {
-                sentences.push(format!("{sentence}: {}", list(kind, names)));
-            }
+            note(&mut sentences, sentence, kind, names);
         };
-        note_materials(root, &mut note);
         let mismatched = &document.conversions.mismatched;
         let name = |&index: &usize| {
             root.materials[index].name.clone().unwrap_or_else(|| format!("material {index}"))
@@ -98,6 +123,15 @@ impl Notices {
         note(sentence, "material", &mismatched);
         let other_modes = meshes(root, |primitive| Topology::of(primitive).is_none());
         note("points and lines are ignored, only triangles are rendered", "mesh", &other_modes);
+        let shapeless =
+            meshes(root, |primitive| Topology::of(primitive).is_some() && !has_positions(primitive));
+        note("primitives without positions are ignored", "mesh", &shapeless);
+        let unnamed = meshes(root, |primitive| primitive.attributes.contains_key(&Checked::Invalid));
+        note("vertex attributes whose names glTF does not know are ignored", "mesh", &unnamed);
+        let shortened = document.shortened.iter();
+        let shortened: Vec<_> =
+            shortened.map(|&index| animation::name(index, &root.animations[index])).collect();
+        note("channels of animations that extensions define are ignored", "animation", &shortened);
         let meshes_of = |indices: &BTreeSet<usize>| -> Vec<String> {
             indices.iter().map(|&index| mesh_name(root, index)).collect()
         };
@@ -116,10 +150,35 @@ impl Notices {
         let lights = document.lights();
         let limited = names("light", lights, |light| light.name.as_ref(), |light| light.range.is_some());
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
+        let closed = "spot lights whose outer cone has no angle are left out";
+        note(closed, "light", &self.closed_spots);
+        note("orthographic cameras are not rendered", "camera", &self.orthographic);
+        for (extension, places) in other_extensions(root) {
+            let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };
+            sentences.push(format!("the extension {extension} is ignored{places}"));
+        }
+        if let Some(view) = self.framed.filter(|_| self.orthographic.is_empty()) {
+            let framed = match view {
+                Framed::FromFront => "the scene has no camera: it is framed from the front (+z)",
+                Framed::FromInside => "the scene has no camera: it is a closed room, framed from inside",
+            };
+            let export =
+                document.is_of_blender().then(|| format!(" (to export one: {})", blender::NO_CAMERA));
+            sentences.push(format!("{framed}{}", export.unwrap_or_default()));
+        }
+        sentences
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let mut sentences = Vec::from_iter(self.blender_units.and_then(of_units).map(str::to_owned));
+        let mut note = |sentence: &str, kind: &str, names: &[String]| {
+            note(&mut sentences, sentence, kind, names);
+        };
+        let clamped = "the angles of spot lights are clamped to 0 <= inner <= outer <= 90 degrees";
+        note(clamped, "light", &self.clamped_spots);
         let penumbra = "inner cones of Blender's spot lights are widened to the flux that Blender renders";
         note(penumbra, "light", &self.blender_spots);
-        note("orthographic cameras are ignored", "camera", &self.orthographic);
-        let solid = "closed meshes of glass without a thickness are solid, as in Blender (a thin wall by --set MATERIAL.thickness=0)";
+        let solid = "closed meshes of glass without a thickness are taken as solid, as in Blender (as a thin wall by --set MATERIAL.thickness=0)";
         note(solid, "material", &self.glass.solid);
         let walls =
             "flat sheets of glass with a thickness bound no solid: they are thin walls of that thickness";
@@ -130,16 +189,6 @@ impl Notices {
         let apart = "faces of solids of glass are in one place, and light meets one of them alone: leave a \
                      gap of air between them";
         note(apart, "material", &self.touching_glass);
-        for (extension, places) in other_extensions(root) {
-            let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };
-            sentences.push(format!("the extension {extension} is ignored{places}"));
-        }
-        if self.framed {
-            let framed = "the scene has no perspective camera: it is framed from the front (+z)";
-            let export =
-                document.is_of_blender().then(|| format!(" (to export one: {})", blender::NO_CAMERA));
-            sentences.push(format!("{framed}{}", export.unwrap_or_default()));
-        }
         sentences
     }
 }
@@ -156,7 +205,7 @@ fn of_units(units: LightUnits) -> Option<&'static str> {
     match units {
         LightUnits::Auto | LightUnits::Radiometric => None,
         LightUnits::Photometric => Some(
-            "the factor of 683 lm/W in the lights of Blender's exporter is ignored, since its emissive surfaces lack it (kept by \
+            "the factor of 683 lm/W in the lights of Blender's exporter is taken off, since its emissive surfaces lack it (kept by \
              --light-units radiometric)",
         ),
         LightUnits::Watts => Some(
@@ -166,7 +215,8 @@ fn of_units(units: LightUnits) -> Option<&'static str> {
 }
 
 /// Notices on unused features of materials.
-fn note_materials(root: &json::Root, note: &mut impl FnMut(&str, &str, &[String])) {
+fn note_materials(root: &json::Root, sentences: &mut Vec<String>) {
+    let mut note = |sentence: &str, kind: &str, names: &[String]| note(sentences, sentence, kind, names);
     let occluded = materials(root, |material| material.occlusion_texture.is_some());
     note("occlusion textures are ignored, occlusion is computed", "material", &occluded);
     let dark = materials(root, has_dark_texture);

@@ -11,7 +11,8 @@ use super::animation::{self, Animation, Moment, Poses};
 use super::buffers::Buffers;
 use super::document::Document;
 use super::extent::Anchor;
-use super::notices::{self, Notices};
+use super::inside::Framed;
+use super::notices::{self, Notices, Sentences};
 use super::room::Room;
 use super::settings::LoadSettings;
 use super::texture::Textures;
@@ -47,7 +48,7 @@ pub struct SceneFile {
     /// Images that cannot be read, each with its reason.
     unreadable: Vec<String>,
     /// Camera that shows the scene as it stands, if the file has none; known once it is needed.
-    framed: OnceLock<Camera>,
+    framed: OnceLock<(Camera, Framed)>,
     /// Place of the scene in the file, by the scene at rest; known once any moment is.
     anchor: OnceLock<Anchor>,
 }
@@ -79,14 +80,14 @@ impl SceneFile {
         self.placed(self.bare.clone(), None)
     }
 
-    /// [`Self::at_rest`] of a file that is not needed any more; animations are among the notices.
+    /// [`Self::at_rest`] of a file that is not needed any more; animations are among the remarks.
     ///
     /// # Errors
     /// As [`Self::at_rest`].
     pub fn into_rest(mut self) -> Result<Scene, SceneError> {
         let bare = std::mem::take(&mut self.bare);
         let mut scene = self.placed(bare, None)?;
-        scene.notices.extend(notices::of_animations(&self.document.root));
+        scene.remarks.extend(notices::of_animations(&self.document.root));
         Ok(scene)
     }
 
@@ -181,20 +182,22 @@ impl SceneFile {
             _ => {}
         }
         if scene.cameras.is_empty() {
-            scene.cameras.push(self.framed(&scene, moment)?);
-            notices.framed = true;
+            let (camera, view) = self.framed(&scene, moment)?;
+            scene.cameras.push(camera);
+            notices.framed = Some(view);
         }
         scene.lift_lamps().map_err(|error| {
             SceneError::memory(&document.path, "looking for lamps in other planes", error)
         })?;
         notices.glass = solid_glass::resolve(document, &mut scene)?;
         notices.touching_glass = touching_glass::join(&mut scene);
-        scene.notices = notices.finish(document);
+        let Sentences { ignored, remarks } = notices.finish(document);
+        (scene.notices, scene.remarks) = (ignored, remarks);
         Ok(scene)
     }
 
     /// Camera of a file without cameras, which stays where it is at rest.
-    fn framed(&self, scene: &Scene, moment: Option<&Moment>) -> Result<Camera, SceneError> {
+    fn framed(&self, scene: &Scene, moment: Option<&Moment>) -> Result<(Camera, Framed), SceneError> {
         if moment.is_some() && self.framed.get().is_none() {
             self.at_rest()?;
         }

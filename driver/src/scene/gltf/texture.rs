@@ -1,6 +1,6 @@
 //! Textures of materials, each once, with their samplers and transforms.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use gltf::json;
 use gltf::json::extensions::texture::TextureTransform;
@@ -9,7 +9,7 @@ use gltf::json::validation::Checked;
 
 use super::accessor::Source;
 use super::document::Document;
-use super::image;
+use super::image::{self, Wanted};
 use super::origin::Origin;
 use super::room::Room;
 use crate::error::SceneError;
@@ -93,6 +93,22 @@ impl<'a> Textures<'a> {
         })
     }
 
+    /// The images, of which those of emission alone are known.
+    fn wanted(&self, materials: &[Material]) -> Vec<Wanted> {
+        let image = |texture: u32| self.textures.get(texture as usize).map(|texture| texture.image);
+        let [mut of_emission, mut of_others] = [BTreeSet::new(), BTreeSet::new()];
+        for material in materials {
+            of_emission.extend(material.emissive_texture.and_then(image));
+            let others = Material { emissive_texture: None, ..material.clone() };
+            of_others.extend(others.textures().filter_map(image));
+        }
+        let wanted = (0..).zip(&self.images).map(|(index, &(origin, encoding))| {
+            let is_of_emission = of_emission.contains(&index) && !of_others.contains(&index);
+            Wanted { origin, encoding, is_of_emission }
+        });
+        wanted.collect()
+    }
+
     /// Loads the images, and leaves textures out whose image cannot be read and is described in `unreadable`.
     pub(super) fn finish(
         self,
@@ -101,7 +117,7 @@ impl<'a> Textures<'a> {
         scene: &mut Scene,
         unreadable: &mut Vec<String>,
     ) -> Result<(), SceneError> {
-        let images = image::load(source, &self.images, room, unreadable)?;
+        let images = image::load(source, &self.wanted(&scene.materials), room, unreadable)?;
         let is_read: Vec<_> = images.iter().map(Option::is_some).collect();
         scene.images = images.into_iter().flatten().collect();
         let images = renumbered(&is_read);

@@ -1,7 +1,7 @@
 //! Topologies of triangles: lists, strips and fans.
 
 use gltf::json;
-use gltf::json::mesh::Mode;
+use gltf::json::mesh::{Mode, Semantic};
 use gltf::json::validation::Checked;
 
 /// Topology of triangles.
@@ -23,6 +23,11 @@ impl Topology {
         }
     }
 
+    /// Topology of a primitive that is rendered: one of triangles, with positions.
+    pub(super) fn of_rendered(primitive: &json::mesh::Primitive) -> Option<Self> {
+        Self::of(primitive).filter(|_| has_positions(primitive))
+    }
+
     /// Number of triangles of `vertices` vertices; `None` if some are left over.
     pub(super) fn triangles(self, vertices: u64) -> Option<u64> {
         match self {
@@ -41,6 +46,11 @@ impl Topology {
             Self::Fan => [triangle + 1, triangle + 2, 0],
         }
     }
+}
+
+/// Returns whether a primitive has positions, which glTF leaves to extensions otherwise.
+pub(super) fn has_positions(primitive: &json::mesh::Primitive) -> bool {
+    primitive.attributes.contains_key(&Checked::Valid(Semantic::Positions))
 }
 
 #[cfg(test)]

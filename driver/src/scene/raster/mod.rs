@@ -10,6 +10,8 @@ mod png;
 mod webp;
 
 pub(super) use self::fault::Fault;
+#[cfg(doc)]
+use super::texture::Encoding;
 use super::texture::{MAX_SIDE, MAX_TEXELS};
 use crate::allocation;
 use crate::foreign;
@@ -84,11 +86,18 @@ impl Kind {
         Ok(size)
     }
 
-    /// Texels of an image, rows from the top; `size` is the result of [`Kind::size`].
-    pub(super) fn decode(self, bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
+    /// Returns whether an image has more than 8 bits a channel.
+    pub(super) fn is_deep(self, bytes: &[u8]) -> bool {
+        self == Self::Png && walled(|| Ok(png::is_deep(bytes))) == Ok(true)
+    }
+
+    /// Texels of an image, rows from the top, in sRGB or, if `is_deep`, in the linear form of
+    /// [`Encoding::SharedExponent`]; `size` is the result of [`Kind::size`].
+    pub(super) fn decode(self, bytes: &[u8], size: [u32; 2], is_deep: bool) -> Result<Vec<[u8; 4]>, Fault> {
         let bytes_needed = DECODING_BYTES * u64::from(size[0]) * u64::from(size[1]);
         allocation::check(bytes_needed).map_err(Fault::memory)?;
         let texels = walled(|| match self {
+            Self::Png if is_deep => png::decode_deep(bytes, size),
             Self::Png => png::decode(bytes, size),
             Self::Jpeg => jpeg::decode(bytes, size),
             Self::WebP => webp::decode(bytes, size),

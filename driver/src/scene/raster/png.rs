@@ -5,6 +5,9 @@ use std::io::Cursor;
 use png::{BitDepth, ColorType, Decoder, Transformations};
 
 use super::fault::Fault;
+use crate::scene::shared_exponent::of_srgb;
+#[cfg(doc)]
+use crate::scene::texture::Encoding;
 
 pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
@@ -66,7 +69,24 @@ fn chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], usize)> {
     })
 }
 
-pub(super) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
+/// Texel of 16 bits a channel, as it is stored.
+type Store = fn([u16; 4]) -> [u8; 4];
+
+/// Returns whether an image has 16 bits a channel.
+pub(super) fn is_deep(bytes: &[u8]) -> bool {
+    decoder(bytes).read_header_info().is_ok_and(|info| info.bit_depth == BitDepth::Sixteen)
+}
+
+pub(super) fn decode(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
+    read(bytes, size, |texel| texel.map(to_8_bits))
+}
+
+/// Texels of [`Encoding::SharedExponent`] of an image in sRGB with 16 bits a channel.
+pub(super) fn decode_deep(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
+    read(bytes, size, |[red, green, blue, _]| of_srgb([red, green, blue]))
+}
+
+fn read(bytes: &[u8], [width, height]: [u32; 2], store: Store) -> Result<Vec<[u8; 4]>, Fault> {
     let mut decoder = decoder(bytes);
     // A row before and after filtering, each of up to eight bytes per texel.
     decoder.set_limits(png::Limits { bytes: ANCILLARY_BYTES + 64 * width as usize });
@@ -76,35 +96,35 @@ pub(super) fn decode(bytes: &[u8], [width, height]: [u32; 2]) -> Result<Vec<[u8;
     if reader.info().interlaced {
         let mut rows = vec![0; reader.output_buffer_size().ok_or_else(|| Fault::damaged("it is too large"))?];
         reader.next_frame(&mut rows).map_err(Fault::damaged)?;
-        append(&mut texels, &rows, reader.output_color_type());
+        append(&mut texels, &rows, reader.output_color_type(), store);
     } else {
         let format = reader.output_color_type();
         while let Some(row) = reader.next_row().map_err(Fault::damaged)? {
-            append(&mut texels, row.data(), format);
+            append(&mut texels, row.data(), format, store);
         }
     }
     Ok(texels)
 }
 
-/// Appends rows in the decoder's output format.
-fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, BitDepth)) {
+/// Appends rows in the decoder's output format; `store` stores those of 16 bits.
+fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, BitDepth), store: Store) {
     let samples = colour.samples();
     match depth {
         BitDepth::Sixteen => {
             let pixels = rows.chunks_exact(2 * samples);
             texels.extend(pixels.map(|pixel| {
-                let mut rounded = [0; 4];
-                for (value, bytes) in rounded.iter_mut().zip(pixel.as_chunks().0) {
-                    *value = to_8_bits(u16::from_be_bytes(*bytes));
+                let mut values = [0; 4];
+                for (value, bytes) in values.iter_mut().zip(pixel.as_chunks().0) {
+                    *value = u16::from_be_bytes(*bytes);
                 }
-                rgba(colour, rounded)
+                store(rgba(colour, values, u16::MAX))
             }));
         }
         // `EXPAND` leaves no depth below 8 bits.
         _ => texels.extend(rows.chunks_exact(samples).map(|pixel| {
             let mut values = [0; 4];
             values.iter_mut().zip(pixel).for_each(|(value, &sample)| *value = sample);
-            rgba(colour, values)
+            rgba(colour, values, u8::MAX)
         })),
     }
 }
@@ -114,11 +134,11 @@ fn to_8_bits(value: u16) -> u8 {
     ((u32::from(value) * 255 + 32_767) / 65_535) as u8
 }
 
-fn rgba(colour: ColorType, [a, b, c, d]: [u8; 4]) -> [u8; 4] {
+fn rgba<T: Copy>(colour: ColorType, [a, b, c, d]: [T; 4], opaque: T) -> [T; 4] {
     match colour {
-        ColorType::Grayscale => [a, a, a, 255],
+        ColorType::Grayscale => [a, a, a, opaque],
         ColorType::GrayscaleAlpha => [a, a, a, b],
-        ColorType::Rgb => [a, b, c, 255],
+        ColorType::Rgb => [a, b, c, opaque],
         // `EXPAND` leaves no indexed colour.
         ColorType::Rgba | ColorType::Indexed => [a, b, c, d],
     }

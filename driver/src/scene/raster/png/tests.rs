@@ -23,7 +23,7 @@ fn file(size: [u32; 2], colour: ColorType, depth: BitDepth, data: &[u8], palette
 
 fn decoded(bytes: &[u8]) -> Vec<[u8; 4]> {
     let kind = Kind::of(bytes).unwrap();
-    kind.decode(bytes, kind.size(bytes).unwrap()).unwrap()
+    kind.decode(bytes, kind.size(bytes).unwrap(), false).unwrap()
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn cut_files_and_false_sizes_are_refused() {
     let whole = file([4, 4], ColorType::Rgba, BitDepth::Eight, &[7; 64], None);
     for length in 8..whole.len() - 12 {
         let bytes = &whole[..length];
-        let result = Kind::Png.size(bytes).and_then(|size| Kind::Png.decode(bytes, size));
+        let result = Kind::Png.size(bytes).and_then(|size| Kind::Png.decode(bytes, size, false));
         assert!(result.is_err(), "{length}");
     }
     // The header's checksum is right, but no file of this length can hold 16384 x 16384 texels.

@@ -1,0 +1,88 @@
+//! Sizes that blocks of DWA compression state (`OpenEXR`, "DWAA and DWAB compression"), checked before they
+//! are decoded.
+//!
+//! The `exr` crate allocates as much as a block states. A few bytes could end the process, since a failed
+//! allocation aborts and cannot be caught like a panic.
+
+use std::io::Cursor;
+
+use exr::block::chunk::CompressedBlock;
+use exr::error::Result;
+use exr::meta::BlockDescription;
+use exr::meta::header::Header;
+use exr::prelude::Compression;
+
+/// Size of a picture that is read however few bytes it is compressed to.
+pub(super) const PLAIN_BYTES: u64 = 4 << 20;
+
+/// Samples of a block of the discrete cosine transform.
+const SAMPLES: u64 = 64;
+
+/// Side of a block of the discrete cosine transform, pixels.
+const SIDE: usize = 8;
+
+/// Number of 64-bit counters at the begin of a block of pixels.
+const COUNTERS: usize = 11;
+
+pub(super) fn is_dwa(compression: Compression) -> bool {
+    matches!(compression, Compression::DWAA(_) | Compression::DWAB(_))
+}
+
+/// Memory of the transform of a block of pixels: 32-bit floats of three channels, bytes.
+pub(super) fn transform_bytes(header: &Header) -> u64 {
+    let [width, height] = padded(header);
+    width.saturating_mul(height).saturating_mul(3 * size_of::<f32>() as u64)
+}
+
+/// Returns whether all blocks of pixels state possible sizes.
+pub(super) fn states_possible_sizes(bytes: &[u8]) -> Result<bool> {
+    let reader = exr::block::read(Cursor::new(bytes), false)?;
+    let headers = reader.headers().to_vec();
+    // By the offsets of the file, as the decoder finds the blocks.
+    for chunk in reader.filter_chunks(false, |_, _, _| true)? {
+        let chunk = chunk?;
+        let Some(header) = headers.get(chunk.layer_index).filter(|header| is_dwa(header.compression)) else {
+            continue;
+        };
+        let pixels = match &chunk.compressed_block {
+            CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
+            CompressedBlock::Tile(block) => &block.compressed_pixels_le,
+            // Deep data is not read.
+            _ => continue,
+        };
+        if !is_possible(header, pixels) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Returns whether a block of pixels states no sizes beyond what its pixels take. Blocks without all counters
+/// are not decoded.
+fn is_possible(header: &Header, pixels: &[u8]) -> bool {
+    let mut counters = [0; COUNTERS];
+    for (counter, bytes) in counters.iter_mut().zip(pixels.as_chunks().0) {
+        *counter = u64::from_le_bytes(*bytes);
+    }
+    let [_, unknown, _, _, _, _, encoded, raw, varying, constant, _] = counters;
+    let block = header.max_block_byte_size() as u64;
+    let [width, height] = padded(header);
+    let samples = width.saturating_mul(height).saturating_mul(header.channels.list.len() as u64);
+    // Runs of one byte take two, and literals a byte for 127 of them.
+    let longest = block.saturating_mul(2);
+    unknown <= block
+        && raw <= block
+        && encoded <= longest
+        && varying <= samples
+        && constant <= samples.div_ceil(SAMPLES)
+        || pixels.len() as u64 == block
+}
+
+/// Width and height of the largest block of pixels, padded to whole blocks of the transform.
+fn padded(header: &Header) -> [u64; 2] {
+    let size = match header.blocks {
+        BlockDescription::Tiles(tiles) => [tiles.tile_size.width(), tiles.tile_size.height()],
+        BlockDescription::ScanLines => [header.layer_size.width(), header.compression.scan_lines_per_block()],
+    };
+    size.map(|side| side.div_ceil(SIDE).saturating_mul(SIDE) as u64)
+}

@@ -1,0 +1,152 @@
+//! JSON in the form that the types of the `gltf` crate take, which are stricter than glTF 2.0.
+//!
+//! glTF lets a scene have no `nodes` and an animation's target have no `node` (an extension may state another
+//! target), and its schema takes `1.0` as an integer. Members that are `null` count as absent.
+
+use std::collections::BTreeSet;
+
+use gltf::json;
+use gltf::json::validation::Checked;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value, json};
+
+/// Exclusive upper bound of numbers whose floating-point form is an integer without doubt.
+const MAX_INTEGER: f64 = 9_007_199_254_740_992.0;
+
+/// Lists of the root.
+const LISTS: [&str; 15] = [
+    "accessors",
+    "animations",
+    "buffers",
+    "bufferViews",
+    "cameras",
+    "extensionsRequired",
+    "extensionsUsed",
+    "images",
+    "materials",
+    "meshes",
+    "nodes",
+    "samplers",
+    "scenes",
+    "skins",
+    "textures",
+];
+
+/// Returns whether a document is of glTF 1.0, whose objects are named instead of numbered.
+pub(super) fn is_of_version_1(document: &Value) -> bool {
+    ["accessors", "meshes", "nodes", "scenes"].iter().any(|list| document[list].is_object())
+}
+
+/// Brings a document into the crate's form. Returns the animations from which channels were removed.
+pub(super) fn amend(document: &mut Value) -> BTreeSet<usize> {
+    simplify(document);
+    let Some(root) = document.as_object_mut() else { return BTreeSet::new() };
+    for scene in list(root, "scenes").filter_map(Value::as_object_mut) {
+        scene.entry("nodes").or_insert_with(|| json!([]));
+    }
+    let mut shortened = BTreeSet::new();
+    for (index, animation) in list(root, "animations").enumerate() {
+        let channels = animation.get_mut("channels").and_then(Value::as_array_mut);
+        let Some(channels) = channels else { continue };
+        let count = channels.len();
+        channels.retain(|channel| !is_of_extension(channel));
+        shortened.extend((channels.len() < count).then_some(index));
+    }
+    shortened
+}
+
+/// Removes channels whose path glTF does not know, as extensions state them. Returns their animations.
+pub(super) fn remove_unknown_paths(root: &mut json::Root) -> BTreeSet<usize> {
+    let mut shortened = BTreeSet::new();
+    for (index, animation) in root.animations.iter_mut().enumerate() {
+        let count = animation.channels.len();
+        animation.channels.retain(|channel| matches!(channel.target.path, Checked::Valid(_)));
+        shortened.extend((animation.channels.len() < count).then_some(index));
+    }
+    shortened
+}
+
+/// JSON path and description of a document's first violation of glTF's schema.
+pub(super) fn violation(document: &Value) -> (String, String) {
+    let Some(root) = document.as_object() else {
+        return (String::new(), "its JSON is no object, which a glTF file is".to_owned());
+    };
+    for (name, value) in root {
+        let Some(elements) = value.as_array() else {
+            match fault_of_member(name, value) {
+                Some(fault) => return (name.clone(), fault),
+                None => continue,
+            }
+        };
+        let mut faults = elements.iter().map(|element| fault_of(name, element)).enumerate();
+        if let Some((index, fault)) = faults.find_map(|(index, fault)| Some((index, fault?))) {
+            return (format!("{name}[{index}]"), fault);
+        }
+    }
+    (String::new(), fault::<json::Root>(document).unwrap_or_default())
+}
+
+fn list<'a>(root: &'a mut Map<String, Value>, name: &str) -> impl Iterator<Item = &'a mut Value> {
+    root.get_mut(name).and_then(Value::as_array_mut).into_iter().flatten()
+}
+
+/// Returns whether the target of an animation's channel is no node.
+fn is_of_extension(channel: &Value) -> bool {
+    channel.get("target").and_then(Value::as_object).is_some_and(|target| !target.contains_key("node"))
+}
+
+/// Removes members that are `null`, and writes whole numbers as integers, except in `extras`.
+fn simplify(value: &mut Value) {
+    match value {
+        Value::Object(members) => {
+            members.retain(|_, member| !member.is_null());
+            let members = members.iter_mut().filter(|(name, _)| *name != "extras");
+            members.for_each(|(_, member)| simplify(member));
+        }
+        Value::Array(elements) => elements.iter_mut().for_each(simplify),
+        Value::Number(number) => {
+            let whole = number.as_f64().filter(|_| number.is_f64());
+            let whole = whole.filter(|value| value.fract() == 0.0 && !value.is_sign_negative());
+            if let Some(value) = whole.filter(|value| *value < MAX_INTEGER) {
+                *number = (value as u64).into();
+            }
+        }
+        _ => {}
+    }
+}
+
+fn fault<T: DeserializeOwned>(value: &Value) -> Option<String> {
+    T::deserialize(value).err().map(|error| error.to_string())
+}
+
+/// Fault of a member of the root that is no list.
+fn fault_of_member(name: &str, value: &Value) -> Option<String> {
+    match name {
+        "asset" => fault::<json::Asset>(value),
+        "scene" => fault::<json::Index<json::Scene>>(value),
+        "extensions" => fault::<json::extensions::root::Root>(value),
+        _ if LISTS.contains(&name) => Some("it is no list".to_owned()),
+        _ => None,
+    }
+}
+
+/// Fault of an element of a list of the root.
+fn fault_of(list: &str, element: &Value) -> Option<String> {
+    match list {
+        "accessors" => fault::<json::Accessor>(element),
+        "animations" => fault::<json::Animation>(element),
+        "buffers" => fault::<json::Buffer>(element),
+        "bufferViews" => fault::<json::buffer::View>(element),
+        "cameras" => fault::<json::Camera>(element),
+        "images" => fault::<json::Image>(element),
+        "materials" => fault::<json::Material>(element),
+        "meshes" => fault::<json::Mesh>(element),
+        "nodes" => fault::<json::Node>(element),
+        "samplers" => fault::<json::texture::Sampler>(element),
+        "scenes" => fault::<json::Scene>(element),
+        "skins" => fault::<json::Skin>(element),
+        "textures" => fault::<json::Texture>(element),
+        "extensionsUsed" | "extensionsRequired" => fault::<String>(element),
+        _ => None,
+    }
+}

@@ -1,0 +1,111 @@
+//! Videos of frames, which the program ffmpeg makes of PNG pictures.
+
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use miette::{MietteDiagnostic, Report};
+
+use crate::arguments::{PictureFormat, PictureOutput, RenderOptions, numbered};
+use crate::console::say;
+use crate::failure::Failure;
+use crate::shell;
+
+const FFMPEG: &str = "ffmpeg";
+
+/// A video, and the pattern of the pictures that it is made of.
+pub(super) struct Video {
+    path: PathBuf,
+    pictures: PathBuf,
+}
+
+/// Replaces the videos among the outputs by the pictures that they are made of.
+///
+/// # Errors
+/// If there are no frames, ffmpeg cannot be started, or a video is one of the inputs.
+pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
+    let mut videos = Vec::new();
+    for output in options.outputs.pictures.iter_mut().filter(|output| output.format == PictureFormat::Video) {
+        let (path, pictures) = (output.path.clone(), output.path.with_extension("######.png"));
+        *output = PictureOutput { path: pictures.clone(), format: PictureFormat::Png };
+        videos.push(Video { path, pictures });
+    }
+    let Some(Video { path, pictures }) = videos.first() else { return Ok(videos) };
+    if options.frames.numbers().is_none() {
+        let text = format!("{} is a video, and one picture is rendered", path.display());
+        return Err(refusal(text, "state the frames of the scene's animations: --frames 1-240"));
+    }
+    let written: Vec<&Path> = videos.iter().map(|video| &*video.path).collect();
+    crate::outputs::check(&crate::input::files(&options.scene), &written, &[])?;
+    if !is_there() {
+        let text =
+            format!("{} is a video, which the program ffmpeg makes, and it is not there", path.display());
+        let pattern = pictures.display();
+        return Err(refusal(text, &format!("install ffmpeg, or render the frames alone: -o {pattern}")));
+    }
+    Ok(videos)
+}
+
+fn is_there() -> bool {
+    let started = Command::new(FFMPEG).arg("-version").stdin(Stdio::null()).output();
+    started.is_ok_and(|output| output.status.success())
+}
+
+impl Video {
+    /// Makes the video of rendered frames.
+    ///
+    /// # Errors
+    /// If ffmpeg fails: its last line, and the command.
+    pub(super) fn write(&self, options: &RenderOptions) -> Result<(), Failure> {
+        let pictures = options.frames.numbers().into_iter().flatten();
+        let pictures: Vec<PathBuf> = pictures.filter_map(|number| numbered(&self.pictures, number)).collect();
+        let failed = |error: std::io::Error| Failure::work_error(&error);
+        let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = tempfile::tempdir_in(folder.unwrap_or(Path::new("."))).map_err(failed)?;
+        let list = folder.path().join("frames.txt");
+        let mut file = std::fs::File::create(&list).map_err(failed)?;
+        for picture in &pictures {
+            let picture = std::fs::canonicalize(picture).map_err(failed)?;
+            let name = picture.to_string_lossy().replace('\'', "'\\''");
+            writeln!(file, "file '{name}'").map_err(failed)?;
+        }
+        let name = self.path.file_name().unwrap_or_default();
+        let made = folder.path().join(name);
+        let words = self.words(options.frames.fps(), &list, &made);
+        let output = Command::new(FFMPEG).args(&words).stdin(Stdio::null()).output().map_err(failed)?;
+        if !output.status.success() {
+            let said = String::from_utf8_lossy(&output.stderr);
+            let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default().to_owned();
+            let text = format!("ffmpeg made no {}: {last}", self.path.display());
+            let help = format!("the frames are written; it was started as: {}", shell::command(words));
+            return Err(Failure::Work(Report::new(MietteDiagnostic::new(text).with_help(help))));
+        }
+        std::fs::rename(&made, &self.path).map_err(failed)?;
+        if !options.quiet {
+            let count = pictures.len();
+            say(format_args!("photoncard: {}: {count} frames, by ffmpeg", self.path.display()));
+        }
+        Ok(())
+    }
+
+    fn words(&self, fps: f64, list: &Path, made: &Path) -> Vec<String> {
+        // Most players take an even number of pixels a side, and two bits of colour for four pixels.
+        let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2,format=yuv420p";
+        let fps = fps.to_string();
+        let [list, made] = [list, made].map(|path| path.to_string_lossy().into_owned());
+        let words = ["-v", "error", "-y", "-f", "concat", "-safe", "0", "-r", &fps, "-i", &list, "-vf", even];
+        words.into_iter().map(str::to_owned).chain([made]).collect()
+    }
+}
+
+/// Error of a video that is no output of a render of frames.
+pub(crate) fn needless() -> Failure {
+    refusal(
+        "a video is of frames that photoncard render makes".to_owned(),
+        "give photoncard render --frames A-B, or -o a name that ends in .exr or .png",
+    )
+}
+
+fn refusal(text: String, help: &str) -> Failure {
+    Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
+}
