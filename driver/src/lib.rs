@@ -99,7 +99,7 @@
 //!
 //! | layer | modules | contents |
 //! |---|---|---|
-//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign`, `heading` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic; headings of files |
+//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign`, `heading`, `intact` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic; headings of files; checks that finished files are whole |
 //! | tiles | [`sums`], [`sink`] | format of pixels' sums, and their values; a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
 //! | pictures | [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`] | pixels of a picture; its layers; files; comparison |
 //! | scenes | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
