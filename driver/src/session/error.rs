@@ -5,7 +5,7 @@ use std::time::Duration;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::link::PortError;
-use photoncard_shared::message::{Fault, PROTOCOL_VERSION, Tile, Versions};
+use photoncard_shared::message::{Fault, FaultCode, PROTOCOL_VERSION, Tile, Versions};
 
 /// Error of a session with a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -161,9 +161,10 @@ impl SessionError {
     }
 
     /// Returns whether the card is wrong about what it was asked, so that nothing of what it has rendered can
-    /// be trusted: it lies, or its messages are none that a sound card sends.
+    /// be trusted: it lies, its messages are none that a sound card sends, or its chip has found itself at fault.
     pub fn is_wrong(&self) -> bool {
-        self.lie().is_some() || matches!(self, Self::Unexpected(_))
+        self.lie().is_some()
+            || matches!(self, Self::Unexpected(_) | Self::Fault(Fault { code: FaultCode::Internal, .. }))
     }
 
     /// Returns whether the card may be retried: it has been silent, slow or disconnected, but not wrong.

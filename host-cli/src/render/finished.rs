@@ -56,6 +56,8 @@ fn damaged(outputs: &OutputOptions) -> Option<&Path> {
     let is_intact = |PictureOutput { path, format }: &PictureOutput| match format {
         PictureFormat::Exr => exr::is_intact(path),
         PictureFormat::Png => tone_mapping::is_intact(path),
+        // A video is of no single frame.
+        PictureFormat::Video => false,
         PictureFormat::Part => {
             Parts::open(std::slice::from_ref(path)).is_ok_and(|part| part.check_pixels().is_ok())
         }
