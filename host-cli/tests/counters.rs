@@ -94,6 +94,23 @@ fn counters_add_up_and_change_no_picture() {
     }
 }
 
+/// The first row of `docs/memory.csv` is a picture that takes a second.
+#[test]
+fn the_figures_of_the_memory_page_are_of_this_program() {
+    let csv = include_str!("../../docs/memory.csv");
+    let row: Vec<&str> = csv.lines().nth(1).expect("a row").split(',').collect();
+    let [scene, rays, "emulated", "48", photon_map, geometry] = row[..] else { panic!("{row:?}") };
+    let room = Room::new();
+    let options = ["--quality", "paper", "--size", "48x48", "--aov", "none", "--gather-rays", rays];
+    let techniques =
+        ["--irradiance-cache", "on", "--ic-error", "0.025", "--counters", "--card", "emulated:1"];
+    let outputs = ["-o", "out.exr", "--stats", "stats.json"];
+    room.rendered(&shipped(scene), &[&outputs[..], &options, &techniques].concat());
+    let statistics = statistics(&room, "stats.json");
+    let bytes = ["photon_map", "scene"].map(|part| count(&statistics, part, "dram_bytes").to_string());
+    assert_eq!(bytes, [photon_map, geometry], "run tests/memory_figures.sh");
+}
+
 #[test]
 fn a_trace_has_a_line_for_every_request_and_every_tile() {
     let room = Room::new();

@@ -71,21 +71,58 @@ fn table_of(document: &str, heading: &str) -> (usize, usize) {
     (first, first + length)
 }
 
-#[test]
-fn the_table_of_qualities_is_that_of_its_csv() {
-    const HEADING: &str = "| scene | quality | CPU s | error, % | mean | median, % | p95, % | Mitsuba, times | Cycles, times | best, times |";
-    let path = documents().join("quality.md");
-    let read = |path: &Path| fs::read_to_string(path).expect("the document can be read");
-    let (document, expected) = (read(&path), quality_table(&read(&documents().join("quality.csv"))));
-    let (first, end) = table_of(&document, HEADING);
+/// The lines of the table of `docs/memory.md`: bytes of whole frames, and how many times less than in the naive order.
+fn memory_table(csv: &str) -> Vec<String> {
+    let rows = csv.lines().skip(1).map(|line| {
+        let fields = <[&str; 6]>::try_from(line.split(',').collect::<Vec<_>>()).expect("six fields");
+        let [scene, rays, card, side, photons, geometry] = fields;
+        let bytes = [photons, geometry].map(|bytes| bytes.parse::<f64>().expect("a number of bytes"));
+        (scene, rays, card, side, bytes)
+    });
+    let frames: Vec<_> = rows.filter(|(.., side, _)| *side == "512").collect();
+    let naive = |of: &str| {
+        let row = frames.iter().find(|(scene, _, card, ..)| *scene == of && *card == "naive");
+        row.map(|(.., bytes)| bytes.iter().sum::<f64>()).expect("a naive frame of each scene")
+    };
+    frames
+        .iter()
+        .map(|(scene, rays, card, _, bytes)| {
+            let [photons, geometry] = bytes.map(|bytes| format!("{:.1}", bytes / 1e6));
+            let times = naive(scene) / bytes.iter().sum::<f64>();
+            format!("| {scene}, {rays} | `{card}` | {photons} | {geometry} | {times:.0} |")
+        })
+        .collect()
+}
+
+/// Compares the table under a heading row with its lines, or writes them.
+fn check_table(name: &str, heading: &str, expected: &[String]) {
+    let path = documents().join(name);
+    let document = fs::read_to_string(&path).expect("the document can be read");
+    let (first, end) = table_of(&document, heading);
     let lines: Vec<&str> = document.lines().collect();
-    if lines[first..end] == expected {
+    if lines[first..end] == *expected {
         return;
     }
     assert!(std::env::var_os("UPDATE_DOCS").is_some(), "expected:\n{}", expected.join("\n"));
     let expected: Vec<&str> = expected.iter().map(String::as_str).collect();
     fs::write(&path, [&lines[..first], &expected, &lines[end..]].concat().join("\n") + "\n")
         .expect("written");
+}
+
+fn csv(name: &str) -> String {
+    fs::read_to_string(documents().join(name)).expect("the figures can be read")
+}
+
+#[test]
+fn the_table_of_qualities_is_that_of_its_csv() {
+    const HEADING: &str = "| scene | quality | CPU s | error, % | mean | median, % | p95, % | Mitsuba, times | Cycles, times | best, times |";
+    check_table("quality.md", HEADING, &quality_table(&csv("quality.csv")));
+}
+
+#[test]
+fn the_table_of_memory_is_that_of_its_csv() {
+    const HEADING: &str = "| scene, gather rays | `--card` | photon map, MB | scene, MB | times less |";
+    check_table("memory.md", HEADING, &memory_table(&csv("memory.csv")));
 }
 
 #[test]
