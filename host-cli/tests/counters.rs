@@ -105,7 +105,9 @@ fn the_figures_of_the_memory_page_are_of_this_program() {
     let techniques =
         ["--irradiance-cache", "on", "--ic-error", "0.025", "--counters", "--card", "emulated:1"];
     let outputs = ["-o", "out.exr", "--stats", "stats.json"];
-    room.rendered(&shipped(scene), &[&outputs[..], &options, &techniques].concat());
+    let scene = shipped(scene);
+    let outcome = room.run(&[&["render", &scene][..], &outputs, &options, &techniques].concat());
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     let statistics = statistics(&room, "stats.json");
     let bytes = ["photon_map", "scene"].map(|part| count(&statistics, part, "dram_bytes").to_string());
     assert_eq!(bytes, [photon_map, geometry], "run tests/memory_figures.sh");
