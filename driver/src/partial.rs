@@ -137,9 +137,21 @@ impl PartialRender {
     fn check_unchanged(&self, reader: &mut BufReader<&File>, head: &Head) -> Result<(), PartialError> {
         reader.rewind().map_err(|error| self.error(error))?;
         let is_same = read_head(reader, &self.path)?.is_some_and(|again| again.settings == head.settings);
-        let differences = || vec!["it was written over while it was read".to_owned()];
-        let differs = || PartialError::Differs { path: self.path.clone(), differences: differences() };
-        is_same.then_some(()).ok_or_else(differs)
+        is_same.then_some(()).ok_or_else(|| self.written_over("read"))
+    }
+
+    /// Checks that a file that is written still has this render's settings: tiles behind those of another
+    /// picture would count as its own.
+    fn check_own(&self, mut file: &File) -> Result<(), PartialError> {
+        file.rewind().map_err(|error| self.error(error))?;
+        let head = read_head(&mut BufReader::new(file), &self.path)?;
+        let is_own = head.is_some_and(|head| differences(&head.settings, &self.settings).is_empty());
+        is_own.then_some(()).ok_or_else(|| self.written_over("rendered"))
+    }
+
+    fn written_over(&self, when: &str) -> PartialError {
+        let differences = vec![format!("it was written over while it was {when}")];
+        PartialError::Differs { path: self.path.clone(), differences }
     }
 
     fn append(&self, kept: &mut KeptTiles, tile: &FinishedTile) -> Result<(), PartialError> {
@@ -149,12 +161,14 @@ impl PartialRender {
             kept.file = file;
         }
         let Some(file) = &mut kept.file else { return Ok(()) };
-        if !kept.is_begun {
+        if kept.is_begun {
+            self.check_own(file)?;
+        } else {
             self.write_head(file).map_err(|error| self.error(error))?;
             kept.is_begun = true;
         }
         let mut write = || {
-            let start = file.stream_position()?;
+            let start = file.seek(SeekFrom::End(0))?;
             // A single call: another process sees the tile whole or truncated.
             file.write_all(&record(tile, self.first_sample))?;
             Ok(start)

@@ -8,7 +8,7 @@ use crate::arguments::{MergeOptions, PictureFormat, PictureOutput};
 use crate::console::{printable_json, say};
 use crate::failure::Failure;
 use crate::outputs;
-use crate::render::files::{Form, write_picture};
+use crate::render::files::{Form, check_standard_output, write_picture};
 use crate::render::{part, video};
 
 /// Maximum number of missing parts whose commands are printed.
@@ -16,13 +16,14 @@ const MAX_COMMANDS: usize = 100;
 
 /// Merges parts to the picture, and writes it.
 pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
-    let MergeOptions { parts: paths, pictures, sample_type, tone, progress: _ } = options;
+    let MergeOptions { parts: paths, pictures, sample_type, tone, progress } = options;
     if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
         return Err(part::needless());
     }
     if pictures.iter().any(|picture| picture.format == PictureFormat::Video) {
         return Err(video::needless());
     }
+    check_standard_output(pictures, None, *progress)?;
     let inputs: Vec<(&Path, &str)> = paths.iter().map(|path| (path.as_path(), "a part")).collect();
     let written: Vec<&Path> = pictures.iter().filter_map(PictureOutput::file).collect();
     outputs::check(&inputs, &written, &[])?;

@@ -71,7 +71,8 @@ fn table_of(document: &str, heading: &str) -> (usize, usize) {
     (first, first + length)
 }
 
-/// The lines of the table of `docs/memory.md`: bytes of whole frames, and how many times less than in the naive order.
+/// The lines of the table of `docs/memory.md`: bytes of whole frames, and how many times less than in the
+/// naive order.
 fn memory_table(csv: &str) -> Vec<String> {
     let rows = csv.lines().skip(1).map(|line| {
         let fields = <[&str; 6]>::try_from(line.split(',').collect::<Vec<_>>()).expect("six fields");

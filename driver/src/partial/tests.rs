@@ -377,6 +377,25 @@ fn a_file_that_changes_while_it_is_read_is_refused() {
     }
 }
 
+/// A file of another picture that takes the place of one that is written gets no tile of this one.
+#[test]
+fn a_file_that_is_written_over_while_tiles_are_added_gets_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = written(&folder);
+    let settings = partial(&folder, true);
+    let place = bytes.windows(9).position(|window| window == b"\"seed\":1}").unwrap();
+    let mut other = bytes.clone();
+    other[place + 7] = b'2';
+    for changed in [&other[..], &bytes[..place]] {
+        fs::write(&settings.path, &bytes).unwrap();
+        let render = begin_render(&settings, json!({ "seed": 1 }), &mut film()).unwrap();
+        fs::write(&settings.path, changed).unwrap();
+        render.put(&blank(&tile(0)));
+        assert!(matches!(render.check(), Err(PartialError::Differs { .. })));
+        assert!(fs::read(&settings.path).unwrap() == changed);
+    }
+}
+
 #[test]
 fn another_version_is_told_and_stays() {
     let folder = tempfile::tempdir().unwrap();

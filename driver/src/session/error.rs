@@ -161,7 +161,8 @@ impl SessionError {
     }
 
     /// Returns whether the card is wrong about what it was asked, so that nothing of what it has rendered can
-    /// be trusted: it lies, its messages are none that a sound card sends, or its chip has found itself at fault.
+    /// be trusted: it lies, its messages are none that a sound card sends, or its chip has found itself at
+    /// fault.
     pub fn is_wrong(&self) -> bool {
         self.lie().is_some()
             || matches!(self, Self::Unexpected(_) | Self::Fault(Fault { code: FaultCode::Internal, .. }))

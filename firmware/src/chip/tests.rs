@@ -1,4 +1,5 @@
-//! Invariants of a chip that are broken on purpose: each is a fault with its number, never light that is lost.
+//! Invariants of a chip that are broken on purpose: each is a fault with its number, never light that is
+//! lost.
 
 use std::boxed::Box;
 

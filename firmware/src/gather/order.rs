@@ -18,11 +18,12 @@ const BUCKETS: u32 = 256;
 /// Bits of a length, below those of three coordinates.
 const LENGTH_BITS: u32 = u64::BITS - 3 * GRID_BITS;
 const MAX_LENGTH: u64 = (1 << LENGTH_BITS) - 1;
-/// Least length that is told from 0, cells of the grid.
+/// Length from which on lengths are told apart, cells of the grid.
 const LEAST_LENGTH: f32 = 64.0;
 
-/// Position of a gather, rounded to the photons' grid: index along the Hilbert curve through 1024 cells an axis, and
-/// offset within the cell. The four bits below tell how long the gather ray is that ends there, by its binary exponent.
+/// Position of a gather, rounded to the photons' grid: index along the Hilbert curve through 1024 cells an
+/// axis, and offset within the cell. The four bits below tell how long the gather ray is that ends there, by
+/// its binary exponent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct HilbertCode(u64);
 
@@ -46,12 +47,13 @@ impl HilbertCode {
         Self(self.0 & !MAX_LENGTH | code)
     }
 
-    /// A length that the ray has at least, and at most twice of it, metres; 0 below 64 cells of the grid.
+    /// A length that the ray is shorter than, and has half of it at least, metres: 64 cells of the grid for
+    /// all shorter rays, infinite for long ones.
     #[inline(always)]
-    pub fn least_length(self, grid: &PhotonGrid) -> f32 {
+    pub fn upper_length(self, grid: &PhotonGrid) -> f32 {
         match self.0 & MAX_LENGTH {
-            0 => 0.0,
-            code => (1_u64 << (code - 1)) as f32 * LEAST_LENGTH * grid.cell,
+            MAX_LENGTH => f32::INFINITY,
+            code => (1_u64 << code) as f32 * LEAST_LENGTH * grid.cell,
         }
     }
 
@@ -193,14 +195,14 @@ mod tests {
         for cell in [1.0 / 1024.0, 1.0, 16.0] {
             let grid = PhotonGrid { origin: [-5; 3], cell };
             let plain = HilbertCode::new(&grid, [1e6, 17.0 * cell, 0.0]);
-            assert_eq!(plain.least_length(&grid), 0.0);
+            assert_eq!(plain.upper_length(&grid), 64.0 * cell);
             for length in [0.0, 0.01, 63.9, 64.0, 65.0, 127.0, 128.0, 1e4, 1e6, f32::INFINITY] {
                 let code = plain.with_length(&grid, length * cell);
                 assert_eq!(code.position(&grid), plain.position(&grid));
                 assert!(code < HilbertCode(plain.0 + MAX_LENGTH + 1) && code >= plain);
-                let least = code.least_length(&grid) / cell;
-                assert!(least <= length, "{least} > {length}");
-                assert!(length < 64.0 || least >= (0.5 * length).min(1e6), "{least} of {length}");
+                let upper = code.upper_length(&grid) / cell;
+                assert!(length < upper || upper == f32::INFINITY, "{length} >= {upper}");
+                assert!(!(64.0..1e5).contains(&length) || upper <= 2.0 * length, "{upper} of {length}");
             }
         }
     }

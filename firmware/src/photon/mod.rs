@@ -94,7 +94,8 @@ pub struct GatherLimits {
     pub neighbors: u32,
     /// Maximum distance of photons, metres.
     pub max_distance: f32,
-    /// Radius of gathers, metres, above which the point may be in a narrow gap, whose light is not that of the photons around.
+    /// Radius of gathers, metres, above which the point may be in a narrow gap, whose light is not that of
+    /// the photons around.
     pub free_within: f32,
 }
 

@@ -5,9 +5,9 @@
 //! before the straight line between the two ends of its border rays: no photon behind a plane wall is in a sector. The area of the
 //! estimate is that of the sectors, so that it agrees with the photons that are counted, whatever the rays have met.
 //!
-//! Photons far off the tangent plane belong to other surfaces, as the boards of a shelf: a region is the part of the sphere
-//! outside a cone about the normal. It ends below what covers the point: photons on the far side of a wall behind furniture face as
-//! the furniture's back does.
+//! Photons far off the tangent plane belong to other surfaces, as the boards of a shelf: a region is the part
+//! of the sphere outside a cone about the normal. It ends below what covers the point: photons on the far
+//! side of a wall behind furniture face as the furniture's back does.
 
 use core::f32::consts::PI;
 
@@ -193,8 +193,9 @@ impl VisibleRegion {
         })
     }
 
-    /// Free height over a point above a surface, infinite beyond the first of two distances, and the normal of the triangle below,
-    /// which the coded normal tells apart from others; the coded normal without a triangle within the second distance.
+    /// Free height over a point above a surface, infinite beyond the first of two distances, and the normal
+    /// of the triangle below, which the coded normal tells apart from others; the coded normal without a
+    /// triangle within the second distance.
     fn clear_height(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -212,8 +213,8 @@ impl VisibleRegion {
     }
 }
 
-/// True if something covers a point of a surface whose normal has the code `normal`, so low that photons on it may be taken for the surface's
-/// by a gather of the radius `radius`.
+/// True if something covers a point of a surface whose normal has the code `normal`, so low that photons on
+/// it may be taken for the surface's by a gather of the radius `radius`.
 ///
 /// # Errors
 /// If the image is not sound.

@@ -215,7 +215,7 @@ pub fn gathered<M: MemoryPort>(
     let limits = GatherLimits {
         neighbors: frame.neighbors,
         max_distance: frame.max_distance,
-        free_within: request.position.least_length(&scene.header.photon_grid),
+        free_within: request.position.upper_length(&scene.header.photon_grid),
     };
     let reflection = &request.reflection;
     let mut count = |tested: u32, nearest: &NearestPhotons, reflected: &Reflected| {

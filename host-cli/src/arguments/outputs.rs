@@ -28,7 +28,7 @@ pub(crate) struct OutputOptions {
     /// this option such a file is refused: remove it to begin anew. Frames whose files are there, whole and
     /// of these settings, are not rendered again.
     #[arg(long)]
-    resume: bool,
+    pub(crate) resume: bool,
     /// Type of the EXR's samples; Z and gathers are always float [default: float]
     #[arg(long, value_parser = choice::<SampleFormat>(), hide_short_help = true)]
     pub(super) sample_type: Option<SampleFormat>,

@@ -11,8 +11,8 @@ const MANY: f64 = 0.5;
 /// Facts on a scene and its view that explain darkness.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Circumstances {
-    /// True if Blender's exporter wrote the file.
-    is_of_blender: bool,
+    /// True if Blender's exporter wrote the file, and no environment was added.
+    lacks_world: bool,
     /// True if the camera is outside of the scene's bounds.
     is_outside: bool,
 }
@@ -21,7 +21,7 @@ impl Circumstances {
     pub(super) fn of(scene: &Scene, camera: &Camera) -> Self {
         let (low, high) = scene.bounds();
         let is_outside = camera.origin.cmplt(low).any() || camera.origin.cmpgt(high).any();
-        Self { is_of_blender: scene.is_of_blender(), is_outside }
+        Self { lacks_world: scene.is_of_blender() && scene.environment.is_none(), is_outside }
     }
 }
 
@@ -36,7 +36,7 @@ pub(super) fn say_dark(film: &Film, circumstances: Circumstances) {
 /// Message on pixels of these radiances and depths.
 fn line(
     all: impl Iterator<Item = ([f32; 3], f32)>,
-    Circumstances { is_of_blender, is_outside }: Circumstances,
+    Circumstances { lacks_world, is_outside }: Circumstances,
 ) -> Option<String> {
     let (mut pixels, mut seen, mut black, mut lit) = (0_u64, 0_u64, 0_u64, false);
     for (radiance, depth) in all {
@@ -54,7 +54,7 @@ fn line(
         return None;
     }
     let what = if lit {
-        format!("{:.0} % of what is seen is black", 100.0 * share)
+        format!("{:.0} % of what is seen is black", (100.0 * share).floor())
     } else {
         "the picture is black".into()
     };
@@ -62,7 +62,7 @@ fn line(
     if is_outside {
         reasons.push("the camera is outside of the scene: of a closed room it sees the walls from behind (--camera-at X,Y,Z)");
     }
-    if is_of_blender {
+    if lacks_world {
         reasons.push(
             "area lights and the world are never in Blender's export: make emissive planes of area lights, and give the world by \
              --environment",
@@ -79,8 +79,8 @@ mod tests {
     fn a_dark_picture_says_why() {
         let (black, lit) = ([0.0; 3], [0.0, 0.1, 0.0]);
         let nowhere = f32::INFINITY;
-        let said = |pixels: &[([f32; 3], f32)], is_of_blender, is_outside| {
-            line(pixels.iter().copied(), Circumstances { is_of_blender, is_outside })
+        let said = |pixels: &[([f32; 3], f32)], lacks_world, is_outside| {
+            line(pixels.iter().copied(), Circumstances { lacks_world, is_outside })
         };
         assert_eq!(said(&[(lit, 1.0), (black, 1.0), (lit, 2.0)], true, true), None);
         assert_eq!(said(&[(black, nowhere), (lit, nowhere)], true, true), None);
@@ -90,7 +90,7 @@ mod tests {
         let all = said(&[(black, 1.0), (black, nowhere)], false, false).unwrap();
         assert!(all.starts_with("the picture is black: no light") && !all.contains("Blender"), "{all}");
         let half = said(&[(black, 1.0), (lit, 1.0), (black, 3.0), (lit, nowhere)], true, true).unwrap();
-        for part in ["67 % of what is seen is black", "outside of the scene", "Blender's export"] {
+        for part in ["66 % of what is seen is black", "outside of the scene", "Blender's export"] {
             assert!(half.contains(part), "{half}");
         }
     }

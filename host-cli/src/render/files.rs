@@ -1,7 +1,7 @@
 //! Output files of a render.
 
 use std::io::IsTerminal;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::exr::{self, SampleFormat};
@@ -14,7 +14,9 @@ use photoncard_driver::render::Rendering;
 use photoncard_driver::tone_mapping::{ToneMapping, is_of_photoncard, png_bytes, write_png};
 
 use super::{part, video};
-use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput, numbered};
+use crate::arguments::{
+    OutputOptions, PictureFormat, PictureOutput, ProgressForm, RenderOptions, TextOutput, numbered,
+};
 use crate::console::{print_json, printable_json, say, write_bytes};
 use crate::failure::Failure;
 use crate::input;
@@ -23,7 +25,8 @@ use crate::input;
 /// that no finished tiles are lost.
 pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     part::check(options.parts.part, &outputs.pictures)?;
-    check_standard_output(outputs)?;
+    check_standard_output(&outputs.pictures, outputs.stats.as_ref(), options.progress)?;
+    check_kept(options, outputs)?;
     let mut written: Vec<&Path> = outputs.pictures.iter().filter_map(PictureOutput::file).collect();
     written.extend(outputs.stats.as_ref().and_then(TextOutput::path));
     written.extend(options.cards.trace.as_deref());
@@ -35,11 +38,17 @@ pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<
     }
 }
 
-/// Checks that standard output takes one picture or the statistics, and is no terminal if it takes a picture.
-fn check_standard_output(outputs: &OutputOptions) -> Result<(), Failure> {
-    let pictures = outputs.pictures.iter().filter(|picture| picture.file().is_none()).count();
-    let texts = usize::from(outputs.stats == Some(TextOutput::StandardOutput));
-    let [text, help] = if pictures + texts > 1 {
+/// Checks that standard output takes one picture, the statistics or the progress, and is no terminal if it
+/// takes a picture.
+pub(crate) fn check_standard_output(
+    pictures: &[PictureOutput],
+    stats: Option<&TextOutput>,
+    progress: ProgressForm,
+) -> Result<(), Failure> {
+    let pictures = pictures.iter().filter(|picture| picture.file().is_none()).count();
+    let has_progress = progress == ProgressForm::Openjd;
+    let texts = usize::from(stats == Some(&TextOutput::StandardOutput)) + usize::from(has_progress);
+    let [text, help] = if pictures > 0 && pictures + texts > 1 {
         ["standard output takes one output alone", "give the other ones files"]
     } else if pictures > 0 && std::io::stdout().is_terminal() {
         ["a picture is not written to a terminal", "direct it to a file or a pipe, such as: -o - | feh -"]
@@ -47,6 +56,25 @@ fn check_standard_output(outputs: &OutputOptions) -> Result<(), Failure> {
         return Ok(());
     };
     Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
+}
+
+/// Checks that finished tiles that are asked for have a file.
+fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
+    let is_piped = outputs.pictures.first().is_some_and(|picture| picture.file().is_none());
+    if !is_piped || !(outputs.resume || options.samples.keep_samples) {
+        return Ok(());
+    }
+    let text = "finished tiles are kept beside a file, and the picture goes to standard output";
+    let help = "name the picture by -o OUT.png or -o OUT.exr, or leave out --resume and --keep-samples";
+    Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
+}
+
+/// Checks that files of names that were not stated are photoncard's own.
+pub(super) fn check_foreign(mut paths: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
+    let Some(other) = paths.find(|path| path.exists() && !is_of_photoncard(path)) else { return Ok(()) };
+    let text = format!("{} is there, and photoncard did not write it", other.display());
+    let report = MietteDiagnostic::new(text).with_help("name the picture by -o OUT.png or -o OUT.exr");
+    Err(Failure::Input(Report::new(report)))
 }
 
 /// Outputs with a picture beside the scene, if none is stated and no part is rendered. A file of that name
@@ -58,12 +86,7 @@ pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptio
     let path = outputs.pictures.first().map_or(Path::new(""), |picture| &picture.path);
     let numbers = options.frames.numbers().into_iter().flatten();
     let of_frames = numbers.filter_map(|number| numbered(path, number));
-    let mut paths = of_frames.chain((!has_frames).then(|| path.to_owned()));
-    if let Some(other) = paths.find(|path| path.exists() && !is_of_photoncard(path)) {
-        let text = format!("{} is there, and photoncard did not write it", other.display());
-        let report = MietteDiagnostic::new(text).with_help("name the picture by -o OUT.png or -o OUT.exr");
-        return Err(Failure::Input(Report::new(report)));
-    }
+    check_foreign(of_frames.chain((!has_frames).then(|| path.to_owned())))?;
     if !options.quiet {
         say(format_args!("photoncard: without -o the picture is written to {}", path.display()));
     }

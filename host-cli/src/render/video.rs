@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 
 use miette::{MietteDiagnostic, Report};
 
+use super::files::check_foreign;
 use crate::arguments::{PictureFormat, PictureOutput, RenderOptions, numbered};
 use crate::console::say;
 use crate::failure::Failure;
@@ -37,6 +38,10 @@ pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     }
     let written: Vec<&Path> = videos.iter().map(|video| &*video.path).collect();
     crate::outputs::check(&crate::input::files(&options.scene), &written, &[])?;
+    let numbers = || options.frames.numbers().into_iter().flatten();
+    let frames =
+        |video: &Video| numbers().filter_map(|number| numbered(&video.pictures, number)).collect::<Vec<_>>();
+    check_foreign(videos.iter().flat_map(frames))?;
     if !is_there() {
         let text =
             format!("{} is a video, which the program ffmpeg makes, and it is not there", path.display());
@@ -77,7 +82,11 @@ impl Video {
             let said = String::from_utf8_lossy(&output.stderr);
             let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default().to_owned();
             let text = format!("ffmpeg made no {}: {last}", self.path.display());
-            let help = format!("the frames are written; it was started as: {}", shell::command(words));
+            let words: Vec<String> = words.iter().map(|word| shell::quoted(word)).collect();
+            let help = format!(
+                "the frames are written; with a list of them it was started as: {FFMPEG} {}",
+                words.join(" ")
+            );
             return Err(Failure::Work(Report::new(MietteDiagnostic::new(text).with_help(help))));
         }
         std::fs::rename(&made, &self.path).map_err(failed)?;
