@@ -1,9 +1,10 @@
 //! Checks of output files before any work.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::output;
+use photoncard_driver::tone_mapping::is_of_photoncard;
 
 use crate::failure::Failure;
 
@@ -23,4 +24,14 @@ pub(crate) fn check(inputs: &[(&Path, &str)], written: &[&Path], reserved: &[&Pa
         taken.push((path, "another output"));
     }
     Ok(())
+}
+
+/// Checks that files of names that were not stated are photoncard's own.
+pub(crate) fn check_foreign(mut paths: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
+    let Some(other) = paths.find(|path| path.exists() && !is_of_photoncard(path)) else {
+        return Ok(());
+    };
+    let text = format!("{} is there, and photoncard did not write it", other.display());
+    let report = MietteDiagnostic::new(text).with_help("name the picture by -o OUT.png or -o OUT.exr");
+    Err(Failure::Input(Report::new(report)))
 }

@@ -1,7 +1,7 @@
 //! Output files of a render.
 
 use std::io::IsTerminal;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::exr::{self, SampleFormat};
@@ -11,7 +11,7 @@ use photoncard_driver::output;
 use photoncard_driver::partial::PartialError;
 use photoncard_driver::parts::{self, PartHead};
 use photoncard_driver::render::Rendering;
-use photoncard_driver::tone_mapping::{ToneMapping, is_of_photoncard, png_bytes, write_png};
+use photoncard_driver::tone_mapping::{ToneMapping, png_bytes, write_png};
 
 use super::{part, video};
 use crate::arguments::{
@@ -69,14 +69,6 @@ fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Fa
     Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
 }
 
-/// Checks that files of names that were not stated are photoncard's own.
-pub(super) fn check_foreign(mut paths: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
-    let Some(other) = paths.find(|path| path.exists() && !is_of_photoncard(path)) else { return Ok(()) };
-    let text = format!("{} is there, and photoncard did not write it", other.display());
-    let report = MietteDiagnostic::new(text).with_help("name the picture by -o OUT.png or -o OUT.exr");
-    Err(Failure::Input(Report::new(report)))
-}
-
 /// Outputs with a picture beside the scene, if none is stated and no part is rendered. A file of that name
 /// that photoncard did not write stays.
 pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptions>, Failure> {
@@ -86,7 +78,7 @@ pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptio
     let path = outputs.pictures.first().map_or(Path::new(""), |picture| &picture.path);
     let numbers = options.frames.numbers().into_iter().flatten();
     let of_frames = numbers.filter_map(|number| numbered(path, number));
-    check_foreign(of_frames.chain((!has_frames).then(|| path.to_owned())))?;
+    crate::outputs::check_foreign(of_frames.chain((!has_frames).then(|| path.to_owned())))?;
     if !options.quiet {
         say(format_args!("photoncard: without -o the picture is written to {}", path.display()));
     }

@@ -6,7 +6,6 @@ use std::process::{Command, Stdio};
 
 use miette::{MietteDiagnostic, Report};
 
-use super::files::check_foreign;
 use crate::arguments::{PictureFormat, PictureOutput, RenderOptions, numbered};
 use crate::console::say;
 use crate::failure::Failure;
@@ -41,7 +40,7 @@ pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     let numbers = || options.frames.numbers().into_iter().flatten();
     let frames =
         |video: &Video| numbers().filter_map(|number| numbered(&video.pictures, number)).collect::<Vec<_>>();
-    check_foreign(videos.iter().flat_map(frames))?;
+    crate::outputs::check_foreign(videos.iter().flat_map(frames))?;
     if !is_there() {
         let text =
             format!("{} is a video, which the program ffmpeg makes, and it is not there", path.display());
