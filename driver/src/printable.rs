@@ -1,4 +1,5 @@
-//! Escaping of foreign text, from scenes, cards, paths or arguments, before it is printed.
+//! Escaping of foreign text, from scenes, cards, paths or arguments, before it is printed or put into a
+//! command.
 
 use std::borrow::Cow;
 
@@ -16,6 +17,15 @@ pub fn printable(text: &str) -> Cow<'_, str> {
         format!("{}{}", body.escape_debug(), &piece[body.len()..])
     };
     text.split_inclusive(kept).map(piece).collect::<String>().into()
+}
+
+/// Quotes a word for a POSIX shell: the shell reads it as it is.
+pub fn shell_word(word: &str) -> Cow<'_, str> {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
+    if !word.is_empty() && word.chars().all(is_plain) {
+        return Cow::Borrowed(word);
+    }
+    format!("'{}'", word.replace('\'', "'\\''")).into()
 }
 
 #[cfg(test)]

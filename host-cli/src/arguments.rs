@@ -264,7 +264,7 @@ mod tests {
             assert!(text.contains("unexpected argument") && text.contains(part), "{line}: {text}");
             assert!(!text.contains("a similar argument exists"), "{line}: {text}");
         }
-        // What is near to an option of this program is still told.
+        // Options of this program that are near are still suggested.
         assert!(said("photoncard render a.glb --qualty draft").contains("--quality"));
         assert!(said("photoncard render a.glb b.glb").contains("unexpected argument"));
     }

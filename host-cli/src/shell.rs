@@ -1,19 +1,11 @@
 //! Commands for a shell.
 
+pub(crate) use photoncard_driver::printable::shell_word as quoted;
+
 /// Command line of this program with these arguments, for a POSIX shell.
 pub(crate) fn command(arguments: impl IntoIterator<Item = String>) -> String {
-    let arguments = arguments.into_iter().map(|argument| quoted(&argument));
+    let arguments = arguments.into_iter().map(|argument| quoted(&argument).into_owned());
     std::iter::once("photoncard".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")
-}
-
-/// Quotes a word for a POSIX shell: the shell reads it as it is.
-pub(crate) fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        word.to_owned()
-    } else {
-        format!("'{}'", word.replace('\'', "'\\''"))
-    }
 }
 
 #[cfg(all(test, unix))]

@@ -1,4 +1,4 @@
-//! What a person types first: a scene alone, outputs by default and to a pipe, words of other renderers.
+//! First commands of a new user: a scene alone, outputs by default and to a pipe, words of other renderers.
 
 mod support;
 
@@ -43,6 +43,10 @@ fn a_picture_goes_to_a_pipe() {
     assert_eq!(room.names(), ["a.png", "scene.gltf"]);
     let twice = Outcome::of(&piped(&["-o", "-", "--stats", "-"]));
     assert!(twice.status == Some(2) && twice.stderr.contains("one output alone"), "{}", twice.stderr);
+    let progress = Outcome::of(&piped(&["-o", "-", "--progress", "openjd"]));
+    assert_eq!(progress.status, Some(2), "{}", progress.stderr);
+    let kept = Outcome::of(&piped(&["-o", "-", "--keep-samples"]));
+    assert!(kept.status == Some(2) && kept.stderr.contains("beside a file"), "{}", kept.stderr);
     let frames = Outcome::of(&piped(&["-o", "-", "--frames", "1-2"]));
     assert!(frames.status == Some(2) && frames.stderr.contains("run of #"), "{}", frames.stderr);
 }

@@ -43,8 +43,8 @@ const OPEN_HEIGHT: f32 = 0.1;
 const MARGIN: f32 = 1.15;
 /// Greatest difference of the hidden shares of area and light in that sphere for which a gather takes all photons.
 const MAX_DIFFERENCE: f32 = 0.06;
-/// Greatest difference in the ball around photons, over the area of one photon's sphere, for which none of them is
-/// taken to have more than [`MAX_DIFFERENCE`].
+/// Greatest difference in the ball around photons, over the area of one photon's sphere, for which none of
+/// them is taken to have more than [`MAX_DIFFERENCE`].
 const NEAR_DIFFERENCE: f32 = 0.03;
 /// Radius of gathers over that of a disc with as many photons as a leaf, estimated by the greatest distance from its middle.
 const BY_SPREAD: f32 = 1.2;

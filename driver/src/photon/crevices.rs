@@ -1,6 +1,6 @@
-//! Photons of one path that lie together. A path that is caught between sheets meets them many times, and its photons
-//! would be all that a gather there finds. One photon with the power of several takes their place, so that a gather
-//! finds those of other paths.
+//! Photons of one path that lie together. A path that is caught between sheets meets them many times, and its
+//! photons would be all that a gather there finds. One photon with the power of several takes their place, so
+//! that a gather finds those of other paths.
 
 use std::f64::consts::PI;
 
@@ -15,8 +15,8 @@ const SAMPLED: usize = 32;
 const NEIGHBOR: usize = 8;
 /// Share of the sampled photons that are at least as dense: a wide ground must not count.
 const SHARE: f64 = 0.25;
-/// Number of a path's arrivals in one place that bring light: more are those between sheets that nearly touch, whose
-/// light nothing sees.
+/// Number of a path's arrivals in one place that bring light: more are those between sheets that nearly
+/// touch, whose light nothing sees.
 const MAX_ARRIVALS: u32 = 4;
 /// Minimum cosine between the normals of photons of one surface.
 const MIN_COSINE: f32 = 0.8;

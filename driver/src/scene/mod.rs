@@ -22,7 +22,6 @@ mod parts;
 mod radiance;
 mod raster;
 mod settings;
-mod shared_exponent;
 mod texture;
 mod triangle;
 
@@ -38,7 +37,7 @@ pub use self::limits::BRIGHTEST;
 pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{Material, Reflection, Transmission};
 pub(crate) use self::parts::parts;
-pub(crate) use self::shared_exponent::shared_exponent;
+pub(crate) use self::texture::shared_exponent;
 pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
 use crate::error::SceneError;

@@ -210,7 +210,7 @@ fn dazzling_light_is_verified_where_there_is_another_card() {
     let mut alone = scheduler(1, 2);
     assert_eq!(take(&mut alone, 0, Duration::ZERO), Some(0));
     assert!(alone.answer(0, lit(0, dazzling), SECOND).found.is_some());
-    // What any scene has is not dazzling, with many samples nor with one.
+    // Radiance within a scene's units is not dazzling, with many samples nor with one.
     for (samples, light, is_dazzling) in
         [(1, 1 << 56, false), (1, i64::MAX, true), (64, 1 << 61, false), (64, 1 << 62, true)]
     {

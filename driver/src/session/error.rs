@@ -121,7 +121,7 @@ pub enum SessionError {
     },
 }
 
-/// What has happened to a link, after its name.
+/// Cause of the end of a link, as the predicate of its name.
 fn ending(error: &PortError) -> String {
     match error {
         PortError::Closed => "was closed by the other end".to_owned(),

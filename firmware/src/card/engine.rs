@@ -219,8 +219,10 @@ impl<K: ChipKind> Engine<K> {
         if let Some(checksums) = &mut self.checksums {
             return match checksums.step(memory, self.written) {
                 Ok((checksum, is_last)) => {
-                    let bytes = checksum.to_le_bytes();
-                    self.data.extend_from_slice(&bytes).map_err(|_| Invariant::Reply.fault())?;
+                    if self.data.extend_from_slice(&checksum.to_le_bytes()).is_err() {
+                        self.checksums = None;
+                        return Err(Invariant::Reply.fault());
+                    }
                     if is_last {
                         send(transport, &Reply::Checksums { first: checksums.first, data: &self.data });
                         self.checksums = None;
@@ -324,7 +326,7 @@ impl<K: ChipKind> Engine<K> {
         if self.data.is_empty() {
             self.first = (tile, index);
         }
-        // What is full is sent.
+        // A full reply has been sent.
         let mut has_room = true;
         sums.write(&mut |bytes| has_room &= self.data.extend_from_slice(bytes).is_ok());
         if !has_room {

@@ -18,21 +18,13 @@ use crate::render::{GatherPoint, PixelSample};
 use crate::scene::{PartialReflection, SceneImage, Surface};
 
 fn scene() -> SceneImage {
-    let lights = Lights {
-        emitters: 0.0,
-        environment: 0.0,
-        distant: 0.0,
-        radiance: [0.0; 3],
-        texture: None,
-        cells: [1; 2],
-    };
     let header = Header {
         lines: 0,
         photon_power_unit: 1.0,
         caustic_power_unit: 1.0,
         radiance_unit: 1.0,
         photon_grid: PhotonGrid::UNIT,
-        lights,
+        lights: Lights::NONE,
         sections: Default::default(),
     };
     SceneImage { header }

@@ -159,7 +159,7 @@ impl VisibleRegion {
         reach: f32,
     ) -> Result<Self, Fault> {
         let coded = unit(decode_normal(normal).into());
-        let lift = LIFT * radius + scene.header.photon_grid.cell;
+        let lift = lift(scene, radius);
         let most = magnitude(&[position]);
         let above = offset_origin(position, coded, most) + coded * lift;
         let (clear, normal) = Self::clear_height(scene, memory, (above, coded), [MAX_SLOPE * reach, radius])?;
@@ -213,6 +213,11 @@ impl VisibleRegion {
     }
 }
 
+/// Distance of the reference point from the surface for gathers of a radius, metres.
+fn lift(scene: &SceneImage, radius: f32) -> f32 {
+    LIFT * radius + scene.header.photon_grid.cell
+}
+
 /// True if something covers a point of a surface whose normal has the code `normal`, so low that photons on
 /// it may be taken for the surface's by a gather of the radius `radius`.
 ///
@@ -226,8 +231,7 @@ pub(super) fn is_covered(
     radius: f32,
 ) -> Result<bool, Fault> {
     let direction = unit(decode_normal(normal).into());
-    let lift = LIFT * radius + scene.header.photon_grid.cell;
-    let origin = offset_origin(position, direction, magnitude(&[position])) + direction * lift;
+    let origin = offset_origin(position, direction, magnitude(&[position])) + direction * lift(scene, radius);
     memory.enter(Stage::GatherRay);
     let up = closest_hit(scene, memory, &Ray { origin, direction, max_distance: MAX_SLOPE * radius })?;
     memory.enter(Stage::Gather);

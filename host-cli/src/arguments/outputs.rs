@@ -99,7 +99,7 @@ impl OutputOptions {
     }
 
     /// Picture that the render is named after: the first EXR, or the first picture without one.
-    fn main(&self) -> Option<&PictureOutput> {
+    pub(crate) fn main(&self) -> Option<&PictureOutput> {
         let exr = self.pictures.iter().find(|picture| picture.format == PictureFormat::Exr);
         exr.or(self.pictures.first())
     }

@@ -60,7 +60,7 @@ pub(crate) fn check_standard_output(
 
 /// Checks that finished tiles that are asked for have a file.
 fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
-    let is_piped = outputs.pictures.first().is_some_and(|picture| picture.file().is_none());
+    let is_piped = outputs.main().is_some_and(|picture| picture.file().is_none());
     if !is_piped || !(outputs.resume || options.samples.keep_samples) {
         return Ok(());
     }

@@ -81,7 +81,7 @@ impl Video {
             let said = String::from_utf8_lossy(&output.stderr);
             let last = said.lines().rev().find(|line| !line.trim().is_empty()).unwrap_or_default().to_owned();
             let text = format!("ffmpeg made no {}: {last}", self.path.display());
-            let words: Vec<String> = words.iter().map(|word| shell::quoted(word)).collect();
+            let words: Vec<_> = words.iter().map(|word| shell::quoted(word)).collect();
             let help = format!(
                 "the frames are written; with a list of them it was started as: {FFMPEG} {}",
                 words.join(" ")

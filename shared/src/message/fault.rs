@@ -49,8 +49,8 @@ pub enum FaultCode {
     Internal,
 }
 
-/// What holds in a chip whose program is right, by the numbers that [`FaultCode::Internal`] carries. Where it
-/// does not hold light would be lost, and a fault is sent in its place.
+/// Invariants of a chip whose program is right, by the numbers that [`FaultCode::Internal`] carries. Where
+/// one does not hold light would be lost, and a fault is sent in its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Invariant {

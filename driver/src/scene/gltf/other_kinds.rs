@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::error::SceneError;
+use crate::printable::shell_word;
 
 /// Remedy of kinds that no program converts whole.
 const BY_HAND: &str =
@@ -59,14 +60,14 @@ pub(super) fn refused_path(path: &Path) -> Option<SceneError> {
     if let Some((_, rest)) = text.split_once("://").filter(|(scheme, _)| is_scheme(scheme)) {
         let name = rest.split(['?', '#']).next().unwrap_or_default().rsplit('/').next().unwrap_or_default();
         let name = if name.is_empty() { "scene.glb" } else { name };
-        let remedy = format!("download it: curl -L -o {} {}", quoted(name), quoted(&text));
+        let remedy = format!("download it: curl -L -o {} {}", shell_word(name), shell_word(&text));
         return Some(other(path, "an address, and scenes are read from files", remedy));
     }
     if !path.is_dir() {
         return None;
     }
     let remedy = match scene_within(path) {
-        Some(scene) => format!("give the scene in it: {}", quoted(&scene.to_string_lossy())),
+        Some(scene) => format!("give the scene in it: {}", shell_word(&scene.to_string_lossy())),
         None => "give a file .gltf or .glb".to_owned(),
     };
     Some(other(path, "a folder", remedy))
@@ -93,15 +94,15 @@ pub(super) fn refused_file(path: &Path, bytes: &[u8]) -> Option<SceneError> {
             let folder = path.with_extension("").to_string_lossy().into_owned();
             let remedy = format!(
                 "unpack it and give the .gltf or .glb in it: unzip {} -d {}",
-                quoted(&file),
-                quoted(&folder)
+                shell_word(&file),
+                shell_word(&folder)
             );
             ("a ZIP archive", remedy)
         }
         Kind::ByHand(what) => (*what, BY_HAND.to_owned()),
         Kind::Prepared => {
             let remedy =
-                format!("render it as it is prepared: photoncard render --prepared {}", quoted(&file));
+                format!("render it as it is prepared: photoncard render --prepared {}", shell_word(&file));
             ("a prepared scene", remedy)
         }
         Kind::Picture => (
@@ -116,7 +117,7 @@ pub(super) fn refused_file(path: &Path, bytes: &[u8]) -> Option<SceneError> {
 pub(super) fn version_1(path: &Path) -> SceneError {
     let file = path.to_string_lossy();
     let made = path.with_extension("2.glb").to_string_lossy().into_owned();
-    let remedy = format!("convert it: npx gltf-pipeline -i {} -o {}", quoted(&file), quoted(&made));
+    let remedy = format!("convert it: npx gltf-pipeline -i {} -o {}", shell_word(&file), shell_word(&made));
     other(path, "a glTF 1.0 scene", remedy)
 }
 
@@ -130,17 +131,8 @@ fn export(file: &str, import: &str, made: &str) -> String {
     let code = format!(
         "import bpy; {import}bpy.ops.export_scene.gltf(filepath={made}, export_lights=True, export_cameras=True)"
     );
-    let file = if file.is_empty() { String::new() } else { format!("{} ", quoted(file)) };
-    format!("convert it by Blender: blender -b {file}--python-expr {}", quoted(&code))
-}
-
-/// Word of a shell.
-fn quoted(word: &str) -> String {
-    let is_plain = |character: char| character.is_ascii_alphanumeric() || "/._-+=:,@%".contains(character);
-    if !word.is_empty() && word.chars().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', "'\\''"))
+    let file = if file.is_empty() { String::new() } else { format!("{} ", shell_word(file)) };
+    format!("convert it by Blender: blender -b {file}--python-expr {}", shell_word(&code))
 }
 
 /// Text of Python in double quotation marks.

@@ -5,9 +5,9 @@ use std::io::Cursor;
 use png::{BitDepth, ColorType, Decoder, Transformations};
 
 use super::fault::Fault;
-use crate::scene::shared_exponent::of_srgb;
 #[cfg(doc)]
 use crate::scene::texture::Encoding;
+use crate::scene::texture::shared_exponent_of_srgb;
 
 pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
@@ -83,7 +83,7 @@ pub(super) fn decode(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault
 
 /// Texels of [`Encoding::SharedExponent`] of an image in sRGB with 16 bits a channel.
 pub(super) fn decode_deep(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
-    read(bytes, size, |[red, green, blue, _]| of_srgb([red, green, blue]))
+    read(bytes, size, |[red, green, blue, _]| shared_exponent_of_srgb([red, green, blue]))
 }
 
 fn read(bytes: &[u8], [width, height]: [u32; 2], store: Store) -> Result<Vec<[u8; 4]>, Fault> {
