@@ -400,12 +400,18 @@ fn a_scene_in_a_linked_folder_reads_what_is_beside_it() {
 
 /// A texel of 16 bits a channel, grey.
 fn deep(grey: u16) -> Vec<u8> {
+    deep_of(png::ColorType::Grayscale, &[grey])
+}
+
+/// A texel of 16 bits a channel.
+fn deep_of(colour: png::ColorType, channels: &[u16]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
-    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_color(colour);
     encoder.set_depth(png::BitDepth::Sixteen);
     let mut writer = encoder.write_header().unwrap();
-    writer.write_image_data(&grey.to_be_bytes()).unwrap();
+    let data: Vec<u8> = channels.iter().flat_map(|channel| channel.to_be_bytes()).collect();
+    writer.write_image_data(&data).unwrap();
     writer.finish().unwrap();
     bytes
 }
@@ -429,4 +435,44 @@ fn emission_keeps_more_than_eight_bits() {
     // An image of the base colour as well has one form.
     assert_eq!(loaded(&deep(0x8000), true), (Encoding::Srgb, [128, 128, 128, 255]));
     assert_eq!(loaded(TEXEL, false).0, Encoding::Srgb);
+}
+
+#[test]
+fn normals_and_data_keep_sixteen_bits() {
+    let loaded = |properties: &[&str]| {
+        let mut scene = embedded(&deep_of(png::ColorType::Rgb, &[32_800, 40_001, 65_535]), "image/png");
+        pbr(&mut scene.json).as_object_mut().unwrap().remove("baseColorTexture");
+        let material = &mut scene.json["materials"][0];
+        for property in properties {
+            match *property {
+                "normalTexture" => material["normalTexture"] = json!({"index": 0}),
+                "metallicRoughnessTexture" => {
+                    material["pbrMetallicRoughness"] = json!({"metallicRoughnessTexture": {"index": 0}});
+                }
+                coat => {
+                    material["extensions"]["KHR_materials_clearcoat"]["clearcoatFactor"] = json!(1.0);
+                    material["extensions"]["KHR_materials_clearcoat"][coat] = json!({"index": 0});
+                }
+            }
+        }
+        let image = scene.load().unwrap().images.remove(0);
+        (image.encoding, decode_texel(image.encoding.into(), image.texels[0]))
+    };
+    let exact = [32_800, 40_001, 65_535].map(|code: u16| f32::from(code) / 65_535.0);
+    let near = |found: f32, expected: f32| (found - expected).abs() < 1e-6;
+    let (encoding, [x, y, z, _]) = loaded(&["normalTexture"]);
+    assert_eq!(encoding, Encoding::NormalPair);
+    let normal = (glam::Vec3::from(exact) * 2.0 - 1.0).normalize();
+    assert!((glam::Vec3::new(x, y, z) * 2.0 - 1.0).distance(normal) < 4e-5);
+    let (encoding, [_, roughness, metallic, _]) = loaded(&["metallicRoughnessTexture"]);
+    assert!(encoding == Encoding::LinearPair && near(roughness, exact[1]) && near(metallic, exact[2]));
+    let (encoding, [factor, roughness, ..]) = loaded(&["clearcoatTexture", "clearcoatRoughnessTexture"]);
+    assert!(encoding == Encoding::LinearPair && near(factor, exact[0]) && near(roughness, exact[1]));
+    let (encoding, [_, roughness, metallic, _]) =
+        loaded(&["metallicRoughnessTexture", "clearcoatRoughnessTexture"]);
+    assert!(encoding == Encoding::LinearPair && near(roughness, exact[1]) && near(metallic, exact[2]));
+    // Three channels have no room of 16 bits each, and neither have normals beside data.
+    for both in ["clearcoatTexture", "normalTexture"] {
+        assert_eq!(loaded(&["metallicRoughnessTexture", both]).0, Encoding::Linear);
+    }
 }

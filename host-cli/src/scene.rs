@@ -79,6 +79,8 @@ fn image(image: &Image) -> String {
         Encoding::Srgb => "sRGB",
         Encoding::Linear => "linear",
         Encoding::SharedExponent => "linear of 16 bits, with a shared exponent",
+        Encoding::LinearPair => "linear of 16 bits, two channels",
+        Encoding::NormalPair => "normals of 16 bits",
     };
     format!("{}: {} x {}, {encoding}", image.name, image.width, image.height)
 }

@@ -37,7 +37,7 @@ use crate::budget::Budget;
 use crate::counters::Counters;
 
 /// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
-pub const PROTOCOL_VERSION: u16 = 16;
+pub const PROTOCOL_VERSION: u16 = 17;
 
 /// Maximum number of lines of one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;

@@ -3,7 +3,6 @@
 
 use glam::Vec3;
 use photoncard_firmware::scene::decode_texel;
-use photoncard_shared::layout::TexelFormat;
 
 use crate::scene::{Encoding, Image};
 
@@ -72,12 +71,7 @@ impl Pyramid {
 
 /// The linear RGB of a texel.
 pub(super) fn decode(encoding: Encoding, texel: [u8; 4]) -> Vec3 {
-    let format = match encoding {
-        Encoding::Srgb => TexelFormat::Srgb,
-        Encoding::Linear => TexelFormat::Linear,
-        Encoding::SharedExponent => TexelFormat::SharedExponent,
-    };
-    let [red, green, blue, _] = decode_texel(format, texel);
+    let [red, green, blue, _] = decode_texel(encoding.into(), texel);
     Vec3::new(red, green, blue)
 }
 

@@ -1,11 +1,11 @@
 //! Textures as records and texel lines of the card image.
 
 use photoncard_shared::address::Line;
-use photoncard_shared::layout::{self, NO_TEXTURE, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH, TexelFormat};
+use photoncard_shared::layout::{self, NO_TEXTURE, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH};
 
 use super::error::PackError;
 use crate::light::EnvironmentMap;
-use crate::scene::{Encoding, Image, Scene, Wrap};
+use crate::scene::{Image, Scene, Wrap};
 
 /// Records of a scene's textures, the environment's last. Textures of one image share its texels.
 ///
@@ -77,11 +77,7 @@ fn bare(image: &Image) -> layout::Texture {
         wrap: [layout::Wrap::Repeat; 2],
         nearest: false,
         set: 0,
-        format: match image.encoding {
-            Encoding::Srgb => TexelFormat::Srgb,
-            Encoding::Linear => TexelFormat::Linear,
-            Encoding::SharedExponent => TexelFormat::SharedExponent,
-        },
+        format: image.encoding.into(),
         matrix: [[1.0, 0.0], [0.0, 1.0]],
         offset: [0.0; 2],
     }
@@ -98,7 +94,7 @@ fn wrap(wrap: Wrap) -> layout::Wrap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Texture;
+    use crate::scene::{Encoding, Texture};
 
     fn image(width: u32, height: u32) -> Image {
         let texels = (0..width * height).map(u32::to_le_bytes).collect();

@@ -234,8 +234,7 @@ impl Scene {
     fn minimum_roughness(&self, material: &Material) -> f32 {
         let texture = material.metallic_roughness_texture.and_then(|index| self.textures.get(index as usize));
         let image = texture.and_then(|texture| self.images.get(texture.image as usize));
-        let minimum = image.and_then(|image| image.texels.iter().map(|[_, roughness, ..]| *roughness).min());
-        f32::from(minimum.unwrap_or(u8::MAX)) / 255.0
+        image.map_or(1.0, Image::minimum_green)
     }
 
     /// Adds the light that rough microsurfaces reflect several times to the reflection of all metallic-roughness materials.

@@ -1,5 +1,7 @@
 //! Images, and textures that map them to surfaces.
 
+use photoncard_shared::layout::TexelFormat;
+
 /// Maximum width and height of an image or an environment, texels.
 pub const MAX_SIDE: u32 = 16_384;
 
@@ -68,6 +70,18 @@ impl Image {
     pub fn bytes(&self) -> u64 {
         size_of_val(&self.texels[..]) as u64
     }
+
+    /// Minimum of green, as it is encoded, 0 to 1; 1 without texels.
+    pub(crate) fn minimum_green(&self) -> f32 {
+        let codes = self.texels.iter();
+        match self.encoding {
+            Encoding::LinearPair => {
+                let minimum = codes.map(|&[.., low, high]| u16::from_le_bytes([low, high])).min();
+                f32::from(minimum.unwrap_or(u16::MAX)) / 65_535.0
+            }
+            _ => f32::from(codes.map(|&[_, green, ..]| green).min().unwrap_or(u8::MAX)) / 255.0,
+        }
+    }
 }
 
 /// Encoding of red, green and blue of a texel. Alpha is always linear.
@@ -80,6 +94,23 @@ pub enum Encoding {
     /// Linear, of nine bits a channel with a shared exponent (OpenGL's `RGB9_E5`), without alpha: for
     /// emission of more than 8 bits.
     SharedExponent,
+    /// Two linear channels of 16 bits, little-endian: the first is red and blue, the second green. Without alpha.
+    LinearPair,
+    /// Red and green of a normal map, linear, 16 bits each, little-endian; blue is that of a unit normal. Without
+    /// alpha.
+    NormalPair,
+}
+
+impl From<Encoding> for TexelFormat {
+    fn from(encoding: Encoding) -> Self {
+        match encoding {
+            Encoding::Srgb => Self::Srgb,
+            Encoding::Linear => Self::Linear,
+            Encoding::SharedExponent => Self::SharedExponent,
+            Encoding::LinearPair => Self::LinearPair,
+            Encoding::NormalPair => Self::NormalPair,
+        }
+    }
 }
 
 /// The nearest `RGB9_E5` texel: nine bits a channel with a shared exponent (OpenGL's
@@ -94,15 +125,6 @@ pub(crate) fn shared_exponent(texel: [f32; 3]) -> [u8; 4] {
     let exponent = if mantissa(greatest, exponent) > 511 { exponent + 1 } else { exponent };
     let [red, green, blue] = [red, green, blue].map(|channel| mantissa(channel, exponent).min(511));
     (red | green << 9 | blue << 18 | (exponent as u32) << 27).to_le_bytes()
-}
-
-/// [`shared_exponent`] of codes of 16 bits in the sRGB transfer function (IEC 61966-2-1).
-pub(super) fn shared_exponent_of_srgb(codes: [u16; 3]) -> [u8; 4] {
-    shared_exponent(codes.map(|code| {
-        let value = f64::from(code) / f64::from(u16::MAX);
-        let linear = if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) };
-        linear as f32
-    }))
 }
 
 #[cfg(test)]
@@ -124,14 +146,5 @@ mod tests {
             assert_eq!(blue, 0.0);
         }
         assert_eq!(decode(shared_exponent([0.0; 3])), [0.0; 3]);
-    }
-
-    #[test]
-    fn codes_of_16_bits_are_nearer_than_those_of_8() {
-        let [grey, dark, white] =
-            [0x8000, 100, u16::MAX].map(|code| decode(shared_exponent_of_srgb([code; 3]))[1]);
-        assert!((grey / 0.214_05 - 1.0).abs() < 1e-3, "{grey}");
-        let exact = 100.0 / 65_535.0 / 12.92;
-        assert!((dark / exact - 1.0).abs() < 3e-3 && white == 1.0, "{dark} {white}");
     }
 }

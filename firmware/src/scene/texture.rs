@@ -157,7 +157,22 @@ pub fn decode_texel(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
             let mantissa = |channel: u32| (bits >> (9 * channel) & 0x1ff) as f32 * scale;
             [mantissa(0), mantissa(1), mantissa(2), 1.0]
         }
+        TexelFormat::LinearPair => {
+            let [first, second] = pair(texel);
+            [first, second, first, 1.0]
+        }
+        TexelFormat::NormalPair => {
+            let [first, second] = pair(texel);
+            let [x, y] = [first, second].map(|channel| 2.0 * channel - 1.0);
+            let z = libm::sqrtf(max(1.0 - (x * x + y * y), 0.0));
+            [first, second, 0.5 * z + 0.5, 1.0]
+        }
     }
+}
+
+/// Two linear channels of 16 bits.
+fn pair([a, b, c, d]: [u8; 4]) -> [f32; 2] {
+    [[a, b], [c, d]].map(|code| f32::from(u16::from_le_bytes(code)) * (1.0 / 65_535.0))
 }
 
 /// The linear value of an sRGB code (IEC 61966-2-1).
@@ -218,6 +233,27 @@ mod tests {
         assert_eq!(decode_texel(TexelFormat::SharedExponent, bits(256, 128, 0, 16)), [1.0, 0.5, 0.0, 1.0]);
         assert_eq!(decode_texel(TexelFormat::SharedExponent, bits(511, 1, 2, 31))[0], 65_408.0);
         assert_eq!(decode_texel(TexelFormat::SharedExponent, [0; 4]), [0.0, 0.0, 0.0, 1.0]);
+    }
+
+    #[test]
+    fn pairs_are_of_sixteen_bits() {
+        let texel = |first: u16, second: u16| {
+            let ([a, b], [c, d]) = (first.to_le_bytes(), second.to_le_bytes());
+            [a, b, c, d]
+        };
+        let decoded = decode_texel(TexelFormat::LinearPair, texel(u16::MAX, 1));
+        assert_eq!(decoded, [1.0, 1.0 / 65_535.0, 1.0, 1.0]);
+        for normal in [[0.0_f32, 0.0, 1.0], [0.6, -0.64, 0.48], [-0.001, 0.002, 0.999_997_5], [0.0, 1.0, 0.0]]
+        {
+            let [x, y] = [normal[0], normal[1]].map(|channel| ((channel + 1.0) * 32_767.5).round() as u16);
+            let decoded =
+                decode_texel(TexelFormat::NormalPair, texel(x, y)).map(|channel| 2.0 * channel - 1.0);
+            let error = normal.iter().zip(decoded).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            // The slope of z has no bound where it is 0.
+            assert!(error < if normal[2] > 0.0 { 4e-5 } else { 8e-3 }, "{normal:?} {decoded:?}");
+        }
+        let outside = decode_texel(TexelFormat::NormalPair, texel(u16::MAX, u16::MAX));
+        assert_eq!(outside, [1.0, 1.0, 0.5, 1.0]);
     }
 
     #[track_caller]

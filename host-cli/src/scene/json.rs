@@ -106,6 +106,8 @@ fn image(image: &Image) -> Value {
         Encoding::Srgb => "srgb",
         Encoding::Linear => "linear",
         Encoding::SharedExponent => "shared-exponent",
+        Encoding::LinearPair => "linear-pair",
+        Encoding::NormalPair => "normal-pair",
     };
     json!({"name": image.name, "width": image.width, "height": image.height, "encoding": encoding})
 }

@@ -52,6 +52,11 @@ pub enum TexelFormat {
     Linear,
     /// OpenGL's `RGB9_E5`: red, green and blue of nine bits each, a shared exponent of five; alpha is 1.
     SharedExponent,
+    /// Two linear channels of 16 bits, little-endian: the first is red and blue, the second green; alpha is 1.
+    LinearPair,
+    /// Red and green of a normal map, linear, 16 bits each, little-endian. Blue is that of a unit normal on the
+    /// front, for normals of `2 channel - 1`; alpha is 1.
+    NormalPair,
 }
 
 impl Record for Texture {
@@ -82,10 +87,12 @@ impl Texture {
             wrap: [wrap(0), wrap(1)],
             nearest: flags & NEAREST != 0,
             set: u32::from(flags & SECOND_SET != 0),
-            format: match flags >> FORMAT_SHIFT & 3 {
+            format: match flags >> FORMAT_SHIFT & 7 {
                 0 => TexelFormat::Srgb,
                 1 => TexelFormat::Linear,
-                _ => TexelFormat::SharedExponent,
+                2 => TexelFormat::SharedExponent,
+                3 => TexelFormat::LinearPair,
+                _ => TexelFormat::NormalPair,
             },
             matrix: [[number(0), number(1)], [number(2), number(3)]],
             offset: [number(4), number(5)],
@@ -152,7 +159,14 @@ mod tests {
     #[test]
     fn textures_survive_their_bytes() {
         let plain = Texture { wrap: [Wrap::Repeat; 2], nearest: false, set: 0, ..texture() };
-        for format in [TexelFormat::Srgb, TexelFormat::Linear, TexelFormat::SharedExponent] {
+        let formats = [
+            TexelFormat::Srgb,
+            TexelFormat::Linear,
+            TexelFormat::SharedExponent,
+            TexelFormat::LinearPair,
+            TexelFormat::NormalPair,
+        ];
+        for format in formats {
             for texture in [texture(), plain] {
                 let texture = Texture { format, ..texture };
                 assert_eq!(Texture::read(&texture.to_bytes()), texture);

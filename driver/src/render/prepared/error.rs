@@ -8,7 +8,7 @@ use crate::output::OutputError;
 use crate::render::PROGRAM;
 
 /// Version of the format, in the file's first line.
-pub(super) const VERSION: u32 = 3;
+pub(super) const VERSION: u32 = 4;
 
 /// Error of a prepared scene that cannot be opened or written.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]

@@ -138,8 +138,8 @@ fn a_damaged_prepared_scene_is_refused_and_named() {
     }
     refuses(&[&bytes[..], &[0; 128]].concat(), "one line more");
     refuses(b"{\"asset\": {\"version\": \"2.0\"}}", "a glTF file");
-    fs::write(&path, b"photoncard prepared scene 4\n{}\n").unwrap();
-    assert!(matches!(PreparedScene::open(&path), Err(PreparedError::Version { found: 4, .. })));
+    fs::write(&path, b"photoncard prepared scene 99\n{}\n").unwrap();
+    assert!(matches!(PreparedScene::open(&path), Err(PreparedError::Version { found: 99, .. })));
     assert!(matches!(PreparedScene::open(folder.path()), Err(PreparedError::Unreadable { .. })));
 }
 

@@ -11,7 +11,7 @@ use super::room::Room;
 use super::specular_glossiness::{Conversion, Grid};
 use super::uri::{decode_data, is_data, locate};
 use crate::error::SceneError;
-use crate::scene::raster::{Fault, Kind};
+use crate::scene::raster::{Deep, Fault, Kind};
 use crate::scene::{Encoding, Image, MAX_TEXELS};
 
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
@@ -26,8 +26,8 @@ pub(super) struct Wanted {
     pub(super) origin: Origin,
     /// Encoding of an image of 8 bits a channel.
     pub(super) encoding: Encoding,
-    /// True if nothing but emission is taken from it.
-    pub(super) is_of_emission: bool,
+    /// Form of an image of more than 8 bits, if it keeps them.
+    pub(super) deep: Option<Deep>,
 }
 
 /// An image file whose header is read.
@@ -49,8 +49,7 @@ enum Found<'a> {
 struct Decoded {
     size: [u32; 2],
     texels: Option<Vec<[u8; 4]>>,
-    /// True for texels of [`Encoding::SharedExponent`].
-    is_deep: bool,
+    deep: Option<Deep>,
     faults: Vec<(Origin, Fault)>,
 }
 
@@ -102,14 +101,14 @@ pub(super) fn load(
     let decoded: Vec<_> = found
         .into_par_iter()
         .zip(wanted)
-        .map(|(image, wanted)| image.map(|image| image.decode(wanted.is_of_emission)))
+        .map(|(image, wanted)| image.map(|image| image.decode(wanted.deep)))
         .collect();
     // The first error in the order of the file is returned, whichever thread failed first.
     let images = decoded.into_iter().zip(wanted).map(|(decoded, &Wanted { origin, encoding, .. })| {
-        let Some(Decoded { size: [width, height], texels, faults, is_deep }) = decoded else {
+        let Some(Decoded { size: [width, height], texels, faults, deep }) = decoded else {
             return Ok(None);
         };
-        let encoding = if is_deep { Encoding::SharedExponent } else { encoding };
+        let encoding = deep.map_or(encoding, Deep::encoding);
         for (origin, fault) in faults {
             unreadable.push(description(source, origin, fault)?);
         }
@@ -136,16 +135,16 @@ impl Found<'_> {
         }
     }
 
-    /// Texels; emission keeps more than 8 bits a channel.
-    fn decode(&self, is_of_emission: bool) -> Decoded {
+    /// Texels, in the form `deep` if the image has more than 8 bits a channel.
+    fn decode(&self, deep: Option<Deep>) -> Decoded {
         let size = self.size();
-        let is_deep = match self {
-            Self::File(file) => is_of_emission && file.kind.is_deep(&file.bytes),
-            Self::Converted(..) => false,
+        let deep = match self {
+            Self::File(file) => deep.filter(|_| file.kind.is_deep(&file.bytes)),
+            Self::Converted(..) => None,
         };
         let mut faults = Vec::new();
         let mut decode = |file: &File<'_>| {
-            let texels = file.kind.decode(&file.bytes, file.size, is_deep);
+            let texels = file.kind.decode(&file.bytes, file.size, deep);
             texels.map_err(|fault| faults.push((file.origin, fault))).ok()
         };
         let texels = match self {
@@ -162,7 +161,7 @@ impl Found<'_> {
                 Some(conversion.texels(size, grids))
             }
         };
-        Decoded { size, texels, is_deep, faults }
+        Decoded { size, texels, deep, faults }
     }
 }
 

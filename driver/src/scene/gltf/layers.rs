@@ -7,9 +7,9 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::document::Document;
-use super::texture::Textures;
+use super::texture::{Textures, Use};
 use crate::error::SceneError;
-use crate::scene::{Coat, DiffuseTransmission, Encoding, Layers, NormalMap, Sheen};
+use crate::scene::{Coat, DiffuseTransmission, Layers, NormalMap, Sheen};
 
 const CLEARCOAT: &str = "KHR_materials_clearcoat";
 const SHEEN: &str = "KHR_materials_sheen";
@@ -138,10 +138,10 @@ impl Reader<'_, '_> {
         extension: &str,
         property: &str,
         info: Option<&json::texture::Info>,
-        encoding: Encoding,
+        taken: Use,
     ) -> Result<Option<u32>, SceneError> {
         let place = self.place(extension, property);
-        info.map(|info| self.textures.add(&place, info, encoding)).transpose()
+        info.map(|info| self.textures.add(&place, info, taken)).transpose()
     }
 
     fn normal(&mut self) -> Result<Option<NormalMap>, SceneError> {
@@ -152,7 +152,7 @@ impl Reader<'_, '_> {
         let source = source.map_err(|error| {
             self.document.invalid(place.as_str(), error.to_string(), "write it as glTF 2.0 says")
         })?;
-        let texture = self.textures.add(&place, &source.info, Encoding::Linear)?;
+        let texture = self.textures.add(&place, &source.info, Use::Normal)?;
         Ok(Some(NormalMap { texture, scale: source.scale }))
     }
 
@@ -164,9 +164,9 @@ impl Reader<'_, '_> {
         let name = "KHR_materials_specular";
         // Alpha is linear in either encoding: both textures are often of one image.
         let [factor, colour] = [&specular.specular_texture, &specular.specular_color_texture];
-        layers.specular_texture = self.texture(name, "specularTexture", factor.as_ref(), Encoding::Srgb)?;
+        layers.specular_texture = self.texture(name, "specularTexture", factor.as_ref(), Use::Colour)?;
         layers.specular_colour_texture =
-            self.texture(name, "specularColorTexture", colour.as_ref(), Encoding::Srgb)?;
+            self.texture(name, "specularColorTexture", colour.as_ref(), Use::Colour)?;
         Ok(())
     }
 
@@ -174,7 +174,7 @@ impl Reader<'_, '_> {
         let extensions = self.source.extensions.as_ref();
         let transmission = extensions.and_then(|extensions| extensions.transmission.as_ref());
         let info = transmission.and_then(|transmission| transmission.transmission_texture.as_ref());
-        self.texture("KHR_materials_transmission", "transmissionTexture", info, Encoding::Linear)
+        self.texture("KHR_materials_transmission", "transmissionTexture", info, Use::Red)
     }
 
     fn coat(&mut self) -> Result<Option<Coat>, SceneError> {
@@ -182,16 +182,20 @@ impl Reader<'_, '_> {
         if source.clearcoat_factor == 0.0 {
             return Ok(None);
         }
-        let mut add = |property: &str, info: Option<&json::texture::Info>| {
-            self.texture(CLEARCOAT, property, info, Encoding::Linear)
+        let mut add = |property: &str, info: Option<&json::texture::Info>, taken| {
+            self.texture(CLEARCOAT, property, info, taken)
         };
         let normal = source.clearcoat_normal_texture.as_ref();
-        let normal_texture = add("clearcoatNormalTexture", normal.map(|normal| &normal.info))?;
+        let normal_texture = add("clearcoatNormalTexture", normal.map(|normal| &normal.info), Use::Normal)?;
         Ok(Some(Coat {
             factor: source.clearcoat_factor,
             roughness: source.clearcoat_roughness_factor,
-            factor_texture: add("clearcoatTexture", source.clearcoat_texture.as_ref())?,
-            roughness_texture: add("clearcoatRoughnessTexture", source.clearcoat_roughness_texture.as_ref())?,
+            factor_texture: add("clearcoatTexture", source.clearcoat_texture.as_ref(), Use::Red)?,
+            roughness_texture: add(
+                "clearcoatRoughnessTexture",
+                source.clearcoat_roughness_texture.as_ref(),
+                Use::Green,
+            )?,
             normal: normal_texture
                 .zip(normal)
                 .map(|(texture, normal)| NormalMap { texture, scale: normal.scale }),
@@ -204,7 +208,7 @@ impl Reader<'_, '_> {
             return Ok(None);
         }
         let mut add = |property: &str, info: Option<&json::texture::Info>| {
-            self.texture(SHEEN, property, info, Encoding::Srgb)
+            self.texture(SHEEN, property, info, Use::Colour)
         };
         Ok(Some(Sheen {
             colour: source.sheen_color_factor.into(),
@@ -222,7 +226,7 @@ impl Reader<'_, '_> {
             return Ok(None);
         }
         let mut add = |property: &str, info: Option<&json::texture::Info>| {
-            self.texture(DIFFUSE_TRANSMISSION, property, info, Encoding::Srgb)
+            self.texture(DIFFUSE_TRANSMISSION, property, info, Use::Colour)
         };
         Ok(Some(DiffuseTransmission {
             factor: source.diffuse_transmission_factor,

@@ -9,10 +9,10 @@ use gltf::json::validation::Checked;
 
 use super::document::Document;
 use super::layers::{self, has_other_layer};
-use super::texture::Textures;
+use super::texture::{Textures, Use};
 use crate::error::SceneError;
 use crate::scene::out_of_range::{OutOfRange, Property};
-use crate::scene::{Encoding, Material, Reflection, Transmission};
+use crate::scene::{Material, Reflection, Transmission};
 
 /// Contents of `extras` for this renderer; other keys belong to other programs.
 #[derive(Deserialize)]
@@ -115,18 +115,18 @@ fn add_textures(
     textures: &mut Textures,
 ) -> Result<(), SceneError> {
     let pbr = &source.pbr_metallic_roughness;
-    let mut add = |info: Option<&json::texture::Info>, name: &str, encoding| {
-        info.map(|info| textures.add(&format!("materials[{index}].{name}"), info, encoding)).transpose()
+    let mut add = |info: Option<&json::texture::Info>, name: &str, taken| {
+        info.map(|info| textures.add(&format!("materials[{index}].{name}"), info, taken)).transpose()
     };
     material.base_texture =
-        add(pbr.base_color_texture.as_ref(), "pbrMetallicRoughness.baseColorTexture", Encoding::Srgb)?;
+        add(pbr.base_color_texture.as_ref(), "pbrMetallicRoughness.baseColorTexture", Use::Colour)?;
     if matches!(material.reflection, Reflection::MetallicRoughness { .. }) {
         let info = pbr.metallic_roughness_texture.as_ref();
         material.metallic_roughness_texture =
-            add(info, "pbrMetallicRoughness.metallicRoughnessTexture", Encoding::Linear)?;
+            add(info, "pbrMetallicRoughness.metallicRoughnessTexture", Use::MetallicRoughness)?;
     }
     if material.is_emissive() {
-        material.emissive_texture = add(source.emissive_texture.as_ref(), "emissiveTexture", Encoding::Srgb)?;
+        material.emissive_texture = add(source.emissive_texture.as_ref(), "emissiveTexture", Use::Emission)?;
     }
     Ok(())
 }

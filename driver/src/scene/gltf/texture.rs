@@ -1,6 +1,6 @@
 //! Textures of materials, each once, with their samplers and transforms.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use gltf::json;
 use gltf::json::extensions::texture::TextureTransform;
@@ -13,10 +13,54 @@ use super::image::{self, Wanted};
 use super::origin::Origin;
 use super::room::Room;
 use crate::error::SceneError;
+use crate::scene::raster::Deep;
 use crate::scene::{Encoding, Material, Scene, Texture, Wrap};
 
 /// Maximum absolute value in a texture transform: beyond it single precision cannot resolve texels.
 const MAX_TRANSFORM: f32 = 1e6;
+
+/// What a material takes from a texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Use {
+    /// Colour, alpha or both.
+    Colour,
+    Emission,
+    Normal,
+    Red,
+    Green,
+    /// Metalness in blue, roughness in green.
+    MetallicRoughness,
+}
+
+impl Use {
+    fn encoding(self) -> Encoding {
+        match self {
+            Self::Colour | Self::Emission => Encoding::Srgb,
+            Self::Normal | Self::Red | Self::Green | Self::MetallicRoughness => Encoding::Linear,
+        }
+    }
+}
+
+/// Image and what is taken from it.
+struct Taken {
+    origin: Origin,
+    encoding: Encoding,
+    uses: Vec<Use>,
+}
+
+impl Taken {
+    fn wanted(&self) -> Wanted {
+        let all = |uses: &[Use]| self.uses.iter().all(|found| uses.contains(found));
+        let forms = [
+            (&[Use::Emission][..], Deep::Emission),
+            (&[Use::Normal], Deep::Normal),
+            (&[Use::Red, Use::Green], Deep::RedGreen),
+            (&[Use::MetallicRoughness, Use::Green], Deep::BlueGreen),
+        ];
+        let deep = forms.into_iter().find_map(|(uses, deep)| all(uses).then_some(deep));
+        Wanted { origin: self.origin, encoding: self.encoding, deep }
+    }
+}
 
 /// Textures in the order in which materials refer to them.
 pub(super) struct Textures<'a> {
@@ -24,7 +68,7 @@ pub(super) struct Textures<'a> {
     textures: Vec<Texture>,
     /// Index of each texture, by the bits of its fields.
     known: BTreeMap<[u32; 11], u32>,
-    images: Vec<(Origin, Encoding)>,
+    images: Vec<Taken>,
     image_indices: BTreeMap<(Origin, Encoding), u32>,
 }
 
@@ -44,7 +88,7 @@ impl<'a> Textures<'a> {
         &mut self,
         item: &str,
         info: &json::texture::Info,
-        encoding: Encoding,
+        taken: Use,
     ) -> Result<u32, SceneError> {
         let document = self.document;
         let index = info.index.value();
@@ -68,17 +112,20 @@ impl<'a> Textures<'a> {
             let place = format!("{item}.extensions.KHR_texture_transform");
             found.ok_or_else(|| document.invalid(place, "the transform is out of range", remedy))
         })?;
-        let image = self.image(origin, encoding);
+        let image = self.image(origin, taken);
         let (wrap, nearest) = sampler(document, texture);
         Ok(self.insert(Texture { image, set, wrap, nearest, matrix, offset }))
     }
 
-    fn image(&mut self, origin: Origin, encoding: Encoding) -> u32 {
+    fn image(&mut self, origin: Origin, taken: Use) -> u32 {
         let Self { images, image_indices, .. } = self;
-        *image_indices.entry((origin, encoding)).or_insert_with(|| {
-            images.push((origin, encoding));
+        let encoding = taken.encoding();
+        let index = *image_indices.entry((origin, encoding)).or_insert_with(|| {
+            images.push(Taken { origin, encoding, uses: Vec::new() });
             images.len() as u32 - 1
-        })
+        });
+        images[index as usize].uses.push(taken);
+        index
     }
 
     fn insert(&mut self, texture: Texture) -> u32 {
@@ -93,22 +140,6 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// The images, of which those of emission alone are known.
-    fn wanted(&self, materials: &[Material]) -> Vec<Wanted> {
-        let image = |texture: u32| self.textures.get(texture as usize).map(|texture| texture.image);
-        let [mut of_emission, mut of_others] = [BTreeSet::new(), BTreeSet::new()];
-        for material in materials {
-            of_emission.extend(material.emissive_texture.and_then(image));
-            let others = Material { emissive_texture: None, ..material.clone() };
-            of_others.extend(others.textures().filter_map(image));
-        }
-        let wanted = (0..).zip(&self.images).map(|(index, &(origin, encoding))| {
-            let is_of_emission = of_emission.contains(&index) && !of_others.contains(&index);
-            Wanted { origin, encoding, is_of_emission }
-        });
-        wanted.collect()
-    }
-
     /// Loads the images, and leaves textures out whose image cannot be read and is described in `unreadable`.
     pub(super) fn finish(
         self,
@@ -117,7 +148,8 @@ impl<'a> Textures<'a> {
         scene: &mut Scene,
         unreadable: &mut Vec<String>,
     ) -> Result<(), SceneError> {
-        let images = image::load(source, &self.wanted(&scene.materials), room, unreadable)?;
+        let wanted: Vec<_> = self.images.iter().map(Taken::wanted).collect();
+        let images = image::load(source, &wanted, room, unreadable)?;
         let is_read: Vec<_> = images.iter().map(Option::is_some).collect();
         scene.images = images.into_iter().flatten().collect();
         let images = renumbered(&is_read);

@@ -3,15 +3,15 @@
 //! Sizes are checked in the header, before anything is allocated for them: against limits, and against the maximum that a
 //! file of its length can hold at the best compression, where its format has one. A file's colour space is ignored, as glTF requires.
 
+mod deep;
 mod fault;
 mod jpeg;
 mod ktx2;
 mod png;
 mod webp;
 
+pub(super) use self::deep::Deep;
 pub(super) use self::fault::Fault;
-#[cfg(doc)]
-use super::texture::Encoding;
 use super::texture::{MAX_SIDE, MAX_TEXELS};
 use crate::allocation;
 use crate::foreign;
@@ -91,14 +91,18 @@ impl Kind {
         self == Self::Png && walled(|| Ok(png::is_deep(bytes))) == Ok(true)
     }
 
-    /// Texels of an image, rows from the top, in sRGB or, if `is_deep`, in the linear form of
-    /// [`Encoding::SharedExponent`]; `size` is the result of [`Kind::size`].
-    pub(super) fn decode(self, bytes: &[u8], size: [u32; 2], is_deep: bool) -> Result<Vec<[u8; 4]>, Fault> {
+    /// Texels of an image, rows from the top: of 8 bits a channel or, of an image that [is deep](Self::is_deep), in
+    /// the form that `deep` names. `size` is the result of [`Kind::size`].
+    pub(super) fn decode(
+        self,
+        bytes: &[u8],
+        size: [u32; 2],
+        deep: Option<Deep>,
+    ) -> Result<Vec<[u8; 4]>, Fault> {
         let bytes_needed = DECODING_BYTES * u64::from(size[0]) * u64::from(size[1]);
         allocation::check(bytes_needed).map_err(Fault::memory)?;
         let texels = walled(|| match self {
-            Self::Png if is_deep => png::decode_deep(bytes, size),
-            Self::Png => png::decode(bytes, size),
+            Self::Png => png::decode(bytes, size, deep),
             Self::Jpeg => jpeg::decode(bytes, size),
             Self::WebP => webp::decode(bytes, size),
             Self::Ktx2 => ktx2::decode(bytes, size),

@@ -4,10 +4,8 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType, Decoder, Transformations};
 
+use super::deep::Deep;
 use super::fault::Fault;
-#[cfg(doc)]
-use crate::scene::texture::Encoding;
-use crate::scene::texture::shared_exponent_of_srgb;
 
 pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
@@ -70,23 +68,23 @@ fn chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], usize)> {
 }
 
 /// Texel of 16 bits a channel, as it is stored.
-type Store = fn([u16; 4]) -> [u8; 4];
+type Store<'a> = &'a dyn Fn([u16; 4]) -> [u8; 4];
 
 /// Returns whether an image has 16 bits a channel.
 pub(super) fn is_deep(bytes: &[u8]) -> bool {
     decoder(bytes).read_header_info().is_ok_and(|info| info.bit_depth == BitDepth::Sixteen)
 }
 
-pub(super) fn decode(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
-    read(bytes, size, |texel| texel.map(to_8_bits))
-}
-
-/// Texels of [`Encoding::SharedExponent`] of an image in sRGB with 16 bits a channel.
-pub(super) fn decode_deep(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault> {
-    read(bytes, size, |[red, green, blue, _]| shared_exponent_of_srgb([red, green, blue]))
-}
-
-fn read(bytes: &[u8], [width, height]: [u32; 2], store: Store) -> Result<Vec<[u8; 4]>, Fault> {
+/// Texels; those of 16 bits a channel in the form that `deep` names, or of 8 bits.
+pub(super) fn decode(
+    bytes: &[u8],
+    [width, height]: [u32; 2],
+    deep: Option<Deep>,
+) -> Result<Vec<[u8; 4]>, Fault> {
+    let store: Store<'_> = match deep {
+        Some(deep) => &move |texel| deep.texel(texel),
+        None => &|texel| texel.map(to_8_bits),
+    };
     let mut decoder = decoder(bytes);
     // A row before and after filtering, each of up to eight bytes per texel.
     decoder.set_limits(png::Limits { bytes: ANCILLARY_BYTES + 64 * width as usize });
@@ -107,7 +105,7 @@ fn read(bytes: &[u8], [width, height]: [u32; 2], store: Store) -> Result<Vec<[u8
 }
 
 /// Appends rows in the decoder's output format; `store` stores those of 16 bits.
-fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, BitDepth), store: Store) {
+fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, BitDepth), store: Store<'_>) {
     let samples = colour.samples();
     match depth {
         BitDepth::Sixteen => {

@@ -23,7 +23,7 @@ fn file(size: [u32; 2], colour: ColorType, depth: BitDepth, data: &[u8], palette
 
 fn decoded(bytes: &[u8]) -> Vec<[u8; 4]> {
     let kind = Kind::of(bytes).unwrap();
-    kind.decode(bytes, kind.size(bytes).unwrap(), false).unwrap()
+    kind.decode(bytes, kind.size(bytes).unwrap(), None).unwrap()
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn of_palette(length: usize) -> Vec<u8> {
 fn palettes_of_whole_colours_are_read_and_others_refused() {
     for length in 0..800 {
         let file = of_palette(length);
-        let read = Kind::Png.size(&file).and_then(|size| decode(&file, size));
+        let read = Kind::Png.size(&file).and_then(|size| decode(&file, size, None));
         if (3..=768).contains(&length) && length % 3 == 0 {
             assert_eq!(read, Ok(vec![[9, 9, 9, 255]]), "{length}");
         } else {
@@ -131,7 +131,7 @@ fn cut_files_and_false_sizes_are_refused() {
     let whole = file([4, 4], ColorType::Rgba, BitDepth::Eight, &[7; 64], None);
     for length in 8..whole.len() - 12 {
         let bytes = &whole[..length];
-        let result = Kind::Png.size(bytes).and_then(|size| Kind::Png.decode(bytes, size, false));
+        let result = Kind::Png.size(bytes).and_then(|size| Kind::Png.decode(bytes, size, None));
         assert!(result.is_err(), "{length}");
     }
     // The header's checksum is right, but no file of this length can hold 16384 x 16384 texels.
