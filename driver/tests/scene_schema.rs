@@ -4,7 +4,7 @@
 mod scene_support;
 
 use photoncard_driver::error::SceneError;
-use photoncard_driver::scene::Scene;
+use photoncard_driver::scene::{Concern, Scene};
 use scene_support::{glb, load_bytes, load_changed, load_with, push, triangle_bytes, triangle_json};
 use serde_json::{Value, json};
 
@@ -79,6 +79,11 @@ fn channels_of_extensions_are_left_out_and_the_others_stay() {
     });
     let said = scene.notices.join("; ");
     assert!(said.contains("'glow', 'both'") && said.contains("KHR_animation_pointer"), "{said}");
+    // A picture of the scene as it stands plays none.
+    assert_eq!(scene.notices_on(|concern| concern != Concern::Animations), Vec::<&str>::new());
+    let sky = loaded(|json| json["extensionsUsed"] = json!(["EXT_lights_image_based", "EXT_other"]));
+    let alone = sky.notices_on(|concern| concern != Concern::Environment);
+    assert!(sky.notices.len() == 2 && alone.len() == 1 && alone[0].contains("EXT_other"), "{alone:?}");
     let required = load_changed(|json| json["extensionsRequired"] = json!(["KHR_animation_pointer"]));
     assert!(matches!(required, Err(SceneError::RequiredExtension { .. })));
 }

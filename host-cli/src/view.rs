@@ -57,9 +57,10 @@ use self::wish::{Sketch, Wish};
 use crate::arguments::ViewOptions;
 use crate::console::{print, say};
 use crate::failure::Failure;
+use crate::input;
+use crate::notices::{self, Uses};
 use crate::progress::stop_on_signals;
 use crate::render::on_threads;
-use crate::{input, notices};
 
 /// Time in which the end of the view is noticed.
 const ATTENTION: Duration = Duration::from_millis(50);
@@ -137,8 +138,8 @@ fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
 fn load(options: &ViewOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX);
     let scene = input::load(&options.scene, dram_bytes)?;
-    notices::say_ignored(&options.scene.path, &scene, options.scene.strict)?;
     let camera = settings.camera(&scene)?;
+    notices::say_ignored(&options.scene, &scene, &Uses::of(&options.scene, &settings.picture, None))?;
     let misfit = options.picture.fit(&camera, &mut settings.picture);
     if let Some(notice) = misfit.filter(|_| !options.quiet) {
         say(format_args!("photoncard: {notice}"));

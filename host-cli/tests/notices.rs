@@ -91,3 +91,31 @@ fn an_orthographic_camera_is_refused_and_another_view_is_not() {
         &["-o", "a.exr", "--camera-at", "0,1,2", "--look-at", "0,0,0", "--fov", "40"],
     );
 }
+
+/// A file without a camera, and one with an orthographic camera before another.
+#[test]
+fn what_the_command_line_states_in_place_of_the_file_is_no_fault_of_a_strict_render() {
+    let room = Room::new();
+    let mut bare = scene();
+    bare["nodes"][1].as_object_mut().unwrap().remove("camera");
+    room.write_scene("bare.gltf", &bare);
+    let mut plan = scene();
+    let orthographic = json!({"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9});
+    let camera = json!({"name": "plan", "type": "orthographic", "orthographic": orthographic});
+    plan["cameras"].as_array_mut().unwrap().insert(0, camera);
+    plan["nodes"][1]["camera"] = json!(1);
+    plan["nodes"].as_array_mut().unwrap().insert(0, json!({"camera": 0}));
+    plan["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    room.write_scene("plan.gltf", &plan);
+    let view = ["--camera-at", "0,1,2", "--look-at", "0,0,0"];
+    for (scene, chosen) in
+        [("bare.gltf", &view[..]), ("plan.gltf", &view), ("plan.gltf", &["--camera", "eye"])]
+    {
+        let options = [&["-o", "a.exr", "--strict", "--quiet"][..], chosen].concat();
+        assert_eq!(room.rendered(scene, &options).stderr, "", "{scene} {chosen:?}");
+    }
+    for (scene, part) in [("bare.gltf", "has no camera"), ("plan.gltf", "is orthographic")] {
+        let refused = room.render(scene, &["-o", "a.exr", "--strict", "--camera-at", "0,1,2"]);
+        assert!(refused.status == Some(2) && refused.stderr.contains(part), "{}", refused.stderr);
+    }
+}

@@ -81,6 +81,8 @@ pub struct Scene {
     pub orthographic: Vec<(usize, String)>,
     /// Sentences on contents of the file that the renderer does not use or that are missing, each once.
     pub notices: Vec<String>,
+    /// Notices that do not concern every picture: the index in [`Self::notices`], and what they are about.
+    pub concerns: Vec<(usize, Concern)>,
     /// Sentences on contents of the file that the renderer takes in another way than they are stated, each
     /// once.
     pub remarks: Vec<String>,
@@ -88,7 +90,28 @@ pub struct Scene {
     pub skipped_triangles: usize,
 }
 
+/// Contents of a file that a picture may do without: what is ignored or missing of them does not show in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Concern {
+    /// The view, which a picture may state.
+    View,
+    /// Cameras that nothing can be seen by, as others can.
+    OtherCameras,
+    /// Animations, which do not play in a picture of the scene as it stands.
+    Animations,
+    /// Light from infinitely far, which a picture may have from another file.
+    Environment,
+}
+
 impl Scene {
+    /// The notices that concern a picture, by what it uses of the file.
+    pub fn notices_on(&self, uses: impl Fn(Concern) -> bool) -> Vec<&str> {
+        let is_idle =
+            |index: usize| self.concerns.iter().any(|&(notice, concern)| notice == index && !uses(concern));
+        let notices = self.notices.iter().enumerate();
+        notices.filter(|(index, _)| !is_idle(*index)).map(|(_, notice)| &**notice).collect()
+    }
+
     /// Coordinates in the file of a place in the scene. Where the scene has no offset they read as the place's own do.
     pub fn in_file(&self, place: Vec3) -> DVec3 {
         // Of all double-precision numbers that round to a coordinate the one with its shortest decimal form is meant.

@@ -14,7 +14,7 @@ use serde_json::Value;
 use crate::arguments::{OutputOptions, PictureOutput, RenderOptions};
 use crate::console::say;
 use crate::failure::Failure;
-use crate::notices;
+use crate::notices::{self, Uses};
 use crate::progress::duration;
 
 /// Prints what was loaded, what is ignored of it, and options without effect; if `options` are quiet, only
@@ -33,7 +33,8 @@ pub(super) fn say_loaded(
     if !options.quiet {
         say(format_args!("photoncard: {}", loaded(path, &settings.picture, scene, camera)));
     }
-    notices::say_ignored(path, scene, options.scene.strict)?;
+    let uses = Uses::of(&options.scene, &settings.picture, Some(&options.frames));
+    notices::say_ignored(&options.scene, scene, &uses)?;
     if options.quiet {
         return Ok(());
     }

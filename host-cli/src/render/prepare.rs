@@ -16,8 +16,9 @@ use super::steps::{assigned, on_threads};
 use crate::arguments::{PrepareOptions, numbered};
 use crate::console::say;
 use crate::failure::Failure;
+use crate::notices::{self, Uses};
 use crate::progress::Progress;
-use crate::{input, notices, outputs};
+use crate::{input, outputs};
 
 /// Prepares a scene, as it stands or in frames, and writes it.
 pub(crate) fn run(options: &PrepareOptions) -> Result<(), Failure> {
@@ -95,7 +96,8 @@ impl<'a> Preparation<'a> {
         let mut settings = options.settings();
         let camera = settings.camera(scene)?;
         options.picture.fit(&camera, &mut settings.picture);
-        notices::say_ignored(&options.scene.path, scene, options.scene.strict)?;
+        let uses = Uses::of(&options.scene, &settings.picture, Some(&options.frames));
+        notices::say_ignored(&options.scene, scene, &uses)?;
         if !options.quiet {
             notices::say_remarks(&options.scene.path, scene);
         }

@@ -17,7 +17,8 @@ use crate::arguments::{
 };
 use crate::console::say;
 use crate::failure::Failure;
-use crate::{input, notices};
+use crate::input;
+use crate::notices::{self, Uses};
 
 /// Name and value of an axis.
 type Value<'a> = (&'a str, &'a str);
@@ -25,8 +26,9 @@ type Value<'a> = (&'a str, &'a str);
 /// Loads the scene of a sweep, and makes its points.
 pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Result<SweepOptions, Failure> {
     let scene = input::load(&arguments.scene, u32::MAX)?;
-    notices::say_ignored(&arguments.scene.path, &scene, arguments.scene.strict)?;
     let name = input::name(&arguments.scene);
+    let picture = arguments.point(&name).settings.picture;
+    notices::say_ignored(&arguments.scene, &scene, &Uses::of(&arguments.scene, &picture, None))?;
     let mut notices = BTreeSet::new();
     let sweep = Sweep::new(arguments.axes(), |values| {
         let made = point(arguments, &values, &scene, &mut notices);

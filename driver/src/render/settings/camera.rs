@@ -19,7 +19,7 @@ impl RenderSettings {
     pub fn camera(&self, scene: &Scene) -> Result<Camera, RenderError> {
         let Picture { camera, camera_at, look_at, fov, .. } = &self.picture;
         // Of an orthographic camera that is placed and turned anew nothing is left.
-        let is_placed = camera_at.is_some() && look_at.is_some();
+        let is_placed = self.picture.states_view();
         let found = match (scene.camera(camera.as_deref()), scene.cameras.first()) {
             (Err(SceneError::OrthographicCamera { .. }), Some(other)) if is_placed => other,
             (found, _) => found?,

@@ -39,6 +39,13 @@ pub struct Picture {
     pub filter: Filter,
 }
 
+impl Picture {
+    /// Returns whether place and direction of the camera are stated, so that nothing of the file's view is left.
+    pub fn states_view(&self) -> bool {
+        self.camera_at.is_some() && self.look_at.is_some()
+    }
+}
+
 impl Default for Picture {
     fn default() -> Self {
         Self {

@@ -15,7 +15,7 @@ use super::names::mesh_name;
 use super::not_finite::NotFinite;
 use super::solid_glass::Resolved;
 use super::topology::{Topology, has_positions};
-use crate::scene::{LightUnits, blender};
+use crate::scene::{Concern, LightUnits, blender};
 
 /// Maximum number of names in a notice; further ones are counted.
 const LISTED: usize = 8;
@@ -84,6 +84,8 @@ fn meshes(root: &json::Root, holds: impl Fn(&json::mesh::Primitive) -> bool) -> 
 pub(super) struct Sentences {
     /// Contents that are not used, or that are missing.
     pub(super) ignored: Vec<String>,
+    /// Those of them that do not concern every picture, by their index.
+    pub(super) concerns: Vec<(usize, Concern)>,
     /// Contents that are used in another way than they are stated.
     pub(super) remarks: Vec<String>,
 }
@@ -98,7 +100,13 @@ fn note(sentences: &mut Vec<String>, sentence: &str, kind: &str, names: &[String
 impl Notices {
     /// All sentences on a document.
     pub(super) fn finish(&self, document: &Document) -> Sentences {
-        Sentences { ignored: self.ignored(document), remarks: self.remarks() }
+        let mut ignored = self.ignored(document);
+        let mut concerns = Vec::new();
+        for (concern, sentence) in self.of_some_pictures(document) {
+            concerns.extend(concern.map(|concern| (ignored.len(), concern)));
+            ignored.push(sentence);
+        }
+        Sentences { ignored, concerns, remarks: self.remarks() }
     }
 
     fn ignored(&self, document: &Document) -> Vec<String> {
@@ -128,10 +136,6 @@ impl Notices {
         note("primitives without positions are ignored", "mesh", &shapeless);
         let unnamed = meshes(root, |primitive| primitive.attributes.contains_key(&Checked::Invalid));
         note("vertex attributes whose names glTF does not know are ignored", "mesh", &unnamed);
-        let shortened = document.shortened.iter();
-        let shortened: Vec<_> =
-            shortened.map(|&index| animation::name(index, &root.animations[index])).collect();
-        note("channels of animations that extensions define are ignored", "animation", &shortened);
         let meshes_of = |indices: &BTreeSet<usize>| -> Vec<String> {
             indices.iter().map(|&index| mesh_name(root, index)).collect()
         };
@@ -152,10 +156,32 @@ impl Notices {
         note("the range of lights is ignored, their light reaches everywhere", "light", &limited);
         let closed = "spot lights whose outer cone has no angle are left out";
         note(closed, "light", &self.closed_spots);
-        note("orthographic cameras are not rendered", "camera", &self.orthographic);
+        sentences
+    }
+
+    /// Sentences that do not concern every picture, and those on extensions.
+    fn of_some_pictures(&self, document: &Document) -> Vec<(Option<Concern>, String)> {
+        let root = &document.root;
+        let shortened = document.shortened.iter();
+        let shortened: Vec<_> =
+            shortened.map(|&index| animation::name(index, &root.animations[index])).collect();
+        let mut sentences = Vec::new();
+        for (concern, sentence, kind, names) in [
+            (
+                Concern::Animations,
+                "channels of animations that extensions define are ignored",
+                "animation",
+                &shortened,
+            ),
+            (Concern::OtherCameras, "orthographic cameras are not rendered", "camera", &self.orthographic),
+        ] {
+            if !names.is_empty() {
+                sentences.push((Some(concern), format!("{sentence}: {}", list(kind, names))));
+            }
+        }
         for (extension, places) in other_extensions(root) {
             let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };
-            sentences.push(format!("the extension {extension} is ignored{places}"));
+            sentences.push((concern_of(&extension), format!("the extension {extension} is ignored{places}")));
         }
         if let Some(view) = self.framed.filter(|_| self.orthographic.is_empty()) {
             let framed = match view {
@@ -164,7 +190,7 @@ impl Notices {
             };
             let export =
                 document.is_of_blender().then(|| format!(" (to export one: {})", blender::NO_CAMERA));
-            sentences.push(format!("{framed}{}", export.unwrap_or_default()));
+            sentences.push((Some(Concern::View), format!("{framed}{}", export.unwrap_or_default())));
         }
         sentences
     }
@@ -190,6 +216,15 @@ impl Notices {
                      gap of air between them";
         note(apart, "material", &self.touching_glass);
         sentences
+    }
+}
+
+/// What an unsupported extension is about, of which not every picture has need.
+fn concern_of(extension: &str) -> Option<Concern> {
+    match extension {
+        "KHR_animation_pointer" => Some(Concern::Animations),
+        "EXT_lights_image_based" => Some(Concern::Environment),
+        _ => None,
     }
 }
 

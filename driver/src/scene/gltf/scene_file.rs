@@ -191,8 +191,8 @@ impl SceneFile {
         })?;
         notices.glass = solid_glass::resolve(document, &mut scene)?;
         notices.touching_glass = touching_glass::join(&mut scene);
-        let Sentences { ignored, remarks } = notices.finish(document);
-        (scene.notices, scene.remarks) = (ignored, remarks);
+        let Sentences { ignored, concerns, remarks } = notices.finish(document);
+        (scene.notices, scene.concerns, scene.remarks) = (ignored, concerns, remarks);
         Ok(scene)
     }
 
