@@ -33,7 +33,7 @@ use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
@@ -98,8 +98,9 @@ impl Arguments {
         let given = of_scene_alone(std::env::args_os().collect());
         Self::try_parse_from(&given).unwrap_or_else(|error| {
             let escaped = given.iter().map(|argument| printable(&argument.to_string_lossy()).into_owned());
-            let error = Self::try_parse_from(escaped).err().unwrap_or(error);
-            suggestions::with_suggestion(prepared::with_remedy(error)).exit()
+            let escaped: Vec<_> = escaped.collect();
+            let error = Self::try_parse_from(&escaped).err().unwrap_or(error);
+            suggestions::with_suggestion(prepared::with_remedy(error), Self::command(), &escaped).exit()
         })
     }
 }
@@ -243,8 +244,10 @@ mod tests {
     }
 
     fn said(line: &str) -> String {
-        let error = Arguments::try_parse_from(line.split(' ')).err().map(suggestions::with_suggestion);
-        error.map_or_else(String::new, |error| error.to_string())
+        let words: Vec<_> = line.split(' ').map(str::to_owned).collect();
+        let error = Arguments::try_parse_from(&words).err();
+        let suggested = |error| suggestions::with_suggestion(error, Arguments::command(), &words);
+        error.map(suggested).map_or_else(String::new, |error| error.to_string())
     }
 
     #[test]
@@ -255,7 +258,9 @@ mod tests {
             ("photoncard render a.glb --width 640", "--size"),
             ("photoncard render a.glb --denoise", "denoising.md"),
             ("photoncard render a.glb --gpu", "--card"),
-            ("photoncard tonemap a.exr --threads 4 -o b.png", "emulated:N"),
+            ("photoncard view a.glb --cores 4", "emulated:N"),
+            ("photoncard tonemap a.exr --threads 4 -o b.png", "of photoncard render"),
+            ("photoncard prepare a.glb --jobs 4 -o b.card", "--threads N"),
             ("photoncard view a.glb --output a.png", "--help"),
             ("photoncard render a.glb --transparent", "background"),
             ("photoncard render a.glb a.png", "-o a.png"),
@@ -267,5 +272,46 @@ mod tests {
         // Options of this program that are near are still suggested.
         assert!(said("photoncard render a.glb --qualty draft").contains("--quality"));
         assert!(said("photoncard render a.glb b.glb").contains("unexpected argument"));
+    }
+
+    /// Command of a name, all of whose options are known.
+    fn named(name: &str) -> clap::Command {
+        let mut command = Arguments::command();
+        command.build();
+        let words = name.split(' ');
+        words.fold(command, |command, word| command.find_subcommand(word).expect(name).clone())
+    }
+
+    /// Returns whether the command, or all that it has, take an option `-o` or `--name`.
+    fn takes(command: &clap::Command, option: &str) -> bool {
+        let is_it = |argument: &clap::Arg| match option.strip_prefix("--") {
+            Some(long) => argument.get_long() == Some(long),
+            None => argument.get_short().is_some_and(|short| option == format!("-{short}")),
+        };
+        let mut others = command.get_subcommands().filter(|command| command.get_name() != "help").peekable();
+        command.get_arguments().any(is_it)
+            || others.peek().is_some() && others.all(|other| takes(other, option))
+    }
+
+    #[test]
+    fn remedies_state_options_of_their_commands_alone() {
+        let mut count = 0;
+        for suggestions::Word { remedy, commands, .. } in &suggestions::OF_OTHERS {
+            let words = remedy.split([' ', ':', ';', ',']).filter(|word| word.starts_with('-'));
+            for (option, command) in
+                words.flat_map(|option| commands.iter().map(move |command| (option, command)))
+            {
+                assert!(takes(&named(command), option), "{command} has no {option}");
+                count += 1;
+            }
+        }
+        assert!(count > 40 && !takes(&named("tonemap"), "--card"));
+    }
+
+    #[test]
+    fn commands_of_commands_are_found_among_all_words() {
+        let words = ["photoncard", "study", "--out", "a", "sweep", "b.glb"].map(str::to_owned);
+        assert_eq!(suggestions::command_of(Arguments::command(), &words), "study sweep");
+        assert_eq!(suggestions::command_of(Arguments::command(), &words[..1]), "");
     }
 }

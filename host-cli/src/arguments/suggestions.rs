@@ -1,79 +1,204 @@
 //! Remedies for what is typed as for other renderers.
 
+use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
-/// Options of other renderers, and what states the same here.
-const OF_OTHERS: [(&[&str], &str); 14] = [
-    (
-        &["--samples", "--sample", "--num-samples", "-s"],
-        "the samples of a pixel are stated by --spp N; by default --quality finds them",
-    ),
-    (
-        &["--width", "--height", "--resolution", "--res", "-w", "--resx", "--resy"],
-        "the size is stated by --size WIDTHxHEIGHT, or --size 1080p",
-    ),
-    (
-        &["--denoise", "--denoiser", "--oidn"],
-        "no denoiser is part of photoncard: -o OUT.exr has the layers albedo and N for one (docs/denoising.md); --quality final has less noise",
-    ),
-    (
-        &["--gpu", "--device", "--cuda", "--optix", "--metal", "--vulkan", "--cycles-device"],
-        "there is no graphics processor to choose: emulated cards run on the processor's cores, others are stated by --card",
-    ),
-    (
-        &["--threads", "--cores", "--jobs", "-j", "-t", "--nthreads"],
-        "the number of chips, each on a core, is stated by --card emulated:N",
-    ),
-    (&["--output", "--out"], "outputs of this command are in its --help"),
-    (&["--outfile", "--render-output", "--image"], "the picture is stated by -o OUT.png or -o OUT.exr"),
-    (
-        &["--transparent", "--alpha", "--film-transparent"],
-        "no transparent background is written: where nothing is seen, the layer Z of an EXR is infinite",
-    ),
-    (
-        &["--bounces", "--max-bounces", "--depth", "--max-depth"],
-        "paths have no number of bounces to state: the photon map has light of all",
-    ),
-    (
-        &["--env", "--envmap", "--hdri", "--world", "--sky", "--background"],
-        "light from infinitely far is stated by --environment FILE or R,G,B",
-    ),
-    (
-        &["--frame", "--start", "--end", "--frame-start", "--frame-end"],
-        "frames are stated by --frames A-B, or --frames N for one",
-    ),
-    (&["--format", "--render-format"], "the format is that of the ending of -o: OUT.exr or OUT.png"),
-    (
-        &["--ev", "--gamma", "--exp"],
-        "the exposure of a PNG is stated by --exposure STOPS, its curve by --tonemap",
-    ),
-    (
-        &["--verbose", "-v", "--log-level"],
-        "progress is printed by default; --quiet leaves warnings alone, --stats OUT.json has all numbers",
-    ),
+/// Commands that render a scene, with any cards.
+const RENDER: &[&str] = &["render", "view", "farm"];
+/// Commands that take the settings of a picture.
+const PICTURE: &[&str] = &["render", "prepare", "view", "study sweep", "farm"];
+/// Commands that write pictures of either format.
+const WRITE: &[&str] = &["render", "merge", "farm"];
+
+/// Options of other renderers; what states the same here, by options of these commands alone. Without
+/// commands it is of all.
+pub(super) struct Word {
+    options: &'static [&'static str],
+    pub(super) remedy: &'static str,
+    pub(super) commands: &'static [&'static str],
+}
+
+/// Of several with an option the first one of the command counts.
+pub(super) const OF_OTHERS: [Word; 17] = [
+    Word {
+        options: &["--samples", "--sample", "--num-samples", "-s"],
+        remedy: "the samples of a pixel are stated by --spp N; by default --quality finds them",
+        commands: PICTURE,
+    },
+    Word {
+        options: &["--width", "--height", "--resolution", "--res", "-w", "--resx", "--resy"],
+        remedy: "the size is stated by --size WIDTHxHEIGHT, or --size 1080p",
+        commands: PICTURE,
+    },
+    Word {
+        options: &["--denoise", "--denoiser", "--oidn"],
+        remedy: "no denoiser is part of photoncard: -o OUT.exr has the layers albedo and N for one (docs/denoising.md); --quality final has less noise",
+        commands: &["render", "farm"],
+    },
+    Word {
+        options: &["--gpu", "--device", "--cuda", "--optix", "--metal", "--vulkan", "--cycles-device"],
+        remedy: "there is no graphics processor to choose: emulated cards run on the processor's cores, others are stated by --card",
+        commands: RENDER,
+    },
+    Word {
+        options: THREADS,
+        remedy: "the number of chips, each on a core, is stated by --card emulated:N",
+        commands: RENDER,
+    },
+    Word {
+        options: THREADS,
+        remedy: "the number of threads is stated by --threads N",
+        commands: &["prepare", "study"],
+    },
+    Word {
+        options: &["--output", "--out"],
+        remedy: "outputs of this command are in its --help",
+        commands: &[],
+    },
+    Word { options: OUTPUT, remedy: "the picture is stated by -o OUT.png or -o OUT.exr", commands: WRITE },
+    Word { options: OUTPUT, remedy: "the picture is stated by -o OUT.png", commands: &["tonemap"] },
+    Word {
+        options: &["--transparent", "--alpha", "--film-transparent"],
+        remedy: "no transparent background is written: where nothing is seen, the layer Z of an EXR is infinite",
+        commands: &[],
+    },
+    Word {
+        options: &["--bounces", "--max-bounces", "--depth", "--max-depth"],
+        remedy: "paths have no number of bounces to state: the photon map has light of all",
+        commands: &[],
+    },
+    Word {
+        options: &["--env", "--envmap", "--hdri", "--world", "--sky", "--background"],
+        remedy: "light from infinitely far is stated by --environment FILE or R,G,B",
+        commands: PICTURE,
+    },
+    Word {
+        options: &["--frame", "--start", "--end", "--frame-start", "--frame-end"],
+        remedy: "frames are stated by --frames A-B, or --frames N for one",
+        commands: &["render", "prepare", "farm"],
+    },
+    Word {
+        options: &["--format", "--render-format"],
+        remedy: "the format is that of the ending of -o: OUT.exr or OUT.png",
+        commands: WRITE,
+    },
+    Word {
+        options: &["--ev", "--gamma", "--exp"],
+        remedy: "the exposure of a PNG is stated by --exposure STOPS, its curve by --tonemap",
+        commands: &["render", "merge", "tonemap", "farm"],
+    },
+    Word {
+        options: VERBOSE,
+        remedy: "progress is printed by default; --quiet leaves warnings alone, --stats OUT.json has all numbers",
+        commands: &["render", "farm"],
+    },
+    Word {
+        options: VERBOSE,
+        remedy: "progress is printed by default, and silenced by --quiet",
+        commands: &["prepare", "study", "card selftest"],
+    },
 ];
+
+const THREADS: &[&str] = &["--threads", "--cores", "--jobs", "-j", "-t", "--nthreads"];
+const OUTPUT: &[&str] = &["--outfile", "--render-output", "--image"];
+const VERBOSE: &[&str] = &["--verbose", "-v", "--log-level"];
 
 /// Endings of pictures' names.
 const PICTURES: [&str; 5] = [".png", ".exr", ".jpg", ".jpeg", ".part"];
 
-/// The error of an unknown argument with what states the same here, if that is known.
-pub(super) fn with_suggestion(mut error: Error) -> Error {
+/// The error of an unknown argument with what states the same here, if that is known. `given` are all words
+/// for `program`, its name first.
+pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[String]) -> Error {
     if error.kind() != ErrorKind::UnknownArgument {
         return error;
     }
     let Some(ContextValue::String(argument)) = error.get(ContextKind::InvalidArg) else { return error };
-    let Some(remedy) = remedy(argument) else { return error };
+    let Some(remedy) = remedy(argument, &command_of(program, given)) else { return error };
     error.remove(ContextKind::SuggestedArg);
     error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![remedy.into()]));
     error
 }
 
-fn remedy(argument: &str) -> Option<String> {
-    let name = argument.split('=').next().unwrap_or(argument);
-    if let Some((_, remedy)) = OF_OTHERS.iter().find(|(names, _)| names.contains(&name)) {
-        return Some((*remedy).to_owned());
+/// Name of the command, without the program's: `render`, `study sweep`.
+pub(super) fn command_of(program: Command, given: &[String]) -> String {
+    let mut command = program;
+    let mut names = Vec::new();
+    for word in given.iter().skip(1) {
+        let Some(next) = command.find_subcommand(word).cloned() else { continue };
+        names.push(next.get_name().to_owned());
+        command = next;
     }
+    names.join(" ")
+}
+
+impl Word {
+    /// Returns whether the command, or one that it is of, is among those of the remedy.
+    fn is_of(&self, command: &str) -> bool {
+        let is_within = |of: &&str| {
+            command.strip_prefix(*of).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
+        };
+        self.commands.is_empty() || self.commands.iter().any(is_within)
+    }
+
+    /// The remedy, with the names of its commands if `command` is none of them.
+    fn remedy_for(&self, command: &str) -> String {
+        if self.is_of(command) {
+            return self.remedy.to_owned();
+        }
+        let commands: Vec<_> = self.commands.iter().map(|of| format!("photoncard {of}")).collect();
+        format!("of {}: {}", commands.join(", "), self.remedy)
+    }
+}
+
+fn remedy(argument: &str, command: &str) -> Option<String> {
+    let name = argument.split('=').next().unwrap_or(argument);
+    let mut words: Vec<_> = OF_OTHERS.iter().filter(|word| word.options.contains(&name)).collect();
+    // The sort is stable.
+    words.sort_by_key(|word| !word.is_of(command));
+    if let Some(word) = words.first() {
+        return Some(word.remedy_for(command));
+    }
+    let endings = match command {
+        "tonemap" => &PICTURES[..1],
+        command if command == "render" || command.starts_with("farm ") => &PICTURES[..],
+        _ => &[],
+    };
     let is_picture =
-        !name.starts_with('-') && PICTURES.iter().any(|ending| name.to_lowercase().ends_with(ending));
+        !name.starts_with('-') && endings.iter().any(|ending| name.to_lowercase().ends_with(ending));
     is_picture.then(|| format!("a picture to write is stated by -o {name}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remedies_of_other_commands_name_them() {
+        for (argument, command, expected) in [
+            ("--samples", "render", Some("the samples")),
+            ("--samples", "study sweep", Some("the samples")),
+            ("--samples", "emulate", Some("of photoncard render, photoncard prepare")),
+            ("--cores", "view", Some("the number of chips")),
+            ("--cores", "prepare", Some("the number of threads")),
+            ("--cores", "farm slurm", Some("the number of chips")),
+            (
+                "--threads",
+                "tonemap",
+                Some("of photoncard render, photoncard view, photoncard farm: the number of chips"),
+            ),
+            ("--outfile", "tonemap", Some("the picture is stated by -o OUT.png")),
+            ("--alpha", "diff", Some("no transparent")),
+            ("a.png", "tonemap", Some("a picture to write is stated by -o a.png")),
+            ("a.exr", "tonemap", None),
+            ("a.png", "diff", None),
+            ("--unheard-of", "render", None),
+        ] {
+            let said = remedy(argument, command);
+            let is_right = match (&said, expected) {
+                (Some(said), Some(expected)) => said.starts_with(expected),
+                (said, expected) => said.is_none() && expected.is_none(),
+            };
+            assert!(is_right, "{command} {argument}: {said:?}");
+        }
+    }
 }
