@@ -4,9 +4,11 @@
 use std::boxed::Box;
 
 use glam::Vec3;
-use photoncard_shared::image::{Header, Lights};
+use photoncard_shared::address::Line;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::image::{Header, Lights, Section, SectionKind};
 use photoncard_shared::layout::PhotonGrid;
-use photoncard_shared::message::{Fault, FrameParameters, Invariant, Tile};
+use photoncard_shared::message::{Camera, Fault, FrameParameters, Invariant, Tile};
 
 use super::buffers::Shared;
 use super::stored_point::{StoredPoint, pattern};
@@ -14,8 +16,11 @@ use super::test_frame::frame;
 use super::*;
 use crate::gather::{GatherRequest, GatherTarget, HilbertCode};
 use crate::memory::Lines;
-use crate::render::{GatherPoint, PixelSample};
-use crate::scene::{PartialReflection, SceneImage, Surface};
+use crate::render::final_gather::{self, GatherRayEnds};
+use crate::render::{Context, GatherPoint, PixelSample};
+use crate::scene::{
+    BUNDLE_RAYS, PartialReflection, Ray, SceneImage, Seen, Surface, closest_hits, transmittances,
+};
 
 fn scene() -> SceneImage {
     let header = Header {
@@ -110,4 +115,47 @@ fn one_gather_point_too_many_is_a_fault() {
         assert_eq!(points.push(0, stored, 0), Ok(()));
     }
     assert_eq!(points.push(0, stored, 0), Err(broken));
+}
+
+/// Result of a piece of work in a scene without surfaces.
+fn in_empty_scene<T>(
+    work: impl FnOnce(&mut Context<Lines>, &GatherPoint) -> Result<T, Fault>,
+) -> Result<T, Fault> {
+    let (mut scene, memory) = (scene(), &mut Lines(&[Line::ZERO]));
+    // A line of zeros is a node without children.
+    scene.header.sections[SectionKind::Nodes as usize] = Section { first_line: 0, records: 1 };
+    let camera = Camera { forward: [0.0, 0.0, -1.0], ..frame().camera };
+    let frame = &FrameParameters { camera, ..frame() };
+    let pattern = pattern(frame, PixelSample { x: 0, y: 0, sample: 0 });
+    let point = GatherPoint::record(Surface::white(Vec3::ZERO, Vec3::Y, 1.0), pattern, 32);
+    work(&mut Context { scene: &scene, memory, frame, counters: &mut Counters { ..Counters::ZERO } }, &point)
+}
+
+#[test]
+fn a_surface_that_is_not_seen_again_is_a_fault() {
+    let read = in_empty_scene(|context, point| {
+        let stored = StoredPoint { seen: Seen::ELSEWHERE, ..StoredPoint::of_record(point) };
+        let at = PixelSample { x: 0, y: 0, sample: 0 };
+        stored.read_surface(context, at, &mut Surface::NOWHERE.clone())
+    });
+    assert_eq!(read, Err(Invariant::Surface.fault()));
+}
+
+#[test]
+fn one_ray_too_many_for_a_bundle_is_a_fault() {
+    let broken = Err(Invariant::Bundle.fault());
+    for (rays, expected) in [(BUNDLE_RAYS, Ok(())), (BUNDLE_RAYS + 1, broken)] {
+        let gathered = in_empty_scene(|context, point| {
+            let target = GatherTarget::new(0, PointIndex::Pixel(0));
+            final_gather::cast(context, point, target, 0..rays as u32, &mut GatherRayEnds::new())
+        });
+        assert_eq!(gathered, expected);
+        let bundle = &[Ray::new(Vec3::ZERO, Vec3::Y); BUNDLE_RAYS + 1][..rays];
+        let hit = in_empty_scene(|context, _| {
+            closest_hits(context.scene, context.memory, bundle, &mut [None; BUNDLE_RAYS])
+        });
+        assert_eq!(hit, expected);
+        let passed = in_empty_scene(|context, _| transmittances(context.scene, context.memory, bundle));
+        assert_eq!(passed.map(|_| ()), expected);
+    }
 }

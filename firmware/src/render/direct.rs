@@ -234,3 +234,19 @@ fn ratio((rays, density): (u32, f32), (other_rays, other_density): (u32, f32)) -
     // At a grazing angle a density, and the ratio, may be infinite.
     (rays as f32 * density) / (other_rays as f32 * other_density)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_shadow_ray_too_many_is_a_fault() {
+        let light =
+            || LightSample { direction: Vec3::Y, distance: 1.0, irradiance: Vec3::ONE, density: None };
+        let mut rays = ShadowRays::new();
+        for _ in 0..BUNDLE_RAYS {
+            assert_eq!(rays.push(Vec3::ZERO, light()), Ok(()));
+        }
+        assert_eq!(rays.push(Vec3::ZERO, light()), Err(Invariant::Bundle.fault()));
+    }
+}
