@@ -2,7 +2,8 @@
 
 mod support;
 
-use support::{Room, shipped};
+use serde_json::json;
+use support::{Room, scene, shipped};
 
 const PICTURE: [&str; 8] =
     ["--size", "64x64", "--photons", "2000", "--gather-rays", "20", "--quiet", "--stats=a.json"];
@@ -55,5 +56,30 @@ fn what_cannot_be_verified_is_refused_in_words() {
         assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
         assert!(outcome.stderr.contains("--verify") && outcome.stderr.contains(words), "{}", outcome.stderr);
         assert!(room.names().is_empty());
+    }
+}
+
+/// A lamp a hundredth of a millimetre above the floor.
+#[test]
+fn dazzling_light_of_a_card_alone_is_told() {
+    let room = Room::new();
+    let mut dazzling = scene();
+    let lights = json!({"lights": [{"type": "point", "intensity": 1}]});
+    dazzling["extensions"] = json!({"KHR_lights_punctual": lights});
+    dazzling["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual"]);
+    let lamp = json!({"translation": [0.0, 1e-5, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}});
+    dazzling["nodes"].as_array_mut().unwrap().push(lamp);
+    dazzling["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    room.write_scene("scene.gltf", &dazzling);
+    let view = ["--camera-at", "0,0.001,0.001", "--look-at", "0,0,0", "--fov", "20", "--stats", "a.json"];
+    for (cards, is_told) in [("emulated:1", true), ("emulated:2", false)] {
+        let options = [&["-o", "a.exr", "--quiet", "--card", cards][..], &view].concat();
+        let said = room.rendered("scene.gltf", &options).stderr;
+        assert_eq!(
+            said.contains("card 0 with light far beyond") && said.contains("--card"),
+            is_told,
+            "{said}"
+        );
+        assert_eq!(statistics(&room)["dazzling_tiles"].as_u64().unwrap() > 0, is_told);
     }
 }

@@ -187,8 +187,11 @@ impl Cards {
             render_seconds: (ended - loaded).as_secs_f64(),
         };
         if outcome.failure.is_some() {
+        let dazzling = names.iter().cloned().enumerate();
+        let dazzling = dazzling.map(|(card, name)| (name, scheduler.dazzling_of(card)));
             let given_up = (0..count).filter(|&card| scheduler.standing(card) == Standing::GivenUp).count();
             return Outcome { cards_given_up: self.lost + given_up, ..outcome };
+            dazzling: dazzling.filter(|(_, tiles)| *tiles > 0).collect(),
         }
         for (number, (_, card)) in self.cards.iter_mut().enumerate() {
             card.tiles = scheduler.rendered_by(number).copied().collect();

@@ -84,6 +84,8 @@ pub(super) struct Outcome {
     pub(super) cards_given_up: usize,
     /// Numbers of tiles that were rendered more than once or taken over.
     pub(super) tiles: TileCounts,
+    /// Names of cards that alone have rendered dazzling tiles, which no other has verified, with their number.
+    pub(super) dazzling: Vec<(String, usize)>,
     /// Error that has ended the work; the rest is what was done until then.
     pub(super) failure: Option<RenderError>,
     /// Time until the last card was loaded, seconds.

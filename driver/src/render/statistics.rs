@@ -42,6 +42,12 @@ pub struct Statistics {
     /// Number of tiles rendered once more, for verification or because another card took too long; no other number counts
     /// them.
     pub repeated_tiles: usize,
+    /// Number of tiles with light far beyond that of the scene's surfaces for which there was no second card to verify
+    /// them.
+    pub dazzling_tiles: usize,
+    /// Names of the cards that have rendered these.
+    #[serde(skip)]
+    pub dazzling_cards: Vec<String>,
     /// Number of tiles rendered again because their card was outvoted; other numbers count them once.
     pub revoked_tiles: usize,
     /// Time of each phase, seconds.
@@ -117,6 +123,8 @@ impl Statistics {
             cards_given_up: outcome.cards_given_up,
             verified_tiles: outcome.tiles.verified,
             repeated_tiles: outcome.tiles.repeated,
+            dazzling_tiles: outcome.dazzling.iter().map(|(_, tiles)| tiles).sum(),
+            dazzling_cards: outcome.dazzling.iter().map(|(card, _)| card.clone()).collect(),
             revoked_tiles: outcome.tiles.revoked,
             time_s,
             rays: Rays {

@@ -58,6 +58,8 @@ pub(super) struct Entry {
     pub(super) is_verified: bool,
     /// True if the first answer is dazzling: another card is asked, as for a verified tile.
     pub(super) is_doubted: bool,
+    /// True if the tile that was believed last is dazzling, and there was no other card to be asked.
+    pub(super) is_dazzling: bool,
     pub(super) copies: Vec<Copy>,
     pub(super) answers: Vec<Answer>,
     /// Cards that were reset or lost while they rendered the tile, once per crash.
@@ -68,7 +70,8 @@ impl Entry {
     pub(super) fn new(tile: Tile) -> Self {
         let (copies, answers, crashes) = (Vec::new(), Vec::new(), Vec::new());
         let progress = Progress::Open;
-        Self { tile, progress, is_verified: false, is_doubted: false, copies, answers, crashes }
+        let (is_verified, is_doubted, is_dazzling) = (false, false, false);
+        Self { tile, progress, is_verified, is_doubted, is_dazzling, copies, answers, crashes }
     }
 
     pub(super) fn is_open(&self) -> bool {
@@ -78,6 +81,12 @@ impl Entry {
     /// Returns whether a card has a copy of the tile or has answered.
     pub(super) fn concerns(&self, card: CardNumber) -> bool {
         self.copies.iter().any(|copy| copy.card == card) || self.has_answer_of(card)
+    }
+
+    /// Returns whether a card alone is believed that its dazzling tile is right.
+    pub(super) fn is_dazzling_of(&self, card: CardNumber) -> bool {
+        let is_its = [Progress::Found(Some(card)), Progress::Done(Some(card))].contains(&self.progress);
+        is_its && self.is_dazzling
     }
 
     pub(super) fn has_answer_of(&self, card: CardNumber) -> bool {

@@ -6,7 +6,7 @@
 //! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; the tiles
 //!   that the outvoted card alone has rendered are rendered again.
 //! - A tile that is brighter than any but a lamp beside a surface makes it is verified as well, if there is
-//!   another card. A tile that is not is believed against one that is.
+//!   another card. A tile that is not is believed against one that is. A card alone is believed, and its tiles counted.
 //! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the cards that have
 //!   crashed at it the minimum number of times, and is abandoned after five crashes.
 //! - A tile of a picture by passes waits for the card that rendered it before, which has kept its irradiance records. Idle cards take tiles
@@ -173,7 +173,8 @@ impl Scheduler {
             self.counts.repeated += 1;
             return Answered::default();
         }
-        entry.is_doubted |= has_others && tile.is_dazzling();
+        entry.is_dazzling = tile.is_dazzling();
+        entry.is_doubted |= has_others && entry.is_dazzling;
         if !entry.is_verified && !entry.is_doubted {
             entry.progress = Progress::Found(Some(card));
             at.counters.add(&tile.counters);
@@ -192,6 +193,8 @@ impl Scheduler {
     fn judge(&mut self, index: usize) -> Answered {
         let entry = &mut self.entries[index];
         let Some(Judgement { tile, agreed, liars }) = entry.judge() else { return Answered::default() };
+        // Another card was asked.
+        entry.is_dazzling = false;
         let was_kept = agreed == Agreement::WithKept;
         match agreed {
             Agreement::ByLight(card) => {
@@ -357,6 +360,11 @@ impl Scheduler {
     /// Numbers of tiles that were taken over or rendered more than once.
     pub fn counts(&self) -> TileCounts {
         self.counts
+    }
+
+    /// Number of dazzling tiles that a card alone has rendered, without another that could be asked.
+    pub fn dazzling_of(&self, card: CardNumber) -> usize {
+        self.entries.iter().filter(|entry| entry.is_dazzling_of(card)).count()
     }
 
     /// Work on the tiles of the picture, each counted once.

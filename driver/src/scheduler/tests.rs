@@ -191,7 +191,16 @@ fn dazzling_light_is_verified_where_there_is_another_card() {
         assert_eq!((answered.found, answered.liars), (Some(lit(0, end)), liars));
         scheduler.complete(0);
         assert!(scheduler.is_complete());
+        // What two cards say is no one's word alone.
+        let of_cards: usize = (0..cards).map(|card| scheduler.dazzling_of(card)).sum();
+        assert_eq!(of_cards, usize::from(cards == 1));
     }
+    let mut verified = scheduler(1, 2).verifying(1.0, 0);
+    for (card, light) in [(0, 7), (1, dazzling)] {
+        assert_eq!(take(&mut verified, card, Duration::ZERO), Some(0));
+        verified.answer(card, lit(0, light), SECOND);
+    }
+    assert_eq!((verified.dazzling_of(0), verified.dazzling_of(1)), (0, 0));
     // The other card ends before it is asked, or while it renders.
     for is_at_work in [false, true] {
         let mut scheduler = scheduler(1, 2).with_helpers();
@@ -205,6 +214,10 @@ fn dazzling_light_is_verified_where_there_is_another_card() {
         assert!(scheduler.check(SECOND).is_ok());
         assert_eq!(take(&mut scheduler, 0, SECOND), Some(0));
         assert_eq!(scheduler.answer(0, lit(0, dazzling), SECOND).found, Some(lit(0, dazzling)));
+        scheduler.complete(0);
+        assert_eq!(scheduler.dazzling_of(0), 1);
+        scheduler.expel(0, None);
+        assert_eq!(scheduler.dazzling_of(0), 0);
     }
     // Modelled memory counts the reads of each tile once.
     let mut alone = scheduler(1, 2);

@@ -57,6 +57,19 @@ pub(super) fn say_sparse(statistics: &Statistics) {
     }
 }
 
+/// Prints that tiles were believed without a second card whose light is as that of a faulty one.
+pub(super) fn say_dazzling(statistics: &Statistics) {
+    let Statistics { dazzling_tiles, dazzling_cards, .. } = statistics;
+    if *dazzling_tiles > 0 {
+        let tiles = counted(*dazzling_tiles, "tile");
+        say(format_args!(
+            "photoncard: {tiles} of {} with light far beyond that of the surfaces, and no second card to verify it: a lamp without \
+             extent that nearly touches a surface makes such light, and so does a faulty card (verified by another --card)",
+            dazzling_cards.join(", ")
+        ));
+    }
+}
+
 /// Prints what was prepared, and the view of it.
 pub(super) fn say_prepared(path: &Path, settings: &RenderSettings, inputs: &NamedSettings, camera: &Camera) {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();

@@ -70,6 +70,7 @@ pub(super) fn finish(
         messages::say_done(outputs, &rendering, frame);
     }
     messages::say_sparse(&rendering.statistics);
+    messages::say_dazzling(&rendering.statistics);
     if options.parts.part.is_none() {
         say_dark(&rendering.film, circumstances);
     }
