@@ -4,11 +4,12 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use glam::Vec3;
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
 use photoncard_driver::render::{
-    CardSet, Integrator, Observer, Phase, PhotonMaps, Picture, RenderSettings, Renderer, Schedule,
+    CardError, CardSet, Integrator, Observer, Phase, PhotonMaps, Picture, RenderSettings, Renderer, Schedule,
     Statistics, Unobserved, render,
 };
 use photoncard_driver::scene::{FixedScene, Scene, gltf};
@@ -252,5 +253,44 @@ fn other_cards_and_modelled_memory_are_connected_anew() {
             // A card without a model shares the image that the host has kept.
             assert_eq!(bytes(&found.statistics), 0, "{addresses}");
         }
+    }
+}
+
+/// Of a queue that is too long for it a card is left out, and it is told once until it fits again.
+#[test]
+fn a_card_that_was_left_out_has_part_in_the_next_picture_that_fits_it() {
+    #[derive(Default)]
+    struct Losses(Mutex<Vec<String>>);
+
+    impl Observer for Losses {
+        fn progress(&self, _: Phase, _: u64, _: u64) {}
+
+        fn is_stopped(&self) -> bool {
+            false
+        }
+
+        fn lost(&self, card: &str, _: &CardError) {
+            self.0.lock().unwrap().push(card.to_owned());
+        }
+    }
+
+    let frame = Frame { camera: 0, seed: 0, photons: 300, lamp: 1, wall: 1 };
+    let scene = frame.scene(&base());
+    let too_long = Some(EmulatedKind::Micro.budget().gather_queue + 1);
+    let (mut renderer, losses) = (Renderer::default(), Losses::default());
+    for (queue, given_up, told) in
+        [(None, 0, 0), (too_long, 1, 1), (too_long, 1, 1), (None, 0, 1), (too_long, 1, 2)]
+    {
+        let settings = frame.settings().with(|settings| {
+            let cards = ["emulated:1", "emulated-micro:1"];
+            settings.cards.addresses = cards.map(|card| card.parse().unwrap()).to_vec();
+            settings.schedule.queue = queue;
+        });
+        let kept = renderer.render(&scene, &settings, &losses).unwrap();
+        let statistics = &kept.statistics;
+        assert_eq!((statistics.cards, statistics.cards_given_up), (2, given_up));
+        assert_eq!(*losses.0.lock().unwrap(), vec!["card 1"; told]);
+        let fresh = render(&scene, &settings, &Unobserved).unwrap();
+        assert!(kept.film.sums().eq(fresh.film.sums()));
     }
 }

@@ -33,6 +33,10 @@ const MAX_REST: Duration = Duration::from_secs(5);
 pub(super) struct Cards {
     set: CardSet,
     cards: Vec<(String, GreetedCard)>,
+    /// Emulated cards that were left out of the last picture for their budget, and may fit the next.
+    left_out: Vec<(String, GreetedCard)>,
+    /// Names of the cards that the observer knows to be left out.
+    known: Vec<String>,
     start: Instant,
     shared: SharedImage,
     /// Image that the cards were last loaded with.
@@ -70,7 +74,8 @@ impl Cards {
         });
         let results = on_threads(greetings);
         let set = settings.cards.clone();
-        let mut this = Self { set, cards: Vec::new(), start, shared, upload: None, lost: 0, used: start };
+        let (cards, left_out, known, upload) = (Vec::new(), Vec::new(), Vec::new(), None);
+        let mut this = Self { set, cards, left_out, known, start, shared, upload, lost: 0, used: start };
         let mut errors = Vec::new();
         for (name, result) in results {
             match result {
@@ -92,6 +97,13 @@ impl Cards {
         // Each record of a modelled memory is of one render.
         let is_modelled = settings.modelled_caches().is_some();
         self.set == settings.cards && !is_modelled && is_fresh && self.cards.len() >= settings.needed_cards()
+    }
+
+    /// Has cards that were left out of the last picture be checked for the next.
+    pub(super) fn take_back(&mut self) {
+        self.lost -= self.left_out.len();
+        self.known = self.left_out.iter().map(|(name, _)| name.clone()).collect();
+        self.cards.append(&mut self.left_out);
     }
 
     /// Reports cards that have not answered the greeting, or have too small a budget, to the observer.
@@ -175,8 +187,11 @@ impl Cards {
             Ok(loaded) => (loaded.max(begun), None),
             Err(error) => (ended, Some(error)),
         };
+        let dazzling = names.iter().cloned().enumerate();
+        let dazzling = dazzling.map(|(card, name)| (name, scheduler.dazzling_of(card)));
         let outcome = Outcome {
             counters: scheduler.counters(),
+            dazzling: dazzling.filter(|(_, tiles)| *tiles > 0).collect(),
             links,
             traffic: None,
             cards: count + self.lost,
@@ -187,11 +202,8 @@ impl Cards {
             render_seconds: (ended - loaded).as_secs_f64(),
         };
         if outcome.failure.is_some() {
-        let dazzling = names.iter().cloned().enumerate();
-        let dazzling = dazzling.map(|(card, name)| (name, scheduler.dazzling_of(card)));
             let given_up = (0..count).filter(|&card| scheduler.standing(card) == Standing::GivenUp).count();
             return Outcome { cards_given_up: self.lost + given_up, ..outcome };
-            dazzling: dazzling.filter(|(_, tiles)| *tiles > 0).collect(),
         }
         for (number, (_, card)) in self.cards.iter_mut().enumerate() {
             card.tiles = scheduler.rendered_by(number).copied().collect();
@@ -232,10 +244,14 @@ impl Executor for Cards {
         observer: &dyn Observer,
     ) -> Result<(), RenderError> {
         let mut misfits = Vec::new();
-        for (name, card) in std::mem::take(&mut self.cards) {
+        for (name, mut card) in std::mem::take(&mut self.cards) {
             match check(&card.budget) {
                 Ok(()) => self.cards.push((name, card)),
-                Err(error) => misfits.push((name, error)),
+                Err(error) => {
+                    misfits.push((name.clone(), error));
+                    card.tiles.clear();
+                    self.left_out.extend(card.card.is_emulated().then_some((name, card)));
+                }
             }
         }
         self.lost += misfits.len();
@@ -244,7 +260,10 @@ impl Executor for Cards {
             // The setting is at fault, and no card.
             return misfits.pop().map_or(Ok(()), |(_, error)| Err(error));
         }
-        let misfits = misfits.into_iter().map(|(name, error)| (name, CardError::of_budget(&error)));
+        // The last card that is missing is the error of the picture, known or not.
+        let has_enough = self.cards.len() >= needed;
+        let misfits = misfits.into_iter().filter(|(name, _)| !has_enough || !self.known.contains(name));
+        let misfits = misfits.map(|(name, error)| (name, CardError::of_budget(&error)));
         self.lose(misfits.collect(), needed, observer)
     }
 

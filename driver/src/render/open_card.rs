@@ -49,6 +49,11 @@ impl OpenCard {
         Ok(Self { connection, injector: faults.map(|faults| FaultInjector::new(faults, index)) })
     }
 
+    /// Returns whether the card is part of this process.
+    pub(super) fn is_emulated(&self) -> bool {
+        matches!(self.connection, Connection::Emulated(_))
+    }
+
     /// Closes the link to a card. Returns the address to reconnect to; `None` for an emulated card.
     pub(super) fn close(&mut self) -> Option<RemoteAddress> {
         match &mut self.connection {

@@ -240,7 +240,10 @@ fn connected<'c>(
     // Others are closed before: a card serves one host at a time.
     let open = cards.take().filter(|cards| cards.serve(settings));
     Ok(cards.insert(match open {
-        Some(open) => open,
+        Some(mut open) => {
+            open.take_back();
+            open
+        }
         None => Cards::connect(settings, observer)?,
     }))
 }
