@@ -52,6 +52,12 @@ fn options_without_effect_are_said_to_have_none() {
     let outcome = room.rendered("scene.gltf", &["-o", "units.exr", "--light-units=watts"]);
     let said = "--light-units has no effect without point, spot or directional lights in the file";
     assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
+    let sky = ["-o", "sky.exr", "--environment=1,1,1", "--environment-rotation=90"];
+    let outcome = room.rendered("scene.gltf", &sky);
+    let said = "--environment-rotation has no effect with an environment that is equal all around";
+    assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
+    let alone = room.render("scene.gltf", &["-o", "a.exr", "--environment-rotation=90"]);
+    assert!(alone.status == Some(2) && alone.stderr.contains("--environment <"), "{}", alone.stderr);
     for option in ["--irradiance-cache=on", "--radiance=precomputed"] {
         let options = ["-o", "plain.exr", "--gather-rays", "0", option];
         let outcome = room.rendered("scene.gltf", &options);
