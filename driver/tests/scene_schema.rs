@@ -109,8 +109,21 @@ fn json_that_violates_the_schema_is_named_by_its_place() {
             other => panic!("{place}: {:?}", other.err()),
         }
     }
-    let twice = br#"{"asset": {"version": "2.0"}, "nodes": [], "nodes": []}"#;
-    assert!(matches!(load_bytes("scene.gltf", twice), Err(SceneError::Json { .. })));
+    // With and without a number that the crate does not take.
+    for (text, place) in [
+        (r#"{"asset": {"version": "2.0"}, "nodes": [], "nodes": []}"#, "nodes"),
+        (
+            r#"{"asset": {"version": "2.0"}, "scene": 0.0, "nodes": [{"mesh": 0, "mesh": 1}]}"#,
+            "nodes[0].mesh",
+        ),
+    ] {
+        match load_bytes("scene.gltf", text.as_bytes()) {
+            Err(SceneError::Invalid { location, reason, .. }) => {
+                assert!(location.item == place && reason.contains("stands twice"), "{location}: {reason}");
+            }
+            other => panic!("{text}: {:?}", other.err()),
+        }
+    }
 }
 
 #[test]

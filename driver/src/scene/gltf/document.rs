@@ -12,6 +12,7 @@ use gltf::json::validation::{Checked, Error as Fault, Validate};
 use miette::{NamedSource, SourceSpan};
 use serde::Deserialize as _;
 
+use super::duplicates;
 use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use super::files::{Files, read_file};
 use super::other_kinds;
@@ -298,7 +299,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, BTreeSet<usize>), Sce
     let strict = foreign::decode(|| Ok(serde_json::from_str(text)), || not_gltf(CONTRADICTION))?;
     match strict {
         Ok(root) => Ok((root, BTreeSet::new())),
-        Err(error) if error.is_data() && !error.to_string().starts_with("duplicate field") => {
+        Err(error) if error.is_data() => {
             // The document as values, and as the crate's types.
             check(bytes.saturating_mul(2))?;
             foreign::decode(|| Ok(parse_amended(path, text)), || not_gltf(CONTRADICTION))?
@@ -322,6 +323,13 @@ fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, BTreeSet<usize>
     Ok((root, shortened))
 }
 
+    if let Some(item) = duplicates::first(text) {
+        return Err(SceneError::Invalid {
+            location: Location::new(path, item),
+            reason: "the key stands twice in its object, and readers take either of its values".to_owned(),
+            remedy: "leave one of the two out, or export the scene again: in glTF each key stands once",
+        });
+    }
 const CONTRADICTION: &str = "its structure contradicts itself";
 
 /// JSON of bytes in UTF-8; empty for others.

@@ -11,6 +11,7 @@ mod camera;
 mod compression;
 mod document;
 mod draco;
+mod duplicates;
 mod extensions;
 mod extent;
 mod files;
