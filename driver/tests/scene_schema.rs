@@ -84,6 +84,16 @@ fn channels_of_extensions_are_left_out_and_the_others_stay() {
     let sky = loaded(|json| json["extensionsUsed"] = json!(["EXT_lights_image_based", "EXT_other"]));
     let alone = sky.notices_on(|concern| concern != Concern::Environment);
     assert!(sky.notices.len() == 2 && alone.len() == 1 && alone[0].contains("EXT_other"), "{alone:?}");
+    // A path that no extension of its channel defines is a mistake.
+    let mistaken = loaded(|json| {
+        let channel = json!({"sampler": 0, "target": {"node": 0, "path": "rotaton"}});
+        let samplers = json!([{"input": 0, "output": 0}]);
+        json["nodes"][0]["name"] = json!("lid");
+        json["animations"] = json!([{"channels": [pointer(), channel], "samplers": samplers}]);
+    });
+    let said = mistaken.notices.join("; ");
+    let parts = ["none of glTF 2.0", "'rotaton' of node 'lid' (animations[0].channels[1])", "'animation 0'"];
+    assert!(mistaken.notices.len() == 2 && parts.iter().all(|part| said.contains(part)), "{said}");
     let required = load_changed(|json| json["extensionsRequired"] = json!(["KHR_animation_pointer"]));
     assert!(matches!(required, Err(SceneError::RequiredExtension { .. })));
 }

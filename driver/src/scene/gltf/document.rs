@@ -17,7 +17,7 @@ use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use super::files::{Files, read_file};
 use super::other_kinds;
 use super::parse_cost;
-use super::schema;
+use super::schema::{self, UnknownPath};
 use super::specular_glossiness::{self, Conversions};
 use crate::error::{Location, SceneError};
 use crate::printable::printable;
@@ -44,6 +44,8 @@ pub(super) struct Document {
     pub(super) conversions: Conversions,
     /// Animations with channels that extensions define, which were removed.
     pub(super) shortened: BTreeSet<usize>,
+    /// Channels that were removed because nothing defines their path.
+    pub(super) unknown_paths: Vec<UnknownPath>,
     /// Files in its folder that were read.
     pub(super) files: Files,
 }
@@ -67,9 +69,19 @@ impl Document {
         // Whatever its name, a file is what can be read.
         let (mut root, mut shortened) =
             parsed.map_err(|error| other_kinds::refused_file(path, &bytes).unwrap_or(error))?;
-        shortened.extend(schema::remove_unknown_paths(&mut root));
+        let removed = schema::remove_unknown_paths(&mut root);
+        let unknown_paths = match removed.is_empty() {
+            true => Vec::new(),
+            false => schema::unknown_paths(json_text(&bytes[text.clone()])),
+        };
+        let of_extensions = |(&index, &count): (&usize, &usize)| {
+            let unknown = unknown_paths.iter().filter(|unknown| unknown.animation == index).count();
+            (unknown < count).then_some(index)
+        };
+        shortened.extend(removed.iter().filter_map(of_extensions));
         let (path, conversions, files) = (path.to_owned(), Conversions::default(), Files::default());
-        let mut document = Self { path, root, bytes, text, blob, conversions, shortened, files };
+        let mut document =
+            Self { path, root, bytes, text, blob, conversions, shortened, unknown_paths, files };
         document.check()?;
         document.conversions = specular_glossiness::convert(&mut document.root);
         Ok(document)
@@ -311,6 +323,13 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, BTreeSet<usize>), Sce
 /// [`parse`] of a text that is JSON and not in the form of the `gltf` crate.
 fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, BTreeSet<usize>), SceneError> {
     let mut document = serde_json::from_str(text).map_err(|error| json_error(path, text, &error))?;
+    if let Some(item) = duplicates::first(text) {
+        return Err(SceneError::Invalid {
+            location: Location::new(path, item),
+            reason: "the key stands twice in its object, and readers take either of its values".to_owned(),
+            remedy: "leave one of the two out, or export the scene again: in glTF each key stands once",
+        });
+    }
     if schema::is_of_version_1(&document) {
         return Err(other_kinds::version_1(path));
     }
@@ -323,13 +342,6 @@ fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, BTreeSet<usize>
     Ok((root, shortened))
 }
 
-    if let Some(item) = duplicates::first(text) {
-        return Err(SceneError::Invalid {
-            location: Location::new(path, item),
-            reason: "the key stands twice in its object, and readers take either of its values".to_owned(),
-            remedy: "leave one of the two out, or export the scene again: in glTF each key stands once",
-        });
-    }
 const CONTRADICTION: &str = "its structure contradicts itself";
 
 /// JSON of bytes in UTF-8; empty for others.

@@ -7,6 +7,12 @@ pub(super) fn mesh_name(root: &json::Root, mesh: usize) -> String {
     root.meshes[mesh].name.clone().unwrap_or_else(|| format!("mesh {mesh}"))
 }
 
+/// Name of a node in a message: `node 'NAME'`, or `node N`, which need not exist.
+pub(super) fn node_name(root: &json::Root, node: usize) -> String {
+    let name = root.nodes.get(node).and_then(|node| node.name.as_ref());
+    name.map_or_else(|| format!("node {node}"), |name| format!("node '{name}'"))
+}
+
 /// Names for a choice, in quotation marks.
 pub(super) fn listed(names: &[String]) -> String {
     if names.is_empty() {

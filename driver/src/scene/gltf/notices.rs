@@ -11,8 +11,9 @@ use super::document::Document;
 use super::extensions::SUPPORTED_EXTENSIONS;
 use super::inside::Framed;
 use super::material::has_dark_texture;
-use super::names::mesh_name;
+use super::names::{mesh_name, node_name};
 use super::not_finite::NotFinite;
+use super::schema::UnknownPath;
 use super::solid_glass::Resolved;
 use super::topology::{Topology, has_positions};
 use crate::scene::{Concern, LightUnits, blender};
@@ -178,6 +179,23 @@ impl Notices {
             if !names.is_empty() {
                 sentences.push((Some(concern), format!("{sentence}: {}", list(kind, names))));
             }
+        }
+        if !document.unknown_paths.is_empty() {
+            let channel = |unknown: &UnknownPath| {
+                let UnknownPath { animation, channel, node, path } = unknown;
+                format!(
+                    "'{path}' of {} (animations[{animation}].channels[{channel}])",
+                    node_name(root, *node)
+                )
+            };
+            let channels: Vec<_> = document.unknown_paths.iter().map(channel).collect();
+            sentences.push((
+                Some(Concern::Animations),
+                format!(
+                    "channels of animations are ignored whose path is none of glTF 2.0 (translation, rotation, scale, weights): {}",
+                    several(&channels)
+                ),
+            ));
         }
         for (extension, places) in other_extensions(root) {
             let places = if places.is_empty() { String::new() } else { format!(": {}", places.join(", ")) };

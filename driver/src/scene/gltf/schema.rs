@@ -3,15 +3,19 @@
 //! glTF lets a scene have no `nodes` and an animation's target have no `node` (an extension may state another
 //! target), and its schema takes `1.0` as an integer. Members that are `null` count as absent.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use gltf::json;
 use gltf::json::validation::Checked;
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
 /// Exclusive upper bound of numbers whose floating-point form is an integer without doubt.
 const MAX_INTEGER: f64 = 9_007_199_254_740_992.0;
+
+/// Paths of the targets of animations.
+const PATHS: [&str; 4] = ["translation", "rotation", "scale", "weights"];
 
 /// Lists of the root.
 const LISTS: [&str; 15] = [
@@ -55,15 +59,43 @@ pub(super) fn amend(document: &mut Value) -> BTreeSet<usize> {
     shortened
 }
 
-/// Removes channels whose path glTF does not know, as extensions state them. Returns their animations.
-pub(super) fn remove_unknown_paths(root: &mut json::Root) -> BTreeSet<usize> {
-    let mut shortened = BTreeSet::new();
+/// Removes channels whose path glTF does not know. Returns their animations, each with the number of channels.
+pub(super) fn remove_unknown_paths(root: &mut json::Root) -> BTreeMap<usize, usize> {
+    let mut shortened = BTreeMap::new();
     for (index, animation) in root.animations.iter_mut().enumerate() {
         let count = animation.channels.len();
         animation.channels.retain(|channel| matches!(channel.target.path, Checked::Valid(_)));
-        shortened.extend((animation.channels.len() < count).then_some(index));
+        let removed = count - animation.channels.len();
+        shortened.extend((removed > 0).then_some((index, removed)));
     }
     shortened
+}
+
+/// A channel whose path neither glTF nor an extension of the channel defines.
+pub(super) struct UnknownPath {
+    pub(super) animation: usize,
+    pub(super) channel: usize,
+    pub(super) node: usize,
+    pub(super) path: String,
+}
+
+/// Channels of a document's text whose path neither glTF nor an extension defines. The crate does not keep what their path is.
+pub(super) fn unknown_paths(text: &str) -> Vec<UnknownPath> {
+    #[derive(Deserialize)]
+    struct Animations {
+        animations: Vec<Value>,
+    }
+    let Ok(Animations { animations }) = serde_json::from_str(text) else { return Vec::new() };
+    let channels = animations.iter().enumerate().flat_map(|(animation, clip)| {
+        let channels = clip["channels"].as_array().into_iter().flatten().enumerate();
+        channels.map(move |(channel, contents)| (animation, channel, &contents["target"]))
+    });
+    let unknown = channels.filter_map(|(animation, channel, target)| {
+        let (node, path) = (target["node"].as_f64()? as usize, target["path"].as_str()?.to_owned());
+        let is_unknown = !PATHS.contains(&&*path) && !target["extensions"].is_object();
+        is_unknown.then_some(UnknownPath { animation, channel, node, path })
+    });
+    unknown.collect()
 }
 
 /// JSON path and description of a document's first violation of glTF's schema.
