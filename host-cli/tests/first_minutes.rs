@@ -66,6 +66,10 @@ fn words_of_other_renderers_and_other_files_are_answered() {
         (&["scene", "info", "http://host/a.glb"], &["an address", "curl -L -o a.glb http://host/a.glb"]),
         (&["a.glb", "--samples", "1"], &["--spp"]),
         (&["absent.glb"], &["absent.glb"]),
+        (
+            &["render", "scene.gltf", "--frames", "1-2", "-o", "view.####.mp4"],
+            &["one video of all frames", "-o view.mp4", "view.####.png"],
+        ),
     ] {
         let refused = room.run(arguments);
         let is_named = parts.iter().all(|part| refused.stderr.contains(part));

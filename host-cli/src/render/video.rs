@@ -31,6 +31,9 @@ pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
         videos.push(Video { path, pictures });
     }
     let Some(Video { path, pictures }) = videos.first() else { return Ok(videos) };
+    if let Some(video) = videos.iter().find(|video| numbered(&video.path, 0).is_some()) {
+        return Err(of_each_frame(&video.path));
+    }
     if options.frames.numbers().is_none() {
         let text = format!("{} is a video, and one picture is rendered", path.display());
         return Err(refusal(text, "state the frames of the scene's animations: --frames 1-240"));
@@ -48,6 +51,26 @@ pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
         return Err(refusal(text, &format!("install ffmpeg, or render the frames alone: -o {pattern}")));
     }
     Ok(videos)
+}
+
+/// Error of a video whose name has a place for the number of a frame.
+fn of_each_frame(path: &Path) -> Failure {
+    let text = format!(
+        "{} is one video of all frames, and a run of # in its name stands for the number of each",
+        path.display()
+    );
+    let words = [as_one(path), path.with_extension("png")];
+    let [one, frames] = words.map(|path| shell::quoted(&path.to_string_lossy()).into_owned());
+    refusal(text, &format!("leave the # out: -o {one}; or write the frames alone: -o {frames}"))
+}
+
+/// The name without the runs of `#`, and without the dot before each.
+fn as_one(pattern: &Path) -> PathBuf {
+    let name = pattern.file_name().unwrap_or_default().to_string_lossy();
+    let kept: Vec<_> = name.split('.').map(|word| word.replace('#', "")).collect();
+    let kept = kept.iter().filter(|word| !word.is_empty()).map(String::as_str).collect::<Vec<_>>().join(".");
+    let is_named = Path::new(&kept).extension().is_some();
+    pattern.with_file_name(if is_named { kept } else { format!("video.{kept}") })
 }
 
 fn is_there() -> bool {
@@ -116,4 +139,21 @@ pub(crate) fn needless() -> Failure {
 
 fn refusal(text: String, help: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_name_of_a_video_has_no_number() {
+        for (pattern, expected) in [
+            ("a#/view.####.mp4", "a#/view.mp4"),
+            ("take#2.webm", "take2.webm"),
+            ("##.mp4", "video.mp4"),
+            ("####.#.mkv", "video.mkv"),
+        ] {
+            assert_eq!(as_one(Path::new(pattern)), Path::new(expected), "{pattern}");
+        }
+    }
 }
