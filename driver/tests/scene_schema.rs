@@ -152,6 +152,10 @@ fn files_of_other_kinds_are_recognised_with_a_command() {
     refused("a.pbrt", b"Film \"rgb\"\n", &["pbrt", "export glTF"]);
     refused("a.zip", b"PK\x03\x04..", &["ZIP", "unzip"]);
     refused("a.card", b"\x89CARD", &["prepared", "--prepared"]);
+    refused("a.glb", b"photoncard prepared scene 9\n{}", &["prepared", "--prepared", "/a.glb"]);
+    refused("a.bin", b"photoncard part 2\n{}\n", &["part of a picture", "photoncard merge", "/a.bin"]);
+    refused("a.part", b"", &["part of a picture", "/a.exr"]);
+    refused("a.exr.partial", b"photoncard partial render 5\n{}\n", &["finished tiles", "/a.exr --resume"]);
     refused(
         "a.gltf",
         br#"{"asset": {"version": "1.0"}, "nodes": {"n": {}}}"#,

@@ -13,7 +13,9 @@ const BY_HAND: &str =
 type Signs = (&'static [&'static [u8]], &'static [&'static str]);
 
 /// Kinds of other files, by their signs.
-const KINDS: [(Signs, Kind); 13] = [
+const KINDS: [(Signs, Kind); 15] = [
+    ((&[b"photoncard partial render "], &["partial"]), Kind::Partial),
+    ((&[b"photoncard part "], &["part"]), Kind::Part),
     ((&[b"BLENDER"], &["blend", "blend1"]), Kind::Blender),
     ((&[b"Kaydara FBX Binary", b"; FBX"], &["fbx"]), Kind::Imported("an FBX file", "import_scene.fbx")),
     (
@@ -31,7 +33,7 @@ const KINDS: [(Signs, Kind); 13] = [
     ),
     ((&[], &["pbrt"]), Kind::ByHand("a pbrt scene")),
     ((&[], &["xml"]), Kind::ByHand("an XML file, such as a scene of Mitsuba")),
-    ((&[], &["card"]), Kind::Prepared),
+    ((&[b"photoncard prepared scene "], &["card"]), Kind::Prepared),
     (
         (
             &[b"\x89PNG", b"\xff\xd8\xff", b"\x76\x2f\x31\x01", b"#?RADIANCE"],
@@ -48,6 +50,10 @@ enum Kind {
     Imported(&'static str, &'static str),
     Zip,
     ByHand(&'static str),
+    /// Finished tiles of a render.
+    Partial,
+    /// Part of a picture.
+    Part,
     Prepared,
     Picture,
 }
@@ -100,6 +106,23 @@ pub(super) fn refused_file(path: &Path, bytes: &[u8]) -> Option<SceneError> {
             ("a ZIP archive", remedy)
         }
         Kind::ByHand(what) => (*what, BY_HAND.to_owned()),
+        Kind::Partial => {
+            let picture = path.with_extension("").to_string_lossy().into_owned();
+            let remedy = format!(
+                "give the scene of that render, which goes on from them: photoncard render SCENE.glb -o {} --resume",
+                shell_word(&picture)
+            );
+            ("a file of finished tiles of a render", remedy)
+        }
+        Kind::Part => {
+            let made = path.with_extension("exr").to_string_lossy().into_owned();
+            let remedy = format!(
+                "merge it with the others: photoncard merge {} OTHERS.part -o {}",
+                shell_word(&file),
+                shell_word(&made)
+            );
+            ("a part of a picture", remedy)
+        }
         Kind::Prepared => {
             let remedy =
                 format!("render it as it is prepared: photoncard render --prepared {}", shell_word(&file));
