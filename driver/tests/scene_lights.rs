@@ -281,7 +281,9 @@ fn texels_that_are_no_radiance_are_clamped_and_counted() {
     exr(&path, &good);
     assert_eq!(Environment::load_with_notice(&path).unwrap().1, None);
     exr(&path, &[[1e30, 1.0, 0.0]]);
-    assert_eq!(Environment::load(&path).unwrap().texels, [[1e20, 1.0, 0.0]]);
+    let (sky, notice) = Environment::load_with_notice(&path).unwrap();
+    assert_eq!(sky.texels, [[1e20, 1.0, 0.0]]);
+    assert!(notice.is_some_and(|notice| notice.ends_with("those above 1e20 as 1e20")));
 }
 
 #[test]

@@ -81,8 +81,8 @@ impl Environment {
         let clamped = environment.clamp();
         let notice = (clamped > 0).then(|| {
             format!(
-                "{clamped} of {} texels of the environment are no radiance: negative channels and NaN count as 0, infinite ones as \
-                 the brightest of the others",
+                "{clamped} of {} texels of the environment are clamped: negative channels and NaN count as 0, infinite ones as the \
+                 brightest of the others, and those above {BRIGHTEST:e} as {BRIGHTEST:e}",
                 environment.texels.len()
             )
         });
