@@ -12,7 +12,7 @@
 //! | `notices` | what is ignored of a scene |
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
-//! | `progress` | progress of a render |
+//! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
 //! | `render` (and `prepare`), `merge`, `farm`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
@@ -30,6 +30,8 @@ mod emulate;
 mod environment;
 mod failure;
 mod farm;
+#[cfg(target_os = "linux")]
+mod hang_up;
 mod input;
 mod merge;
 mod notices;

@@ -18,6 +18,8 @@ use self::openjd::Percent;
 use self::remaining::Remaining;
 use crate::arguments::ProgressForm;
 use crate::console::say;
+#[cfg(target_os = "linux")]
+use crate::hang_up;
 
 /// Display of the progress of a render or of a card's self-test; SIGINT, SIGTERM and SIGHUP stop it.
 pub(crate) struct Progress {
@@ -215,22 +217,12 @@ pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
         signal_hook::flag::register(signal, stopped.clone())?;
     }
     #[cfg(target_os = "linux")]
-    if !is_hang_up_ignored() {
+    // If it is not known, a hang-up ends the process as it does by default.
+    if hang_up::is_ignored() == Some(false) {
         // A terminal that is closed sends several.
         signal_hook::flag::register(signal_hook::consts::SIGHUP, stopped.clone())?;
     }
     Ok(stopped)
-}
-
-/// Returns whether the process was started to go on without its terminal, as by `nohup`: it ignores SIGHUP,
-/// by the mask in `/proc`.
-#[cfg(target_os = "linux")]
-fn is_hang_up_ignored() -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    // If it is not known, a hang-up ends the process as it does by default.
-    mask.is_none_or(|mask| mask & 1 << (signal_hook::consts::SIGHUP - 1) != 0)
 }
 
 /// Seconds in words: `8 s`, `2 min 05 s`, `3 h 20 min`.

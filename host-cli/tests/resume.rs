@@ -1,6 +1,9 @@
 //! Interrupted renders: when a card, its link or the host ends, finished tiles are kept.
 #![cfg(unix)]
 
+#[cfg(target_os = "linux")]
+#[path = "../src/hang_up.rs"]
+mod hang_up;
 mod support;
 
 use std::fs;
@@ -41,10 +44,11 @@ fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
 
 /// Signal of a terminal that is closed; that of a stop if tests run without one, whose programs ignore it.
 fn hang_up() -> &'static str {
-    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
-    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    if mask.is_some_and(|mask| mask & 1 == 0) { "-HUP" } else { "-TERM" }
+    #[cfg(target_os = "linux")]
+    if hang_up::is_ignored() == Some(false) {
+        return "-HUP";
+    }
+    "-TERM"
 }
 
 /// The picture of an undisturbed render.
