@@ -99,7 +99,8 @@ fn counters_add_up_and_change_no_picture() {
 fn the_figures_of_the_memory_page_are_of_this_program() {
     let csv = include_str!("../../docs/memory.csv");
     let row: Vec<&str> = csv.lines().nth(1).expect("a row").split(',').collect();
-    let [scene, rays, "emulated", "48", photon_map, geometry] = row[..] else { panic!("{row:?}") };
+    let [scene, rays, "emulated", "48", photon_map, geometry, program] = row[..] else { panic!("{row:?}") };
+    assert!(program.starts_with("photoncard "), "{row:?}");
     let room = Room::new();
     let options = ["--quality", "paper", "--size", "48x48", "--aov", "none", "--gather-rays", rays];
     let techniques =

@@ -72,25 +72,25 @@ fn table_of(document: &str, heading: &str) -> (usize, usize) {
 }
 
 /// The lines of the table of `docs/memory.md`: bytes of whole frames, and how many times less than in the
-/// naive order.
+/// naive order, with the program that was measured.
 fn memory_table(csv: &str) -> Vec<String> {
     let rows = csv.lines().skip(1).map(|line| {
-        let fields = <[&str; 6]>::try_from(line.split(',').collect::<Vec<_>>()).expect("six fields");
-        let [scene, rays, card, side, photons, geometry] = fields;
+        let fields = <[&str; 7]>::try_from(line.split(',').collect::<Vec<_>>()).expect("seven fields");
+        let [scene, rays, card, side, photons, geometry, program] = fields;
         let bytes = [photons, geometry].map(|bytes| bytes.parse::<f64>().expect("a number of bytes"));
-        (scene, rays, card, side, bytes)
+        ((scene, rays, card, side), bytes, program)
     });
-    let frames: Vec<_> = rows.filter(|(.., side, _)| *side == "512").collect();
+    let frames: Vec<_> = rows.filter(|((.., side), ..)| *side == "512").collect();
     let naive = |of: &str| {
-        let row = frames.iter().find(|(scene, _, card, ..)| *scene == of && *card == "naive");
-        row.map(|(.., bytes)| bytes.iter().sum::<f64>()).expect("a naive frame of each scene")
+        let row = frames.iter().find(|((scene, _, card, _), ..)| *scene == of && *card == "naive");
+        row.map(|(_, bytes, _)| bytes.iter().sum::<f64>()).expect("a naive frame of each scene")
     };
     frames
         .iter()
-        .map(|(scene, rays, card, _, bytes)| {
+        .map(|((scene, rays, card, _), bytes, program)| {
             let [photons, geometry] = bytes.map(|bytes| format!("{:.1}", bytes / 1e6));
             let times = naive(scene) / bytes.iter().sum::<f64>();
-            format!("| {scene}, {rays} | `{card}` | {photons} | {geometry} | {times:.0} |")
+            format!("| {scene}, {rays} | `{card}` | {photons} | {geometry} | {times:.0} | {program} |")
         })
         .collect()
 }
@@ -122,7 +122,8 @@ fn the_table_of_qualities_is_that_of_its_csv() {
 
 #[test]
 fn the_table_of_memory_is_that_of_its_csv() {
-    const HEADING: &str = "| scene, gather rays | `--card` | photon map, MB | scene, MB | times less |";
+    const HEADING: &str =
+        "| scene, gather rays | `--card` | photon map, MB | scene, MB | times less | program |";
     check_table("memory.md", HEADING, &memory_table(&csv("memory.csv")));
 }
 
