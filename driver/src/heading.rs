@@ -18,6 +18,17 @@ pub(crate) struct Kind {
     pub(crate) version: u32,
 }
 
+/// Heading that was read.
+#[derive(Debug)]
+pub(crate) struct Heading<T> {
+    /// The JSON.
+    pub(crate) head: T,
+    /// Size, bytes.
+    pub(crate) bytes: u64,
+    /// CRC-32C of both lines.
+    pub(crate) checksum: u32,
+}
+
 /// Fault of a heading.
 #[derive(Debug)]
 pub(crate) enum HeadingFault {
@@ -38,25 +49,26 @@ impl From<io::Error> for HeadingFault {
 }
 
 impl Kind {
-    /// The heading of a file, with `head` as JSON.
+    /// The heading of a file, with `head` as JSON, and the CRC-32C of both lines.
     ///
     /// # Errors
     /// If it is no JSON.
-    pub(crate) fn heading(self, head: &impl Serialize) -> serde_json::Result<Vec<u8>> {
+    pub(crate) fn heading(self, head: &impl Serialize) -> serde_json::Result<(Vec<u8>, u32)> {
         let Self { name, version } = self;
         let mut bytes = format!("{name} {version}\n{}\n", serde_json::to_string(head)?).into_bytes();
-        bytes.extend(checksum(&bytes).to_le_bytes());
-        Ok(bytes)
+        let sum = checksum(&bytes);
+        bytes.extend(sum.to_le_bytes());
+        Ok((bytes, sum))
     }
 
-    /// Reads the heading of a file. Returns its JSON and its size in bytes.
+    /// Reads the heading of a file.
     ///
     /// # Errors
     /// If the file is of another kind or version, damaged or unreadable.
     pub(crate) fn read<T: DeserializeOwned>(
         self,
         reader: &mut impl BufRead,
-    ) -> Result<(T, u64), HeadingFault> {
+    ) -> Result<Heading<T>, HeadingFault> {
         let mut bytes = Vec::new();
         // The kind, a blank, a number of 10 digits and the line feed.
         let title = self.name.len() as u64 + 12;
@@ -69,12 +81,13 @@ impl Kind {
             ErrorKind::UnexpectedEof => HeadingFault::Damaged("it ends within its head"),
             _ => error.into(),
         })?;
-        if checksum(&bytes).to_le_bytes() != sum {
+        let checksum = checksum(&bytes);
+        if checksum.to_le_bytes() != sum {
             return Err(HeadingFault::Damaged("its head has another checksum"));
         }
         let head = bytes.get(title..).and_then(|text| serde_json::from_slice(text).ok());
         let head = head.ok_or(HeadingFault::Damaged("its head lacks something, or has too much"))?;
-        Ok((head, (bytes.len() + sum.len()) as u64))
+        Ok(Heading { head, bytes: (bytes.len() + sum.len()) as u64, checksum })
     }
 
     fn check_title(self, line: &[u8]) -> Result<(), HeadingFault> {

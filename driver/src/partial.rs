@@ -1,13 +1,15 @@
 //! Partial renders: finished tiles are appended to a file beside the picture, so that `--resume` can continue from them.
 //!
 //! ```text
-//! photoncard partial render 3\n
+//! photoncard partial render 4\n
 //! { settings as JSON }\n
+//! CRC-32C: u32
 //! record: 89 54 49 4c 45 0d 0a 1a | x, y, width, height, first sample, samples: u32 each | pixels, 60 bytes each, with layers 112 | CRC-32C: u32
 //! ...
 //! ```
 //!
-//! Numbers are little-endian; the checksum covers all preceding bytes of the record. An incomplete last record, left when
+//! Numbers are little-endian. The first checksum covers the two lines; that of a record covers the first checksum
+//! and all preceding bytes of the record. An incomplete last record, left when
 //! the process ended during a write, is cut off. A damaged record is skipped: the reader searches for the magic number that
 //! begins the next one. If two records contain a pixel, the later one holds. The settings are those that pixels depend on:
 //! a resumed render may use other tiles, another order and other cards. They do not hold the number of samples: a picture of more
@@ -35,7 +37,7 @@ use serde_json::Value;
 
 pub use self::error::PartialError;
 pub use self::head::PartialSettings;
-use self::head::{Head, check_empty, differences, read_head, title};
+use self::head::{Head, check_empty, differences, encode, read_head};
 use self::records::{HEAD_BYTES, read_tiles, record};
 use self::samples::{KeptSamples, Split};
 use crate::film::Film;
@@ -55,8 +57,8 @@ pub struct PartialRender {
 struct KeptTiles {
     /// The file, locked; `None` until it is created.
     file: Option<File>,
-    /// True once title and settings are written.
-    is_begun: bool,
+    /// Checksum of title and settings, once they are written.
+    head: Option<u32>,
     /// True if the file has tiles of the earlier render.
     holds_earlier: bool,
     /// True if the file has tiles of either render.
@@ -72,8 +74,8 @@ impl PartialRender {
     /// samples, these are the second result, and the film is of the others.
     ///
     /// # Errors
-    /// If the file is no partial render, in use by another render or unreadable; if it is to be resumed and
-    /// has other settings, or is not and has tiles.
+    /// If the file is no partial render, in use by another render or unreadable, or its settings are damaged;
+    /// if it is to be resumed and has other settings, or is not and has tiles.
     pub(crate) fn begin(
         partial: &PartialSettings,
         settings: Value,
@@ -113,9 +115,9 @@ impl PartialRender {
         }
         let asked = film.format().samples;
         let mut found = KeptSamples::new(film);
-        let sound = read_tiles(&mut reader, head.bytes, &mut found).map_err(|error| self.error(error))?;
+        let sound = read_tiles(&mut reader, head.bytes, head.checksum, &mut found)
+            .map_err(|error| self.error(error))?;
         self.check_unchanged(&mut reader, &head)?;
-        let head = head.bytes;
         let Split { base, rest } = found.split().map_err(|samples| PartialError::Differs {
             path: self.path.clone(),
             differences: vec![format!("spp was {samples}, and not all of them are finished, and is {asked}")],
@@ -126,9 +128,9 @@ impl PartialRender {
         }
         file.set_len(sound).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|error| self.error(error))?;
         let mut kept = self.lock();
-        kept.holds_earlier = sound > head;
+        kept.holds_earlier = sound > head.bytes;
         kept.holds_tiles = kept.holds_earlier;
-        kept.is_begun = true;
+        kept.head = Some(head.checksum);
         Ok(base)
     }
 
@@ -136,16 +138,16 @@ impl PartialRender {
     /// another picture as well.
     fn check_unchanged(&self, reader: &mut BufReader<&File>, head: &Head) -> Result<(), PartialError> {
         reader.rewind().map_err(|error| self.error(error))?;
-        let is_same = read_head(reader, &self.path)?.is_some_and(|again| again.settings == head.settings);
+        let is_same = read_head(reader, &self.path)?.is_some_and(|again| again.checksum == head.checksum);
         is_same.then_some(()).ok_or_else(|| self.written_over("read"))
     }
 
-    /// Checks that a file that is written still has this render's settings: tiles behind those of another
-    /// picture would count as its own.
-    fn check_own(&self, mut file: &File) -> Result<(), PartialError> {
+    /// Checks that a file that is written still has this render's settings, whose checksum is `head`: tiles
+    /// behind those of another picture would be lost.
+    fn check_own(&self, mut file: &File, head: u32) -> Result<(), PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
-        let head = read_head(&mut BufReader::new(file), &self.path)?;
-        let is_own = head.is_some_and(|head| differences(&head.settings, &self.settings).is_empty());
+        let found = read_head(&mut BufReader::new(file), &self.path)?;
+        let is_own = found.is_some_and(|found| found.checksum == head);
         is_own.then_some(()).ok_or_else(|| self.written_over("rendered"))
     }
 
@@ -161,16 +163,14 @@ impl PartialRender {
             kept.file = file;
         }
         let Some(file) = &mut kept.file else { return Ok(()) };
-        if kept.is_begun {
-            self.check_own(file)?;
-        } else {
-            self.write_head(file).map_err(|error| self.error(error))?;
-            kept.is_begun = true;
-        }
+        let head = match kept.head {
+            Some(head) => self.check_own(file, head).map(|()| head)?,
+            None => *kept.head.insert(self.write_head(file).map_err(|error| self.error(error))?),
+        };
         let mut write = || {
             let start = file.seek(SeekFrom::End(0))?;
             // A single call: another process sees the tile whole or truncated.
-            file.write_all(&record(tile, self.first_sample))?;
+            file.write_all(&record(tile, self.first_sample, head))?;
             Ok(start)
         };
         let start = write().map_err(|error| self.error(error))?;
@@ -193,10 +193,13 @@ impl PartialRender {
         Ok(())
     }
 
-    fn write_head(&self, file: &mut File) -> io::Result<()> {
+    /// Writes title and settings, and returns their checksum.
+    fn write_head(&self, file: &mut File) -> io::Result<u32> {
+        let (bytes, sum) = encode(&self.settings);
         file.set_len(0)?;
         file.rewind()?;
-        file.write_all(format!("{}{}\n", title(), self.settings).as_bytes())
+        file.write_all(&bytes)?;
+        Ok(sum)
     }
 
     /// Removes a file without tiles that cannot be written: there is nothing to resume from.
@@ -205,7 +208,7 @@ impl PartialRender {
             // If the removal fails, the file is empty at least.
             let _ = file.set_len(0);
             let _ = file::remove(&file, &self.path);
-            kept.is_begun = false;
+            kept.head = None;
         }
     }
 

@@ -8,6 +8,7 @@ use std::thread;
 use std::time::Duration;
 
 use photoncard_firmware::kind::MICRO;
+use photoncard_shared::checksum::checksum;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};
 use photoncard_shared::transport::Transport;
@@ -113,7 +114,9 @@ fn settings_of_a_kept_file_are_shown_escaped() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let settings = json!({HOSTILE: HOSTILE});
-    room.write("a.exr.partial", format!("photoncard partial render 3\n{settings}\n"));
+    let head = format!("photoncard partial render 4\n{settings}\n");
+    let sum = checksum(head.as_bytes()).to_le_bytes();
+    room.write("a.exr.partial", [head.as_bytes(), &sum].concat());
     // Within JSON a part of the text is escaped before.
     check_shown(&room.render("scene.gltf", &["-o", "a.exr", "--resume"]), 2, SHOWN, 1);
 }

@@ -128,7 +128,9 @@ fn only_the_same_picture_is_gone_on_with() {
     let outcome = room.run(&arguments(&cornell, &["--seed", "7", "--card", "unix:absent"]));
     assert_eq!(outcome.status, Some(1), "{}", outcome.stderr);
     assert!(!outcome.stderr.contains("--resume goes on"), "{}", outcome.stderr);
-    room.write("a.exr.partial", b"photoncard partial render 3\n{]\n");
+    room.write("a.exr.partial", b"photoncard partial render 4\n{]\n\0\0\0\0");
+    refused(&[], &["the settings in a.exr.partial are damaged", "remove the file"]);
+    room.write("a.exr.partial", b"photoncard partial renders\n");
     refused(&[], &["is no partial render"]);
     room.write("a.exr.partial", b"photoncard partial render 1\n{}\n");
     refused(&[], &["of version 1", "the program that began it", "remove the file"]);

@@ -4,7 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 /// Version of the file's format, in its first line.
-pub(super) const VERSION: u32 = 3;
+pub(super) const VERSION: u32 = 4;
 
 /// Error of a partial render that cannot be resumed or written.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
@@ -33,6 +33,13 @@ pub enum PartialError {
         path: PathBuf,
         /// Version of the file's format.
         found: u32,
+    },
+    /// Error of a partial render whose settings are not as they were written.
+    #[error("the settings in {} are damaged: it is unknown of which picture its finished tiles are", path.display())]
+    #[diagnostic(help("copy it again; or remove the file to begin anew, or choose another output"))]
+    Damaged {
+        /// Path of the file.
+        path: PathBuf,
     },
     /// Error of a partial render of another picture.
     #[error("{} is of another picture: {}", path.display(), differences.join("; "))]

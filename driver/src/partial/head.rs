@@ -1,9 +1,10 @@
-//! Head of a partial render: title and settings.
+//! Head of a partial render: title, settings and their checksum.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
 use std::path::{Path, PathBuf};
 
+use photoncard_shared::checksum::checksum;
 use serde_json::{Map, Value};
 
 use super::error::{PartialError, VERSION};
@@ -17,8 +18,10 @@ const MAX_SETTINGS: u64 = 1 << 20;
 pub(super) struct Head {
     /// Settings that identify the picture, by the names of options.
     pub(super) settings: Map<String, Value>,
-    /// Size of title and settings, bytes.
+    /// Size, bytes.
     pub(super) bytes: u64,
+    /// CRC-32C of title and settings.
+    pub(super) checksum: u32,
 }
 
 /// File of finished tiles, and whether a render continues from it.
@@ -34,7 +37,8 @@ impl PartialSettings {
     /// Settings of the samples that a render goes on from, by the names of options; `None` if it is not to be resumed, or there are none.
     ///
     /// # Errors
-    /// If the file is no partial render of this version, in use by another render or unreadable.
+    /// If the file is no partial render of this version, its settings are damaged, or it is in use by another
+    /// render or unreadable.
     pub fn kept(&self) -> Result<Option<Map<String, Value>>, PartialError> {
         let Some(file) = self.resume.then(|| file::open(&self.path, false)).transpose()?.flatten() else {
             return Ok(None);
@@ -47,14 +51,14 @@ impl PartialSettings {
     ///
     /// # Errors
     /// [`PartialError::Unfinished`] if tiles would be lost; if the file is no partial render of this version,
-    /// in use by another render or unreadable.
+    /// its settings are damaged, or it is in use by another render or unreadable.
     pub fn check_free(&self) -> Result<(), PartialError> {
         let file = file::open(&self.path, false)?;
         file.filter(|_| !self.resume).map_or(Ok(()), |file| check_empty(&file, &self.path))
     }
 }
 
-/// Reads title and settings; `None` if the file ends before they do.
+/// Reads the head; `None` if the file ends before it does.
 pub(super) fn read_head(reader: &mut impl BufRead, path: &Path) -> Result<Option<Head>, PartialError> {
     let foreign = || PartialError::Foreign { path: path.to_owned() };
     match read_title(reader).map_err(failed(path))?.ok_or_else(foreign)? {
@@ -63,20 +67,35 @@ pub(super) fn read_head(reader: &mut impl BufRead, path: &Path) -> Result<Option
         Title::Version(found) => return Err(PartialError::Version { path: path.to_owned(), found }),
     }
     let mut settings = Vec::new();
-    let mut limited = reader.take(MAX_SETTINGS);
+    let mut limited = reader.by_ref().take(MAX_SETTINGS);
     limited.read_until(b'\n', &mut settings).map_err(failed(path))?;
     if !settings.ends_with(b"\n") && (settings.len() as u64) < MAX_SETTINGS {
         return Ok(None);
     }
-    let bytes = (title().len() + settings.len()) as u64;
-    let settings = serde_json::from_slice(&settings).map_err(|_| foreign())?;
-    Ok(Some(Head { settings, bytes }))
+    let mut sum = [0; 4];
+    match reader.read_exact(&mut sum) {
+        Err(error) if error.kind() == ErrorKind::UnexpectedEof => return Ok(None),
+        read => read.map_err(failed(path))?,
+    }
+    let bytes = [title().as_bytes(), &settings].concat();
+    let checksum = checksum(&bytes);
+    let settings = serde_json::from_slice(&settings).ok().filter(|_| checksum.to_le_bytes() == sum);
+    let settings = settings.ok_or_else(|| PartialError::Damaged { path: path.to_owned() })?;
+    Ok(Some(Head { settings, bytes: (bytes.len() + sum.len()) as u64, checksum }))
+}
+
+/// Bytes of a head, and the checksum of title and settings.
+pub(super) fn encode(settings: &Value) -> (Vec<u8>, u32) {
+    let mut bytes = format!("{}{settings}\n", title()).into_bytes();
+    let sum = checksum(&bytes);
+    bytes.extend(sum.to_le_bytes());
+    (bytes, sum)
 }
 
 /// Checks that a file has no tiles.
 ///
 /// # Errors
-/// If it has, or is no partial render of this version.
+/// If it has, is no partial render of this version, or its settings are damaged.
 pub(super) fn check_empty(mut file: &File, path: &Path) -> Result<(), PartialError> {
     file.rewind().map_err(failed(path))?;
     let mut reader = BufReader::new(file);

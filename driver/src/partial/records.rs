@@ -1,10 +1,13 @@
 //! Records of finished tiles in a partial render: `magic number | x, y, width, height | first sample, samples | pixels | CRC-32C`.
+//!
+//! The checksum begins with that of the file's head: records of another picture, which a copy over this file that was
+//! interrupted leaves in it, are invalid.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
 
 use photoncard_firmware::kind::REFERENCE;
-use photoncard_shared::checksum::checksum;
+use photoncard_shared::checksum::Checksum;
 use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{PixelSums, Tile};
 
@@ -24,12 +27,21 @@ const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
 /// tiles. Without a limit, a hostile file would take hours.
 const MAX_IN_VAIN: u64 = 32 << 20;
 
-/// Encodes the record of a finished tile, whose samples begin with `first_sample`.
-pub(crate) fn record(finished: &FinishedTile, first_sample: u32) -> Vec<u8> {
+/// Encodes the record of a finished tile, whose samples begin with `first_sample`, for a file whose head has the checksum
+/// `file`.
+pub(crate) fn record(finished: &FinishedTile, first_sample: u32, file: u32) -> Vec<u8> {
     let mut bytes = head(finished.tile(), first_sample, finished.format().samples);
     bytes.extend(finished.records());
-    bytes.extend(checksum(&bytes).to_le_bytes());
+    bytes.extend(checksum(file, &bytes));
     bytes
+}
+
+/// CRC-32C of the checksum of a file's head and the bytes of a record.
+fn checksum(file: u32, record: &[u8]) -> [u8; CHECKSUM_BYTES] {
+    let mut sum = Checksum::default();
+    sum.update(&file.to_le_bytes());
+    sum.update(record);
+    sum.value().to_le_bytes()
 }
 
 /// Encodes the head of a tile's record.
@@ -45,19 +57,21 @@ pub(crate) fn record_bytes(tile: &Tile, format: &SumFormat) -> u64 {
     (HEAD_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * format.record_bytes() as u64
 }
 
-/// Decodes the record of a tile with all samples of the format; `None` unless it is that, sound and whole.
-pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat) -> Option<FinishedTile> {
+/// Decodes the record of a tile with all samples of the format, from a file whose head has the checksum `file`; `None` unless
+/// it is that, sound and whole.
+pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat, file: u32) -> Option<FinishedTile> {
     let (bytes, sum) = record.split_last_chunk::<CHECKSUM_BYTES>()?;
     let pixels = bytes.strip_prefix(&*head(tile, 0, format.samples))?;
-    let is_sound = checksum(bytes).to_le_bytes() == *sum;
+    let is_sound = checksum(file, bytes) == *sum;
     is_sound.then(|| FinishedTile::new(*tile, pixels.to_vec(), format, Counters::ZERO)).flatten()
 }
 
-/// Reads all valid tiles from offset `start` on. Returns the end of the last one. After invalid bytes the
+/// Reads all valid tiles from offset `start` on, behind a head of the checksum `file`. Returns the end of the last one. After invalid bytes the
 /// search continues at the next magic number. It stops when the invalid tiles exceed the file's size plus [`MAX_IN_VAIN`].
 pub(super) fn read_tiles(
     reader: &mut BufReader<&File>,
     start: u64,
+    file: u32,
     kept: &mut KeptSamples,
 ) -> io::Result<u64> {
     let end = reader.get_ref().metadata()?.len();
@@ -65,7 +79,7 @@ pub(super) fn read_tiles(
     let mut in_vain = end + MAX_IN_VAIN;
     while let Some(skipped) = skip_magic(reader)? {
         at += skipped;
-        match read_tile(reader, end.saturating_sub(at), kept)? {
+        match read_tile(reader, file, end.saturating_sub(at), kept)? {
             Some(bytes) => {
                 at += bytes;
                 sound = at;
@@ -112,7 +126,12 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
 
 /// Reads a tile after its magic number, at most `available` bytes. Returns their number; `None` if it is
 /// invalid.
-fn read_tile(reader: &mut impl Read, available: u64, kept: &mut KeptSamples) -> io::Result<Option<u64>> {
+fn read_tile(
+    reader: &mut impl Read,
+    file: u32,
+    available: u64,
+    kept: &mut KeptSamples,
+) -> io::Result<Option<u64>> {
     let mut bytes = MAGIC.to_vec();
     bytes.resize(HEAD_BYTES, 0);
     if !read_all(reader, &mut bytes[MAGIC.len()..])? {
@@ -130,7 +149,7 @@ fn read_tile(reader: &mut impl Read, available: u64, kept: &mut KeptSamples) -> 
         return Ok(None);
     }
     let (bytes, sum) = bytes.split_at(length as usize - CHECKSUM_BYTES);
-    if checksum(bytes).to_le_bytes() != sum {
+    if checksum(file, bytes) != sum {
         return Ok(None);
     }
     if let Some(film) = kept.film_of(samples) {

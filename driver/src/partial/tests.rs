@@ -6,6 +6,7 @@ use photoncard_shared::message::{LayerSums, PIXEL_BYTES, PixelSums, Tile};
 use serde_json::json;
 
 use super::file::{FAMILY, check_lock, is_at};
+use super::head::title;
 use super::records::{CHECKSUM_BYTES, HEAD_BYTES, MAGIC};
 use super::*;
 use crate::film::{SumFormat, Window};
@@ -155,7 +156,8 @@ fn the_later_record_of_a_tile_holds() {
     for (x, y) in pixel_positions(&tile(1)) {
         film.write(x, y, &PixelSums { depth: -1, ..PixelSums::default() }).unwrap();
     }
-    bytes.extend(record(&film.finished(&tile(1)).unwrap(), 0));
+    let (_, head) = encode(&json!({ "seed": 1 }));
+    bytes.extend(record(&film.finished(&tile(1)).unwrap(), 0, head));
     let depth = |bytes: &[u8]| {
         let settings = partial(&folder, true);
         fs::write(&settings.path, bytes).unwrap();
@@ -238,7 +240,7 @@ fn a_head_that_is_cut_off_holds_nothing() {
     let bytes = written(&folder);
     let head = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(1).unwrap().0;
     let settings = partial(&folder, true);
-    for length in [0, 1, FAMILY.len(), title().len() - 1, title().len(), title().len() + 1, head] {
+    for length in [0, 1, FAMILY.len(), title().len() - 1, title().len(), title().len() + 1, head, head + 4] {
         fs::write(&settings.path, &bytes[..length]).unwrap();
         assert_eq!(settings.kept().unwrap(), None, "{length}");
         assert!(taken_over(&folder, &bytes[..length]).is_empty(), "{length}");
@@ -368,10 +370,10 @@ fn a_file_that_changes_while_it_is_read_is_refused() {
     let mut reader = BufReader::new(&file);
     let head = read_head(&mut reader, &settings.path).unwrap().unwrap();
     render.check_unchanged(&mut reader, &head).unwrap();
-    let place = bytes.windows(9).position(|window| window == b"\"seed\":1}").unwrap();
-    let mut other = bytes.clone();
-    other[place + 7] = b'2';
-    for changed in [&other[..], &bytes[..place], b"notes"] {
+    let [(own, _), (other, _)] =
+        [json!({ "seed": 1 }), json!({ "seed": 2 })].map(|settings| encode(&settings));
+    assert!(bytes.starts_with(&own));
+    for changed in [&other[..], &bytes[..20], b"notes"] {
         fs::write(&settings.path, changed).unwrap();
         assert!(render.check_unchanged(&mut reader, &head).is_err());
     }
@@ -383,10 +385,8 @@ fn a_file_that_is_written_over_while_tiles_are_added_gets_no_more() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
     let settings = partial(&folder, true);
-    let place = bytes.windows(9).position(|window| window == b"\"seed\":1}").unwrap();
-    let mut other = bytes.clone();
-    other[place + 7] = b'2';
-    for changed in [&other[..], &bytes[..place]] {
+    let (other, _) = encode(&json!({ "seed": 2 }));
+    for changed in [&other[..], &bytes[..20]] {
         fs::write(&settings.path, &bytes).unwrap();
         let render = begin_render(&settings, json!({ "seed": 1 }), &mut film()).unwrap();
         fs::write(&settings.path, changed).unwrap();
@@ -394,6 +394,45 @@ fn a_file_that_is_written_over_while_tiles_are_added_gets_no_more() {
         assert!(matches!(render.check(), Err(PartialError::Differs { .. })));
         assert!(fs::read(&settings.path).unwrap() == changed);
     }
+}
+
+/// A render takes settings that are not stated from the file: a damaged number in it gives a picture of two settings.
+#[test]
+fn damaged_settings_are_refused_and_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = written(&folder);
+    let (head, _) = encode(&json!({ "seed": 1 }));
+    for place in title().len()..head.len() {
+        let mut damaged = bytes.clone();
+        damaged[place] ^= 1;
+        for resume in [false, true] {
+            let settings = partial(&folder, resume);
+            fs::write(&settings.path, &damaged).unwrap();
+            let begun = begin_render(&settings, json!({ "seed": 1 }), &mut film());
+            assert!(matches!(begun, Err(PartialError::Damaged { .. })), "{place}");
+            assert!(!resume || settings.kept().is_err(), "{place}");
+            assert!(settings.check_free().is_err() != resume, "{place}");
+            assert!(fs::read(&settings.path).unwrap() == damaged);
+        }
+    }
+}
+
+/// A copy of another picture's file over this one that was interrupted: its settings, and then tiles of both.
+#[test]
+fn tiles_of_another_picture_are_not_taken_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let bytes = written(&folder);
+    let [(own, sum), (other, _)] =
+        [json!({ "seed": 1 }), json!({ "seed": 2 })].map(|settings| encode(&settings));
+    let tiles = &bytes[own.len()..];
+    let path = partial(&folder, true).path;
+    fs::write(&path, [&other, tiles].concat()).unwrap();
+    let mut film = film();
+    let render = begin_render(&partial(&folder, true), json!({ "seed": 2 }), &mut film).unwrap();
+    assert!(!render.holds_tiles() && (0..TILES).all(|id| !film.has(&tile(id))));
+    drop(render);
+    let added = record(&blank(&tile(0)), 0, sum ^ 1);
+    assert_eq!(taken_over(&folder, &[&own, &added, &tiles[RECORD_BYTES..]].concat()), [1, 2, 3, 4, 5]);
 }
 
 #[test]

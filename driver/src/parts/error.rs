@@ -8,7 +8,7 @@ use crate::film::FilmError;
 use crate::output::OutputError;
 
 /// Version of the format of a part's file, in its first line.
-pub(super) const VERSION: u32 = 1;
+pub(super) const VERSION: u32 = 2;
 
 /// Error of a part that cannot be written, or of parts that cannot be merged.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]

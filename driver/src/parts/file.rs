@@ -9,7 +9,7 @@ use photoncard_shared::message::Tile;
 use super::error::{PartError, VERSION};
 use super::head::{PartHead, PartPicture};
 use crate::film::Film;
-use crate::heading::{HeadingFault, Kind};
+use crate::heading::{Heading, HeadingFault, Kind};
 use crate::output::{OutputError, PendingFile};
 use crate::partial::records::{decode, record, record_bytes};
 use crate::sink::FinishedTile;
@@ -24,11 +24,11 @@ const KIND: Kind = Kind { name: "photoncard part", version: VERSION };
 pub fn write(path: &Path, head: &PartHead, film: &Film) -> Result<(), PartError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
     let mut file = io::BufWriter::new(PendingFile::create(path)?);
-    let bytes = KIND.heading(head).map_err(|error| failed(error.into()))?;
+    let (bytes, sum) = KIND.heading(head).map_err(|error| failed(error.into()))?;
     file.write_all(&bytes).map_err(failed)?;
     // A finished render has all pixels of its part.
     for tile in head.part.patches(film.window()).iter().filter_map(|patch| film.finished(patch)) {
-        file.write_all(&record(&tile, 0)).map_err(failed)?;
+        file.write_all(&record(&tile, 0, sum)).map_err(failed)?;
     }
     Ok(file.into_inner().map_err(|error| failed(error.into_error()))?.commit()?)
 }
@@ -38,6 +38,8 @@ pub(super) struct PartFile {
     pub(super) path: PathBuf,
     pub(super) head: PartHead,
     pub(super) picture: PartPicture,
+    /// Checksum of the head.
+    checksum: u32,
     /// Bytes of the head, and of the file.
     bytes: [u64; 2],
 }
@@ -55,15 +57,16 @@ impl PartFile {
             return Err(unreadable(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
         }
         let mut reader = BufReader::new(File::open(path).map_err(unreadable)?);
-        let (head, bytes): (PartHead, u64) = KIND.read(&mut reader).map_err(|fault| match fault {
-            HeadingFault::Foreign => PartError::Foreign { path: path.to_owned() },
-            HeadingFault::Version(found) => PartError::Version { path: path.to_owned(), found },
-            HeadingFault::Damaged(fault) => damaged(fault),
-            HeadingFault::Unreadable(source) => unreadable(source),
-        })?;
+        let Heading { head, bytes, checksum }: Heading<PartHead> =
+            KIND.read(&mut reader).map_err(|fault| match fault {
+                HeadingFault::Foreign => PartError::Foreign { path: path.to_owned() },
+                HeadingFault::Version(found) => PartError::Version { path: path.to_owned(), found },
+                HeadingFault::Damaged(fault) => damaged(fault),
+                HeadingFault::Unreadable(source) => unreadable(source),
+            })?;
         let picture = head.picture().ok_or_else(|| damaged("its head is of no picture"))?;
         let bytes = [bytes, found.len()];
-        Ok(Self { path: path.to_owned(), head, picture, bytes })
+        Ok(Self { path: path.to_owned(), head, picture, checksum, bytes })
     }
 
     /// Checks that the file is as long as the `patches` of the part.
@@ -80,8 +83,8 @@ impl PartFile {
         Err(PartError::Damaged { path: self.path.clone(), fault })
     }
 
-    /// Reads the `patches` of the part. The head is read again before and after them: pixels of a file that
-    /// is written over meanwhile are those of another picture, and have checksums as well.
+    /// Reads the `patches` of the part. The head is read again before and after them: a file
+    /// that is written over meanwhile is another.
     ///
     /// # Errors
     /// If the file is damaged, unreadable or no longer that of the head, and those of `put`.
@@ -101,7 +104,7 @@ impl PartFile {
                 Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => return Err(damaged()),
                 read => read.map_err(unreadable)?,
             }
-            put(decode(&bytes, patch, self.picture.format).ok_or_else(damaged)?)?;
+            put(decode(&bytes, patch, self.picture.format, self.checksum).ok_or_else(damaged)?)?;
         }
         self.check_head(&mut reader)
     }
@@ -110,7 +113,7 @@ impl PartFile {
     fn check_head(&self, reader: &mut BufReader<File>) -> Result<(), PartError> {
         reader.rewind().map_err(|source| PartError::Unreadable { path: self.path.clone(), source })?;
         match KIND.read::<PartHead>(reader) {
-            Ok((head, _)) if head == self.head => Ok(()),
+            Ok(found) if found.checksum == self.checksum => Ok(()),
             _ => {
                 Err(PartError::Damaged { path: self.path.clone(), fault: "it has changed while it was read" })
             }

@@ -156,9 +156,18 @@ fn a_damaged_part_is_refused_and_named() {
         refuses(&[&bytes[..place], &bytes[place..place + 1], &bytes[place..]].concat(), "a repeated byte");
     }
     refuses(&[&bytes[..], b"\n"].concat(), "one byte more");
-    refuses(b"photoncard partial render 3\n{}\n", "a partial render");
-    fs::write(&path, b"photoncard part 2\n{}\n").unwrap();
-    assert!(matches!(refused(std::slice::from_ref(&path)), PartError::Version { found: 2, .. }));
+    refuses(b"photoncard partial render 4\n{}\n", "a partial render");
+    fs::write(&path, b"photoncard part 1\n{}\n").unwrap();
+    assert!(matches!(refused(std::slice::from_ref(&path)), PartError::Version { found: 1, .. }));
+    // A copy of another picture's part over this one that was interrupted behind the head.
+    let mut other = head(part(1, 1), 4);
+    other.settings.insert("seed".into(), json!(4));
+    write(&path, &other, &film(9)).unwrap();
+    let changed = fs::read(&path).unwrap();
+    let tiles = |bytes: &[u8]| bytes.windows(5).position(|window| window == b"\x89TILE").unwrap();
+    let mixed = [&changed[..tiles(&changed)], &bytes[tiles(&bytes)..]].concat();
+    assert_eq!(mixed.len(), changed.len());
+    refuses(&mixed, "the tiles of another picture");
     let folder = folder.path().to_owned();
     assert!(matches!(refused(&[folder]), PartError::Unreadable { .. }));
 }

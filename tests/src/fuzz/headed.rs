@@ -8,7 +8,7 @@ use photoncard_driver::layer::Layers;
 use photoncard_driver::parts::{self, Part, PartError, PartHead, Parts};
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, PreparedScene, RenderSettings, Unobserved};
 use photoncard_firmware::kind::REFERENCE;
-use photoncard_shared::checksum::checksum;
+use photoncard_shared::checksum::{Checksum, checksum};
 use tempfile::TempDir;
 
 use super::mutation;
@@ -20,6 +20,8 @@ use crate::everything::everything;
 const BOUND: usize = 256 << 20;
 /// Multiple of bytes at which the lines of a prepared scene begin.
 const PAGE: usize = 4096;
+/// Beginning of the record of a tile in a part.
+const TILE: &[u8] = b"\x89TILE";
 
 /// Target of a kind of files.
 pub(super) struct Files {
@@ -111,19 +113,35 @@ fn read_prepared(path: &Path) -> bool {
     true
 }
 
-/// A file of a head that was edited, with a checksum of its own.
+/// A file of a head that was edited, with a checksum of its own, and tiles that are bound to it.
 fn resigned(file: &[u8], page: usize, random: &mut Random) -> Vec<u8> {
     let mut lines = file.splitn(3, |&byte| byte == b'\n');
     let [title, head, rest] = [(); 3].map(|()| lines.next().unwrap_or_default().to_vec());
     let old = title.len() + head.len() + 2 + 4;
-    let body = rest.get(4 + (old.next_multiple_of(page) - old)..).unwrap_or_default();
+    let mut body = rest.get(4 + (old.next_multiple_of(page) - old)..).unwrap_or_default().to_vec();
     let mut text = head;
     mutation::edit_json(&mut text, random);
     text.retain(|&byte| byte != b'\n');
     let mut bytes = [&title[..], b"\n", &text, b"\n"].concat();
-    bytes.extend(checksum(&bytes).to_le_bytes());
+    let sum = checksum(&bytes).to_le_bytes();
+    bytes.extend(sum);
     bytes.resize(bytes.len().next_multiple_of(page), 0);
-    [&bytes, body].concat()
+    bind_tiles(&mut body, sum);
+    [bytes, body].concat()
+}
+
+/// Makes the checksums of tiles anew, which begin with that of the head.
+fn bind_tiles(body: &mut [u8], head: [u8; 4]) {
+    let starts: Vec<usize> = (0..body.len()).filter(|&place| body[place..].starts_with(TILE)).collect();
+    let ends: Vec<usize> = starts.iter().skip(1).copied().chain([body.len()]).collect();
+    for (start, end) in starts.into_iter().zip(ends) {
+        if let Some((record, sum)) = body[start..end].split_last_chunk_mut() {
+            let mut own = Checksum::default();
+            own.update(&head);
+            own.update(record);
+            *sum = own.value().to_le_bytes();
+        }
+    }
 }
 
 impl Target for Files {

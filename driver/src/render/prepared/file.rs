@@ -11,7 +11,7 @@ use super::error::{PreparedError, VERSION};
 use super::head::Head;
 use super::scene::PreparedScene;
 use crate::allocation::OutOfMemory;
-use crate::heading::{HeadingFault, Kind};
+use crate::heading::{Heading, HeadingFault, Kind};
 use crate::output::{OutputError, PendingFile};
 use crate::pack::CardImage;
 use crate::render::PROGRAM;
@@ -45,7 +45,7 @@ impl PreparedScene {
 
 fn write(scene: &PreparedScene, path: &Path) -> Result<(), PreparedError> {
     let failed = |source| OutputError::Write { path: path.to_owned(), source };
-    let mut bytes = KIND.heading(&Head::new(scene)).map_err(|error| failed(error.into()))?;
+    let (mut bytes, _) = KIND.heading(&Head::new(scene)).map_err(|error| failed(error.into()))?;
     bytes.resize(bytes.len().next_multiple_of(PAGE as usize), 0);
     let mut file = BufWriter::new(PendingFile::create(path)?);
     let lines = scene.kept.prepared.image.lines();
@@ -67,7 +67,7 @@ fn open(path: &Path) -> Result<PreparedScene, PreparedError> {
     }
     let file = File::open(path).map_err(unreadable)?;
     let mut reader = BufReader::with_capacity(BUFFER, file);
-    let (head, bytes): (Head, u64) = KIND.read(&mut reader).map_err(|fault| match fault {
+    let Heading { head, bytes, .. }: Heading<Head> = KIND.read(&mut reader).map_err(|fault| match fault {
         HeadingFault::Foreign => PreparedError::Foreign { path: path.to_owned() },
         HeadingFault::Version(found) => PreparedError::Version { path: path.to_owned(), found },
         HeadingFault::Damaged(fault) => damaged(fault),

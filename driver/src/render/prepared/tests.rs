@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use super::file::KIND;
 use super::*;
 use crate::film::Film;
+use crate::heading::Heading;
 use crate::pack::PackedScene;
 use crate::render::{Integrator, PhotonMaps, Picture, RenderSettings, Unobserved, render};
 use crate::scene::Scene;
@@ -149,10 +150,10 @@ fn a_hostile_prepared_scene_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = prepared(folder.path());
     let bytes = fs::read(&path).unwrap();
-    let (head, length): (Value, u64) = KIND.read(&mut &bytes[..]).unwrap();
+    let Heading { head, bytes: length, .. }: Heading<Value> = KIND.read(&mut &bytes[..]).unwrap();
     let lines = &bytes[(length as usize).next_multiple_of(4096)..];
     let refused = |head: &Value, lines: &[u8]| {
-        let mut file = KIND.heading(head).unwrap();
+        let (mut file, _) = KIND.heading(head).unwrap();
         file.resize(file.len().next_multiple_of(4096), 0);
         file.extend(lines);
         fs::write(&path, file).unwrap();
