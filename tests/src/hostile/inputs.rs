@@ -60,7 +60,7 @@ const IMAGES: [&str; 18] = [
 ];
 
 impl Inputs {
-    /// Files of a kind that ship with the project, and generated pictures.
+    /// Files of a kind that ship with the project, and generated pictures; none of kept files.
     ///
     /// # Panics
     /// If a file is missing.
@@ -73,6 +73,7 @@ impl Inputs {
         let mut seeds: Vec<_> = match kind {
             Kind::Images => IMAGES.iter().map(shipped).collect(),
             Kind::Scenes => SCENES.iter().map(shipped).collect(),
+            Kind::Kept(_) => Vec::new(),
         };
         if kind == Kind::Images {
             let of = |extension: &str, files: Vec<Vec<u8>>| {
@@ -81,7 +82,7 @@ impl Inputs {
             };
             seeds.extend(of("hdr", environment::pictures()));
             seeds.extend(of("exr", picture::pictures()));
-        } else {
+        } else if kind == Kind::Scenes {
             seeds.push(Seed { extension: "gltf".to_owned(), bytes: gltf::rich() });
         }
         Self { kind, seeds }
@@ -135,7 +136,7 @@ pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
 }
 
 /// Edits a part of a file; its length may change.
-fn edit_window(bytes: &mut Vec<u8>, random: &mut Random) {
+pub(super) fn edit_window(bytes: &mut Vec<u8>, random: &mut Random) {
     let start = random.below(bytes.len());
     let end = (start + WINDOW).min(bytes.len());
     let mut window = bytes[start..end].to_vec();

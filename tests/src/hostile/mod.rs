@@ -1,10 +1,13 @@
 //! Damaged real files: scenes and images that ship are mutated and read in processes of limited memory.
 //!
+//! Files that the command keeps, such as parts of pictures, are mutated while it works as well, and its pictures are compared.
+//!
 //! The fuzz targets catch panics in their own process and start from small generated files. Here a process reads a batch of
 //! inputs, and its end is the result: an exit status, a signal, or a time-out. Every input is a function of its kind, a
 //! seed and a number.
 
 mod inputs;
+mod kept;
 mod reader;
 mod supervisor;
 
@@ -22,12 +25,37 @@ pub enum Kind {
     Images,
     /// glTF as text and as GLB, loaded, packed, and rendered with few photons and rays.
     Scenes,
+    /// Files that the command keeps and reads again; the command alone reads them.
+    Kept(Kept),
+}
+
+/// Kind of files that are damaged before or while the command reads them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kept {
+    /// Prepared scenes.
+    Cards,
+    /// Parts of a picture, which are merged.
+    Parts,
+    /// Finished tiles of a render that is resumed.
+    Partials,
+    /// `OpenEXR` and PNG pictures of frames that are resumed.
+    Frames,
 }
 
 impl Kind {
+    /// All kinds.
+    pub const ALL: [Self; 6] = [
+        Self::Images,
+        Self::Scenes,
+        Self::Kept(Kept::Cards),
+        Self::Kept(Kept::Parts),
+        Self::Kept(Kept::Partials),
+        Self::Kept(Kept::Frames),
+    ];
+
     /// Kind with the name `name` on the command line.
     pub fn of(name: &str) -> Option<Self> {
-        [Self::Images, Self::Scenes].into_iter().find(|kind| kind.name() == name)
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
 
     /// Name on the command line.
@@ -35,6 +63,10 @@ impl Kind {
         match self {
             Self::Images => "images",
             Self::Scenes => "scenes",
+            Self::Kept(Kept::Cards) => "cards",
+            Self::Kept(Kept::Parts) => "parts",
+            Self::Kept(Kept::Partials) => "partials",
+            Self::Kept(Kept::Frames) => "frames",
         }
     }
 }
@@ -56,7 +88,8 @@ pub struct Settings {
     pub patience: Duration,
     /// Address space of a process, kilobytes.
     pub kilobytes: u64,
-    /// Command `photoncard`, which reads every [`Settings::every`]th input as well.
+    /// Command `photoncard`, which reads every [`Settings::every`]th image or scene as well, and all kept
+    /// files.
     pub command: Option<PathBuf>,
     /// Interval of inputs that [`Settings::command`] reads.
     pub every: u64,

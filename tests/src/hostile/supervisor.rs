@@ -10,7 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::inputs::as_file;
-use super::{Inputs, Kind, Settings};
+use super::{Inputs, Kind, Settings, kept};
 
 /// Interval at which a running command is polled.
 const GLANCE: Duration = Duration::from_millis(2);
@@ -29,7 +29,7 @@ pub struct Finding {
 pub struct Report {
     /// Number of inputs that were read.
     pub inputs: u64,
-    /// Number of inputs that were valid.
+    /// Number of inputs that were valid; of kept files, of which the undamaged picture came.
     pub sound: u64,
     /// Number of exits of the command with status 0, 1 and 2.
     pub statuses: [u64; 3],
@@ -40,13 +40,16 @@ pub struct Report {
 }
 
 /// Reads inputs in processes of limited memory. `reader` is the program that calls [`read_batch`](super::read_batch) for
-/// the arguments `read KIND SEED FIRST INPUTS FOLDER`.
+/// the arguments `read KIND SEED FIRST INPUTS FOLDER`; it reads no kept files.
 ///
 /// # Errors
 /// If a process cannot be started or a file cannot be written.
 pub fn supervise(reader: &Path, settings: &Settings, tell: &dyn Fn(&Report)) -> io::Result<Report> {
-    let mut report = Report::default();
     fs::create_dir_all(&settings.folder)?;
+    if let Kind::Kept(files) = settings.kind {
+        return kept::supervise(settings, files, tell);
+    }
+    let mut report = Report::default();
     let inputs = Inputs::new(settings.kind);
     let end = settings.first + settings.inputs;
     let mut next = settings.first;
@@ -69,7 +72,7 @@ pub fn supervise(reader: &Path, settings: &Settings, tell: &dyn Fn(&Report)) -> 
 }
 
 /// Command with a limited address space.
-fn limited(settings: &Settings, program: &Path) -> Command {
+pub(super) fn limited(settings: &Settings, program: &Path) -> Command {
     let mut command = Command::new("sh");
     let script = format!("ulimit -v {} && exec \"$0\" \"$@\"", settings.kilobytes);
     command.args(["-c", &script]).arg(program).stdin(Stdio::null()).stderr(Stdio::null());
@@ -148,7 +151,7 @@ fn run_command(settings: &Settings, inputs: &Inputs, number: u64, report: &mut R
             render(&mut command, &scene, &settings.folder).arg("--environment").arg(&path)
         }
         (Kind::Images, _) => command.args(["scene", "info"]).arg(&path),
-        (Kind::Scenes, _) => render(&mut command, &path, &settings.folder),
+        (Kind::Scenes | Kind::Kept(_), _) => render(&mut command, &path, &settings.folder),
     };
     let begun = Instant::now();
     let status = ended(&mut command.spawn()?, settings.patience)?;
@@ -174,7 +177,7 @@ fn render<'c>(command: &'c mut Command, scene: &Path, folder: &Path) -> &'c mut 
 }
 
 /// Exit status of a process, which is killed if it exceeds the time.
-fn ended(child: &mut Child, patience: Duration) -> io::Result<Option<ExitStatus>> {
+pub(super) fn ended(child: &mut Child, patience: Duration) -> io::Result<Option<ExitStatus>> {
     let begun = Instant::now();
     while begun.elapsed() < patience {
         if let Some(status) = child.try_wait()? {

@@ -1,0 +1,350 @@
+//! Files that the command keeps and reads again, damaged before it starts or while it works.
+//!
+//! Works are done with small scenes, so that an input takes some hundredths of a second. The command must end with the picture of undamaged files, or with an error that says something and without a
+//! picture. A damage that forges checksums makes another valid file, and is not tried here.
+
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::{self, Write as _};
+use std::ops::Range;
+use std::os::unix::process::ExitStatusExt as _;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use super::inputs::edit_window;
+use super::supervisor::{ended, limited};
+use super::{Finding, Kept, Kind, Report, Settings};
+use crate::fuzz::{Random, mutation};
+
+/// Beginning of the record of a tile, in parts and partial renders.
+const RECORD: &[u8] = b"\x89TILE";
+/// Settings of photons and rays that take some milliseconds.
+const LIGHT: &str = "--photons 200 --neighbors 10 --caustic-photons 0 --gather-rays 2 --shadow-rays 1 --spp 1 --adaptive off \
+                     --irradiance-cache off";
+/// Settings of a picture of four tiles.
+const PICTURE: &str = "--size 8x8 --tile 4 --card emulated:1 --threads 1 --quiet";
+
+/// Files of a folder, by name.
+type Files = BTreeMap<String, Vec<u8>>;
+
+/// Command line that reads kept files.
+struct Work {
+    arguments: String,
+    kept: Files,
+    /// Time without damage.
+    usual: Duration,
+}
+
+/// Works of one kind, and the folder where they are done.
+struct Bench<'s> {
+    settings: &'s Settings,
+    program: &'s Path,
+    folder: PathBuf,
+    works: Vec<Work>,
+    /// Pictures of undamaged files, and of none.
+    right: Vec<Files>,
+}
+
+impl Kept {
+    /// Endings of the names of the files that may be damaged.
+    fn endings(self) -> &'static [&'static str] {
+        match self {
+            Self::Cards => &[".card"],
+            Self::Parts => &[".part"],
+            Self::Partials => &[".partial"],
+            Self::Frames => &[".exr", ".png"],
+        }
+    }
+
+    /// Command lines of which the last reads what the others have written.
+    fn commands(self, seed: u32) -> Vec<String> {
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes");
+        let scene = format!("{root}/furnace.gltf");
+        match self {
+            Self::Cards => vec![
+                format!("prepare {scene} -o a.card {LIGHT} --seed {seed} --quiet"),
+                format!("render --prepared a.card -o a.exr -o a.png {PICTURE}"),
+            ],
+            Self::Parts => {
+                let part = |part| {
+                    format!("render {scene} -o {part}.part --part {part}/3 {LIGHT} {PICTURE} --seed {seed}")
+                };
+                let merge = "merge 1.part 2.part 3.part -o a.exr -o a.png".to_owned();
+                [1, 2, 3].map(part).into_iter().chain([merge]).collect()
+            }
+            Self::Partials => {
+                // Photons and rays of the second are those of the file.
+                let render = format!("render {scene} -o a.exr --quality draft --neighbors 10 {PICTURE}");
+                let (photons, samples) = (200 + 100 * seed, 4 >> seed);
+                vec![
+                    format!("{render} --photons {photons} --gather-rays 2 --spp 2 --keep-samples"),
+                    format!("{render} --spp {samples} --resume"),
+                ]
+            }
+            Self::Frames => {
+                let scene = format!("{root}/cornell-moving.glb");
+                let render = format!(
+                    "render {scene} --frames 1-2 -o f.#.exr -o f.#.png {LIGHT} {PICTURE} --seed {seed}"
+                );
+                let resume = format!("{render} --resume");
+                vec![render, resume]
+            }
+        }
+    }
+}
+
+/// Runs the command on damaged files.
+///
+/// # Errors
+/// If no command is named, it cannot be started, it fails without damage, or a file cannot be written.
+pub(super) fn supervise(settings: &Settings, kind: Kept, tell: &dyn Fn(&Report)) -> io::Result<Report> {
+    let bench = Bench::new(settings, kind)?;
+    let mut report = Report::default();
+    for number in settings.first..settings.first + settings.inputs {
+        let begun = Instant::now();
+        match bench.run(number)? {
+            Ok(status) => {
+                report.sound += u64::from(status == 0);
+                report.statuses[status] += 1;
+            }
+            Err(what) => report.findings.push(Finding { number, what }),
+        }
+        report.slowest = report.slowest.max((begun.elapsed(), number));
+        report.inputs += 1;
+        if report.inputs.is_multiple_of(settings.batch) {
+            tell(&report);
+        }
+    }
+    Ok(report)
+}
+
+impl<'s> Bench<'s> {
+    fn new(settings: &'s Settings, kind: Kept) -> io::Result<Self> {
+        let program = settings.command.as_deref().ok_or_else(|| io::Error::other("--command is missing"))?;
+        let folder = settings.folder.join("work");
+        fs::create_dir_all(&folder)?;
+        let mut this = Self { settings, program, folder, works: Vec::new(), right: Vec::new() };
+        for seed in [0, 1] {
+            this.add(kind, seed)?;
+        }
+        Ok(this)
+    }
+
+    /// Makes the files of a work, and the pictures of these files and of none.
+    fn add(&mut self, kind: Kept, seed: u32) -> io::Result<()> {
+        self.fill(&Files::new())?;
+        let mut commands = kind.commands(seed);
+        let arguments = commands.pop().unwrap_or_default();
+        for command in commands {
+            self.done(&command)?;
+        }
+        let mut kept = self.files()?;
+        kept.retain(|name, _| kind.endings().iter().any(|ending| name.ends_with(ending)));
+        self.fill(&Files::new())?;
+        if self.finish(self.start(&arguments)?)?.is_some_and(|status| status.success()) {
+            self.right.push(self.pictures()?);
+        }
+        self.fill(&kept)?;
+        let begun = Instant::now();
+        self.done(&arguments)?;
+        self.works.push(Work { arguments, kept, usual: begun.elapsed() });
+        self.right.push(self.pictures()?);
+        Ok(())
+    }
+
+    /// Runs a command that must succeed.
+    fn done(&self, arguments: &str) -> io::Result<()> {
+        let status = self.finish(self.start(arguments)?)?;
+        let failed = || io::Error::other(format!("{arguments}: {status:?} {}", self.said()));
+        status.filter(ExitStatus::success).map(drop).ok_or_else(failed)
+    }
+
+    fn start(&self, arguments: &str) -> io::Result<Child> {
+        let mut command: Command = limited(self.settings, self.program);
+        command.args(arguments.split_whitespace()).current_dir(&self.folder);
+        command.stderr(File::create(self.settings.folder.join("said"))?).spawn()
+    }
+
+    fn finish(&self, mut child: Child) -> io::Result<Option<ExitStatus>> {
+        ended(&mut child, self.settings.patience)
+    }
+
+    /// What the last command has said.
+    fn said(&self) -> String {
+        fs::read(self.settings.folder.join("said"))
+            .map_or(String::new(), |text| String::from_utf8_lossy(&text).into_owned())
+    }
+
+    /// Makes the folder hold these files alone.
+    fn fill(&self, files: &Files) -> io::Result<()> {
+        self.files()?.keys().try_for_each(|name| fs::remove_file(self.folder.join(name)))?;
+        files.iter().try_for_each(|(name, bytes)| fs::write(self.folder.join(name), bytes))
+    }
+
+    fn files(&self) -> io::Result<Files> {
+        let read = |entry: io::Result<fs::DirEntry>| {
+            let entry = entry?;
+            Ok((entry.file_name().to_string_lossy().into_owned(), fs::read(entry.path())?))
+        };
+        fs::read_dir(&self.folder)?.map(read).collect()
+    }
+
+    fn pictures(&self) -> io::Result<Files> {
+        let mut files = self.files()?;
+        files.retain(|name, _| name.ends_with(".exr") || name.ends_with(".png"));
+        Ok(files)
+    }
+
+    /// Runs the command of an input. Returns its exit status, or what is wrong.
+    fn run(&self, number: u64) -> io::Result<Result<usize, String>> {
+        let mut random = Random::new(self.settings.kind.name(), self.settings.seed, number);
+        let work = random.pick(&self.works);
+        let damaged = self.damaged(work, &mut random);
+        let is_before = random.once_in(2);
+        let mut pause = || work.usual.mul_f64(random.below(1000) as f64 / 1000.0);
+        let pauses = [pause(), pause()];
+        self.fill(&work.kept)?;
+        if is_before {
+            self.write_over(&damaged, &mut random)?;
+        }
+        let child = self.start(&work.arguments)?;
+        if !is_before {
+            sleep(pauses[0]);
+            self.write_over(&damaged, &mut random)?;
+            if random.once_in(4) {
+                sleep(pauses[1]);
+                self.write_over(&work.kept, &mut random)?;
+            }
+        }
+        let status = self.finish(child)?;
+        let mut judged = self.judge(work, status)?;
+        // A frame that was damaged after it was read, or written, is found by the next command.
+        let is_late = !is_before && self.settings.kind == Kind::Kept(Kept::Frames);
+        if is_late && judged.is_err() && status.is_some_and(|status| status.success()) {
+            let again = self.finish(self.start(&work.arguments)?)?;
+            judged = self.judge(work, again)?;
+        }
+        if judged.is_err() {
+            self.keep(number, &damaged)?;
+        }
+        let when = if is_before { "before" } else { "while" };
+        Ok(judged.map_err(|what| format!("{:?} damaged {when} {}: {what}", damaged.keys(), work.arguments)))
+    }
+
+    /// One or two files of a work, damaged.
+    fn damaged(&self, work: &Work, random: &mut Random) -> Files {
+        let names: Vec<&String> = work.kept.keys().collect();
+        let chosen = (0..=random.below(2)).map(|_| *random.pick(&names)).collect::<Vec<_>>();
+        let damage = |name: &String| {
+            let donors: Vec<&[u8]> = self
+                .works
+                .iter()
+                .flat_map(|other| &other.kept)
+                .filter(|(other, _)| *other == name || random.once_in(8))
+                .map(|(_, bytes)| &**bytes)
+                .collect();
+            let mut bytes = work.kept[name].clone();
+            for _ in 0..random.edits() {
+                damage(&mut bytes, &donors, random);
+            }
+            (name.clone(), bytes)
+        };
+        chosen.into_iter().map(damage).collect()
+    }
+
+    /// Writes files over those that are there, as `cp` or `rsync --inplace` does.
+    fn write_over(&self, files: &Files, random: &mut Random) -> io::Result<()> {
+        for (name, bytes) in files {
+            let is_cut = random.once_in(2);
+            match File::options().write(true).truncate(is_cut).open(self.folder.join(name)) {
+                // The command has removed it.
+                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+                Err(error) => return Err(error),
+                Ok(mut file) => {
+                    file.write_all(bytes)?;
+                    file.set_len(bytes.len() as u64)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn judge(&self, work: &Work, status: Option<ExitStatus>) -> io::Result<Result<usize, String>> {
+        let Some(status) = status else { return Ok(Err("it takes too long".to_owned())) };
+        let (said, pictures) = (self.said(), self.pictures()?);
+        Ok(match status.code() {
+            _ if said.contains("panicked") => Err(format!("it panics: {said}")),
+            Some(0) if self.right.contains(&pictures) => Ok(0),
+            Some(0) => Err("it ends with another picture and status 0".to_owned()),
+            Some(1 | 2) if said.trim().is_empty() => Err("it fails without a word".to_owned()),
+            Some(code @ 1..=2) => match pictures.keys().find(|name| !work.kept.contains_key(*name)) {
+                None => Ok(code as usize),
+                Some(name) => Err(format!("it fails and leaves {name}: {said}")),
+            },
+            code => Err(format!("it ends with status {code:?}, signal {:?}: {said}", status.signal())),
+        })
+    }
+
+    /// Keeps the damaged files of a finding.
+    fn keep(&self, number: u64, damaged: &Files) -> io::Result<()> {
+        let name = format!("{}-{}-{number}", self.settings.kind.name(), self.settings.seed);
+        let folder = self.settings.folder.join(name);
+        fs::create_dir_all(&folder)?;
+        damaged.iter().try_for_each(|(name, bytes)| fs::write(folder.join(name), bytes))
+    }
+}
+
+/// Damages a file as copying, disks and memory do. `donors` are files that may have been written over a part of it.
+fn damage(bytes: &mut Vec<u8>, donors: &[&[u8]], random: &mut Random) {
+    let length = bytes.len();
+    match random.below(12) {
+        0..=3 => edit_window(bytes, random),
+        4..=5 => edit_head(bytes, random),
+        6 => bytes.truncate(random.below(length)),
+        7 => bytes.resize(length + random.below(5000), *random.pick(&[0, 0xff, b'\n'])),
+        8 => bytes[block(length, random)].fill(0),
+        9 => {
+            let (one, other) = (block(length, random), block(length, random));
+            let same = one.len().min(other.len());
+            let copy = bytes[one.start..one.start + same].to_vec();
+            bytes.copy_within(other.start..other.start + same, one.start);
+            bytes[other.start..other.start + same].copy_from_slice(&copy);
+        }
+        10 => *bytes = random.pick(donors).to_vec(),
+        _ => {
+            let donor = random.pick(donors);
+            let mut ends = [boundary(donor, random), boundary(donor, random)];
+            ends.sort_unstable();
+            let end = if random.once_in(2) { donor.len() } else { ends[1] };
+            bytes.splice(ends[0].min(length)..end.min(length), donor[ends[0]..end].iter().copied());
+        }
+    }
+}
+
+/// Edits a number or a string in the first two lines, where heads are.
+fn edit_head(bytes: &mut Vec<u8>, random: &mut Random) {
+    let ends = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').map(|(place, _)| place);
+    let end = ends.take(2).last().unwrap_or(bytes.len());
+    let mut head = bytes[..end].to_vec();
+    mutation::edit_json(&mut head, random);
+    bytes.splice(..end, head);
+}
+
+/// A block of a file: of a disk, or smaller.
+fn block(length: usize, random: &mut Random) -> Range<usize> {
+    let size = *random.pick(&[16, 512, 4096]);
+    let start = random.below(length.div_ceil(size)) * size;
+    start.min(length)..(start + size).min(length)
+}
+
+/// A place where one file may end and another go on: a block's, or a record's.
+fn boundary(bytes: &[u8], random: &mut Random) -> usize {
+    let records: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place..].starts_with(RECORD)).collect();
+    if records.is_empty() || random.once_in(2) {
+        block(bytes.len(), random).start
+    } else {
+        *random.pick(&records)
+    }
+}
