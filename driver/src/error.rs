@@ -5,10 +5,41 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use miette::{Diagnostic, NamedSource, SourceSpan};
+use miette::{Diagnostic, MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
 use thiserror::Error;
 
 use crate::allocation::{self, OutOfMemory};
+
+/// Part of a line of a file, which knows its place there.
+#[derive(Debug)]
+pub struct Excerpt {
+    /// Name of the file.
+    pub name: String,
+    /// The part.
+    pub part: String,
+    /// Line of the file and bytes in it before the part, both from 0.
+    pub place: [usize; 2],
+}
+
+impl SourceCode for Excerpt {
+    fn read_span<'a>(
+        &'a self,
+        span: &SourceSpan,
+        lines_before: usize,
+        lines_after: usize,
+    ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
+        let read = self.part.read_span(span, lines_before, lines_after)?;
+        let [line, column] = self.place;
+        Ok(Box::new(MietteSpanContents::new_named(
+            self.name.clone(),
+            read.data(),
+            *read.span(),
+            line + read.line(),
+            column + read.column(),
+            read.line_count(),
+        )))
+    }
+}
 
 /// Location in a scene: file and JSON path.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -97,9 +128,9 @@ pub enum SceneError {
         file: String,
         /// The parser's message.
         message: String,
-        /// Text of the file.
+        /// Text around the fault.
         #[source_code]
-        text: Arc<NamedSource<String>>,
+        text: Arc<Excerpt>,
         /// Position of the fault in the text.
         #[label("here")]
         at: SourceSpan,

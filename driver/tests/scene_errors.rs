@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use glam::Vec3;
-use miette::Diagnostic;
+use miette::{Diagnostic, SourceCode};
 use photoncard_driver::error::SceneError;
 use photoncard_driver::scene::{Environment, Scene, gltf};
 use scene_support::{glb, load_bytes, load_changed, load_with, triangle_bytes, triangle_json};
@@ -63,12 +63,15 @@ fn json_errors_point_into_the_text() {
     let label = error.labels().unwrap().next().unwrap();
     let source = error.source_code().unwrap();
     let shown = source.read_span(label.inner(), 0, 0).unwrap();
-    assert_eq!(shown.data(), b"}");
+    assert_eq!((shown.data(), shown.line(), shown.column()), (&b"}"[..], 2, 13));
     // A line of megabytes is shortened.
     let long = format!("{{\"asset\": {{\"version\": \"{}\"}}, }}", "ü".repeat(10_000));
     let error = load_bytes("scene.gltf", long.as_bytes()).unwrap_err();
-    let SceneError::Json { text, .. } = &error else { panic!("{error}") };
-    assert!(text.inner().len() < 1000);
+    let SceneError::Json { text, at, .. } = &error else { panic!("{error}") };
+    assert!(text.part.len() < 1000);
+    let shown = text.read_span(at, 0, 0).unwrap();
+    assert_eq!((shown.data(), shown.line(), shown.column()), (&b"}"[..], 0, long.len() - 1));
+    check(&error, &[&format!("line 1 column {}", long.len())]);
 }
 
 #[test]

@@ -11,7 +11,7 @@ const PHOTOMETRIC_SINCE: (u32, u32) = (3, 4);
 /// Remedy of a file without light.
 pub(super) const NO_LIGHT: &str = "tick Include > Data > Punctual Lights in Blender's export dialog, or pass \
      export_lights=True to export_scene.gltf; area lights and the world are not exported: make emissive planes of area \
-     lights, and add the world as an environment; or give a material an Emission Strength above 0";
+     lights, and add the world by --environment; or give a material an Emission Strength above 0";
 
 /// Remedy of a file without a camera.
 pub(super) const NO_CAMERA: &str = "tick Include > Data > Cameras in Blender's export dialog, or pass \

@@ -47,7 +47,8 @@ const FRAMED: &str = "framed";
 
 /// Remedy of a scene without light.
 const NO_LIGHT: &str = "give a material of at least one triangle an emissiveFactor above 0 (and KHR_materials_emissive_strength \
-                        for its radiance), place a light of KHR_lights_punctual, or add an environment";
+                        for its radiance), place a light of KHR_lights_punctual, or add an environment: --environment 1,1,1 \
+                        is a white sky";
 
 /// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
 #[derive(Clone, Debug, Default)]

@@ -9,7 +9,7 @@ use gltf::json;
 use gltf::json::extensions::scene::khr_lights_punctual::Light;
 use gltf::json::mesh::Semantic;
 use gltf::json::validation::{Checked, Error as Fault, Validate};
-use miette::{NamedSource, SourceSpan};
+use miette::SourceSpan;
 use serde::Deserialize as _;
 
 use super::duplicates;
@@ -19,7 +19,7 @@ use super::other_kinds;
 use super::parse_cost;
 use super::schema::{self, UnknownPath};
 use super::specular_glossiness::{self, Conversions};
-use crate::error::{Location, SceneError};
+use crate::error::{Excerpt, Location, SceneError};
 use crate::printable::printable;
 use crate::scene::blender;
 use crate::{allocation, foreign};
@@ -357,7 +357,8 @@ fn without_padding(text: &str) -> &str {
 /// Syntax error with an excerpt of the text: a line of glTF may contain a whole buffer in base64.
 fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError {
     const CONTEXT: usize = 100;
-    let line = text.lines().nth(error.line().saturating_sub(1)).unwrap_or_default();
+    let above = error.line().saturating_sub(1);
+    let line = text.lines().nth(above).unwrap_or_default();
     let at = char_boundary(line, error.column().saturating_sub(1));
     let start = char_boundary(line, at.saturating_sub(CONTEXT));
     let end = char_boundary(line, at + CONTEXT);
@@ -367,7 +368,11 @@ fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError 
     let file = path.display().to_string();
     SceneError::Json {
         message: error.to_string(),
-        text: Arc::new(NamedSource::new(printable(&file), format!("{before}{here}{after}"))),
+        text: Arc::new(Excerpt {
+            name: printable(&file).into(),
+            part: format!("{before}{here}{after}"),
+            place: [above, start],
+        }),
         at: SourceSpan::new(before.len().into(), here.len()),
         file,
     }
