@@ -45,7 +45,7 @@ tar --version 2>/dev/null | grep -q GNU || fail "GNU tar is missing; it sorts th
 command -v strip >/dev/null || fail "strip is missing; on Debian: sudo apt-get install binutils"
 [ -z "$deb" ] || "$cargo" deb --version >/dev/null 2>&1 || fail "cargo-deb is missing; run: cargo install cargo-deb --locked"
 if [ -z "$binary" ]; then
-    "$cargo" build --release --locked -p photoncard
+    "$cargo" build --release --locked -p photoncard --features study
     binary=${CARGO_TARGET_DIR:-target}/release/photoncard
 fi
 version=$("$binary" -V) || fail "$binary states no version"
@@ -56,7 +56,7 @@ name=photoncard-$version-$target
 # Licences of the crates that are in the program, with their texts, and where the sources are, as the MPL asks.
 third_party() {
     local crates=${CARGO_HOME:-$HOME/.cargo}/registry/src crate version licence folder texts text
-    "$cargo" tree --locked -p photoncard -e normal --target "$target" --prefix none --format '{p} {l}' |
+    "$cargo" tree --locked -p photoncard --features study -e normal --target "$target" --prefix none --format '{p} {l}' |
         grep -v ' (/.*)' | sed 's/ (\*)$//; s/ (proc-macro)//' | sort -u |
         while read -r crate version licence; do
             folder=$(find "$crates" -maxdepth 2 -name "$crate-${version#v}" -type d -print -quit)

@@ -2,12 +2,12 @@
 # Counts the floating-point operations of the firmware: runs it without floating-point instructions, where each operation is a call.
 #
 #   tests/operations.sh report     operations of each unit for a ray and for a gather of several scenes, counted and by the table
-#   tests/operations.sh table      writes the operations of a step, driver/src/cost_model/arithmetic/table.rs
+#   tests/operations.sh table      writes the operations of a step, driver/render/src/cost_model/arithmetic/table.rs
 #
 # It takes about a minute on Linux and x86-64, and the target x86_64-unknown-none. tests/tests/operations.rs checks the table.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-table=driver/src/cost_model/arithmetic/table.rs
+table=driver/render/src/cost_model/arithmetic/table.rs
 case ${1:-} in
     report) cargo run --quiet -p photoncard-tests --example operations report ;;
     table)

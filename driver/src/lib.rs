@@ -2,7 +2,7 @@
 //! or on cards at the other end of a link.
 //!
 //! photoncard is photon mapping (Jensen 2001) on *rendering chips*: small processors with a fixed amount of on-chip memory, a
-//! private DRAM and one link to a host. A chip runs [`photoncard_firmware`]. This crate is what runs on the host: it loads a
+//! private DRAM and one link to a host. A chip runs `photoncard_firmware`. This crate is what runs on the host: it loads a
 //! scene, traces photons, packs scene and photon map into a *card image*, sends the image to each card, deals tiles to the cards
 //! and assembles the picture. The picture is equal, bit for bit, for any number and kind of cards.
 //!
@@ -92,32 +92,22 @@
 //! assert!(progress.is_stopped());
 //! ```
 //!
-//! # Layers
+//! # Rooms
 //!
-//! Modules from bottom to top. A module imports modules of its own row and of rows above it in this table, never of rows below
-//! it; and no file imports one that imports it back, directly or around (`tests/tests/imports`).
+//! Six crates, whose modules this one re-exports. Each imports those of rows above it, but `photoncard_cards`, which takes
+//! `photoncard_picture` alone.
 //!
-//! | layer | modules | contents |
+//! | crate | modules | contents |
 //! |---|---|---|
-//! | foundation | [`output`], [`printable`], [`choice`], `allocation`, `foreign`, `heading`, `intact` | output files that appear whole or not at all; escaping of foreign text; names of enumerations; memory limits; isolation of decoders that panic; headings of files; checks that finished files are whole |
-//! | tiles | [`sums`], [`sink`] | format of pixels' sums, and their values; a finished tile, and [`TileSink`](sink::TileSink), the trait of every output |
-//! | pictures | [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`] | pixels of a picture; its layers; files; comparison |
-//! | scenes | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
-//! | trees | [`bvh`], `fold`, `light` | bounding volume hierarchy; folding of binary trees into wide nodes; light tree and environment |
-//! | card image | [`pack`] | the scene's sections of the card image |
-//! | photons | [`photon`], `density`, [`photon_map`] | photon pass; area corrections of the density estimate; the photon map's sections of the card image |
-//! | links | [`link`], [`session`] | ports of bytes; the host's end of the protocol, without I/O |
-//! | cards | [`emulator`] | chips on threads of this process, memory models and traces |
-//! | tiles to cards | [`scheduler`], [`dispatcher`] | which card renders which tile; finished tiles to the sinks |
-//! | sinks | [`viewer`], [`partial`], [`parts`], [`display`] | [`Viewer`](viewer::Viewer), the trait of sinks that show tiles; the file of finished tiles, for `--resume`; parts of a picture, and their merge; the client of a display server |
-//! | cost model | [`cost_model`] | FLOPs and DRAM bytes of a frame by Table 7.1 |
-//! | render | [`render`] | one render from a scene to a complete film; settings, statistics, card addresses |
-//! | quality | [`quality`] | settings for what a picture is needed for, by pilot renders |
-//! | studies | [`study`] | measurements of shipped scenes, and reports |
+//! | [`photoncard_picture`] | [`film`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`], [`tone_mapping`], [`difference`], [`output`], [`printable`], [`choice`] | pixels of a picture and what takes them; its files; names of enumerations |
+//! | [`photoncard_scene`] | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
+//! | [`photoncard_map`] | [`bvh`], [`pack`], [`photon`], [`photon_map`] | bounding volume hierarchy, light tree, photon pass and photon map: the sections of the card image |
+//! | [`photoncard_cards`] | [`link`], [`session`], [`scheduler`], [`dispatcher`] | ports of bytes; the host's end of the protocol, without I/O; which card renders which tile |
+//! | [`photoncard_render`] | [`render`], [`emulator`], [`quality`], [`partial`], [`parts`], [`display`], [`cost_model`] | one render from a scene to a complete film; chips on threads of this process; settings by pilot renders; the file of finished tiles; parts and their merge; the client of a display server; FLOPs and DRAM bytes by Table 7.1 |
+//! | [`photoncard_study`] | [`study`] | measurements of shipped scenes, and reports |
 //!
-//! Below all of them are [`photoncard_shared`] (formats of memory and wire) and [`photoncard_firmware`]. `pack`, `light`,
-//! `photon`, `density`, `photon_map` and `emulator` import the firmware, so that photons, chords and irradiance points are
-//! computed by the chip's own code.
+//! Below all of them are `photoncard_shared` (formats of memory and wire) and `photoncard_firmware`, with which the map traces
+//! photons: photons, chords and irradiance points are computed by the chip's own code.
 //!
 //! # Way of the data
 //!
@@ -130,39 +120,12 @@
 //! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in `docs/architecture.md`.
 #![forbid(unsafe_code)]
 
-mod allocation;
-pub mod bvh;
-pub mod choice;
-pub mod cost_model;
-mod density;
-pub mod difference;
-pub mod dispatcher;
-pub mod display;
-pub mod emulator;
-pub mod error;
-pub mod exr;
-pub mod film;
-mod fold;
-mod foreign;
-mod heading;
-mod intact;
-pub mod layer;
-mod light;
-pub mod link;
-pub mod output;
-pub mod pack;
-pub mod partial;
-pub mod parts;
-pub mod photon;
-pub mod photon_map;
-pub mod printable;
-pub mod quality;
-pub mod render;
-pub mod scene;
-pub mod scheduler;
-pub mod session;
-pub mod sink;
-pub mod study;
-pub mod sums;
-pub mod tone_mapping;
-pub mod viewer;
+pub use photoncard_cards::{dispatcher, link, scheduler, session};
+pub use photoncard_map::{bvh, pack, photon, photon_map};
+pub use photoncard_picture::{
+    choice, difference, exr, film, layer, output, printable, sink, sums, tone_mapping, viewer,
+};
+pub use photoncard_render::{self as render, cost_model, display, emulator, partial, parts, quality};
+pub use photoncard_scene::{self as scene, error};
+#[cfg(feature = "study")]
+pub use photoncard_study as study;

@@ -10,6 +10,8 @@
 //! direction table ([`crate::importance::DirectionTable`]), and a radical inverse: any run of consecutive rays, such as
 //! those of one cell of the table, is stratified in both.
 
+pub use photoncard_shared::hash::hash;
+
 /// Dimension of a random number: its purpose. Patterns of different dimensions are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
@@ -98,16 +100,6 @@ fn scramble(mut digits: u32, seed: u32) -> u32 {
     digits = digits.wrapping_mul(seed >> 16 | 1);
     digits ^= digits.wrapping_mul(0x0552_6c56);
     digits ^ digits.wrapping_mul(0x53a2_2864)
-}
-
-/// 32-bit integer hash (Wellons, `lowbias32`).
-#[inline(always)]
-pub fn hash(mut x: u32) -> u32 {
-    x ^= x >> 16;
-    x = x.wrapping_mul(0x7feb_352d);
-    x ^= x >> 15;
-    x = x.wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
 }
 
 /// Base-2 radical inverse of `index`, in [0, 1) (van der Corput 1935).

@@ -7,6 +7,7 @@ mod files;
 mod frames;
 mod integrator;
 mod lights;
+#[cfg(feature = "study")]
 mod machine;
 mod merge;
 mod outputs;
@@ -19,9 +20,12 @@ mod render;
 mod samples;
 mod scene;
 mod schedule;
+#[cfg(feature = "study")]
 mod study;
+#[cfg(feature = "study")]
 mod study_output;
 mod suggestions;
+#[cfg(feature = "study")]
 mod sweep;
 mod threads;
 mod tone;
@@ -55,8 +59,11 @@ pub(crate) use self::prepared::OF_PREPARATION;
 pub(crate) use self::progress::ProgressForm;
 pub(crate) use self::render::{RenderOptions, Unfitted};
 pub(crate) use self::scene::SceneOptions;
+#[cfg(feature = "study")]
 pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
+#[cfg(feature = "study")]
 pub(crate) use self::study_output::StudyOutput;
+#[cfg(feature = "study")]
 pub(crate) use self::sweep::{CACHE, SweepArguments};
 pub(crate) use self::tonemap::TonemapOptions;
 pub(crate) use self::view::ViewOptions;
@@ -157,7 +164,14 @@ pub(crate) enum Command {
         folder: PathBuf,
     },
     /// Measure how memory traffic and time depend on orders, caches, techniques and chips
+    #[cfg(feature = "study")]
     Study(StudyArguments),
+    /// Measure how memory traffic and time depend on orders, caches, techniques and chips: this program was built without it
+    #[cfg(not(feature = "study"))]
+    Study {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+        words: Vec<OsString>,
+    },
 }
 
 #[derive(Subcommand)]

@@ -41,6 +41,7 @@ mod render;
 mod report;
 mod scene;
 mod shell;
+#[cfg(feature = "study")]
 mod study;
 mod tonemap;
 mod view;
@@ -49,6 +50,14 @@ use std::process::ExitCode;
 
 use crate::arguments::{Arguments, CardCommand, Command, ProgressForm, SceneCommand};
 use crate::progress::openjd;
+
+#[cfg(not(feature = "study"))]
+fn without_studies() -> failure::Failure {
+    let remedy = "build it with them: cargo build --release -p photoncard --features study";
+    failure::Failure::Input(
+        miette::MietteDiagnostic::new("this program was built without studies").with_help(remedy).into(),
+    )
+}
 
 fn main() -> ExitCode {
     // Invalid arguments end the process here, with status 2.
@@ -70,7 +79,10 @@ fn main() -> ExitCode {
         Command::Diff(options) => diff::run(options),
         Command::Completions { shell } => documents::completions(*shell),
         Command::Man { folder } => documents::man(folder),
+        #[cfg(feature = "study")]
         Command::Study(arguments) => study::run(arguments),
+        #[cfg(not(feature = "study"))]
+        Command::Study { .. } => Err(without_studies()),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

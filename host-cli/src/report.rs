@@ -4,124 +4,178 @@ use std::error::Error;
 use std::fmt::{Display, Formatter, Result};
 use std::io::{IsTerminal, stderr};
 
-use miette::{
-    Diagnostic, LabeledSpan, MietteHandler, MietteHandlerOpts, ReportHandler, Severity, SourceCode,
-};
+use anstream::{AutoStream, ColorChoice};
+use clap::builder::styling::{AnsiColor, Style};
+use miette::{Diagnostic, ReportHandler};
 use photoncard_driver::printable::printable;
 
-/// Installs the layout. Lines are broken on a terminal only: elsewhere a path in a message stays in one piece.
+/// Installs the layout. Lines are broken on a terminal only: elsewhere a path in a message stays in one
+/// piece.
 pub(crate) fn lay_out_errors() {
     let build = |_: &_| {
-        let options = MietteHandlerOpts::new().wrap_lines(stderr().is_terminal()).break_words(false);
-        Box::new(PrintableHandler(options.build())) as Box<dyn ReportHandler>
+        let width = terminal_size::terminal_size_of(stderr()).map(|(width, _)| usize::from(width.0));
+        let width = width.filter(|_| stderr().is_terminal()).unwrap_or(usize::MAX);
+        let has_colours = AutoStream::choice(&stderr()) != ColorChoice::Never;
+        Box::new(Layout { width, has_colours }) as Box<dyn ReportHandler>
     };
     // `set_hook` fails only if there is a hook already.
     let _ = miette::set_hook(Box::new(build));
 }
 
-/// Handler that escapes the texts of every error before colours and line breaks are added.
-struct PrintableHandler(MietteHandler);
+/// Prints an error with its causes, the excerpt of a file that it points into, and its remedy.
+struct Layout {
+    /// Columns at which lines are broken.
+    width: usize,
+    has_colours: bool,
+}
 
-impl ReportHandler for PrintableHandler {
+impl ReportHandler for Layout {
     fn debug(&self, error: &dyn Diagnostic, f: &mut Formatter<'_>) -> Result {
-        self.0.debug(&Printable::new(error), f)
+        let red = AnsiColor::Red.on_default();
+        if let Some(code) = error.code() {
+            writeln!(f, "{}\n", self.coloured(red, &code))?;
+        }
+        let texts = messages(error);
+        let last = texts.len() - 1;
+        for (index, text) in texts.iter().enumerate() {
+            let [first, next] = match index {
+                0 => ["  × ", if last == 0 { "    " } else { "  │ " }],
+                _ if index == last => ["  ╰─▶ ", "      "],
+                _ => ["  ├─▶ ", "  │   "],
+            };
+            self.paragraph(f, red, [first, next], text)?;
+        }
+        self.excerpt(f, error)?;
+        if let Some(help) = help(error) {
+            self.paragraph(f, AnsiColor::Cyan.on_default(), ["  help: ", "        "], &help)?;
+        }
+        Ok(())
     }
 }
 
-/// Diagnostic with its texts and causes escaped. An excerpt of a file is escaped by its author instead, as labels point
-/// into it by offset.
-#[derive(Debug)]
-struct Printable<'a> {
-    diagnostic: &'a dyn Diagnostic,
-    message: String,
-    cause: Option<Cause<'a>>,
-}
+impl Layout {
+    fn coloured(&self, style: Style, text: impl Display) -> String {
+        if self.has_colours { format!("{style}{text}{style:#}") } else { text.to_string() }
+    }
 
-#[derive(Debug)]
-enum Cause<'a> {
-    Diagnostic(Box<Printable<'a>>),
-    Error(PrintableError),
-}
+    /// Lines of a text, the first behind one mark and the others behind another.
+    fn paragraph(&self, f: &mut Formatter<'_>, style: Style, marks: [&str; 2], text: &str) -> Result {
+        let [mut mark, next] = marks;
+        for line in text.lines() {
+            for line in broken(line, self.width.saturating_sub(next.chars().count())) {
+                writeln!(f, "{}{line}", self.coloured(style, mark))?;
+                mark = next;
+            }
+        }
+        Ok(())
+    }
 
-impl<'a> Printable<'a> {
-    fn new(diagnostic: &'a dyn Diagnostic) -> Self {
-        let cause = match diagnostic.diagnostic_source() {
-            Some(cause) => Some(Cause::Diagnostic(Box::new(Printable::new(cause)))),
-            None => diagnostic.source().map(|cause| Cause::Error(PrintableError::new(cause))),
-        };
-        Self { diagnostic, message: escaped(diagnostic), cause }
+    /// The line that an error points into, with a mark below the place. Its author escapes it, as labels are
+    /// offsets.
+    fn excerpt(&self, f: &mut Formatter<'_>, error: &dyn Diagnostic) -> Result {
+        let (Some(source), Some(labels)) = (error.source_code(), error.labels()) else { return Ok(()) };
+        for label in labels {
+            let Ok(contents) = source.read_span(label.inner(), 1, 1) else { continue };
+            let text = String::from_utf8_lossy(contents.data());
+            let Some(before) = text.get(..label.offset() - contents.span().offset()) else { continue };
+            let start = before.rfind('\n').map_or(0, |end| end + 1);
+            let indent = before[start..].chars().count();
+            let line = contents.line() + before.matches('\n').count() + 1;
+            let column = indent + 1 + if start == 0 { contents.column() } else { 0 };
+            let mark = self.coloured(AnsiColor::Magenta.on_default(), "╰── ");
+            writeln!(f, "   ╭─[{}:{line}:{column}]", contents.name().unwrap_or_default())?;
+            writeln!(f, "   │ {}", text[start..].lines().next().unwrap_or_default())?;
+            writeln!(f, "   · {:indent$}{mark}{}", "", label.label().unwrap_or_default())?;
+        }
+        Ok(())
     }
 }
 
-impl Display for Printable<'_> {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        f.write_str(&self.message)
+/// Messages of an error and of its causes, escaped; a cause that the message before it ends with is left out.
+fn messages(error: &dyn Diagnostic) -> Vec<String> {
+    let mut texts = vec![escaped(error)];
+    let mut cause: Option<&dyn Error> =
+        error.diagnostic_source().map(|cause| cause as &dyn Error).or_else(|| error.source());
+    while let Some(error) = cause {
+        let text = escaped(error);
+        if !texts.last().is_some_and(|last| last.ends_with(&text)) {
+            texts.push(text);
+        }
+        cause = error.source();
+    }
+    texts
+}
+
+/// Remedy of an error, or of the first of its causes that has one, escaped.
+fn help(error: &dyn Diagnostic) -> Option<String> {
+    match error.help() {
+        Some(help) => Some(escaped(help)),
+        None => help(error.diagnostic_source()?),
     }
 }
 
-impl Error for Printable<'_> {
-    fn source(&self) -> Option<&(dyn Error + 'static)> {
-        match &self.cause {
-            Some(Cause::Error(cause)) => Some(cause),
-            _ => None,
+/// Parts of a line of at most `width` characters, broken at spaces; a longer word stays in one piece.
+fn broken(line: &str, width: usize) -> Vec<String> {
+    let mut words = line.split(' ');
+    let mut parts = vec![words.next().unwrap_or_default().to_owned()];
+    for word in words {
+        match parts.last_mut() {
+            Some(part) if part.chars().count() + 1 + word.chars().count() <= width => {
+                part.push(' ');
+                part.push_str(word);
+            }
+            _ => parts.push(word.to_owned()),
         }
     }
-}
-
-impl Diagnostic for Printable<'_> {
-    fn code<'a>(&'a self) -> Option<Box<dyn Display + 'a>> {
-        self.diagnostic.code()
-    }
-
-    fn severity(&self) -> Option<Severity> {
-        self.diagnostic.severity()
-    }
-
-    fn help<'a>(&'a self) -> Option<Box<dyn Display + 'a>> {
-        self.diagnostic.help().map(|help| Box::new(escaped(&help)) as Box<dyn Display>)
-    }
-
-    fn source_code(&self) -> Option<&dyn SourceCode> {
-        self.diagnostic.source_code()
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        self.diagnostic.labels()
-    }
-
-    fn diagnostic_source(&self) -> Option<&dyn Diagnostic> {
-        match &self.cause {
-            Some(Cause::Diagnostic(cause)) => Some(cause.as_ref()),
-            _ => None,
-        }
-    }
-}
-
-/// Error with its text and causes escaped.
-#[derive(Debug)]
-struct PrintableError {
-    message: String,
-    cause: Option<Box<PrintableError>>,
-}
-
-impl PrintableError {
-    fn new(error: &dyn Error) -> Self {
-        Self { message: escaped(error), cause: error.source().map(|cause| Box::new(Self::new(cause))) }
-    }
-}
-
-impl Display for PrintableError {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        f.write_str(&self.message)
-    }
-}
-
-impl Error for PrintableError {
-    fn source(&self) -> Option<&(dyn Error + 'static)> {
-        self.cause.as_deref().map(|cause| cause as &(dyn Error + 'static))
-    }
+    parts
 }
 
 fn escaped(text: impl Display) -> String {
     printable(&text.to_string()).into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use miette::{LabeledSpan, MietteDiagnostic, NamedSource, Report};
+
+    use super::*;
+
+    /// What [`Layout`] prints of a report.
+    fn printed(report: &Report, width: usize) -> String {
+        struct Printed<'a>(&'a dyn Diagnostic, Layout);
+        impl Display for Printed<'_> {
+            fn fmt(&self, f: &mut Formatter<'_>) -> Result {
+                self.1.debug(self.0, f)
+            }
+        }
+        Printed(report.as_ref(), Layout { width, has_colours: false }).to_string()
+    }
+
+    #[test]
+    fn an_error_has_its_message_excerpt_and_remedy() {
+        let place = LabeledSpan::at(11..12, "here");
+        let error =
+            MietteDiagnostic::new("no\x1b[31m number").with_code("scene::json").with_help("correct it");
+        let report = Report::new(error.with_label(place))
+            .with_source_code(NamedSource::new("a.gltf", "{\"ä\": 1,\n x}\n".to_owned()));
+        let expected = [
+            "scene::json\n",
+            "  × no\\u{1b}[31m number",
+            "   ╭─[a.gltf:2:2]",
+            "   │  x}",
+            "   ·  ╰── here",
+            "  help: correct it\n",
+        ];
+        assert_eq!(printed(&report, usize::MAX), expected.join("\n"));
+    }
+
+    #[test]
+    fn long_lines_are_broken_at_spaces() {
+        assert_eq!(broken("one two three", 7), ["one two", "three"]);
+        assert_eq!(broken("one two three", 8), ["one two", "three"]);
+        assert_eq!(broken("a/path/without/spaces is long", 6), ["a/path/without/spaces", "is", "long"]);
+        assert_eq!(broken("", 6), [""]);
+        let report = Report::new(MietteDiagnostic::new("one two three").with_help("four five six"));
+        assert_eq!(printed(&report, 11), "  × one two\n    three\n  help: four\n        five\n        six\n");
+    }
 }

@@ -99,3 +99,42 @@ impl Structure {
         )
     }
 }
+
+/// Stage of rendering that reads memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Stage {
+    /// Loading an image and beginning a frame.
+    Begin = 0,
+    /// Eye rays.
+    Eye = 1,
+    /// Survey rays of irradiance records.
+    Survey = 2,
+    /// Photon gathers for direction tables (importance sampling).
+    Table = 3,
+    /// Shadow rays.
+    Shadow = 4,
+    /// Final gather rays.
+    GatherRay = 5,
+    /// Photon gathers at the ends of final gather rays.
+    Gather = 6,
+    /// Photon gathers in the caustic map, at visible surfaces.
+    Caustic = 7,
+}
+
+/// Number of stages.
+pub const STAGES: usize = 8;
+
+impl Stage {
+    /// All stages, in order.
+    pub const ALL: [Self; STAGES] = [
+        Self::Begin,
+        Self::Eye,
+        Self::Survey,
+        Self::Table,
+        Self::Shadow,
+        Self::GatherRay,
+        Self::Gather,
+        Self::Caustic,
+    ];
+}

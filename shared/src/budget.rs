@@ -59,6 +59,9 @@ pub const MAX_IN_FLIGHT: u32 = 8;
 /// Maximum of [`Budget::tile_pixels`], and of [`Budget::irradiance_records`], over all chips.
 pub const MAX_TILE_PIXELS: u32 = 1 << 15;
 
+/// [`Budget::dram_bytes`] of the reference chip, against which a scene is counted where no card is known.
+pub const REFERENCE_DRAM_BYTES: u32 = 512 << 20;
+
 /// Maximum of [`Budget::gather_rays`] over all chips.
 pub const MAX_GATHER_RAYS: u32 = 1 << 14;
 

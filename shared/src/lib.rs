@@ -48,6 +48,8 @@
 //! | [`message`] | message | commands of the host, replies of a card, faults |
 //! | [`counters`] | | work of a tile, which a card reports with it |
 //!
+//! [`hash`] is that of all random numbers.
+//!
 //! No function allocates, and no input makes one panic. `docs/protocol.md` describes the protocol for other implementations,
 //! `docs/glossary.md` defines the terms.
 #![forbid(unsafe_code)]
@@ -69,6 +71,7 @@ pub mod budget;
 pub mod checksum;
 pub mod counters;
 pub mod frame;
+pub mod hash;
 pub mod image;
 pub mod layout;
 pub mod link;

@@ -1,6 +1,6 @@
 //! The floating-point operations of the firmware: `tests/operations.sh`.
 //!
-//! `operations table` prints `driver/src/cost_model/arithmetic/table.rs`: the operations of each step, counted in tiles of several scenes.
+//! `operations table` prints `driver/render/src/cost_model/arithmetic/table.rs`: the operations of each step, counted in tiles of several scenes.
 //! `operations report` prints the operations of each unit for a ray and for a gather, counted and by the table.
 
 use photoncard_driver::choice::Choice;

@@ -168,7 +168,7 @@ proptest! {
 
     /// Any number of tiles in flight, on chips of any kind, in any order, with a queue of any size: gathers wait across tiles.
     #[test]
-    fn nor_do_tiles_in_flight(
+    fn tiles_in_flight_do_not_change_a_bit(
         tile in 2_u32..9,
         order in prop::sample::select(&CHIPS_ORDERS[..]),
         queue in prop_oneof![Just(None), (1_u32..40).prop_map(Some), (40_u32..700).prop_map(Some)],
@@ -210,27 +210,27 @@ fn order_tiles_chips_and_kind_of_chip_do_not_change_a_bit() {
 }
 
 #[test]
-fn nor_do_they_with_rays_by_photons() {
+fn rays_by_photons_are_exact() {
     check_variants(Sampling::Photon);
 }
 
 #[test]
-fn nor_do_they_with_rays_by_the_product() {
+fn rays_by_the_product_are_exact() {
     check_variants(Sampling::Product);
 }
 
 #[test]
-fn nor_do_they_with_rays_by_the_mixture() {
+fn rays_by_the_mixture_are_exact() {
     check_variants(Sampling::Mixture);
 }
 
 #[test]
-fn nor_do_they_with_precomputed_irradiance() {
+fn precomputed_irradiance_is_exact() {
     check_variants_of(&glossy(), &settings().with(|s| s.photons.radiance = Radiance::Precomputed));
 }
 
 #[test]
-fn nor_do_they_with_textures_cut_outs_mirrors_glass_and_lights_of_every_kind() {
+fn textures_cut_outs_mirrors_glass_and_lights_of_every_kind_are_exact() {
     let small = settings().with(|s| {
         (s.picture.width, s.picture.height) = (25, 19);
         s.photons.caustic_photons = Some(3000);
@@ -239,7 +239,7 @@ fn nor_do_they_with_textures_cut_outs_mirrors_glass_and_lights_of_every_kind() {
 }
 
 #[test]
-fn nor_do_they_with_adaptive_sampling() {
+fn adaptive_sampling_is_exact() {
     let scene = everything();
     for irradiance_error in [None, Some(0.1)] {
         let with = |settings: RenderSettings| {
@@ -266,7 +266,7 @@ fn nor_do_they_with_adaptive_sampling() {
 }
 
 #[test]
-fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
+fn more_records_than_a_chip_has_room_for_are_exact() {
     // So small an error bound divides every cell, down to one record at every other pixel: these blocks are halved.
     let records = |width: u32, height: u32| (width.div_ceil(2) + 1) * (height.div_ceil(2) + 1);
     assert!(records(61, 61) > REFERENCE.irradiance_records && records(140, 1) > MICRO.irradiance_records);
@@ -296,7 +296,7 @@ fn nor_do_they_with_more_records_than_a_chip_has_room_for() {
 
 /// Far to the right a position in the picture has few bits below the pixel: it may be rounded to the next pixel's border.
 #[test]
-fn nor_do_they_where_samples_are_rounded_to_the_next_pixel() {
+fn samples_rounded_to_the_next_pixel_are_exact() {
     let scene = glossy();
     let settings = |tile| {
         settings().with(|s| {

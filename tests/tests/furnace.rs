@@ -56,7 +56,7 @@ fn a_diffuse_furnace_glows_evenly() {
 }
 
 #[test]
-fn nor_does_it_flicker_by_precomputed_irradiance() {
+fn a_diffuse_furnace_glows_evenly_by_precomputed_irradiance() {
     let settings = settings().with(|s| s.photons.radiance = Radiance::Precomputed);
     for albedo in [0.2, 0.8] {
         let expected = EMISSION as f64 / (1.0 - albedo as f64);

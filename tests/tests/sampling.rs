@@ -60,24 +60,24 @@ fn check_sampling(light: &IndirectLight, sampling: Sampling, reference: &[DVec3]
 }
 
 #[test]
-fn the_cornell_box_has_the_same_indirect_light_by_every_sampling() {
+fn indirect_light_of_the_cornell_box_is_the_same_by_every_sampling() {
     check("cornell.gltf", None, &[]);
 }
 
 #[test]
-fn so_has_one_that_is_lit_from_a_spot() {
+fn indirect_light_from_a_spot_is_the_same_by_every_sampling() {
     check("cornell-uplight.gltf", None, &[]);
 }
 
 #[test]
-fn so_have_glossy_floors() {
+fn indirect_light_of_glossy_floors_is_the_same_by_every_sampling() {
     for exponent in ["1", "8", "32", "128"] {
         check("cornell-glossy.gltf", Some("floor"), &[&format!("floor.exponent={exponent}")]);
     }
 }
 
 #[test]
-fn so_has_the_atrium() {
+fn indirect_light_of_the_atrium_is_the_same_by_every_sampling() {
     check("atrium.glb", None, &[]);
 }
 

@@ -13,7 +13,7 @@ const SIDE: u32 = 200;
 const TRIANGLES: usize = (2 * SIDE * SIDE) as usize;
 /// `BYTES_OF_A_TRIANGLE` of `driver::scene::gltf::mikktspace`.
 const BYTES_A_TRIANGLE: usize = 1600;
-const TEXEL: &[u8] = include_bytes!("../../driver/tests/images/texel.png");
+const TEXEL: &[u8] = include_bytes!("../../driver/scene/tests/it/images/texel.png");
 
 /// A hilly square of triangles that share no vertex index.
 fn mesh() -> (Vec<u8>, usize) {

@@ -12,7 +12,7 @@ use crate::common::{Board, receive_all, semihosting};
 const TICKS: u64 = 10_000;
 
 /// Interrupt number of the UART.
-const UART: u32 = 10;
+const UART_IRQ: u32 = 10;
 
 // SAFETY: the registers of the UART, of hart 0's timer and of the interrupt controller, by the documents above.
 const UART_DATA: Register<u8> = unsafe { Register::at(0x1000_0000) };
@@ -24,7 +24,7 @@ const TIMER_COMPARE: Register<u32> = unsafe { Register::at(0x0200_4000) };
 const TIMER_COMPARE_HIGH: Register<u32> = unsafe { Register::at(0x0200_4004) };
 const TIMER: Register<u32> = unsafe { Register::at(0x0200_BFF8) };
 const TIMER_HIGH: Register<u32> = unsafe { Register::at(0x0200_BFFC) };
-const PRIORITY: Register<u32> = unsafe { Register::at(0x0C00_0000 + 4 * UART as usize) };
+const PRIORITY: Register<u32> = unsafe { Register::at(0x0C00_0000 + 4 * UART_IRQ as usize) };
 const ENABLE: Register<u32> = unsafe { Register::at(0x0C00_2000) };
 const THRESHOLD: Register<u32> = unsafe { Register::at(0x0C20_0000) };
 const CLAIM: Register<u32> = unsafe { Register::at(0x0C20_0004) };
@@ -68,7 +68,7 @@ impl Board for Virt {
         UART_FIFO.write(FIFO_ON);
         Self::listen(true);
         PRIORITY.write(1);
-        ENABLE.write(1 << UART);
+        ENABLE.write(1 << UART_IRQ);
         THRESHOLD.write(0);
         // SAFETY: the handlers of both interrupts are defined below.
         unsafe {
@@ -116,7 +116,7 @@ fn timer() {
 #[core_interrupt(Interrupt::MachineExternal)]
 fn external() {
     let source = CLAIM.read();
-    if source == UART {
+    if source == UART_IRQ {
         receive_all::<Virt>();
     }
     CLAIM.write(source);

@@ -206,13 +206,13 @@ impl<K: ChipKind> Chip<K> {
         }
         let done = flight.counters.rays_and_gathers();
         match pass {
-            Pass::Recall => flight.recall(job, shared)?,
+            Pass::ReadKept => flight.read_kept(job, shared)?,
             Pass::Survey => flight.survey(job, shared)?,
             Pass::RecordPoints => flight.choose_record_point(job, shared)?,
             Pass::RecordRays => flight.cast_for_record(job, shared, number)?,
             Pass::Probe => flight.probe(job)?,
             Pass::Eye => flight.look(job, shared, number)?,
-            Pass::Direct => flight.light_directly(job, shared, number)?,
+            Pass::Direct => flight.gather_direct_light(job, shared, number)?,
             Pass::Rays => flight.cast_for_pixel(job, shared, number)?,
             _ => self.active = None,
         }

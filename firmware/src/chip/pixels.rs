@@ -154,7 +154,7 @@ impl<K: ChipKind> Flight<K> {
     }
 
     /// Adds the light of shadow rays and caustics to the pixel of the present gather point, with the weight of its path.
-    pub(super) fn light_directly<M: MemoryPort>(
+    pub(super) fn gather_direct_light<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
         shared: &mut Shared<K>,

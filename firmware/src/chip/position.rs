@@ -45,7 +45,7 @@ impl Block {
     }
 }
 
-/// Passes of a block, in order. The passes from [`Pass::Recall`] to [`Pass::WaitForRecords`] are skipped without the irradiance cache, and
+/// Passes of a block, in order. The passes from [`Pass::ReadKept`] to [`Pass::WaitForRecords`] are skipped without the irradiance cache, and
 /// those after the first with kept records; [`Pass::CompletePlain`] is skipped where every sample has gather rays, and the passes after it
 /// are of the other pixels alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +55,7 @@ pub(super) enum Pass {
     /// The next block has not begun.
     NextBlock,
     /// Search for the irradiance records that an earlier frame has kept.
-    Recall,
+    ReadKept,
     /// Survey: placement of irradiance records, level by level of the lattice.
     Survey,
     /// Directions of the gather rays of the records.

@@ -14,13 +14,13 @@ use crate::render::{RenderJob, final_gather};
 
 impl<K: ChipKind> Flight<K> {
     /// Reads back the block's records, if an earlier frame has kept them.
-    pub(super) fn recall<M: MemoryPort>(
+    pub(super) fn read_kept<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
         shared: &mut Shared<K>,
     ) -> Result<(), Fault> {
         let window = self.window();
-        match shared.store.recall(&mut job.context(&mut self.counters), &window, &mut self.cache)? {
+        match shared.store.read_kept(&mut job.context(&mut self.counters), &window, &mut self.cache)? {
             Recalled::Records => {
                 self.position = Position::at(Pass::CompletePlain);
             }

@@ -78,7 +78,7 @@ impl RecordStore {
     /// # Errors
     /// If the memory is shorter than it was.
     #[inline(never)]
-    pub fn recall<M: MemoryPort, R: Capacity>(
+    pub fn read_kept<M: MemoryPort, R: Capacity>(
         &self,
         context: &mut Context<M>,
         window: &Window,

@@ -1,6 +1,6 @@
 //! The reference chip: the dissertation's.
 
-use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
+use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, REFERENCE_DRAM_BYTES, gather_candidates};
 
 use super::capacity::Entries;
 use super::chip_kind::{ChipKind, TechniqueMemory};
@@ -10,7 +10,7 @@ use crate::photon::CandidateBuffer;
 /// tiles have up to 64x64 pixels (16x16 in the dissertation). One tile in flight leaves room for a long gather queue, and gather points for half a tile.
 pub const REFERENCE: Budget = Budget {
     sram_bytes: 1 << 20,
-    dram_bytes: 512 << 20,
+    dram_bytes: REFERENCE_DRAM_BYTES,
     photon_cache_bytes: 128 << 10,
     scene_cache_bytes: 75 << 10,
     stack_bytes: 16 << 10,

@@ -14,8 +14,9 @@ pub use counted::Counted;
 pub use dram::{Dram, Lines};
 pub use line_cache::{CacheEntry, CacheShape, LineCache, LineCaches, SetIndex, ShapeError};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
+pub use photoncard_shared::address::{STAGES, Stage};
 use photoncard_shared::message::{Fault, FaultCode};
-pub use traffic::{Reads, STAGES, Stage, Traffic};
+pub use traffic::{Reads, Traffic};
 
 /// Access of a chip to card memory. A cache or a counter is a `MemoryPort` over a `MemoryPort`.
 pub trait MemoryPort {

@@ -22,7 +22,7 @@ pub use bundle::{BUNDLE_RAYS, Bundle, closest_hits, transmittances};
 pub use bvh::{ClosestHit, Passed, ShadowRay, closest_hit, transmittance};
 pub use cut_out::is_there;
 pub use reflection::{
-    DecodedLobe, NARROW_ALPHA, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,
+    DecodedLobe, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,
 };
 pub use seen::Seen;
 pub use specular::Specular;

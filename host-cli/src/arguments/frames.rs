@@ -27,7 +27,7 @@ pub(crate) struct FrameOptions {
     /// Animation that plays, by its name; may be repeated [default: all of the file]
     #[arg(long = "animation", value_name = "NAME", requires = "frames", hide_short_help = true)]
     animations: Vec<String>,
-    /// Frames in a second [default: 24]
+    /// Frames per second [default: 24]
     #[arg(long, value_name = "NUMBER", requires = "frames", value_parser = fps, allow_negative_numbers = true)]
     fps: Option<f64>,
 }
@@ -53,7 +53,7 @@ impl FrameOptions {
         named.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
     }
 
-    /// Frames in a second.
+    /// Frames per second.
     pub(crate) fn fps(&self) -> f64 {
         self.fps.unwrap_or(FPS)
     }

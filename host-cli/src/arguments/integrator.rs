@@ -36,8 +36,10 @@ pub(crate) struct IntegratorOptions {
     /// Maximum relative error of interpolated irradiance [default: by --quality, 0.025 for paper]
     #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) ic_error: Option<f32>,
-    /// Adaptive sampling: after its first four samples a pixel has s / (THRESHOLD sqrt(L)) paths a sample, 1 to 16, by their deviation s and mean L; or off
-    /// [default: by --quality, for the scene; off where all other settings of samples and rays are stated]
+    /// Give pixels whose first four samples differ up to 16 paths per sample; smaller thresholds give more [default: by --quality]
+    ///
+    /// A pixel has s / (THRESHOLD sqrt(L)) paths per sample, by the deviation s and the mean L of its first four. By default the
+    /// pilot chooses the threshold for the scene; adaptive sampling is off where all other settings of samples and rays are stated.
     #[arg(long, value_name = "THRESHOLD|off", value_parser = adaptive, allow_negative_numbers = true, hide_short_help = true)]
     adaptive: Option<Adaptive>,
 }

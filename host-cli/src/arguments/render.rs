@@ -38,11 +38,11 @@ pub(crate) struct RenderOptions {
     pub(crate) picture: PictureOptions,
     #[command(flatten)]
     pub(super) photons: PhotonOptions,
-    /// Cameras that the photons are for
+    /// Guide photons to the whole scene, or to what this camera uses
     ///
-    /// For the picture's camera more photons are where it uses them: light through a window wastes fewer on the outside of a house. The
-    /// picture's expected value stays. With auto a pilot measures what that gains, unless all that it would choose is stated. Pictures of
-    /// several cameras, such as frames and prepared scenes, share photons for the scene.
+    /// By the camera more photons are where the picture uses them: light through a window wastes fewer on the outside of a
+    /// house. The picture's expected value stays. With auto a pilot measures what that gains, unless all that it would
+    /// choose is stated. Pictures of several cameras, such as frames and prepared scenes, share photons for the scene.
     #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::Auto.name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
     photons_for: PhotonsFor,
     #[command(flatten)]
@@ -144,7 +144,7 @@ impl RenderOptions {
         self.photons_for() == PhotonsFor::Auto
     }
 
-    /// Cameras that the photons are for: any, where several pictures share them.
+    /// What guides the photons: the scene, where several pictures share them.
     fn photons_for(&self) -> PhotonsFor {
         let is_shared = self.frames.numbers().is_some() || self.prepared.prepared;
         if is_shared { PhotonsFor::Scene } else { self.photons_for }

@@ -95,7 +95,7 @@ mod tests {
     use super::*;
     use crate::arguments::Arguments;
 
-    fn sorted(line: &str) -> Result<Words, String> {
+    fn words_of(line: &str) -> Result<Words, String> {
         let command = Arguments::command();
         let farm = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm")).unwrap();
         Words::new(line.split(' ').map(str::to_owned), farm)
@@ -105,7 +105,7 @@ mod tests {
     fn words_are_sorted_by_the_steps_that_take_them() {
         let line = "--size 8x8 --photons=9 a.gltf -o b.exr --quiet --card emulated:1 --irradiance-cache on --parts 3 -oc.png \
                     --sample-type half --tile 8 --set -x.y=1 --frames=1-2";
-        let words = sorted(line).unwrap();
+        let words = words_of(line).unwrap();
         assert_eq!(words.scene, ["a.gltf"]);
         assert_eq!(words.both, ["--size", "8x8", "--quiet"]);
         assert_eq!(words.prepare, ["--photons=9", "--irradiance-cache", "on", "--set", "-x.y=1"]);
@@ -127,7 +127,7 @@ mod tests {
             "--keep-samples",
         ] {
             let name = option.split('=').next().unwrap();
-            assert_eq!(sorted(&format!("a.gltf {option}")), Err(name.to_owned()));
+            assert_eq!(words_of(&format!("a.gltf {option}")), Err(name.to_owned()));
         }
     }
 

@@ -17,7 +17,7 @@ impl Record for DistantLight {
     const BYTES: usize = 32;
 }
 
-const THRESHOLD: usize = 24;
+const THRESHOLD_OFFSET: usize = 24;
 
 impl DistantLight {
     /// Reads a record.
@@ -33,7 +33,7 @@ impl DistantLight {
     /// [`Self::threshold`](Self#structfield.threshold) of a record, without reading the rest.
     #[inline(always)]
     pub fn threshold(bytes: &[u8; Self::BYTES]) -> u32 {
-        read_u32(bytes, THRESHOLD)
+        read_u32(bytes, THRESHOLD_OFFSET)
     }
 
     /// The record's bytes.
@@ -41,7 +41,7 @@ impl DistantLight {
         let mut bytes = [0; Self::BYTES];
         write_vector(&mut bytes, 0, self.direction);
         write_vector(&mut bytes, 12, self.irradiance);
-        write_u32(&mut bytes, THRESHOLD, self.threshold);
+        write_u32(&mut bytes, THRESHOLD_OFFSET, self.threshold);
         bytes
     }
 }

@@ -13,6 +13,11 @@ pub const HAS_ATTRIBUTES: u32 = 4;
 /// Flag of [`Material::flags`]: the GGX lobe is narrow somewhere, and is followed by rays instead of being estimated from photons.
 pub const NARROW_LOBE: u32 = 8;
 
+/// `a = roughness^2` below which a GGX lobe is narrow: half of its light is within 28 degrees, an eighth of the hemisphere. A
+/// material with a narrow lobe at some texel has [`NARROW_LOBE`] for all texels: photons are stored for the lobe everywhere on a
+/// surface or nowhere.
+pub const NARROW_ALPHA: f32 = 0.25;
+
 /// Flag of [`Material::flags`]: [`Material::cutoff`] is a factor of alpha, the share of the surface that is there (glTF's `alphaMode`
 /// `BLEND`).
 pub const BLENDS: u32 = 64;

@@ -13,14 +13,14 @@ use super::target::{Target, bound};
 
 /// Scenes with buffer views of every mode and filter, in both versions of meshopt.
 const MESHOPT: [&[u8]; 2] = [
-    include_bytes!("../../../driver/tests/compressed/meshopt-0.glb"),
-    include_bytes!("../../../driver/tests/compressed/meshopt-1.glb"),
+    include_bytes!("../../../driver/scene/tests/it/compressed/meshopt-0.glb"),
+    include_bytes!("../../../driver/scene/tests/it/compressed/meshopt-1.glb"),
 ];
 
 /// Scenes with a primitive of every attribute, by both encoders of Draco.
 const DRACO: [&[u8]; 2] = [
-    include_bytes!("../../../driver/tests/compressed/draco-edgebreaker.glb"),
-    include_bytes!("../../../driver/tests/compressed/draco-sequential.glb"),
+    include_bytes!("../../../driver/scene/tests/it/compressed/draco-edgebreaker.glb"),
+    include_bytes!("../../../driver/scene/tests/it/compressed/draco-sequential.glb"),
 ];
 
 /// Target of compressed contents. An input is a scene.

@@ -36,8 +36,8 @@ const SHIPPED: [&[u8]; 3] = [
 ];
 
 /// Images, each at a multiple of four bytes, after the triangle's data.
-const PNG: &[u8] = include_bytes!("../../../driver/tests/images/texel.png");
-const JPEG: &[u8] = include_bytes!("../../../driver/tests/images/grey.jpg");
+const PNG: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/texel.png");
+const JPEG: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/grey.jpg");
 
 /// Bytes of a triangle: vertices, indices, an index and a position of a sparse accessor, coordinates, colours, joints,
 /// weights, a matrix, images, and times, rotations and weights of keyframes.

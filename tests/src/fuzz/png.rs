@@ -85,7 +85,7 @@ fn checksum(bytes: &[u8]) -> [u8; 4] {
 mod tests {
     use super::*;
 
-    const FILE: &[u8] = include_bytes!("../../../driver/tests/images/palette.png");
+    const FILE: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/palette.png");
 
     #[test]
     fn a_file_is_its_chunks() {

@@ -19,20 +19,20 @@ pub(super) struct Textures {
 
 /// Images of all colour types of PNG: no edit of a byte adds a palette.
 const SEEDS: [&[u8]; 14] = [
-    include_bytes!("../../../driver/tests/images/texel.png"),
-    include_bytes!("../../../driver/tests/images/palette.png"),
-    include_bytes!("../../../driver/tests/images/deep.png"),
-    include_bytes!("../../../driver/tests/images/interlaced.png"),
-    include_bytes!("../../../driver/tests/images/colour.jpg"),
-    include_bytes!("../../../driver/tests/images/progressive.jpg"),
-    include_bytes!("../../../driver/tests/images/grey.jpg"),
-    include_bytes!("../../../driver/tests/images/lossy.webp"),
-    include_bytes!("../../../driver/tests/images/lossless.webp"),
-    include_bytes!("../../../driver/tests/images/alpha.webp"),
-    include_bytes!("../../../driver/tests/images/etc1s.ktx2"),
-    include_bytes!("../../../driver/tests/images/etc1s-alpha.ktx2"),
-    include_bytes!("../../../driver/tests/images/uastc.ktx2"),
-    include_bytes!("../../../driver/tests/images/uastc-zstd.ktx2"),
+    include_bytes!("../../../driver/scene/tests/it/images/texel.png"),
+    include_bytes!("../../../driver/scene/tests/it/images/palette.png"),
+    include_bytes!("../../../driver/scene/tests/it/images/deep.png"),
+    include_bytes!("../../../driver/scene/tests/it/images/interlaced.png"),
+    include_bytes!("../../../driver/scene/tests/it/images/colour.jpg"),
+    include_bytes!("../../../driver/scene/tests/it/images/progressive.jpg"),
+    include_bytes!("../../../driver/scene/tests/it/images/grey.jpg"),
+    include_bytes!("../../../driver/scene/tests/it/images/lossy.webp"),
+    include_bytes!("../../../driver/scene/tests/it/images/lossless.webp"),
+    include_bytes!("../../../driver/scene/tests/it/images/alpha.webp"),
+    include_bytes!("../../../driver/scene/tests/it/images/etc1s.ktx2"),
+    include_bytes!("../../../driver/scene/tests/it/images/etc1s-alpha.ktx2"),
+    include_bytes!("../../../driver/scene/tests/it/images/uastc.ktx2"),
+    include_bytes!("../../../driver/scene/tests/it/images/uastc-zstd.ktx2"),
 ];
 
 /// Memory of the card, bytes. It bounds the texels of WebP and of ETC1S in KTX2, which may take no bytes of the file at all.

@@ -4,14 +4,11 @@
 //! an item that the other defines, whichever module hands the item on by `pub use`. Neither a `mod` declaration nor a `pub use` of a
 //! name that the file itself does not use is an import.
 //!
-//! Modules of the driver besides keep the order of the table of layers in its documentation, which names each of them once.
-//!
 //! No types are resolved, so that two uses of another file remain unseen: a method or a field of a value whose type the file does not
 //! name, such as an inherent method that another file defines for a type; and paths in the body of a `macro_rules!`, or in arguments of
 //! a macro that are no expressions with commas between them.
 
 mod circles;
-mod layers;
 mod modules;
 mod paths;
 
@@ -20,7 +17,6 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use self::circles::{Imports, circles};
-use self::layers::Layers;
 use self::modules::Crate;
 
 fn workspace() -> &'static Path {
@@ -65,7 +61,9 @@ fn imports_of<'r>(roots: impl IntoIterator<Item = &'r PathBuf>) -> Imports {
 fn no_file_imports_one_that_imports_it_back() {
     let imports = imports_of(&roots());
     let mut on_disk = BTreeSet::new();
-    for package in ["shared", "firmware", "driver", "host-cli", "scenes", "tests"] {
+    let rooms = ["cards", "map", "picture", "render", "scene", "study"].map(|room| format!("driver/{room}"));
+    let packages = ["shared", "firmware", "driver", "host-cli", "scenes", "tests"];
+    for package in packages.into_iter().chain(rooms.iter().map(String::as_str)) {
         for folder in ["src", "boards"].map(|folder| workspace().join(package).join(folder)) {
             if folder.is_dir() {
                 rust_files(&folder, &mut on_disk);
@@ -80,58 +78,15 @@ fn no_file_imports_one_that_imports_it_back() {
     assert!(circles.is_empty(), "{} circles:\n{}", circles.len(), circles.join("\n"));
 }
 
-#[test]
-fn modules_of_the_driver_import_none_of_a_layer_above() {
-    let folder = workspace().join("driver/src").canonicalize().expect("a folder");
-    let root = folder.join("lib.rs");
-    let layers = Layers::read(&std::fs::read_to_string(&root).expect("is read"));
-    let faults = layers.faults(&imports_of([&root]), &folder);
-    assert!(faults.is_empty(), "{} faults:\n{}", faults.len(), faults.join("\n"));
-}
-
-/// Imports of a crate that is made of these files, the first of them its root, and its folder.
-fn written(files: &[(&str, &str)]) -> (Imports, tempfile::TempDir) {
+/// The circles of a crate that is made of these files, the first of them its root.
+fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in files {
         let path = folder.path().join(name);
         std::fs::create_dir_all(path.parent().expect("a folder")).expect("is made");
         std::fs::write(path, text).expect("is written");
     }
-    (imports_of([&folder.path().join(files[0].0)]), folder)
-}
-
-/// The circles of a crate that is made of these files, the first of them its root.
-fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
-    let (imports, folder) = written(files);
-    circles(&imports, folder.path())
-}
-
-#[test]
-fn what_the_table_of_layers_does_not_allow_is_named() {
-    let table = "//! # Layers\n//!\n//! | layer | modules | |\n//! |---|---|---|\n";
-    let rows = "//! | one | [`a`], `b` | `z` |\n//! | two | [`c`] | |\n//!\n//! # End\n//! | | `y` | |\n";
-    let faults_of = |root: &str, a: &str, c: &str| {
-        let root = format!("{root}mod a; mod b; mod c;");
-        let files = [
-            ("lib.rs", root.as_str()),
-            ("a/mod.rs", "mod d;"),
-            ("a/d.rs", a),
-            ("b.rs", "pub struct B;"),
-            ("c.rs", c),
-        ];
-        let (imports, folder) = written(&files);
-        Layers::read(&root).faults(&imports, &folder.path().canonicalize().expect("a folder"))
-    };
-    let sound = format!("{table}{rows}");
-    let [up, down] = ["use crate::b::B;", "use crate::c::C; use crate::b::B;"];
-    assert_eq!(faults_of(&sound, up, up), [""; 0]);
-    assert_eq!(faults_of(&sound, down, "pub struct C;"), ["a/d.rs takes crate::c::C of a row below"]);
-    assert_eq!(
-        faults_of(&sound.replace("`b`", "`c`"), "", ""),
-        ["c is in two rows", "the module b is in no row"]
-    );
-    assert_eq!(faults_of(&sound.replace("[`c`]", "`c`, `e`"), "", ""), ["e is no module"]);
-    assert_eq!(faults_of("", "", "").len(), 3);
+    circles(&imports_of([&folder.path().join(files[0].0)]), folder.path())
 }
 
 #[test]

@@ -39,11 +39,6 @@ use ggx::Estimate;
 use lobe::Lobe;
 use phong::PhongLobe;
 
-/// `a = roughness^2` below which a GGX lobe is narrow: half of its light is within 28 degrees, an eighth of the hemisphere. A material
-/// with a narrow lobe at some texel has [`NARROW_LOBE`](photoncard_shared::layout::NARROW_LOBE), for all texels: photons are stored
-/// for the lobe everywhere on a surface or nowhere.
-pub const NARROW_ALPHA: f32 = 0.25;
-
 /// The parameters of a reflection function `f`: a Lambertian part and a lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflection {

@@ -1,0 +1,147 @@
+//! Transfer of tiles: from the scheduler to sessions, and finished ones from sessions to sinks.
+
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock};
+use std::time::Duration;
+
+use photoncard_picture::sink::{FinishedTile, TileSink};
+use photoncard_shared::message::Tile;
+
+use crate::scheduler::{Answered, CardNumber, Scheduler, SchedulerError, Standing};
+use crate::session::{Event, Session, SessionError};
+
+/// State that the sessions of a render share, each on a thread of its own or all on one.
+pub struct Dispatcher<'a> {
+    scheduler: Mutex<Scheduler>,
+    /// Notified when a tile waits again, a card is given up, or all tiles are done.
+    changed: Condvar,
+    sinks: Vec<&'a dyn TileSink>,
+    /// Called before the sinks receive a card's tile.
+    rendered: &'a (dyn Fn(CardNumber, &Tile) + Sync),
+    /// Held shared while a tile is put into the sinks, exclusively while sinks revoke tiles.
+    order: RwLock<()>,
+}
+
+impl<'a> Dispatcher<'a> {
+    /// Dispatcher between the scheduler's cards and all sinks.
+    pub fn new(scheduler: Scheduler, sinks: Vec<&'a dyn TileSink>) -> Self {
+        Self {
+            scheduler: Mutex::new(scheduler),
+            changed: Condvar::new(),
+            sinks,
+            rendered: &|_, _| {},
+            order: RwLock::default(),
+        }
+    }
+
+    /// Dispatcher that calls a function before the sinks receive a card's tile.
+    #[must_use]
+    pub fn telling(self, rendered: &'a (dyn Fn(CardNumber, &Tile) + Sync)) -> Self {
+        Self { rendered, ..self }
+    }
+
+    /// The scheduler, which holds the tiles that are left.
+    pub fn scheduler(&self) -> MutexGuard<'_, Scheduler> {
+        // A thread that panicked holding the lock ends the render.
+        self.scheduler.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Assigns tiles to a card until its credits are used up.
+    pub fn supply(&self, card: CardNumber, session: &mut Session, now: Duration) {
+        while session.wants_tile() {
+            match self.scheduler().take(card, now) {
+                Some(assignment) => session.give(assignment),
+                None => {
+                    session.flush();
+                    session.prepare();
+                    break;
+                }
+            }
+            session.prepare();
+        }
+    }
+
+    /// Handles the events of a session.
+    ///
+    /// # Errors
+    /// If cards contradict each other, or none can render the tiles that are left.
+    pub fn collect(
+        &self,
+        card: CardNumber,
+        session: &mut Session,
+        now: Duration,
+    ) -> Result<(), SchedulerError> {
+        while let Some(event) = session.next_event() {
+            match event {
+                Event::Ready => self.scheduler().set_standing(card, Standing::Living),
+                Event::TileDone(tile) => self.finish(card, tile, now)?,
+                Event::TileLost { tile, was_at_work } => {
+                    self.scheduler().give_back(card, tile.id, was_at_work, now);
+                    self.changed.notify_all();
+                }
+                // A card under test has no job, and is no card of a render.
+                Event::Computed(_) | Event::MemoryTested(_) => {}
+            }
+        }
+        let result = self.scheduler().check(now);
+        if let Err(SchedulerError::Disagreement { tile, sources }) = &result {
+            // Either of two cards that disagree may be wrong: tiles that only they have rendered are revoked.
+            sources
+                .iter()
+                .filter_map(|source| source.card())
+                .for_each(|card| self.distrust(card, Some(*tile)));
+        }
+        result
+    }
+
+    /// Handles a tile that a card has rendered.
+    fn finish(&self, card: CardNumber, tile: FinishedTile, now: Duration) -> Result<(), SchedulerError> {
+        let rectangle = *tile.tile();
+        let order = self.order.read().unwrap_or_else(PoisonError::into_inner);
+        let Answered { found, liars, fault } = self.scheduler().answer(card, tile, now);
+        let order = if liars.is_empty() {
+            order
+        } else {
+            drop(order);
+            // The tile is not complete yet, so the render cannot end before the wrong card's tiles are revoked.
+            liars.into_iter().for_each(|liar| self.distrust(liar, Some(rectangle)));
+            self.order.read().unwrap_or_else(PoisonError::into_inner)
+        };
+        if let Some(tile) = found {
+            (self.rendered)(card, &rectangle);
+            self.sinks.iter().for_each(|sink| sink.put(&tile));
+            self.scheduler().complete(rectangle.id);
+        }
+        drop(order);
+        // Another card may verify the tile, or all tiles are done.
+        self.changed.notify_all();
+        fault.map_or(Ok(()), Err)
+    }
+
+    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, and revokes all tiles
+    /// that it alone has rendered.
+    pub fn distrust(&self, card: CardNumber, about: Option<Tile>) {
+        let _alone = self.order.write().unwrap_or_else(PoisonError::into_inner);
+        let revoked = self.scheduler().expel(card, about);
+        for tile in revoked {
+            self.sinks.iter().for_each(|sink| sink.revoke(&tile));
+        }
+        self.changed.notify_all();
+    }
+
+    /// Fails if other cards outvoted a card whose session has ended.
+    ///
+    /// # Errors
+    /// [`SessionError`] of the lie.
+    pub fn check_card(&self, card: CardNumber) -> Result<(), SessionError> {
+        let lie = self.scheduler().lie_of(card);
+        lie.map_or(Ok(()), |tile| Err(SessionError::Outvoted { tile }))
+    }
+
+    /// Waits at most `longest` for a change; returns at once if all tiles are done.
+    pub fn wait(&self, longest: Duration) {
+        let scheduler = self.scheduler();
+        if !scheduler.is_complete() {
+            drop(self.changed.wait_timeout(scheduler, longest));
+        }
+    }
+}

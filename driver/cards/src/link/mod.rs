@@ -1,0 +1,19 @@
+//! Links to cards: ports of bytes.
+//!
+//! A card in this process is on a [`loopback()`]; others are reached over serial ports ([`open_serial`], listed by
+//! [`list_serial_ports`]) and sockets ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the opposite end: hosts
+//! connect to it to reach a card that this process emulates, one after another ([`HostPort`]). A [`FaultInjector`]
+//! simulates a bad line on any of them. A target without an operating system, such as a browser, has loopback and fault injector alone.
+
+mod fault_injector;
+mod loopback;
+#[cfg(not(target_family = "wasm"))]
+mod system;
+
+pub use fault_injector::{FaultInjector, LineFaults};
+pub use loopback::{LoopbackPort, loopback};
+#[cfg(not(target_family = "wasm"))]
+pub use system::{
+    HostPort, LinkError, ListedPort, ListenAddress, Listener, SerialLink, StreamPort, connect_tcp,
+    connect_unix, host_name, list_serial_ports, open_serial, tcp_address,
+};

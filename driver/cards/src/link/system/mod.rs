@@ -1,0 +1,27 @@
+//! Links that need an operating system: serial ports, sockets and pseudo terminals.
+
+mod error;
+mod host_port;
+mod listener;
+mod serial;
+mod serial_list;
+mod socket;
+mod stream;
+
+#[cfg(unix)]
+mod pty;
+#[cfg(not(unix))]
+mod unsupported;
+
+pub use error::LinkError;
+pub use host_port::HostPort;
+pub use listener::{ListenAddress, Listener};
+pub use serial::{SerialLink, open_serial};
+pub use serial_list::{ListedPort, list_serial_ports};
+pub use socket::connect_tcp;
+#[cfg(unix)]
+pub use socket::connect_unix;
+pub use socket::{host_name, tcp_address};
+pub use stream::StreamPort;
+#[cfg(not(unix))]
+pub use unsupported::connect_unix;

@@ -1,0 +1,158 @@
+//! State of a tile: its copies on cards, and their answers.
+
+use std::time::Duration;
+
+use photoncard_picture::sink::FinishedTile;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::Tile;
+
+use super::card::CardNumber;
+use super::error::Source;
+
+/// Progress of a tile.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Progress {
+    /// To be rendered or verified.
+    Open,
+    /// Rendered, and in transit to the sinks; with its card unless two cards agree on it.
+    Found(Option<CardNumber>),
+    /// Stored by all sinks; with its card unless two cards agree on it.
+    Done(Option<CardNumber>),
+    /// Abandoned after five crashes.
+    Abandoned,
+}
+
+/// Copy of a tile on a card.
+#[derive(Debug)]
+pub(super) struct Copy {
+    pub(super) card: CardNumber,
+    /// Earliest time at which the card can have started it.
+    pub(super) since: Duration,
+}
+
+/// Rendered tile that awaits comparison.
+#[derive(Debug)]
+pub(super) struct Answer {
+    pub(super) source: Source,
+    pub(super) tile: FinishedTile,
+}
+
+impl Answer {
+    /// Returns whether two answers are equal bit for bit.
+    fn agrees_with(&self, other: &Self) -> bool {
+        let is_kept = [self, other].iter().any(|answer| answer.source == Source::Kept);
+        let work = |answer: &Self| {
+            // These counters depend on the capacity of the chip's queue.
+            Counters { drains: 0, most_waiting: 0, ..answer.tile.counters }
+        };
+        self.tile.records() == other.tile.records() && (is_kept || work(self) == work(other))
+    }
+}
+
+/// State of a tile: its copies on cards, and their answers.
+#[derive(Debug)]
+pub(super) struct Entry {
+    pub(super) tile: Tile,
+    pub(super) progress: Progress,
+    /// True if two cards must agree on the tile.
+    pub(super) is_verified: bool,
+    /// True if the first answer is dazzling: another card is asked, as for a verified tile.
+    pub(super) is_doubted: bool,
+    /// True if the tile that was believed last is dazzling, and there was no other card to be asked.
+    pub(super) is_dazzling: bool,
+    pub(super) copies: Vec<Copy>,
+    pub(super) answers: Vec<Answer>,
+    /// Cards that were reset or lost while they rendered the tile, once per crash.
+    pub(super) crashes: Vec<CardNumber>,
+}
+
+impl Entry {
+    pub(super) fn new(tile: Tile) -> Self {
+        let (copies, answers, crashes) = (Vec::new(), Vec::new(), Vec::new());
+        let progress = Progress::Open;
+        let (is_verified, is_doubted, is_dazzling) = (false, false, false);
+        Self { tile, progress, is_verified, is_doubted, is_dazzling, copies, answers, crashes }
+    }
+
+    pub(super) fn is_open(&self) -> bool {
+        self.progress == Progress::Open
+    }
+
+    /// Returns whether a card has a copy of the tile or has answered.
+    pub(super) fn concerns(&self, card: CardNumber) -> bool {
+        self.copies.iter().any(|copy| copy.card == card) || self.has_answer_of(card)
+    }
+
+    /// Returns whether a card alone is believed that its dazzling tile is right.
+    pub(super) fn is_dazzling_of(&self, card: CardNumber) -> bool {
+        let is_its = [Progress::Found(Some(card)), Progress::Done(Some(card))].contains(&self.progress);
+        is_its && self.is_dazzling
+    }
+
+    pub(super) fn has_answer_of(&self, card: CardNumber) -> bool {
+        self.answers.iter().any(|answer| answer.source == Source::Card(card))
+    }
+
+    /// Earliest time at which a card can have started its copy.
+    pub(super) fn since(&self, card: CardNumber) -> Option<Duration> {
+        self.copies.iter().find(|copy| copy.card == card).map(|copy| copy.since)
+    }
+
+    pub(super) fn crashes_of(&self, card: CardNumber) -> usize {
+        self.crashes.iter().filter(|&&crashed| crashed == card).count()
+    }
+
+    /// Indices of two answers that agree.
+    pub(super) fn agreeing(&self) -> Option<[usize; 2]> {
+        let pairs = (1..self.answers.len()).flat_map(|second| (0..second).map(move |first| [first, second]));
+        pairs.into_iter().find(|&[first, second]| self.answers[first].agrees_with(&self.answers[second]))
+    }
+
+    /// Returns whether there are several answers, which then differ pairwise.
+    pub(super) fn is_disputed(&self) -> bool {
+        self.is_open() && self.answers.len() > 1
+    }
+
+    /// Removes all answers if two of them agree, and returns the verdict.
+    pub(super) fn judge(&mut self) -> Option<Judgement> {
+        let Some([first, second]) = self.agreeing() else { return self.judge_by_light() };
+        let answers = std::mem::take(&mut self.answers);
+        let is_other = |answer: &&Answer| !answer.agrees_with(&answers[first]);
+        let liars = answers.iter().filter(is_other).map(|answer| answer.source).collect();
+        let was_kept = [first, second].iter().any(|&index| answers[index].source == Source::Kept);
+        let tile = answers.into_iter().nth(first)?.tile;
+        let agreed = if was_kept { Agreement::WithKept } else { Agreement::OfCards };
+        Some(Judgement { tile, agreed, liars })
+    }
+
+    /// Believes one of two cards that differ, if the other's tile alone is dazzling.
+    fn judge_by_light(&mut self) -> Option<Judgement> {
+        let [a, b] = &self.answers[..] else { return None };
+        let (believed, liar) = match [a, b].map(|answer| answer.tile.is_dazzling()) {
+            [false, true] => (0, b.source),
+            [true, false] => (1, a.source),
+            _ => return None,
+        };
+        let agreed = Agreement::ByLight(self.answers[believed].source.card()?);
+        let tile = std::mem::take(&mut self.answers).swap_remove(believed).tile;
+        Some(Judgement { tile, agreed, liars: vec![liar] })
+    }
+}
+
+/// Verdict on a verified tile: the tile that is believed, why, and the sources of other answers.
+pub(super) struct Judgement {
+    pub(super) tile: FinishedTile,
+    pub(super) agreed: Agreement,
+    pub(super) liars: Vec<Source>,
+}
+
+/// Reason why a tile is believed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Agreement {
+    /// Two cards agree on it.
+    OfCards,
+    /// A card agrees with the partial file, which has it already.
+    WithKept,
+    /// The card's tile is not dazzling, and the other's is.
+    ByLight(CardNumber),
+}

@@ -1,0 +1,381 @@
+//! Assignment of tiles to cards.
+//!
+//! Tiles wait in one queue. A card with a free credit takes the next one, unless so few are left that other cards would go without; no
+//! card waits for another, and results arrive in any order. A tile's pixels do not depend on its card or its time.
+//!
+//! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; the tiles
+//!   that the outvoted card alone has rendered are rendered again.
+//! - A tile that is brighter than any but a lamp beside a surface makes it is verified as well, if there is
+//!   another card. A tile that is not is believed against one that is. A card alone is believed, and its tiles counted.
+//! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the cards that have
+//!   crashed at it the minimum number of times, and is abandoned after five crashes.
+//! - A tile of a picture by passes waits for the card that rendered it before, which has kept its irradiance records. Idle cards take tiles
+//!   of others from the end, unless these will soon come to them.
+//! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once that exceeds
+//!   twice the mean time of a tile. The first answer counts.
+//!
+//! The scheduler has no thread, lock or clock: [`crate::dispatcher`] connects it to sessions and sinks.
+
+mod card;
+mod dealing;
+mod ending;
+mod entry;
+mod error;
+mod homes;
+#[cfg(test)]
+mod tests;
+mod tiles;
+
+pub use self::card::{CardNumber, Standing};
+pub use self::error::rectangles;
+pub use self::error::{SchedulerError, Source};
+pub use self::tiles::{GatherOrder, near, spread, tiles};
+
+use std::collections::{HashMap, VecDeque};
+use std::time::Duration;
+
+use photoncard_picture::film::Film;
+use photoncard_picture::sink::FinishedTile;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::hash::hash;
+use photoncard_shared::message::Tile;
+
+use self::card::{Card, TileTimes};
+use self::entry::{Agreement, Answer, Entry, Judgement, Progress};
+
+/// Number of crashes after which a tile is set apart.
+const CRASHES_APART: usize = 2;
+/// Number of crashes after which a tile is abandoned.
+const MAX_CRASHES: usize = 5;
+/// Maximum time of a ray over the mean of the card's slowest tile.
+const SLOWER_THAN_BEFORE: f64 = 50.0;
+/// Maximum time of a ray over the mean of the slowest tile of all cards, for a card without rendered tiles: a Cortex-M4F
+/// takes some 400 times as long as a chip that a desktop computer emulates.
+const SLOWER_THAN_OTHERS: f64 = 1000.0;
+
+/// Tiles of a picture, with their progress.
+#[derive(Debug)]
+pub struct Scheduler {
+    entries: Vec<Entry>,
+    by_id: HashMap<u32, usize>,
+    /// Queue of tiles that no card has.
+    waiting: VecDeque<usize>,
+    /// Tiles with an answer that await a second one.
+    compared: VecDeque<usize>,
+    /// Open tiles at which cards have crashed so often that they wait until all others are done.
+    set_apart: Vec<usize>,
+    cards: Vec<Card>,
+    has_helpers: bool,
+    /// Time before which no card has had a tile for too long.
+    next_help: Duration,
+    /// Time since which no card can continue, though the render is not complete.
+    stuck_since: Option<Duration>,
+    times: TileTimes,
+    /// Work on verified tiles.
+    verified_work: Counters,
+    done: usize,
+    counts: TileCounts,
+}
+
+/// Numbers of tiles that were taken over or rendered more than once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TileCounts {
+    /// Tiles taken over from an earlier render, without those to be verified.
+    pub kept: usize,
+    /// Tiles on which two cards agree.
+    pub verified: usize,
+    /// Tiles rendered once more, for verification or by an idle card.
+    pub repeated: usize,
+    /// Tiles revoked because their card was outvoted.
+    pub revoked: usize,
+}
+
+/// Consequences of an answer.
+#[derive(Debug, Default)]
+pub struct Answered {
+    /// Tile for the sinks; [`Scheduler::complete`] confirms that they have it.
+    pub found: Option<FinishedTile>,
+    /// Cards that were outvoted at the tile: arguments of [`Scheduler::expel`].
+    pub liars: Vec<CardNumber>,
+    /// Error that ends the render.
+    pub fault: Option<SchedulerError>,
+}
+
+impl Scheduler {
+    /// Scheduler of `tiles` for `cards` cards.
+    pub fn new(tiles: Vec<Tile>, cards: usize) -> Self {
+        Self {
+            by_id: tiles.iter().zip(0..).map(|(tile, index)| (tile.id, index)).collect(),
+            waiting: (0..tiles.len()).collect(),
+            entries: tiles.into_iter().map(Entry::new).collect(),
+            compared: VecDeque::new(),
+            set_apart: Vec::new(),
+            cards: (0..cards).map(|_| Card::new()).collect(),
+            has_helpers: false,
+            next_help: Duration::ZERO,
+            stuck_since: None,
+            times: TileTimes::default(),
+            verified_work: Counters::ZERO,
+            done: 0,
+            counts: TileCounts::default(),
+        }
+    }
+
+    /// Enables other cards to render tiles as well that a card has had for too long, or that are dazzling.
+    #[must_use]
+    pub fn with_helpers(self) -> Self {
+        Self { has_helpers: true, ..self }
+    }
+
+    /// Verifies a share of the tiles (at least one) on a second card; a hash of the seed selects them.
+    #[must_use]
+    pub fn verifying(mut self, share: f64, seed: u32) -> Self {
+        let chance = |entry: &Entry| hash(hash(seed) ^ entry.tile.id);
+        let least = self.entries.iter().map(chance).min();
+        for entry in &mut self.entries {
+            let chance = hash(hash(seed) ^ entry.tile.id);
+            entry.is_verified = f64::from(chance) < share * 2_f64.powi(32) || least == Some(chance);
+        }
+        self
+    }
+
+    /// Takes over the tiles of a film. Tiles to be verified are compared with a card's.
+    #[must_use]
+    pub fn with_kept(mut self, film: &Film) -> Self {
+        for (index, entry) in self.entries.iter_mut().enumerate() {
+            let Some(tile) = film.finished(&entry.tile) else { continue };
+            if entry.is_verified {
+                entry.answers.push(Answer { source: Source::Kept, tile });
+                self.compared.push_back(index);
+            } else {
+                entry.progress = Progress::Done(None);
+                self.done += 1;
+                self.counts.kept += 1;
+            }
+        }
+        let entries = &self.entries;
+        self.waiting.retain(|&index| entries[index].is_open() && entries[index].answers.is_empty());
+        self
+    }
+
+    /// Handles a tile that a card has rendered.
+    pub fn answer(&mut self, card: CardNumber, tile: FinishedTile, now: Duration) -> Answered {
+        let Some((index, since)) = self.remove_copy(card, tile.tile().id, now) else {
+            return Answered::default();
+        };
+        let has_others = self.has_helpers && self.living().any(|other| other != card);
+        let took = now.saturating_sub(since);
+        self.times.count(took);
+        let at = &mut self.cards[card];
+        at.count_time(took, &tile.counters);
+        let entry = &mut self.entries[index];
+        if !entry.is_open() || at.standing == Standing::GivenUp {
+            self.counts.repeated += 1;
+            return Answered::default();
+        }
+        entry.is_dazzling = tile.is_dazzling();
+        entry.is_doubted |= has_others && entry.is_dazzling;
+        if !entry.is_verified && !entry.is_doubted {
+            entry.progress = Progress::Found(Some(card));
+            at.counters.add(&tile.counters);
+            return Answered { found: Some(tile), ..Answered::default() };
+        }
+        if entry.answers.is_empty() {
+            self.compared.push_back(index);
+        } else {
+            self.counts.repeated += 1;
+        }
+        entry.answers.push(Answer { source: Source::Card(card), tile });
+        self.judge(index)
+    }
+
+    /// Compares the answers to a tile.
+    fn judge(&mut self, index: usize) -> Answered {
+        let entry = &mut self.entries[index];
+        let Some(Judgement { tile, agreed, liars }) = entry.judge() else { return Answered::default() };
+        // Another card was asked.
+        entry.is_dazzling = false;
+        let was_kept = agreed == Agreement::WithKept;
+        match agreed {
+            Agreement::ByLight(card) => {
+                entry.progress = Progress::Found(Some(card));
+                self.cards[card].counters.add(&tile.counters);
+            }
+            Agreement::OfCards | Agreement::WithKept => {
+                self.counts.verified += 1;
+                entry.progress = Progress::Found(None);
+            }
+        }
+        let fault = liars.contains(&Source::Kept).then_some(SchedulerError::KeptDiffers { tile: entry.tile });
+        if was_kept {
+            entry.progress = Progress::Done(None);
+            self.done += 1;
+        } else if agreed == Agreement::OfCards {
+            self.verified_work.add(&tile.counters);
+        }
+        let liars = liars.into_iter().filter_map(Source::card).collect();
+        Answered { found: (!was_kept).then_some(tile), liars, fault }
+    }
+
+    /// Marks a tile as stored by all sinks.
+    pub fn complete(&mut self, id: u32) {
+        let Some(entry) = self.by_id.get(&id).map(|&index| &mut self.entries[index]) else { return };
+        if let Progress::Found(source) = entry.progress {
+            entry.progress = Progress::Done(source);
+            self.done += 1;
+        }
+    }
+
+    /// Removes a tile from a card that has not rendered it. It goes to the front of the queue, as it has waited longest.
+    /// `has_crashed` is true if the card was working on it.
+    pub fn give_back(&mut self, card: CardNumber, id: u32, has_crashed: bool, now: Duration) {
+        let Some((index, _)) = self.remove_copy(card, id, now) else { return };
+        let entry = &mut self.entries[index];
+        if !entry.is_open() {
+            return;
+        }
+        if has_crashed && self.cards[card].lie.is_none() {
+            entry.crashes.push(card);
+        }
+        if entry.crashes.len() >= MAX_CRASHES {
+            entry.progress = Progress::Abandoned;
+        } else if entry.copies.is_empty() && entry.answers.is_empty() {
+            if entry.crashes.len() < CRASHES_APART {
+                self.waiting.push_front(index);
+            } else {
+                self.set_apart.push(index);
+            }
+        }
+        self.release_doubted();
+    }
+
+    /// Removes a tile from a card. Returns its index and the time since which the card had it.
+    fn remove_copy(&mut self, card: CardNumber, id: u32, now: Duration) -> Option<(usize, Duration)> {
+        let index = *self.by_id.get(&id)?;
+        let copies = &mut self.entries[index].copies;
+        let copy = copies.iter().position(|copy| copy.card == card)?;
+        let since = copies.remove(copy).since;
+        let tiles = &mut self.cards[card].tiles;
+        tiles.retain(|&tile| tile != index);
+        // The card can start its next tile no earlier than now.
+        if let Some(&next) = tiles.first() {
+            let copies = &mut self.entries[next].copies;
+            copies
+                .iter_mut()
+                .filter(|copy| copy.card == card)
+                .for_each(|copy| copy.since = copy.since.max(now));
+        }
+        Some((index, since))
+    }
+
+    /// Sets the availability of a card; a card that was given up stays so.
+    pub fn set_standing(&mut self, card: CardNumber, standing: Standing) {
+        if self.cards[card].standing != Standing::GivenUp {
+            self.cards[card].standing = standing;
+        }
+        if standing != Standing::Living {
+            self.release_homes(card);
+            self.release_doubted();
+        }
+    }
+
+    /// Has the last card render doubted tiles again, as no other card is left to be asked.
+    fn release_doubted(&mut self) {
+        if self.living().nth(1).is_some() {
+            return;
+        }
+        for (index, entry) in self.entries.iter_mut().enumerate() {
+            let is_waiting = entry.is_open() && entry.copies.is_empty() && entry.answers.len() == 1;
+            if entry.is_doubted && !entry.is_verified && is_waiting {
+                entry.is_doubted = false;
+                entry.answers.clear();
+                self.compared.retain(|&compared| compared != index);
+                self.waiting.push_back(index);
+            }
+        }
+    }
+
+    /// Availability of a card.
+    pub fn standing(&self, card: CardNumber) -> Standing {
+        self.cards[card].standing
+    }
+
+    /// Returns whether any card is available.
+    pub fn has_living(&self) -> bool {
+        self.living().next().is_some()
+    }
+
+    /// Tile at which a card was outvoted.
+    pub fn lie_of(&self, card: CardNumber) -> Option<Tile> {
+        self.cards[card].lie
+    }
+
+    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, with all tiles that it
+    /// alone has rendered. Returns the tiles for the sinks to revoke. None of its tiles may be in transit to
+    /// the sinks.
+    pub fn expel(&mut self, card: CardNumber, about: Option<Tile>) -> Vec<Tile> {
+        self.set_standing(card, Standing::GivenUp);
+        self.cards[card].lie = about;
+        self.cards[card].counters = Counters::ZERO;
+        let mut revoked = Vec::new();
+        for (index, entry) in self.entries.iter_mut().enumerate() {
+            if entry.progress == Progress::Done(Some(card)) {
+                entry.progress = Progress::Open;
+                self.done -= 1;
+                self.waiting.push_back(index);
+                revoked.push(entry.tile);
+            } else if entry.is_open() && entry.has_answer_of(card) {
+                entry.answers.retain(|answer| answer.source != Source::Card(card));
+                if entry.answers.is_empty() {
+                    entry.is_doubted = false;
+                    self.compared.retain(|&compared| compared != index);
+                    if entry.copies.is_empty() {
+                        self.waiting.push_back(index);
+                    }
+                }
+            }
+        }
+        self.counts.revoked += revoked.len();
+        revoked
+    }
+
+    /// Maximum time of a ray or its gather on a card, seconds, from the times of rendered tiles; `None` before the first
+    /// tile of any card.
+    pub fn slowest(&self, card: CardNumber) -> Option<f64> {
+        let before = self.cards[card].slowest.map(|seconds| seconds * SLOWER_THAN_BEFORE);
+        let others = self.cards.iter().filter_map(|card| card.slowest).reduce(f64::max);
+        before.or(others.map(|seconds| seconds * SLOWER_THAN_OTHERS))
+    }
+
+    /// Returns whether all tiles are done.
+    pub fn is_complete(&self) -> bool {
+        self.done == self.entries.len()
+    }
+
+    /// Number of tiles that are done, and of all tiles, both without tiles taken over from an earlier render.
+    pub fn progress(&self) -> (usize, usize) {
+        (self.done - self.counts.kept, self.entries.len() - self.counts.kept)
+    }
+
+    /// Numbers of tiles that were taken over or rendered more than once.
+    pub fn counts(&self) -> TileCounts {
+        self.counts
+    }
+
+    /// Number of dazzling tiles that a card alone has rendered, without another that could be asked.
+    pub fn dazzling_of(&self, card: CardNumber) -> usize {
+        self.entries.iter().filter(|entry| entry.is_dazzling_of(card)).count()
+    }
+
+    /// Work on the tiles of the picture, each counted once.
+    pub fn counters(&self) -> Counters {
+        let mut sum = self.verified_work;
+        self.cards.iter().for_each(|card| sum.add(&card.counters));
+        sum
+    }
+
+    /// Work on the tiles that a card alone has rendered.
+    pub fn counters_of(&self, card: CardNumber) -> &Counters {
+        &self.cards[card].counters
+    }
+}

@@ -1,0 +1,441 @@
+//! The host's end of a card's link: a state machine without I/O, whose inputs are bytes, tiles and a clock.
+//!
+//! A session greets the card, sends the parts of the image that the card lacks, sets the frame, requests tiles and checks
+//! their pixels. Its results are [`Event`]s. A card that was reset is greeted and loaded again, and its tiles are returned.
+//! Threads, ports, time, scheduler and sinks are outside: `photoncard_render` runs one session per thread, a simulator many
+//! in one.
+
+mod channel;
+mod clock;
+mod error;
+mod failures;
+mod job;
+mod link_bytes;
+mod load;
+mod pixel_limits;
+mod replies;
+mod self_test;
+mod state;
+mod tiles;
+mod upload;
+
+pub use error::SessionError;
+pub use job::{Assignment, Event, Job};
+pub use link_bytes::LinkBytes;
+pub use pixel_limits::PixelLimits;
+pub use upload::Upload;
+pub use upload::changed_runs;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use photoncard_shared::budget::Budget;
+use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
+use photoncard_shared::message::{self, Command, MemoryUse, OPERAND_BYTES};
+use photoncard_shared::transport::Event as LineEvent;
+
+use self::channel::Channel;
+use self::clock::Clock;
+use self::error::check_versions;
+use self::failures::Failures;
+use self::load::{Comparison, Load};
+use self::self_test::Request;
+use self::state::State;
+use self::tiles::TilesInFlight;
+
+/// Maximum number of tiles on a card, whatever its budget: the tiles of a lost card are delayed.
+const MAX_CREDITS: u32 = 16;
+
+/// Session with one card.
+pub struct Session {
+    state: State,
+    budget: Option<Budget>,
+    build: String,
+    memory_use: Option<MemoryUse>,
+    job: Option<Job>,
+    comparison: Comparison,
+    /// Checksum of the image that the card is assumed to hold.
+    assumed: Option<u64>,
+    load: Load,
+    /// Requested part of the self-test.
+    request: Request,
+    tiles: TilesInFlight,
+    /// Maximum number of replies about tiles of an earlier frame that may still come.
+    stale_replies: u64,
+    events: VecDeque<Event>,
+    channel: Channel,
+    clock: Clock,
+    failures: Failures,
+    /// True if the card was working on a suspect tile when it was last greeted.
+    left_suspect: bool,
+    /// True after a [`Command::Flush`], until the next tile.
+    is_flushed: bool,
+    /// Number of bytes received since the last frame of the session.
+    unheard_bytes: u64,
+}
+
+impl Session {
+    /// Session that starts with a greeting. `number` distinguishes it from frames of other sessions on the line; any value
+    /// is valid.
+    pub fn new(number: u32, now: Duration) -> Self {
+        let mut session = Self {
+            state: State::Greeting,
+            budget: None,
+            build: String::new(),
+            memory_use: None,
+            job: None,
+            comparison: Comparison::default(),
+            assumed: None,
+            load: Load::default(),
+            request: Request::Nothing,
+            tiles: TilesInFlight::default(),
+            stale_replies: 0,
+            events: VecDeque::new(),
+            channel: Channel::before(number),
+            clock: Clock::new(now),
+            failures: Failures::default(),
+            left_suspect: false,
+            is_flushed: false,
+            unheard_bytes: 0,
+        };
+        session.greet_card();
+        session
+    }
+
+    /// Budget of the card; `None` before its hello.
+    pub fn budget(&self) -> Option<&Budget> {
+        self.budget.as_ref()
+    }
+
+    /// Name and version of the card's firmware; empty before its hello.
+    pub fn build(&self) -> &str {
+        &self.build
+    }
+
+    /// On-chip memory of the card's firmware; `None` before its hello, or if the card does not measure it.
+    pub fn memory_use(&self) -> Option<MemoryUse> {
+        self.memory_use
+    }
+
+    /// States that the card's memory holds the image of a checksum: the next load sends no line of it, and the card checks it as it checks
+    /// what it has received.
+    pub fn assume(&mut self, checksum: u64) {
+        self.assumed = Some(checksum);
+    }
+
+    /// Sets the job of the card, which starts as soon as the card has answered the greeting. A card that has rendered another job
+    /// receives only what it lacks; what is left of that job is dropped.
+    pub fn start(&mut self, job: Job, now: Duration) {
+        self.clock.rest(now);
+        self.events.clear();
+        let before = self.job.replace(job);
+        match (self.state, before) {
+            (State::Greeting, _) => {}
+            (State::Ready, _) => self.begin_load(),
+            (State::Rendering, Some(before)) => self.go_on_from(&before.upload, now),
+            _ => self.greet_anew(now),
+        }
+    }
+
+    /// Continues with the job on a card that holds the image `held`, and may be at work on tiles of an earlier frame.
+    fn go_on_from(&mut self, held: &Upload, now: Duration) {
+        let Some(job) = &self.job else { return };
+        let Some(runs) = job.upload.missing_from(held.checksum()) else { return self.greet_anew(now) };
+        let is_held = job.upload.checksum() == held.checksum();
+        self.channel.drop_commands();
+        self.stale_replies = std::mem::take(&mut self.tiles).most_replies();
+        if is_held {
+            self.begin_frame();
+        } else {
+            self.load = Load::new(runs, true);
+            self.begin_image();
+        }
+    }
+
+    /// Requests the results of operand triples, at most [`message::CASES_PER_COMMAND`], from a card that has said hello and has no job:
+    /// [`Event::Computed`].
+    pub fn compute(&mut self, operands: &[[u8; OPERAND_BYTES]], now: Duration) {
+        self.ask(
+            Request::Compute(operands.len()),
+            &Command::Compute { operands: operands.as_flattened() },
+            now,
+        );
+    }
+
+    /// Requests the test of its memory from a card that has said hello and has no job: [`Event::MemoryTested`], until the test
+    /// is over.
+    pub fn test_memory(&mut self, now: Duration) {
+        self.ask(Request::Memory(None), &Command::TestMemory, now);
+    }
+
+    fn ask(&mut self, request: Request, command: &Command, now: Duration) {
+        self.clock.rest(now);
+        self.request = request;
+        self.send(command);
+        self.state = State::Testing;
+    }
+
+    /// Removes and returns the oldest event.
+    pub fn next_event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    /// Returns whether the card has a free credit, and the send window room for a command.
+    pub fn wants_tile(&self) -> bool {
+        let credits = self.budget.map_or(1, |budget| budget.tiles.min(MAX_CREDITS) as usize);
+        self.is_loaded() && self.tiles.len() < credits && self.channel.is_free()
+    }
+
+    /// Assigns a tile to a card for which [`Self::wants_tile`] is true.
+    pub fn give(&mut self, assignment: Assignment) {
+        self.tiles.push(assignment);
+        self.is_flushed = false;
+        self.send(&Command::RenderTile(assignment.tile));
+    }
+
+    /// Sends [`Command::Flush`] to a card for which [`Self::wants_tile`] is true and there is no tile: it does the gathers of its
+    /// tiles in flight instead of waiting for another.
+    pub fn flush(&mut self) {
+        if !self.tiles.is_empty() && !std::mem::replace(&mut self.is_flushed, true) {
+            self.send(&Command::Flush);
+        }
+    }
+
+    /// Maximum number of tiles that the card works on at once.
+    fn at_work(&self) -> usize {
+        let of_card = self.budget.map_or(1, |budget| budget.in_flight);
+        self.job.as_ref().map_or(of_card, |job| of_card.min(job.frame.in_flight)) as usize
+    }
+
+    /// Statistics of the link so far.
+    pub fn link_bytes(&self) -> LinkBytes {
+        self.channel.statistics()
+    }
+
+    /// Number of lines of the image that the card has or that were sent.
+    pub fn loaded_lines(&self) -> usize {
+        match self.state {
+            State::Greeting | State::Ready | State::Comparing | State::Testing => 0,
+            State::Loading => self.load.done(),
+            _ => self.upload_lines(),
+        }
+    }
+
+    fn upload_lines(&self) -> usize {
+        self.job.as_ref().map_or(0, |job| job.upload.lines().len())
+    }
+
+    /// Returns whether the card has the image and the frame.
+    pub fn is_loaded(&self) -> bool {
+        self.state == State::Rendering
+    }
+
+    /// Returns whether the card is loaded, has no tile, and no bytes are to be sent.
+    pub fn is_idle(&mut self) -> bool {
+        self.is_loaded() && !self.is_waiting() && self.channel.transport.outgoing().is_empty()
+    }
+
+    /// Returns whether an answer of the card is due.
+    fn is_waiting(&self) -> bool {
+        match self.state {
+            State::Ready => false,
+            State::Rendering => !self.tiles.is_empty() || !self.channel.transport.is_acknowledged(),
+            _ => true,
+        }
+    }
+
+    /// Fills the send window with commands and lines of the image.
+    pub fn prepare(&mut self) {
+        self.channel.forward();
+        while self.channel.is_free() && self.load_more() {}
+    }
+
+    /// Sends the next lines of the image, or the command that ends it. Returns false if the session is not loading.
+    fn load_more(&mut self) -> bool {
+        let (State::Loading, Some(job)) = (self.state, &self.job) else { return false };
+        let sent = self.load.next_lines(&job.upload, &mut self.channel.transport);
+        self.channel.bytes.image += sent as u64;
+        self.channel.bytes.payload += sent as u64;
+        if sent == 0 {
+            self.send(&Command::EndImage);
+            self.channel.forward();
+            self.state = State::Accepting;
+        }
+        true
+    }
+
+    /// Bytes to send now.
+    pub fn outgoing(&mut self) -> &[u8] {
+        self.channel.transport.outgoing()
+    }
+
+    /// Returns whether there are bytes to send before the card answers.
+    pub fn has_more_to_send(&mut self) -> bool {
+        !self.channel.transport.outgoing().is_empty()
+            || self.state == State::Loading && self.channel.transport.can_send()
+    }
+
+    /// Removes the first `bytes` bytes of [`Self::outgoing`], which were sent.
+    pub fn sent(&mut self, bytes: usize, now: Duration) {
+        self.channel.transport.sent(bytes);
+        self.channel.bytes.wire += bytes as u64;
+        if bytes > 0 {
+            self.clock.sent(now);
+        }
+    }
+
+    /// Processes bytes from the card.
+    ///
+    /// # Errors
+    /// If they violate the protocol, report a fault of the card, or show that it has failed too often.
+    pub fn receive(&mut self, mut bytes: &[u8], now: Duration) -> Result<(), SessionError> {
+        self.channel.bytes.wire += bytes.len() as u64;
+        self.unheard_bytes += bytes.len() as u64;
+        while !bytes.is_empty() {
+            let passed = self.channel.transport.passed();
+            let (taken, event) = self.channel.transport.receive(bytes);
+            bytes = &bytes[taken..];
+            match event {
+                None => {}
+                Some(LineEvent::Heard) => {
+                    self.clock.heard(now);
+                    self.unheard_bytes = bytes.len() as u64;
+                }
+                Some(LineEvent::Unknown) if self.clock.has_heard() => self.reset(now)?,
+                // The greeting was lost.
+                Some(LineEvent::Unknown) => self.channel.transport.send_again(),
+            }
+            let mut payload = [0; MAX_PAYLOAD];
+            while let Some(message) = self.channel.transport.take() {
+                let payload = &mut payload[..message.len()];
+                payload.copy_from_slice(message);
+                if let (State::Greeting, Some(versions)) = (self.state, message::hello_versions(payload)) {
+                    check_versions(versions)?;
+                }
+                let reply = message::decode(payload).ok_or(SessionError::Unexpected("not a reply"))?;
+                self.take(&reply)?;
+            }
+            if self.channel.transport.passed() != passed {
+                self.clock.passed(now);
+            }
+        }
+        Ok(())
+    }
+
+    /// Acknowledges received frames; to be called when the line is quiet.
+    pub fn acknowledge(&mut self) {
+        self.channel.transport.acknowledge();
+    }
+
+    /// Advances the clock; to be called often. Probes a card that has been quiet for too long. `slowest` is the maximum
+    /// time of a ray or its gather, seconds, if known ([`Scheduler::slowest`](crate::scheduler::Scheduler::slowest)).
+    ///
+    /// # Errors
+    /// If the card has been silent or without progress for too long, or has failed too often.
+    pub fn tick(&mut self, slowest: Option<f64>, now: Duration) -> Result<(), SessionError> {
+        self.clock.look(now);
+        if !self.is_waiting() {
+            self.clock.rest(now);
+            return Ok(());
+        }
+        // A card that holds another host's session of equal number treats the hello as a repeated frame.
+        if self.state == State::Greeting && self.clock.is_greeted_in_vain(now) {
+            return self.reset(now);
+        }
+        if self.clock.must_ask(now) {
+            self.channel.transport.probe();
+        }
+        let rays = self.job.as_ref().map_or(0, |job| self.tiles.most_rays(self.at_work(), &job.frame));
+        let result = self.clock.check(rays, slowest, now);
+        match result {
+            Err(SessionError::Standstill(_)) => self.fail()?,
+            Err(SessionError::Silent(time)) if self.is_garbled() => {
+                return Err(SessionError::Garbled { time, bytes: self.unheard_bytes });
+            }
+            _ => {}
+        }
+        result
+    }
+
+    /// Returns whether bytes have come in place of frames, and not a frame alone that was cut off.
+    fn is_garbled(&self) -> bool {
+        let least = if self.clock.has_heard() { MAX_FRAME as u64 } else { 1 };
+        self.unheard_bytes >= least
+    }
+
+    /// Returns the unfinished tiles of a card that is lost or was reset, as events.
+    pub fn give_back(&mut self) {
+        let at_work = self.at_work();
+        self.tiles.give_back(at_work, &mut self.events);
+    }
+
+    /// Greets the card again, with a new session number, after its link was closed or it was silent. Its tiles are
+    /// returned.
+    pub fn greet_again(&mut self, now: Duration) {
+        self.left_suspect = self.tiles.is_at_suspect();
+        self.give_back();
+        self.channel.bytes.resets += 1;
+        self.greet_anew(now);
+    }
+
+    /// Greets the card with a new session number; what it works at is dropped.
+    fn greet_anew(&mut self, now: Duration) {
+        self.tiles = TilesInFlight::default();
+        self.clock = Clock::new(now);
+        self.greet_card();
+    }
+
+    /// Greets a card again that does not know the session, or that answers without a reply to the hello.
+    fn reset(&mut self, now: Duration) -> Result<(), SessionError> {
+        self.failures.forget_lines();
+        self.fail()?;
+        self.greet_again(now);
+        Ok(())
+    }
+
+    /// Counts a failure of the card, unless it was working on a tile at which cards have crashed before.
+    fn fail(&mut self) -> Result<(), SessionError> {
+        if self.tiles.is_at_suspect() { Ok(()) } else { self.failures.count() }
+    }
+
+    fn greet_card(&mut self) {
+        self.unheard_bytes = 0;
+        self.state = State::Greeting;
+        self.stale_replies = 0;
+        self.channel.greet();
+    }
+
+    fn send(&mut self, command: &Command) {
+        self.channel.send(command);
+    }
+
+    /// Requests the next checksums of the card's chunks; after the last ones starts to send lines.
+    fn begin_load(&mut self) {
+        let Some(job) = &self.job else { return };
+        if let Some(runs) = self.assumed.take().and_then(|held| job.upload.missing_from(held)) {
+            self.load = Load::new(runs, false);
+            return self.begin_image();
+        }
+        if let Some(question) = self.comparison.next_question(&job.upload) {
+            self.send(&question);
+            self.state = State::Comparing;
+            return;
+        }
+        self.load = Load::new(self.comparison.finish(&job.upload), false);
+        self.begin_image();
+    }
+
+    fn begin_image(&mut self) {
+        let Some(Job { upload, .. }) = &self.job else { return };
+        let command = Command::BeginImage { lines: upload.lines().len() as u32, checksum: upload.checksum() };
+        self.send(&command);
+        self.state = State::Loading;
+    }
+
+    fn begin_frame(&mut self) {
+        let Some(job) = &self.job else { return };
+        let command = Command::BeginFrame(job.frame);
+        self.send(&command);
+        self.state = State::Framing;
+    }
+}

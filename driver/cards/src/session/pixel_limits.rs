@@ -1,0 +1,103 @@
+//! Ranges of pixel sums that a chip can produce: a value outside shows that the card or its memory is wrong.
+
+use photoncard_picture::sums::SumFormat;
+use photoncard_shared::image::Header;
+use photoncard_shared::message::{
+    ALBEDO_STEPS, DEPTH_STEPS, FrameParameters, LayerSums, NORMAL_STEPS, PixelSums,
+};
+
+/// Relative rounding error of a unit normal.
+const NORMAL_ROUNDING: f64 = 1.0 / (1 << 19) as f64;
+/// Rounding error of a surface's position along the view's axis, relative to the scene's maximum coordinate.
+const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
+/// Maximum number of cells of the photon grid along the scene's longest side.
+const GRID_CELLS: f32 = (1 << 20) as f32;
+
+/// Ranges of a frame's pixel sums over n samples, of which s see a surface.
+///
+/// | sum | range |
+/// |---|---|
+/// | light, direct, indirect, caustic | at least 0; beside a lamp without extent there is no upper limit |
+/// | albedo | 0 to s |
+/// | normals | length 0 to s, and 2^-19 s for the rounding of normals |
+/// | depths | 0 to s times the distance to the scene's farthest corner; 2^-19 s maximum coordinates beyond |
+/// | surfaces s, gathers | 0 to n |
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PixelLimits {
+    format: SumFormat,
+    /// Minimum and maximum depth of a sample, multiples of 1 / [`DEPTH_STEPS`] units.
+    depths: [f64; 2],
+}
+
+/// Invalid value of a channel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct BadValue {
+    pub(super) channel: &'static str,
+    pub(super) value: f64,
+}
+
+impl PixelLimits {
+    /// Limits of a frame of the image with the header `header`.
+    pub fn new(header: &Header, frame: &FrameParameters) -> Self {
+        let grid = &header.photon_grid;
+        let corners = grid.origin.iter().map(|&origin| (origin as f32).abs() * grid.cell);
+        let farthest = corners.fold(0.0, f32::max) + GRID_CELLS * grid.cell;
+        let eye = frame.camera.origin.iter().fold(0.0, |most: f32, coordinate| most.max(coordinate.abs()));
+        let format = SumFormat::new(header, frame);
+        let steps = f64::from(DEPTH_STEPS) / f64::from(format.scale.depth);
+        let rounding = f64::from(DEPTH_ROUNDING * (farthest + eye)) * steps + 1.0;
+        Self { format, depths: [-rounding, farthest_corner(header, frame) * steps + rounding] }
+    }
+
+    /// Format of the sums.
+    pub fn format(&self) -> &SumFormat {
+        &self.format
+    }
+
+    /// First invalid value of a pixel.
+    pub(super) fn find_bad(&self, sums: &PixelSums) -> Option<BadValue> {
+        let PixelSums { light, albedo, normal, depth, surfaces, layers } = *sums;
+        let seen = f64::from(surfaces);
+        let find = |channel, values: [f64; 3], is_possible: &dyn Fn(f64) -> bool| {
+            let bad = values.into_iter().find(|&value| !is_possible(value));
+            bad.map(|value| BadValue { channel, value })
+        };
+        let find_light =
+            |channel, light: [i64; 3]| find(channel, light.map(|value| value as f64), &|value| value >= 0.0);
+        let normal = normal.map(|value| f64::from(value) / f64::from(NORMAL_STEPS));
+        let length = normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+        let find_count = |channel, count: u32| {
+            let is_possible = count <= self.format.samples;
+            (!is_possible).then_some(BadValue { channel, value: f64::from(count) })
+        };
+        let is_albedo = |value: f64| value <= seen * f64::from(ALBEDO_STEPS);
+        let [least, most] = self.depths.map(|depth| depth * seen);
+        let is_deep = (least..=most).contains(&(depth as f64)) && (surfaces > 0 || depth == 0);
+        find_count("surfaces", surfaces)
+            .or_else(|| find_light("radiance", light))
+            .or_else(|| find("albedo", albedo.map(f64::from), &is_albedo))
+            .or_else(|| find("a normal of component", normal, &|_| length <= seen * (1.0 + NORMAL_ROUNDING)))
+            .or_else(|| (!is_deep).then_some(BadValue { channel: "depth", value: depth as f64 }))
+            .or_else(|| {
+                let LayerSums { direct, indirect, caustic, gathers } = layers?;
+                find_light("direct light", direct)
+                    .or_else(|| find_light("indirect light", indirect))
+                    .or_else(|| find_light("caustic light", caustic))
+                    .or_else(|| find_count("gathers", gathers))
+            })
+    }
+}
+
+/// Distance from the eye to the farthest corner of the photon grid, which holds the scene, metres; an axis of
+/// another length than 1 counts.
+fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
+    let grid = &header.photon_grid;
+    let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();
+    let ways = std::array::from_fn(|axis| {
+        let first = f64::from(grid.origin[axis]) * f64::from(grid.cell);
+        let last = first + f64::from(GRID_CELLS * grid.cell);
+        let eye = f64::from(frame.camera.origin[axis]);
+        (first - eye).abs().max((last - eye).abs())
+    });
+    length(ways) * length(frame.camera.forward.map(f64::from)).max(1.0)
+}

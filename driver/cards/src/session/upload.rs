@@ -1,0 +1,127 @@
+//! Card image as it is sent to cards: everything that is computed of it once, for all cards.
+
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+use photoncard_shared::address::Line;
+use photoncard_shared::checksum::image_checksum;
+use photoncard_shared::message::CHUNK_LINES;
+
+/// Runs of consecutive lines of an image, in order and without overlap.
+pub(super) type Runs = Arc<[Range<usize>]>;
+
+/// Lines of an image, in memory that the host keeps.
+type SharedLines = Arc<dyn AsRef<[Line]> + Send + Sync>;
+
+/// Card image as it is sent to cards. Checksums and changed lines are computed once, however many cards there are.
+pub struct Upload {
+    lines: SharedLines,
+    checksum: u64,
+    /// Checksums of all whole chunks, as soon as a card's are compared with them.
+    chunks: OnceLock<Vec<u64>>,
+    /// Checksum of the image before, and runs of the lines in which this one differs from it.
+    change: Option<(u64, Runs)>,
+}
+
+impl Upload {
+    /// Image for cards that hold none, or any other.
+    pub fn new(lines: Arc<impl AsRef<[Line]> + Send + Sync + 'static>) -> Self {
+        let checksum = image_checksum((*lines).as_ref());
+        Self { lines, checksum, chunks: OnceLock::new(), change: None }
+    }
+
+    /// Image for cards that may hold the image `before`.
+    #[must_use]
+    pub fn after(self, before: &Self) -> Self {
+        let runs = changed_runs(before.lines(), self.lines());
+        Self { change: Some((before.checksum, runs.into())), ..self }
+    }
+
+    /// Lines of the image.
+    pub fn lines(&self) -> &[Line] {
+        (*self.lines).as_ref()
+    }
+
+    /// [`image_checksum`] of the lines.
+    pub fn checksum(&self) -> u64 {
+        self.checksum
+    }
+
+    /// Checksums of all whole chunks.
+    pub(super) fn chunks(&self) -> &[u64] {
+        let sums = || self.lines().chunks_exact(CHUNK_LINES as usize).map(image_checksum).collect();
+        self.chunks.get_or_init(sums)
+    }
+
+    /// Runs of lines that a card lacks that holds the image of a checksum; `None` if they are not known.
+    pub(super) fn missing_from(&self, held: u64) -> Option<Runs> {
+        if held == self.checksum {
+            return Some(Runs::default());
+        }
+        self.change.as_ref().filter(|(before, _)| *before == held).map(|(_, runs)| runs.clone())
+    }
+}
+
+/// Runs of the lines of `after` that `before` lacks or has otherwise.
+pub fn changed_runs(before: &[Line], after: &[Line]) -> Vec<Range<usize>> {
+    let mut runs = Vec::new();
+    for (index, line) in after.iter().enumerate() {
+        if before.get(index) != Some(line) {
+            add_run(&mut runs, index..index + 1);
+        }
+    }
+    runs
+}
+
+/// Appends a run, which follows all others.
+pub(super) fn add_run(runs: &mut Vec<Range<usize>>, run: Range<usize>) {
+    match runs.last_mut() {
+        Some(last) if last.end == run.start => last.end = run.end,
+        _ if run.is_empty() => {}
+        _ => runs.push(run),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_shared::address::LINE_BYTES;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn lines(bytes: &[u8]) -> Vec<Line> {
+        bytes.iter().map(|&byte| Line([byte; LINE_BYTES])).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn changed_runs_make_one_image_of_the_other_and_hold_no_equal_line(
+            before in proptest::collection::vec(0..3_u8, 0..40),
+            after in proptest::collection::vec(0..3_u8, 0..40),
+        ) {
+            let runs = changed_runs(&lines(&before), &lines(&after));
+            let mut made = before.clone();
+            made.resize(after.len(), u8::MAX);
+            let mut end_of_last = None;
+            for run in runs {
+                prop_assert!(run.start < run.end && end_of_last.is_none_or(|end| end < run.start));
+                prop_assert!(run.clone().all(|line| before.get(line) != Some(&after[line])));
+                made[run.clone()].copy_from_slice(&after[run.clone()]);
+                end_of_last = Some(run.end);
+            }
+            prop_assert_eq!(made, after);
+        }
+    }
+
+    #[test]
+    fn a_card_lacks_nothing_of_the_image_that_it_holds_and_changed_lines_of_the_one_before() {
+        let [first, other] =
+            [[1, 2, 3, 4, 5], [1, 7, 8, 4, 9]].map(|bytes| Upload::new(Arc::new(lines(&bytes))));
+        let [held, checksum] = [first.checksum(), other.checksum()];
+        assert_eq!(other.missing_from(held), None);
+        let other = other.after(&first);
+        assert_eq!(other.missing_from(checksum).as_deref(), Some(&[][..]));
+        assert_eq!(other.missing_from(held).as_deref(), Some(&[1..3, 4..5][..]));
+        assert_eq!(other.missing_from(!held), None);
+    }
+}

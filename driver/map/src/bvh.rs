@@ -1,0 +1,403 @@
+//! Bounding volume hierarchy: built by obvhs as a binary tree, folded into wide nodes for the chip by the surface area
+//! heuristic.
+
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::{Bvh2, node::Bvh2Node};
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use photoncard_scene::Triangle;
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::budget::BVH_STACK;
+use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, MAX_MATERIALS, NodeBox};
+use rayon::prelude::*;
+
+use crate::fold::{Folded, Tree};
+
+mod reinsertion;
+
+/// A bounding volume hierarchy in the chip's records.
+#[derive(Debug)]
+pub struct Hierarchy {
+    /// Nodes, the root first.
+    pub nodes: Vec<[u8; LINE_BYTES]>,
+    /// Leaves of triangles.
+    pub leaves: Vec<[u8; LINE_BYTES]>,
+    /// Indices of the triangles of each leaf, in the leaf's order.
+    pub leaf_triangles: Vec<LeafTriangles>,
+}
+
+/// Indices of the triangles of a leaf, in the leaf's order.
+pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
+
+/// Properties of materials that leaves hold for their triangles. Materials beyond the end of a list have
+/// none.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Finishes<'a> {
+    /// True for materials whose triangles may have cut-outs.
+    pub cut_out: &'a [bool],
+    /// True for flat glass, which light passes without a change of direction.
+    pub flat_glass: &'a [bool],
+}
+
+/// Triangles of a hierarchy.
+struct Mesh<'a> {
+    triangles: &'a [Triangle],
+    finishes: Finishes<'a>,
+}
+
+/// Error of [`build`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum HierarchyError {
+    /// Error of a descent that could overflow the chip's stack.
+    #[error(
+        "a descent in the bounding volume hierarchy may put off {entries} parts; the chip's stack holds {BVH_STACK}"
+    )]
+    TooDeep {
+        /// Maximum number of stack entries that a descent needs.
+        entries: usize,
+    },
+    /// Error of more triangles than a card can index.
+    #[error("the scene has {triangles} triangles; a card image can index at most {MAX_TRIANGLES}")]
+    TooMany {
+        /// Number of triangles of the scene.
+        triangles: usize,
+    },
+    /// Error of a material index above the maximum that a card can index.
+    #[error(
+        "a triangle has the material of index {material}; a card image can index at most {MAX_MATERIALS} materials"
+    )]
+    TooManyMaterials {
+        /// Index of the material.
+        material: u32,
+    },
+    /// Error of a corner that is not finite, or so far away that the area of the scene's bounding box is not.
+    #[error("a triangle has a corner whose position is not finite, or too far from the origin")]
+    NotFinite,
+}
+
+/// Maximum number of triangles. Each may have a leaf of its own, and a triangle's index in the card image is
+/// `leaf * LEAF_TRIANGLES + slot`.
+const MAX_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
+
+/// Cost of a visit of a leaf, relative to a visit of a node.
+const LEAF_COST: f32 = 1.0;
+
+/// Number of a depth's nodes that one thread converts at once.
+const SEQUENTIAL: usize = 256;
+
+/// Maximum number of concentric boxes that the builder receives one by one.
+const MAX_CONCENTRIC: usize = 64;
+
+/// Shares of the nodes that the two optimizations of the binary tree reinsert.
+const REINSERTED: [f32; 2] = [0.2, 0.4];
+/// Depth of the binary tree above which its builder searches for partners next to each part alone.
+const SEARCH_DEPTH: usize = 2;
+
+/// Builds the hierarchy of `triangles`, at least one. The result does not depend on the machine or on threads.
+///
+/// # Errors
+/// If the triangles or materials are too many, a corner is not finite or too far away, or a descent could overflow the
+/// chip's stack.
+pub fn build(triangles: &[Triangle], finishes: Finishes) -> Result<Hierarchy, HierarchyError> {
+    if triangles.len() > MAX_TRIANGLES {
+        return Err(HierarchyError::TooMany { triangles: triangles.len() });
+    }
+    if let Some(triangle) = triangles.iter().find(|triangle| triangle.material >= MAX_MATERIALS) {
+        return Err(HierarchyError::TooManyMaterials { material: triangle.material });
+    }
+    let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();
+    // `min` and `max` skip NaN, so the corners themselves are checked.
+    let is_finite = triangles.iter().flat_map(|triangle| triangle.vertices).all(glam::Vec3::is_finite);
+    let all = boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds));
+    if !is_finite || !all.half_area().is_finite() {
+        return Err(HierarchyError::NotFinite);
+    }
+    let parts = Parts::new(&boxes);
+    let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, &boxes)).collect();
+    let binary = binary(&around_parts);
+    let mesh = &Mesh { triangles, finishes };
+    let mut folded = Folded::new(tree(&binary, &parts, &boxes, mesh));
+    if folded.stack > BVH_STACK {
+        // A tree of median splits is slower to traverse, but has minimum depth.
+        let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
+        folded = Folded::new(halves(&mut indices, &boxes, mesh));
+    }
+    let Folded { nodes, leaves, stack } = folded;
+    if stack > BVH_STACK {
+        return Err(HierarchyError::TooDeep { entries: stack });
+    }
+    let nodes = nodes.par_iter().map(|node| BvhNode::encode(&node.children, node.links));
+    let nodes = nodes.collect::<Option<_>>().ok_or(HierarchyError::NotFinite)?;
+    let lines = leaves.par_iter().map(|indices| {
+        mesh.encode(indices).unwrap_or_else(|| unreachable!("a leaf of {} triangles", indices.len()))
+    });
+    Ok(Hierarchy { nodes, leaves: lines.collect(), leaf_triangles: leaves })
+}
+
+/// The builder's tree of boxes, each in a leaf of its own: leaves are made when the tree is folded.
+fn binary(boxes: &[Aabb]) -> Bvh2 {
+    let (distance, precision) = (PlocSearchDistance::High, SortPrecision::U128);
+    let indices = (0..boxes.len() as u32).collect();
+    let mut tree =
+        PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, indices, precision, SEARCH_DEPTH);
+    REINSERTED.iter().for_each(|&share| reinsertion::optimize(&mut tree, share));
+    tree
+}
+
+/// Input of the builder: one box for many triangles whose boxes have a common centre, one for each other triangle.
+///
+/// Concentric boxes, each in the next, are all at one distance from the smallest: hardly two of them are each other's
+/// nearest, and the builder would search all of them for each pair that it joins.
+struct Parts {
+    crowds: Vec<Vec<u32>>,
+    singles: Vec<u32>,
+}
+
+impl Parts {
+    fn new(boxes: &[Aabb]) -> Self {
+        let centre = |bounds: &Aabb| bounds.center().to_array().map(|value| (value + 0.0).to_bits());
+        let mut keyed: Vec<_> = boxes.iter().map(centre).zip(0_u32..).collect();
+        keyed.sort_unstable();
+        let same = keyed.chunk_by(|(a, _), (b, _)| a == b).filter(|same| same.len() > MAX_CONCENTRIC);
+        let crowds: Vec<Vec<u32>> = same.map(|same| same.iter().map(|(_, index)| *index).collect()).collect();
+        let mut is_single = vec![true; boxes.len()];
+        crowds.iter().flatten().for_each(|&index| is_single[index as usize] = false);
+        Self { crowds, singles: (0..).zip(is_single).filter_map(|(index, is)| is.then_some(index)).collect() }
+    }
+
+    /// The triangles of each part.
+    fn iter(&self) -> impl Iterator<Item = &[u32]> {
+        self.crowds.iter().map(Vec::as_slice).chain(self.singles.chunks(1))
+    }
+
+    /// The triangles of a part.
+    fn triangles(&self, part: u32) -> &[u32] {
+        let part = part as usize;
+        match part.checked_sub(self.crowds.len()) {
+            None => &self.crowds[part],
+            Some(single) => &self.singles[single..=single],
+        }
+    }
+}
+
+fn around(indices: &[u32], boxes: &[Aabb]) -> Aabb {
+    indices.iter().fold(Aabb::empty(), |bounds, &index| bounds.union(&boxes[index as usize]))
+}
+
+fn bounding_box(triangle: &Triangle) -> Aabb {
+    let [a, b, c] = triangle.vertices;
+    Aabb { min: a.min(b).min(c).into(), max: a.max(b).max(c).into() }
+}
+
+impl Mesh<'_> {
+    fn record(&self, triangle: &Triangle) -> layout::Triangle {
+        let vertices = triangle.vertices.map(|vertex| vertex.to_array());
+        let material = triangle.material;
+        let is = |list: &[bool]| list.get(material as usize).copied().unwrap_or(false);
+        let [cut_out, flat_glass] = [self.finishes.cut_out, self.finishes.flat_glass].map(is);
+        layout::Triangle { vertices, material, cut_out, flat_glass }
+    }
+
+    /// Encodes a leaf of the triangles `indices`; `None` if they exceed one line.
+    fn encode(&self, indices: &[u32]) -> Option<[u8; LINE_BYTES]> {
+        let records: heapless::Vec<_, LEAF_TRIANGLES> =
+            indices.iter().map(|&index| self.record(&self.triangles[index as usize])).collect();
+        BvhLeaf::encode(&records)
+    }
+}
+
+/// Converts the builder's tree for folding. Every subtree whose triangles fit in one leaf may become one.
+fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
+    let missing = || unreachable!("a part is made before its parent");
+    let mut below = Vec::new();
+    for nodes in depths(binary).iter().rev() {
+        let mut below_nodes = below.into_iter();
+        let mut part = || below_nodes.next().unwrap_or_else(missing);
+        let with_parts = nodes.iter().map(|&node| (node, (!node.is_leaf()).then(|| [part(), part()])));
+        let with_parts: Vec<_> = with_parts.collect();
+        let trees = with_parts.into_par_iter().with_min_len(SEQUENTIAL).map(|(node, parts_below)| {
+            let Some(parts_below) = parts_below else {
+                // The leaf holds one part.
+                let part = binary.primitive_indices[node.first_index as usize];
+                return halves(&mut parts.triangles(part).to_vec(), boxes, mesh);
+            };
+            let bounds = node.aabb();
+            let (lower, upper) = (bounds.min.to_array(), bounds.max.to_array());
+            let leaf = both(&parts_below, mesh).map(|leaf| (leaf, LEAF_COST * bounds.half_area()));
+            Tree::node(parts_below, NodeBox { lower, upper }, bounds.half_area(), leaf)
+        });
+        below = trees.collect();
+    }
+    below.pop().unwrap_or_else(missing)
+}
+
+/// Nodes by depth, the root first. The children of a depth's nodes follow each other in the next.
+fn depths(binary: &Bvh2) -> Vec<Vec<&Bvh2Node>> {
+    let mut depths = Vec::new();
+    let mut nodes = vec![&binary.nodes[0]];
+    while !nodes.is_empty() {
+        let inner = nodes.iter().filter(|node| !node.is_leaf()).map(|node| node.first_index as usize);
+        let below = inner.flat_map(|first| [first, first + 1].map(|child| &binary.nodes[child])).collect();
+        depths.push(std::mem::replace(&mut nodes, below));
+    }
+    depths
+}
+
+/// A tree of median splits along the longest axis.
+fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
+    let bounds = around(indices, boxes);
+    let area = bounds.half_area();
+    let node_box = NodeBox { lower: bounds.min.to_array(), upper: bounds.max.to_array() };
+    if let Ok(leaf) = LeafTriangles::from_slice(indices)
+        && mesh.encode(&leaf).is_some()
+    {
+        return Tree::leaf(leaf, node_box, LEAF_COST * area);
+    }
+    let axis = bounds.diagonal().max_position();
+    let (middle, center) = (indices.len() / 2, |index: u32| boxes[index as usize].center()[axis]);
+    indices.select_nth_unstable_by(middle, |&a, &b| center(a).total_cmp(&center(b)).then(a.cmp(&b)));
+    let (below, above) = indices.split_at_mut(middle);
+    let parts = [below, above].map(|part| halves(part, boxes, mesh));
+    Tree::node(parts, node_box, area, None)
+}
+
+/// Triangles of two leaves together, if one leaf holds them.
+fn both(parts: &[Tree<LeafTriangles, NodeBox>; 2], mesh: &Mesh) -> Option<LeafTriangles> {
+    let mut indices = LeafTriangles::new();
+    for part in parts {
+        indices.extend_from_slice(part.as_leaf()?).ok()?;
+    }
+    indices.sort_unstable();
+    mesh.encode(&indices).is_some().then_some(indices)
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use photoncard_firmware::sampler::hash;
+    use photoncard_shared::layout::{Child, WideNode};
+
+    use super::*;
+
+    fn triangles(count: u32) -> Vec<Triangle> {
+        let random = |i: u32, k: u32| (hash(hash(i).wrapping_add(k)) >> 8) as f32 / 16_777_216.0;
+        let point = |i: u32, k: u32| Vec3::new(random(i, k), random(i, k + 1), random(i, k + 2));
+        let corners = |i: u32| [0, 3, 6].map(|k| point(i, 9) + 0.1 * point(i, k));
+        (0..count).map(|i| Triangle::new(corners(i), i)).collect()
+    }
+
+    /// Collects the triangles below a child; asserts that each lies within the boxes of all nodes above.
+    fn walk(hierarchy: &Hierarchy, child: Child, room: NodeBox, found: &mut Vec<u32>) {
+        let node = match child {
+            Child::Leaf(leaf) => {
+                let leaf = BvhLeaf(&hierarchy.leaves[leaf as usize]);
+                let mut indices: Vec<u32> = (0..leaf.triangles() as usize)
+                    .map(|slot| {
+                        let triangle = leaf.triangle(slot);
+                        let corners = triangle.vertices.map(|v| NodeBox { lower: v, upper: v });
+                        assert!(corners.into_iter().all(|corner| room.union(corner) == room));
+                        triangle.material
+                    })
+                    .collect();
+                found.append(&mut indices);
+                return;
+            }
+            Child::Node(node) => &hierarchy.nodes[node as usize],
+        };
+        for index in 0..WideNode(node).children() {
+            let child = BvhNode(node).bounds(index as usize).expect("a child");
+            let room = NodeBox {
+                lower: [0, 1, 2].map(|axis| child.lower[axis].max(room.lower[axis])),
+                upper: [0, 1, 2].map(|axis| child.upper[axis].min(room.upper[axis])),
+            };
+            walk(hierarchy, WideNode(node).links().child(index), room, found);
+        }
+    }
+
+    #[test]
+    fn every_triangle_is_in_one_leaf_and_in_its_boxes() {
+        for count in [1, 2, 3, 4, 17, 1000, 20_000] {
+            let hierarchy = build(&triangles(count), Finishes::default()).expect("builds");
+            let everywhere = NodeBox { lower: [-9.0; 3], upper: [9.0; 3] };
+            let mut found = Vec::new();
+            walk(&hierarchy, Child::Node(0), everywhere, &mut found);
+            found.sort_unstable();
+            assert!(found.into_iter().eq(0..count), "{count} triangles");
+        }
+    }
+
+    #[test]
+    fn every_triangle_of_a_mesh_is_in_one_leaf_whatever_its_material() {
+        let vertex = |x: u32, y: u32| Vec3::new(x as f32, (x * 7 % 5 + y * 3 % 4) as f32 * 0.1, y as f32);
+        let squares = (0..40_u32).flat_map(|x| (0..40_u32).map(move |y| (x, y)));
+        for materials in 1..=4 {
+            let mesh: Vec<Triangle> = squares
+                .clone()
+                .flat_map(|(x, y)| {
+                    let [a, b] = [vertex(x, y), vertex(x + 1, y)];
+                    let [c, d] = [vertex(x + 1, y + 1), vertex(x, y + 1)];
+                    [[a, b, c], [a, c, d]].map(|vertices| Triangle::new(vertices, hash(x + y) % materials))
+                })
+                .collect();
+            let hierarchy = build(&mesh, Finishes::default()).expect("builds");
+            let bits = |triangle: layout::Triangle| {
+                (triangle.vertices.map(|vertex| vertex.map(f32::to_bits)), triangle.material)
+            };
+            let leaves = hierarchy.leaves.iter().map(BvhLeaf);
+            let mut found: Vec<_> = leaves
+                .flat_map(|leaf| (0..leaf.triangles() as usize).map(move |slot| bits(leaf.triangle(slot))))
+                .collect();
+            let mut expected: Vec<_> = mesh
+                .iter()
+                .map(|triangle| {
+                    bits(Mesh { triangles: &mesh, finishes: Finishes::default() }.record(triangle))
+                })
+                .collect();
+            found.sort_unstable();
+            expected.sort_unstable();
+            assert!(found == expected, "{materials} materials");
+            assert!(
+                materials > 1 || hierarchy.leaves.len() < mesh.len() * 2 / 5,
+                "{}",
+                hierarchy.leaves.len()
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_no_place_is_refused() {
+        for coordinate in [f32::NAN, f32::INFINITY, 1e30] {
+            let mut triangles = triangles(20);
+            triangles[7].vertices[1] = Vec3::splat(coordinate);
+            assert!(
+                matches!(build(&triangles, Finishes::default()), Err(HierarchyError::NotFinite)),
+                "{coordinate}"
+            );
+        }
+    }
+
+    /// Coincident or concentric squares, of which the builder would join two at a time.
+    #[test]
+    fn crowds_of_triangles_are_built_in_no_time_to_speak_of() {
+        for step in [0.0, 1e-5] {
+            let squares = (0..50_000).map(|i| {
+                let side = 1.0 + step * i as f32;
+                let [a, b, c] =
+                    [(-side, -side), (side, -side), (side, side)].map(|(x, z)| Vec3::new(x, 0.0, z));
+                Triangle::new([a, b, c], i % 3)
+            });
+            let begin = std::time::Instant::now();
+            let hierarchy = build(&squares.collect::<Vec<_>>(), Finishes::default()).expect("builds");
+            assert!(begin.elapsed().as_secs() < 60, "{:?}", begin.elapsed());
+            let mut found: Vec<u32> = hierarchy.leaf_triangles.iter().flatten().copied().collect();
+            found.sort_unstable();
+            assert!(found.into_iter().eq(0..50_000));
+        }
+    }
+
+    #[test]
+    fn triangles_in_one_place_are_no_trouble() {
+        let [triangle] = triangles(1)[..] else { unreachable!() };
+        let hierarchy = build(&vec![triangle; 5000], Finishes::default()).expect("builds");
+        assert!((5000 / LEAF_TRIANGLES..5000 / 3).contains(&hierarchy.leaves.len()));
+    }
+}

@@ -1,0 +1,272 @@
+//! Sources of photons, chosen in proportion to their power.
+
+use std::f64::consts::PI;
+
+use glam::{DVec3, Vec3};
+use photoncard_firmware::scene::light::environment_direction;
+use photoncard_scene::Scene;
+
+use super::environment::Cells;
+use super::environment_parts::{Parts, SIDE};
+use super::shares::projected_area;
+use super::targets::Targets;
+use super::thresholds::thresholds;
+use super::{Lights, mean};
+
+/// A source of photons.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Source {
+    /// An emitter, by its index.
+    Emitter(u32),
+    /// A distant light.
+    Distant {
+        /// Unit vector in which light travels.
+        direction: Vec3,
+        /// Irradiance of a surface that faces the light, W/m^2.
+        irradiance: Vec3,
+    },
+    /// A cell of the environment, from column 0, row 0 at the upper left.
+    Cell {
+        /// Left border and width of the cell, as fractions of the map's width.
+        across: [f32; 2],
+        /// Cosines of the polar angles, from +y, of the cell's upper and lower border.
+        cosines: [f32; 2],
+        /// Solid angle of the cell, sr.
+        solid_angle: f32,
+    },
+}
+
+/// All sources of a scene, with the probabilities of choosing them.
+#[derive(Clone, Debug)]
+pub(crate) struct Sources {
+    list: Vec<Source>,
+    thresholds: Vec<u32>,
+    /// Lower and upper corner of the box that light from infinitely far enters through, a little larger than the
+    /// scene's bounds.
+    pub(crate) bounds: [Vec3; 2],
+    /// Targets that photons are aimed at; empty if they are not aimed.
+    pub(crate) targets: Targets,
+    /// Power of all sources, watts, mean of the channels; 0 if photons may be aimed.
+    pub(crate) power: f64,
+    /// Maximum over the sources of power in the strongest channel over probability, watts: the unit of photons' powers is derived from it.
+    /// A photon that is not aimed may be stronger, where photons are.
+    pub(crate) strongest: f32,
+}
+
+/// A source chosen by [`Sources::choose`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct ChosenSource {
+    pub(crate) source: Source,
+    pub(crate) probability: f32,
+    /// Remainder of the random number, rescaled to [0, 1).
+    pub(crate) rest: f32,
+}
+
+/// Minimum share of an emitter's light that is assumed to go towards the targets.
+const MIN_AIMED_SHARE: f64 = 1e-3;
+/// Margin of the box beyond the scene's bounds, relative to the longest side or a tenth of the maximum coordinate,
+/// whichever is larger.
+const MARGIN: f32 = 1e-4;
+
+impl Sources {
+    /// The sources of a scene, for photons in all directions.
+    pub(crate) fn new(scene: &Scene, lights: &Lights) -> Self {
+        Self::towards(scene, lights, Targets::default())
+    }
+
+    /// The sources of a scene, for photons that are aimed at specular surfaces; `None` if there are none.
+    pub(crate) fn of_caustics(scene: &Scene, lights: &Lights) -> Option<Self> {
+        let targets = Targets::specular(scene);
+        (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
+    }
+
+    /// The sources of a scene, for photons in all directions, most of them aimed at surfaces that are no lamps: the lights may be
+    /// far from these. `None` if there are none.
+    pub(crate) fn aimed(scene: &Scene, lights: &Lights) -> Option<Self> {
+        let targets = Targets::lit(scene);
+        (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
+    }
+
+    /// These sources with photons aimed at other targets as well as in all directions.
+    pub(crate) fn aimed_at(&self, targets: Targets) -> Self {
+        let strongest = self.strongest / (1.0 - targets.share);
+        Self { targets, strongest, power: 0.0, ..self.clone() }
+    }
+
+    fn towards(scene: &Scene, lights: &Lights, targets: Targets) -> Self {
+        let bounds = enlarged(scene.bounds());
+        let size = (bounds[1] - bounds[0]).as_dvec3();
+        let is_aimed = !targets.is_empty();
+        let mut all = AllSources::default();
+        for (index, emitter) in (0..).zip(&lights.emitters) {
+            let share = if is_aimed { aimed_share(&targets, &emitter.bounds.corners) } else { 1.0 };
+            all.add(Source::Emitter(index), emitter.bounds.power * share, emitter.strongest);
+        }
+        let shown = |direction: DVec3| {
+            if is_aimed { f64::from(targets.area()) } else { projected_area(size, direction) }
+        };
+        for light in &lights.distant {
+            let [direction, irradiance] = [light.direction, light.irradiance].map(Vec3::from);
+            let area = shown(direction.as_dvec3());
+            let strongest = f64::from(irradiance.max_element()) * area;
+            all.add(Source::Distant { direction, irradiance }, mean(irradiance) * area, strongest);
+        }
+        all.add_cells(lights, shown, is_aimed.then_some(f64::from(targets.area())), size);
+        let thresholds = thresholds(&all.powers);
+        let strongest = all.strongest.iter().enumerate().map(|(index, watts)| {
+            let (lower, upper) = share(&thresholds, index);
+            (watts * super::thresholds::ALL / f64::from(upper - lower).max(1.0)) as f32
+        });
+        Self {
+            strongest: strongest.filter(|watts| watts.is_finite()).fold(0.0, f32::max),
+            power: if is_aimed { 0.0 } else { all.powers.iter().sum() },
+            list: all.list,
+            thresholds,
+            bounds,
+            targets,
+        }
+    }
+
+    /// Source at `number / 2^64` of the cumulative distribution; `None` if there are no sources.
+    pub(crate) fn choose(&self, number: u64) -> Option<ChosenSource> {
+        let target = (number >> 32) as u32;
+        let index = self.thresholds.partition_point(|&threshold| threshold < target);
+        let source = *self.list.get(index)?;
+        let (lower, upper) = share(&self.thresholds, index);
+        let width = f64::from(upper - lower).max(1.0);
+        let into = number.saturating_sub(u64::from(lower) << 32) as f64 / super::thresholds::ALL;
+        Some(ChosenSource {
+            source,
+            probability: (width / super::thresholds::ALL) as f32,
+            rest: ((into / width) as f32).min(1.0 - f32::EPSILON / 2.0),
+        })
+    }
+}
+
+/// Approximate share of an emitter's light that goes towards the targets: their solid angle at the emitter's centre
+/// over `4 pi`, and at least [`MIN_AIMED_SHARE`], as other points of the emitter may see more of them.
+fn aimed_share(targets: &Targets, corners: &[DVec3]) -> f64 {
+    let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
+    (f64::from(targets.solid_angle(middle.as_vec3())) / (4.0 * PI)).clamp(MIN_AIMED_SHARE, 1.0)
+}
+
+/// Lower and upper threshold of a source, of 2^32.
+fn share(thresholds: &[u32], index: usize) -> (u32, u32) {
+    let lower = index.checked_sub(1).map_or(0, |before| thresholds[before]);
+    (lower, thresholds[index])
+}
+
+fn enlarged((lower, upper): (Vec3, Vec3)) -> [Vec3; 2] {
+    let greatest = lower.abs().max(upper.abs()).max_element();
+    let margin = MARGIN * (upper - lower).max_element().max(0.1 * greatest).max(1e-30);
+    [lower - margin, upper + margin]
+}
+
+/// Sources with their powers and their powers in the strongest channel, watts, as they are collected.
+#[derive(Default)]
+struct AllSources {
+    list: Vec<Source>,
+    powers: Vec<f64>,
+    strongest: Vec<f64>,
+}
+
+impl AllSources {
+    fn add(&mut self, source: Source, power: f64, strongest: f64) {
+        self.list.push(source);
+        self.powers.push(power);
+        self.strongest.push(strongest);
+    }
+
+    /// Adds the cells of the environment. `shown(direction)` is the area that a cell's light passes through; `same` is this
+    /// area if it is equal for all directions.
+    fn add_cells(&mut self, lights: &Lights, shown: impl Fn(DVec3) -> f64, same: Option<f64>, size: DVec3) {
+        let Some(map) = lights.environment() else { return };
+        let cells = &map.cells;
+        // The mean projected area of a box is half of the sum of its projected areas along the axes.
+        let all_sides = same.map_or(size.y * size.z + size.z * size.x + size.x * size.y, |area| 2.0 * area);
+        for row in 0..cells.rows {
+            let border = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(cells.rows));
+            let [upper, lower] = [border(row), border(row + 1)];
+            for column in 0..cells.columns {
+                if let Some(parts) = cells.parts(row, column) {
+                    self.add_parts(cells, parts, (row, column), (&shown, all_sides));
+                    continue;
+                }
+                let width = 1.0 / cells.columns as f32;
+                let left = column as f32 * width;
+                let middle = environment_direction(left + 0.5 * width, (0.5 * (upper + lower)) as f32);
+                // Light of a cell that covers much of the sphere meets several sides of the box.
+                let is_wide = cells.columns < 8 || cells.rows < 8;
+                let area = if is_wide { 0.5 * all_sides } else { shown(middle.as_dvec3()) };
+                let weight = cells.weights[(row * cells.columns + column) as usize];
+                let solid_angle = cells.solid_angle(row);
+                let source = Source::Cell {
+                    across: [left, width],
+                    cosines: [upper as f32, lower as f32],
+                    solid_angle: solid_angle as f32,
+                };
+                let strongest = f64::from(map.brightest) * solid_angle * all_sides;
+                self.add(source, weight * area, strongest);
+            }
+        }
+    }
+
+    /// Adds the parts of a divided cell, as [`Self::add_cells`].
+    fn add_parts(
+        &mut self,
+        cells: &Cells,
+        parts: &Parts,
+        (row, column): (u32, u32),
+        (shown, all_sides): (impl Fn(DVec3) -> f64, f64),
+    ) {
+        let border = |row: u32| libm::cos(std::f64::consts::PI * f64::from(row) / f64::from(cells.rows));
+        let [upper, lower] = [border(row), border(row + 1)];
+        let height = (lower - upper) / f64::from(SIDE);
+        let width = 1.0 / (cells.columns * SIDE) as f32;
+        let solid_angle = cells.solid_angle(row) / f64::from(SIDE * SIDE);
+        for (index, (weight, brightest)) in (0..).zip(parts.weights.iter().zip(&parts.brightest)) {
+            let [down, right] = [index / SIDE, index % SIDE];
+            let upper = upper + height * f64::from(down);
+            let left = column as f32 / cells.columns as f32 + right as f32 * width;
+            let middle = environment_direction(left + 0.5 * width, (upper + 0.5 * height) as f32);
+            let source = Source::Cell {
+                across: [left, width],
+                cosines: [upper as f32, (upper + height) as f32],
+                solid_angle: solid_angle as f32,
+            };
+            self.add(source, weight * shown(middle.as_dvec3()), brightest * solid_angle * all_sides);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use photoncard_scene::{Environment, PunctualKind, PunctualLight};
+
+    #[test]
+    fn numbers_find_each_source_by_its_power() {
+        let light = |intensity: f32| PunctualLight {
+            name: "lamp".into(),
+            kind: PunctualKind::Point { position: Vec3::ZERO },
+            intensity: Vec3::splat(intensity),
+        };
+        let scene = Scene {
+            lights: vec![light(1.0), light(3.0)],
+            environment: Some(Environment::constant(Vec3::ZERO)),
+            ..Scene::default()
+        };
+        let sources = Sources::new(&scene, &Lights::new(&scene));
+        assert!((sources.power / (16.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
+        let at = |number: f64| sources.choose((number * 2.0_f64.powi(64)) as u64).expect("there are some");
+        let first = at(0.2);
+        assert_eq!(first.source, Source::Emitter(0));
+        assert!((first.probability - 0.25).abs() < 1e-6 && (first.rest - 0.8).abs() < 1e-6, "{first:?}");
+        let second = at(0.4);
+        assert_eq!(second.source, Source::Emitter(1));
+        assert!((second.rest - 0.2).abs() < 1e-6, "{second:?}");
+        assert_eq!(at(0.999_999_999_9).source, Source::Emitter(1));
+        let dark = Scene::default();
+        assert!(Sources::new(&dark, &Lights::new(&dark)).choose(7).is_none());
+    }
+}

@@ -1,0 +1,185 @@
+//! Packing: conversion of a scene to the sections of a card image, in lines.
+//!
+//! A [`PackedScene`] holds hierarchy, triangles, materials and lights. The photon pass ([`crate::photon`]) traces in it
+//! with the chip's own ray caster, so that photons lie on exactly the surfaces that gather rays meet. [`crate::photon_map`]
+//! adds the sections of the photon map.
+
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::scene::SceneImage;
+use photoncard_picture::allocation::{self, OutOfMemory};
+use photoncard_scene::Scene;
+use photoncard_shared::image::{Header, SectionKind};
+use photoncard_shared::layout::{
+    self, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, power_of_two_above,
+};
+use photoncard_shared::message::SumScale;
+
+use crate::bvh::{self, Finishes, LeafTriangles};
+use crate::light::{Lights, Sources};
+
+mod card_image;
+mod corners;
+mod error;
+mod flat_glass;
+mod materials;
+mod textures;
+mod writer;
+
+pub use self::card_image::CardImage;
+use self::corners::PackedCorners;
+pub use self::error::PackError;
+use self::flat_glass::Glazing;
+pub(crate) use self::writer::ImageWriter;
+
+/// Bytes of memory that packing takes per triangle beside the scene, mainly for binary trees.
+const BYTES_OF_A_TRIANGLE: u64 = 700;
+
+/// The card image of a scene without photons, and the sources that light it.
+#[derive(Clone)]
+pub struct PackedScene {
+    image: CardImage,
+    sources: Sources,
+    aimed_sources: Option<Sources>,
+    caustic_sources: Option<Sources>,
+    keeps_photons: bool,
+    has_lobes_under_punctual_lights: bool,
+}
+
+impl PackedScene {
+    /// Packs geometry, materials, textures and lights.
+    ///
+    /// # Errors
+    /// If the geometry exceeds a chip or this process's memory, or there are more textures or lights than a chip can index.
+    pub fn new(scene: &Scene) -> Result<Self, PackError> {
+        allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
+            .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
+        let lights = Lights::new(scene);
+        let image = write(scene, &lights)?;
+        let keeps_photons = materials::keep_photons(scene, image.view());
+        Ok(Self {
+            image,
+            sources: Sources::new(scene, &lights),
+            aimed_sources: Sources::aimed(scene, &lights),
+            caustic_sources: Sources::of_caustics(scene, &lights),
+            keeps_photons,
+            has_lobes_under_punctual_lights: !scene.lights.is_empty()
+                && scene.materials.iter().any(|material| scene.has_narrow_lobe(material)),
+        })
+    }
+
+    /// The scene as a chip sees it, without photons.
+    pub fn view(&self) -> (SceneImage, Lines<'_>) {
+        self.image.view()
+    }
+
+    /// The card image, without photons.
+    pub(crate) fn image(&self) -> &CardImage {
+        &self.image
+    }
+
+    /// The card image, to be completed.
+    pub(crate) fn into_image(self) -> CardImage {
+        self.image
+    }
+
+    /// Grid of photon positions: the finest that covers the scene.
+    pub fn photon_grid(&self) -> PhotonGrid {
+        self.image
+            .bounds()
+            .map_or(PhotonGrid::UNIT, |NodeBox { lower, upper }| PhotonGrid::around(lower, upper))
+    }
+
+    /// Units of the sums of pixels.
+    pub fn sum_scale(&self) -> SumScale {
+        SumScale { depth: self.photon_grid().cell, ..self.view().0.header.sum_scale() }
+    }
+
+    /// The sources of photons.
+    pub(crate) fn sources(&self) -> &Sources {
+        &self.sources
+    }
+
+    /// The sources of photons that are aimed at surfaces; `None` if there are none.
+    pub(crate) fn aimed_sources(&self) -> Option<&Sources> {
+        self.aimed_sources.as_ref()
+    }
+
+    /// The sources of caustic photons, aimed at specular surfaces; `None` if there are none.
+    pub(crate) fn caustic_sources(&self) -> Option<&Sources> {
+        self.caustic_sources.as_ref()
+    }
+
+    /// Returns whether any surface stores photons.
+    pub(crate) fn keeps_photons(&self) -> bool {
+        self.keeps_photons
+    }
+
+    /// Returns whether there are narrow lobes and lights without extent: the caustic map brings the one's light to the other.
+    pub(crate) fn has_lobes_under_punctual_lights(&self) -> bool {
+        self.has_lobes_under_punctual_lights
+    }
+}
+
+/// Writes the sections of a scene.
+fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
+    let uncovered = scene.uncovered_materials();
+    let glazing = Glazing::new(scene);
+    let flat_glass = glazing.is_flat(scene);
+    let cut_out = glazing.of_materials(&uncovered);
+    let hierarchy = bvh::build(&glazing.triangles, Finishes { cut_out: &cut_out, flat_glass: &flat_glass })?;
+    let corners = PackedCorners::new(scene, lights, (&hierarchy.leaf_triangles, &uncovered));
+    let textures = textures::records(scene, lights.environment())?;
+    let indices = indices_in_image(scene, &hierarchy.leaf_triangles);
+    let mut image = ImageWriter::new(header(scene, lights));
+    image.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
+    image.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
+    image.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
+    image.append(SectionKind::Attributes, corners.records.into_iter())?;
+    let materials = glazing.records(materials::records(scene, lights, &uncovered));
+    image.append(SectionKind::Materials, materials.iter().map(layout::Material::to_bytes))?;
+    image.append(SectionKind::Layers, materials::layers(scene).into_iter())?;
+    image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
+    image.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
+    let index_in_image = |triangle: usize| indices.get(triangle).copied().unwrap_or(0);
+    image.append(SectionKind::Emitters, lights.emitters(index_in_image).map(|emitter| emitter.to_bytes()))?;
+    image.append(SectionKind::LightNodes, lights.nodes())?;
+    image.append(SectionKind::DistantLights, lights.distant().iter().map(DistantLight::to_bytes))?;
+    let cells = lights.cell_thresholds();
+    image.append(SectionKind::EnvironmentCells, cells.iter().map(|threshold| threshold.to_le_bytes()))?;
+    Ok(image.finish())
+}
+
+/// Header of a scene without photons: units and lights. The writer sets lines and sections.
+fn header(scene: &Scene, lights: &Lights) -> Header {
+    Header {
+        radiance_unit: radiance_unit(scene, lights),
+        lights: lights.header(scene.textures.len() as u32),
+        ..Header::EMPTY
+    }
+}
+
+/// Index of each triangle of the scene in the card image, from the triangles of the image's leaves.
+fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
+    let mut indices = vec![0; scene.triangles.len()];
+    for (leaf, triangles) in leaves.iter().enumerate() {
+        for (slot, &triangle) in triangles.iter().enumerate() {
+            // `bvh` has checked that indices fit.
+            indices[triangle as usize] = (leaf * LEAF_TRIANGLES + slot) as u32;
+        }
+    }
+    indices
+}
+
+/// Unit of the chips' fixed-point sums of radiance, which hold 23 bits above the unit and 40 below.
+///
+/// The unit is 2^4 times a typical radiance: that of all surfaces if the emitted power were spread over them and reflected once by
+/// white. A much brighter emitter or texel of the environment raises it, so that its own radiance is within 2^7 units. The sums of
+/// 2^12 samples, the maximum of a pixel, then hold 2^15 times the typical radiance and 2^4 times the brightest one on average: shadow
+/// rays next to an emitter may contribute a thousand times as much.
+fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
+    let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
+    let typical = lights.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));
+    let environment = lights.environment().map_or(0.0, |environment| environment.brightest);
+    let brightest = scene.materials.iter().map(|m| m.emission.max_element()).fold(environment, f32::max);
+    power_of_two_above((16.0 * typical).max(f64::from(brightest) / 128.0))
+}

@@ -1,0 +1,118 @@
+//! The card image: its header and its lines.
+
+use std::ops::Range;
+
+use glam::Vec3;
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::scene::SceneImage;
+use photoncard_shared::address::{LINE_BYTES, Line};
+use photoncard_shared::image::{Header, HeaderError, Lights, Section, SectionKind};
+use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, WideNode};
+
+/// Sections of lights.
+const LIGHT_SECTIONS: [SectionKind; 4] = [
+    SectionKind::Emitters,
+    SectionKind::LightNodes,
+    SectionKind::DistantLights,
+    SectionKind::EnvironmentCells,
+];
+
+/// Card image.
+#[derive(Clone)]
+pub struct CardImage {
+    /// Header, as encoded in the first lines.
+    pub(super) header: Header,
+    pub(super) lines: Vec<Line>,
+}
+
+impl AsRef<[Line]> for CardImage {
+    fn as_ref(&self) -> &[Line] {
+        &self.lines
+    }
+}
+
+impl CardImage {
+    /// Image of lines that were read from a file.
+    ///
+    /// # Errors
+    /// If they do not begin with a header of as many lines.
+    pub fn of_lines(lines: Vec<Line>) -> Result<Self, &'static str> {
+        let header = lines.first_chunk().map(Header::read);
+        let header = match header {
+            Some(Ok(header)) => header,
+            Some(Err(HeaderError::Version(_))) => return Err("its card image has another layout"),
+            Some(Err(_)) | None => return Err("it holds no card image"),
+        };
+        if header.lines as usize != lines.len() {
+            return Err("its card image has another length");
+        }
+        Ok(Self { header, lines })
+    }
+
+    /// All lines, the header's first.
+    pub fn lines(&self) -> &[Line] {
+        &self.lines
+    }
+
+    /// Bytes of the image.
+    pub fn bytes(&self) -> u64 {
+        self.lines.len() as u64 * LINE_BYTES as u64
+    }
+
+    /// The image as a chip sees it.
+    pub fn view(&self) -> (SceneImage, Lines<'_>) {
+        (SceneImage { header: self.header }, Lines(&self.lines))
+    }
+
+    /// The lines of a section.
+    pub fn section(&self, kind: SectionKind) -> &[Line] {
+        &self.lines[self.range(kind)]
+    }
+
+    /// The lines of a section, mutable.
+    pub(crate) fn section_mut(&mut self, kind: SectionKind) -> &mut [Line] {
+        let range = self.range(kind);
+        &mut self.lines[range]
+    }
+
+    /// Indices of a section's lines.
+    fn range(&self, kind: SectionKind) -> Range<usize> {
+        let Section { first_line, records } = self.header.section(kind);
+        let first = first_line as usize;
+        first..first + records.div_ceil(kind.records_per_line()) as usize
+    }
+
+    /// The image with its lights out: no surface and no environment emits, and there are no lights to sample. Photons stay, so that a
+    /// render of it shows the light of the photon map alone.
+    #[must_use]
+    pub fn without_emission(&self) -> Self {
+        let mut dark = self.clone();
+        dark.header.lights = Lights::NONE;
+        for kind in LIGHT_SECTIONS {
+            dark.header.sections[kind as usize] = Section::default();
+        }
+        let header = dark.header.to_lines();
+        dark.lines.iter_mut().zip(header).for_each(|(line, header)| *line = header);
+        let materials = dark.header.section(SectionKind::Materials).records as usize;
+        let lines = dark.section_mut(SectionKind::Materials);
+        for index in 0..materials {
+            let line = &mut lines[index / Material::PER_LINE];
+            if let Some(record) = line.record_mut(index % Material::PER_LINE) {
+                *record = Material { emission: [0.0; 3], ..Material::read(record) }.to_bytes();
+            }
+        }
+        dark
+    }
+
+    /// Bounding box of the scene, enlarged by the rounding of the root's 8-bit grid; `None` without triangles.
+    pub(super) fn bounds(&self) -> Option<NodeBox> {
+        let Line(root) = self.section(SectionKind::Nodes).first()?;
+        let children = 0..WideNode(root).children() as usize;
+        children.filter_map(|child| BvhNode(root).bounds(child)).reduce(NodeBox::union)
+    }
+
+    /// Diagonal of the scene's bounding box, metres; 1 without triangles.
+    pub fn diagonal(&self) -> f32 {
+        self.bounds().map_or(1.0, |NodeBox { lower, upper }| Vec3::from(upper).distance(Vec3::from(lower)))
+    }
+}

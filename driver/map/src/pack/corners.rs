@@ -1,0 +1,88 @@
+//! Vertex attributes of triangles as records of the card image.
+
+use photoncard_scene::{NO_ATTRIBUTES, Scene, Triangle, VertexAttributes};
+use photoncard_shared::layout::{self, LeafAttributes, Record, Tangents};
+
+use crate::bvh::LeafTriangles;
+use crate::light::Lights;
+
+/// Vertex attributes of the triangles of all leaves. Leaves without attributes have no records.
+pub(super) struct PackedCorners {
+    /// Entry of each leaf; empty if no leaf has attributes.
+    pub(super) leaves: Vec<u32>,
+    /// Records of the leaves with attributes.
+    pub(super) records: Vec<[u8; layout::Attributes::BYTES]>,
+}
+
+impl PackedCorners {
+    /// Attributes of a scene whose triangles are in `leaves`. `uncovered` are [`Scene::uncovered_materials`].
+    pub(super) fn new(
+        scene: &Scene,
+        lights: &Lights,
+        (leaves, uncovered): (&[LeafTriangles], &[bool]),
+    ) -> Self {
+        let mut packed = Self { leaves: Vec::with_capacity(leaves.len()), records: Vec::new() };
+        for leaf in leaves {
+            let entry = packed.append(scene, lights, (leaf, uncovered));
+            packed.leaves.push(entry);
+        }
+        if packed.records.is_empty() {
+            packed.leaves.clear();
+        }
+        packed
+    }
+
+    /// Appends the records of a leaf. Returns its entry.
+    fn append(
+        &mut self,
+        scene: &Scene,
+        lights: &Lights,
+        (leaf, uncovered): (&LeafTriangles, &[bool]),
+    ) -> u32 {
+        let triangles = || leaf.iter().map(|&index| &scene.triangles[index as usize]);
+        let materials = || triangles().map(|triangle| &scene.materials[triangle.material as usize]);
+        let has_corners = triangles().any(|triangle| triangle.attributes != NO_ATTRIBUTES);
+        let has_cut_outs = triangles().any(|triangle| uncovered[triangle.material as usize]);
+        let has_emitters = leaf.iter().any(|&index| lights.of_triangle(index).is_some());
+        if !has_corners && !has_cut_outs && !has_emitters {
+            return layout::NO_ATTRIBUTES;
+        }
+        let is_of_second_set = |texture: u32| scene.textures[texture as usize].set == 1;
+        let two_sets = materials().any(|material| material.textures().any(is_of_second_set));
+        if materials().any(|material| material.tangent_texture().is_some()) {
+            let tangents: Vec<Tangents> = triangles().map(|triangle| tangents(scene, triangle)).collect();
+            self.records.extend(Tangents::to_records(&tangents));
+        }
+        // A record takes half a line, and lines are fewer than 2^32: the upper bit is free.
+        let first = self.records.len() as u32;
+        for &index in leaf {
+            let triangle = &scene.triangles[index as usize];
+            let emitter = lights.of_triangle(index);
+            let attributes =
+                scene.attributes.get(triangle.attributes as usize).unwrap_or(&VertexAttributes::NONE);
+            let sets = 0..1 + usize::from(two_sets);
+            self.records.extend(sets.map(|set| record(attributes, set, emitter).to_bytes()));
+        }
+        LeafAttributes { first, two_sets }.to_entry()
+    }
+}
+
+/// Tangents of a triangle; none if it has no normal map.
+fn tangents(scene: &Scene, triangle: &Triangle) -> Tangents {
+    let attributes = scene.attributes.get(triangle.attributes as usize);
+    let tangents = attributes.and_then(|attributes| scene.tangents.get(attributes.tangents as usize));
+    tangents.map_or(Tangents::NONE, |corners| Tangents {
+        directions: corners.map(|tangent| tangent.truncate().to_array()),
+        signs: corners.map(|tangent| tangent.w),
+    })
+}
+
+/// Record of vertex attributes with one set of texture coordinates; `emitter` is the triangle's emitter, if any.
+fn record(attributes: &VertexAttributes, set: usize, emitter: Option<u32>) -> layout::Attributes {
+    layout::Attributes {
+        normals: attributes.normals.map(|normals| normals.map(|normal| normal.to_array())),
+        coordinates: attributes.coordinates[set].map(|coordinates| coordinates.to_array()),
+        colours: attributes.colours,
+        emitter,
+    }
+}

@@ -1,0 +1,119 @@
+//! Textures as records and texel lines of the card image.
+
+use photoncard_scene::{Image, Scene, Wrap};
+use photoncard_shared::address::Line;
+use photoncard_shared::layout::{self, NO_TEXTURE, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH};
+
+use super::error::PackError;
+use crate::light::EnvironmentMap;
+
+/// Records of a scene's textures, the environment's last. Textures of one image share its texels.
+///
+/// # Errors
+/// If they are more than a material's record can index.
+pub(super) fn records(
+    scene: &Scene,
+    environment: Option<&EnvironmentMap>,
+) -> Result<Vec<layout::Texture>, PackError> {
+    if scene.textures.len() >= usize::from(NO_TEXTURE) {
+        return Err(PackError::TooManyTextures { textures: scene.textures.len() });
+    }
+    let mut first_line = 0;
+    let bare: Vec<layout::Texture> = scene
+        .images
+        .iter()
+        .map(|image| {
+            let texture = layout::Texture { first_line, ..bare(image) };
+            // An overflow is impossible after `lines` are appended: lines are counted there, and an image has fewer lines
+            // than texels.
+            first_line = first_line.wrapping_add(texture.lines());
+            texture
+        })
+        .collect();
+    let textures = scene.textures.iter().map(|texture| layout::Texture {
+        wrap: texture.wrap.map(wrap),
+        nearest: texture.nearest,
+        set: texture.set,
+        matrix: texture.matrix,
+        offset: texture.offset,
+        ..bare[texture.image as usize]
+    });
+    Ok(textures.chain(environment.map(|map| map.texture(first_line))).collect())
+}
+
+/// Lines of all images' texels, one image after the other, the environment's last.
+pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> impl Iterator<Item = Line> {
+    let of_images = scene.images.iter().flat_map(|image| {
+        tiles(bare(image), |x, y| image.texels[y as usize * image.width as usize + x as usize])
+    });
+    let of_environment =
+        environment.into_iter().flat_map(|map| tiles(map.texture(0), |x, y| map.texel(x, y)));
+    of_images.chain(of_environment)
+}
+
+/// Lines of a texture; `texel` returns the texel at a column and a row.
+fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl Iterator<Item = Line> {
+    let [width, height] = texture.size.map(u32::from);
+    let across = width.div_ceil(TILE_WIDTH);
+    (0..texture.lines()).map(move |tile| {
+        let [column, row] = [tile % across * TILE_WIDTH, tile / across * TILE_HEIGHT];
+        let mut line = Line::ZERO;
+        for (place, bytes) in (0..TEXELS_PER_LINE).zip(line.0.as_chunks_mut().0) {
+            // Tiles that extend beyond the borders repeat the last texels.
+            let x = (column + place % TILE_WIDTH).min(width - 1);
+            let y = (row + place / TILE_WIDTH).min(height - 1);
+            *bytes = texel(x, y);
+        }
+        line
+    })
+}
+
+/// Texture of an image, with texels from line 0 on.
+fn bare(image: &Image) -> layout::Texture {
+    layout::Texture {
+        first_line: 0,
+        // The loader rejects larger images.
+        size: [image.width, image.height].map(|side| side as u16),
+        wrap: [layout::Wrap::Repeat; 2],
+        nearest: false,
+        set: 0,
+        format: image.encoding.into(),
+        matrix: [[1.0, 0.0], [0.0, 1.0]],
+        offset: [0.0; 2],
+    }
+}
+
+fn wrap(wrap: Wrap) -> layout::Wrap {
+    match wrap {
+        Wrap::Repeat => layout::Wrap::Repeat,
+        Wrap::Mirror => layout::Wrap::Mirror,
+        Wrap::Clamp => layout::Wrap::Clamp,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use photoncard_scene::{Encoding, Texture};
+
+    fn image(width: u32, height: u32) -> Image {
+        let texels = (0..width * height).map(u32::to_le_bytes).collect();
+        Image { name: "counted".into(), width, height, texels, encoding: Encoding::Linear }
+    }
+
+    #[test]
+    fn every_texel_is_where_its_texture_says() {
+        let images = vec![image(13, 6), image(1, 1), image(8, 4), image(3, 70)];
+        let textures = [0, 3, 1, 2, 3].map(Texture::new).to_vec();
+        let scene = Scene { images, textures, ..Scene::default() };
+        let lines: Vec<Line> = lines(&scene, None).collect();
+        for (texture, record) in scene.textures.iter().zip(records(&scene, None).expect("few")) {
+            let Image { width, height, texels, .. } = &scene.images[texture.image as usize];
+            for (number, texel) in (0..).zip(texels) {
+                let (line, place) = record.locate(number % width, number / width);
+                assert_eq!(lines[line as usize].record::<4>(place), Some(texel));
+            }
+            assert_eq!(record.size.map(u32::from), [*width, *height]);
+        }
+    }
+}

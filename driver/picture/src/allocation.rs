@@ -1,0 +1,65 @@
+//! Check of available memory before work of a known size: memory that the process cannot have is an error, whereas an
+//! allocation that fails in the middle of the work would abort the process.
+
+use std::hint::black_box;
+
+/// Error of an allocation that the process cannot have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{bytes} bytes of memory are needed, which the system does not give")]
+pub struct OutOfMemory {
+    /// Requested bytes.
+    pub bytes: u64,
+}
+
+impl OutOfMemory {
+    /// Error of a list of `elements` elements that cannot grow to twice that number.
+    pub fn doubling<T>(elements: usize) -> Self {
+        Self { bytes: 2 * (elements * size_of::<T>()) as u64 }
+    }
+}
+
+/// Appends to a list if there is memory for it.
+pub fn push<T>(list: &mut Vec<T>, element: T) -> Result<(), OutOfMemory> {
+    list.try_reserve(1).map_err(|_| OutOfMemory::doubling::<T>(list.len()))?;
+    list.push(element);
+    Ok(())
+}
+
+/// Remedy for memory that the system refuses.
+pub const REMEDY: &str =
+    "close other programs, raise the process's limit (`ulimit -v`), or use a machine with more memory";
+
+/// Checks that the process can allocate `bytes` at once. The allocation is freed again.
+///
+/// # Errors
+/// If the allocation fails.
+pub fn check(bytes: u64) -> Result<(), OutOfMemory> {
+    let mut probe = Vec::<u8>::new();
+    let all = usize::try_from(bytes).map_err(|_| OutOfMemory { bytes })?;
+    probe.try_reserve_exact(all).map_err(|_| OutOfMemory { bytes })?;
+    // An allocation that is never used may be removed by the compiler.
+    black_box(probe.as_mut_ptr());
+    Ok(())
+}
+
+/// Zeros. The system gives their memory when it is first written, so that a film of which a part is rendered takes that part's.
+///
+/// # Errors
+/// If the allocation fails.
+pub(crate) fn zeros(bytes: usize) -> Result<Vec<u8>, OutOfMemory> {
+    check(bytes as u64)?;
+    Ok(vec![0; bytes])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_no_machine_has_is_refused() {
+        assert_eq!(check(1 << 20), Ok(()));
+        for bytes in [1 << 60, u64::MAX] {
+            assert_eq!(check(bytes), Err(OutOfMemory { bytes }));
+        }
+    }
+}

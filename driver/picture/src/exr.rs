@@ -1,0 +1,415 @@
+//! `OpenEXR` files: writing of films, and reading of radiance for comparisons.
+//!
+//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers
+//! are in channels like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data
+//! window is the film's crop window, the display window the full picture. The picture's provenance is JSON in
+//! the one attribute `photoncard`: the `exr` crate keeps attributes in a hash map, so several would change
+//! the file's bytes from run to run. The standard attribute `comments` has the file's checksum, by which
+//! [`is_intact`] knows a file that was cut off or damaged.
+
+mod dwa;
+
+use std::io::{self, Cursor};
+use std::path::{Path, PathBuf};
+
+use exr::meta::BlockDescription;
+use exr::meta::header::Header;
+use exr::prelude::{
+    AnyChannel, AnyChannels, AttributeValue, Compression, Encoding, FlatSamples, Image, ImageAttributes,
+    IntegerBounds, Layer, LayerAttributes, LineOrder, MetaData, ReadChannels, ReadLayers, SampleType,
+    SmallVec, Text, Vec2, WritableImage, f16, read as reader,
+};
+use thiserror::Error;
+
+use crate::allocation::{self, OutOfMemory};
+use crate::choice::choices;
+use crate::film::Film;
+use crate::foreign;
+use crate::intact::{self, BLANK};
+use crate::layer::{Channel, Layers};
+#[cfg(not(target_family = "wasm"))]
+use crate::output::{self, OutputError};
+
+/// Name of the attribute that holds the picture's provenance.
+pub const PROVENANCE: &str = "photoncard";
+
+/// Maximum number of pixels of a picture that is read.
+pub const MAX_READ_PIXELS: u64 = 1 << 28;
+
+/// Pixel type of the stored samples. Depth and gathers are always [`SampleFormat::Float`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SampleFormat {
+    /// `HALF`, 16 bits: three digits, up to 65504; larger finite values are stored as 65504.
+    #[default]
+    Half,
+    /// `FLOAT`, 32 bits: exactly as rendered.
+    Float,
+}
+
+choices!(SampleFormat { Half = "half", Float = "float" });
+
+/// Linear RGB radiance of a file's data window.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RgbImage {
+    /// Columns of the data window.
+    pub width: usize,
+    /// Rows of the data window.
+    pub height: usize,
+    /// The data window's first column and row in the full picture.
+    pub data_window_origin: [i32; 2],
+    /// The pixels, row by row from the top.
+    pub pixels: Vec<[f32; 3]>,
+}
+
+impl RgbImage {
+    /// Columns and rows of the data window; each is at most [`MAX_READ_PIXELS`].
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height].map(|side| side as u32)
+    }
+}
+
+/// Error of [`write()`] and [`read_rgb`].
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ExrError {
+    /// The file cannot be written.
+    #[cfg(not(target_family = "wasm"))]
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The encoder refused the picture.
+    #[error("cannot encode {} as OpenEXR: {reason}", path.display())]
+    Encode {
+        /// The output file.
+        path: PathBuf,
+        /// The encoder's error.
+        reason: String,
+    },
+    /// The file cannot be read.
+    #[error("cannot read {}; check that the path names a file and that it may be read", path.display())]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's error.
+        #[source]
+        source: io::Error,
+    },
+    /// The file is not an `OpenEXR` picture, or it is damaged.
+    #[error("{} is not a readable OpenEXR picture: {reason}; render or copy it again", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// The decoder's error, or a contradiction in the file.
+        reason: String,
+    },
+    /// The picture has no plain colour channels.
+    #[error("{} has no channels R, G and B, only {channels}; write the picture as plain RGB", path.display())]
+    NoColour {
+        /// The file.
+        path: PathBuf,
+        /// Names of the file's channels.
+        channels: String,
+    },
+    /// The file's compression cannot be read safely.
+    #[error("{} has {compression}, which is not read; store the picture with ZIP compression", path.display())]
+    Compression {
+        /// The file.
+        path: PathBuf,
+        /// Name of the compression.
+        compression: String,
+    },
+    /// The process cannot have the memory that reading takes.
+    #[error("reading {} takes {bytes} bytes of memory, which the system does not give; {}", path.display(), allocation::REMEDY)]
+    Memory {
+        /// The file.
+        path: PathBuf,
+        /// Bytes of memory.
+        bytes: u64,
+    },
+    /// The picture is too large to be read at once.
+    #[error("{} has {width} x {height} pixels, more than {MAX_READ_PIXELS}; take crops of it", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// Width of the data window, pixels.
+        width: usize,
+        /// Height of the data window, pixels.
+        height: usize,
+    },
+}
+
+/// Writes the film to `path`, whole or not at all, as [`bytes`] has it.
+///
+/// # Errors
+/// If the file cannot be written, or the provenance is empty.
+#[cfg(not(target_family = "wasm"))]
+pub fn write(
+    path: &Path,
+    film: &Film,
+    layers: &Layers,
+    provenance_json: &str,
+    format: SampleFormat,
+) -> Result<(), ExrError> {
+    Ok(output::write(path, &bytes(path, film, layers, provenance_json, format)?)?)
+}
+
+/// The film as `OpenEXR`: equal films give equal bytes. `path` is the file's name in errors.
+///
+/// Pixels that were never written are zero, and so are layers that the film does not have. `provenance_json` is stored
+/// in the attribute [`PROVENANCE`]; characters beyond ASCII are stored as JSON's `\u` escapes.
+///
+/// # Errors
+/// If the provenance is empty, or no text.
+pub fn bytes(
+    path: &Path,
+    film: &Film,
+    layers: &Layers,
+    provenance_json: &str,
+    format: SampleFormat,
+) -> Result<Vec<u8>, ExrError> {
+    let fault = |reason: String| ExrError::Encode { path: path.to_owned(), reason };
+    if provenance_json.is_empty() {
+        return Err(fault("the provenance is empty".to_owned()));
+    }
+    let image = image_of(film, layers, provenance_json, format)
+        .ok_or_else(|| fault("the provenance is not text".to_owned()))?;
+    let mut bytes = Cursor::new(Vec::new());
+    image.write().to_buffered(&mut bytes).map_err(|error| fault(error.to_string()))?;
+    let mut bytes = bytes.into_inner();
+    intact::seal_exr(&mut bytes);
+    Ok(bytes)
+}
+
+fn image_of(
+    film: &Film,
+    layers: &Layers,
+    provenance: &str,
+    format: SampleFormat,
+) -> Option<Image<Layer<AnyChannels<FlatSamples>>>> {
+    let window = film.window();
+    let provenance = Text::new_or_none(ascii(provenance))?;
+    let mut attributes =
+        ImageAttributes::new(IntegerBounds::from_dimensions((film.width() as usize, film.height() as usize)));
+    attributes.other.insert(Text::new_or_none(PROVENANCE)?, AttributeValue::Text(provenance));
+    let size = Vec2(window.width() as usize, window.height() as usize);
+    let position = Vec2(i32::try_from(window.x0).ok()?, i32::try_from(window.y0).ok()?);
+    let comments = Text::new_or_none(BLANK);
+    let own = LayerAttributes { comments, ..LayerAttributes::default() }.with_position(position);
+    let encoding = Encoding {
+        compression: Compression::ZIP16,
+        blocks: exr::image::Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    Some(Image { attributes, layer_data: Layer::new(size, own, encoding, channels(film, layers, format)) })
+}
+
+fn channels(film: &Film, layers: &Layers, format: SampleFormat) -> AnyChannels<FlatSamples> {
+    let stored = |channel: &Channel, format: SampleFormat| {
+        let values = film.all().map(|pixel| (channel.value)(&pixel));
+        let samples = match format {
+            SampleFormat::Half => FlatSamples::F16(values.map(to_half).collect()),
+            SampleFormat::Float => FlatSamples::F32(values.collect()),
+        };
+        AnyChannel::new(channel.name, samples)
+    };
+    let mut list: SmallVec<_> = Layers::colour().iter().map(|channel| stored(channel, format)).collect();
+    for layer in layers.iter() {
+        let format = if layer.is_always_single() { SampleFormat::Float } else { format };
+        list.extend(layer.channels().iter().map(|channel| stored(channel, format)));
+    }
+    AnyChannels::sort(list)
+}
+
+/// The nearest half; finite values beyond its range become plus or minus 65504.
+fn to_half(value: f32) -> f16 {
+    let half = f16::from_f32(value);
+    if half.is_infinite() && value.is_finite() { f16::MAX.copysign(half) } else { half }
+}
+
+/// JSON with every character beyond ASCII escaped: the attribute is ASCII, and only strings of JSON hold other
+/// characters.
+pub(crate) fn ascii(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
+    for character in json.chars() {
+        if character.is_ascii() {
+            text.push(character);
+        } else {
+            let units = character
+                .encode_utf16(&mut [0; 2])
+                .iter()
+                .map(|unit| format!("\\u{unit:04x}"))
+                .collect::<String>();
+            text.push_str(&units);
+        }
+    }
+    text
+}
+
+/// Reads the plain colour channels `R G B` (half, float or unsigned) of the first part that has them.
+///
+/// # Errors
+/// As [`read_with_provenance`].
+pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
+    read_with_provenance(path).map(|(picture, _)| picture)
+}
+
+/// Reads a picture as [`read_rgb`], and the JSON of its attribute [`PROVENANCE`]; `None` if the file has none, or it is not JSON.
+///
+/// # Errors
+/// If the file cannot be read, is malformed, has no such channels, or has more than [`MAX_READ_PIXELS`]. A file
+/// that states a size its length cannot hold is refused before anything is allocated.
+pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), ExrError> {
+    let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
+    let found = std::fs::metadata(path).map_err(unreadable)?;
+    if !found.is_file() {
+        return Err(unreadable(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
+    }
+    let bytes = std::fs::read(path).map_err(unreadable)?;
+    decode_walled(path, &bytes, MAX_READ_PIXELS)
+}
+
+/// Reads the provenance of a picture of this program and the type of its samples, without its pixels; `None` if the file is none.
+pub fn read_form(path: &Path) -> Option<(String, SampleFormat)> {
+    let meta = || MetaData::read_from_file(path, false).map_err(drop);
+    let meta = foreign::decode(meta, || ()).ok()?;
+    let [header] = &meta.headers[..] else { return None };
+    let format = match header.channels.find_index_of_channel(&Text::new_or_none("R")?) {
+        Some(red) => match header.channels.list.get(red)?.sample_type {
+            SampleType::F16 => SampleFormat::Half,
+            SampleType::F32 => SampleFormat::Float,
+            SampleType::U32 => return None,
+        },
+        None => return None,
+    };
+    Some((provenance(&header.own_attributes)?, format))
+}
+
+/// Returns whether a file is, to the byte, one that [`write()`] has written; an unreadable one is not.
+pub fn is_intact(path: &Path) -> bool {
+    std::fs::read(path).is_ok_and(|bytes| intact::is_intact_exr(&bytes))
+}
+
+/// [`read_rgb`] from the bytes of a file, with at most `most_pixels` pixels.
+pub fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
+    decode_walled(path, bytes, most_pixels).map(|(picture, _)| picture)
+}
+
+fn decode_walled(
+    path: &Path,
+    bytes: &[u8],
+    most_pixels: u64,
+) -> Result<(RgbImage, Option<String>), ExrError> {
+    // The `exr` crate does not check every number of a file: sums of window sizes, offsets of blocks.
+    foreign::decode(
+        || decode(path, bytes, most_pixels),
+        || ExrError::Malformed {
+            path: path.to_owned(),
+            reason: "its structure contradicts itself".to_owned(),
+        },
+    )
+}
+
+fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<(RgbImage, Option<String>), ExrError> {
+    let malformed =
+        |error: exr::error::Error| ExrError::Malformed { path: path.to_owned(), reason: error.to_string() };
+    let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(malformed)?;
+    MetaData::validate(&meta.headers, false).map_err(malformed)?;
+    for header in &meta.headers {
+        check_size(path, header, bytes.len() as u64, most_pixels)?;
+    }
+    if !meta.headers.iter().any(has_colour) {
+        let names = meta.headers.iter().flat_map(|header| header.channels.list.iter());
+        let names: Vec<_> = names.take(20).map(|channel| channel.name.to_string()).collect();
+        return Err(ExrError::NoColour { path: path.to_owned(), channels: names.join(", ") });
+    }
+    let has_dwa = meta.headers.iter().any(|header| dwa::is_dwa(header.compression));
+    if has_dwa && !dwa::states_possible_sizes(bytes).map_err(malformed)? {
+        let reason = "a block states more samples than it has".to_owned();
+        return Err(ExrError::Malformed { path: path.to_owned(), reason });
+    }
+    let image = reader()
+        .no_deep_data()
+        .largest_resolution_level()
+        .rgb_channels(
+            |size, _| (size.width(), vec![[0.0; 3]; size.area()]),
+            |(width, pixels): &mut (usize, Vec<[f32; 3]>), position, (red, green, blue): (f32, f32, f32)| {
+                pixels[position.y() * *width + position.x()] = [red, green, blue];
+            },
+        )
+        .first_valid_layer()
+        .all_attributes()
+        // A panic on a worker thread would end the process.
+        .non_parallel()
+        .from_buffered(Cursor::new(bytes))
+        .map_err(malformed)?;
+    let layer = image.layer_data;
+    let provenance = provenance(&layer.attributes);
+    let Vec2(x, y) = layer.attributes.layer_position;
+    let (width, pixels) = layer.channel_data.pixels;
+    let picture = RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels };
+    Ok((picture, provenance))
+}
+
+/// The attribute [`PROVENANCE`], if it is JSON.
+fn provenance(attributes: &LayerAttributes) -> Option<String> {
+    let AttributeValue::Text(text) = attributes.other.get(&Text::new_or_none(PROVENANCE)?)? else {
+        return None;
+    };
+    let text = text.to_string();
+    serde_json::from_str::<serde::de::IgnoredAny>(&text).is_ok().then_some(text)
+}
+
+fn has_colour(header: &Header) -> bool {
+    let has = |name: &str| header.channels.list.iter().any(|channel| channel.name.eq(name));
+    has("R") && has("G") && has("B")
+}
+
+/// Refuses sizes that are too large, or that a file of `length` bytes cannot hold at any compression.
+fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Result<(), ExrError> {
+    const CHUNK_OVERHEAD: u64 = 16;
+    let Vec2(width, height) = header.layer_size;
+    let pixels = (width as u64).checked_mul(height as u64).filter(|&pixels| pixels <= most_pixels);
+    let pixels = pixels.ok_or_else(|| ExrError::TooLarge { path: path.to_owned(), width, height })?;
+    let contradiction = |reason: String| Err(ExrError::Malformed { path: path.to_owned(), reason });
+    if (header.chunk_count as u64).saturating_mul(CHUNK_OVERHEAD) > length {
+        return contradiction(format!("{} blocks do not fit into {length} bytes", header.chunk_count));
+    }
+    let Some(most) = most_compressed(header.compression) else {
+        return Err(ExrError::Compression {
+            path: path.to_owned(),
+            compression: header.compression.to_string(),
+        });
+    };
+    let held = length.saturating_mul(most);
+    // A picture of one colour is smaller than any that shows something.
+    let held = if dwa::is_dwa(header.compression) { held.max(dwa::PLAIN_BYTES) } else { held };
+    let stated = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
+    if stated > held {
+        return contradiction(format!("{width} x {height} pixels do not fit into {length} bytes"));
+    }
+    // The picture, and one block while it is unpacked and reordered.
+    let block = stated.min(header.max_block_byte_size() as u64);
+    let transform = if dwa::is_dwa(header.compression) { dwa::transform_bytes(header) } else { 0 };
+    let unpacked = transform.saturating_add(3 * block);
+    allocation::check(pixels.saturating_mul(size_of::<[f32; 3]>() as u64).saturating_add(unpacked))
+        .map_err(|OutOfMemory { bytes }| ExrError::Memory { path: path.to_owned(), bytes })?;
+    let BlockDescription::Tiles(tiles) = header.blocks else { return Ok(()) };
+    let tile = (tiles.tile_size.width() as u64).saturating_mul(tiles.tile_size.height() as u64);
+    if tile > MAX_READ_PIXELS {
+        return contradiction(format!("a tile of {tile} pixels is not possible"));
+    }
+    Ok(())
+}
+
+/// Upper bound of the compression ratio; `None` for compressions that are not read.
+fn most_compressed(compression: Compression) -> Option<u64> {
+    match compression {
+        Compression::Uncompressed => Some(1),
+        Compression::RLE => Some(64),
+        // Deflate reaches 1032 to 1; the others stay below.
+        Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => Some(1100),
+        Compression::PIZ | Compression::B44 | Compression::B44A => Some(1100),
+        // A code of a bit or more for 64 samples of two bytes, but for runs of equal codes.
+        Compression::DWAA(_) | Compression::DWAB(_) => Some(1100),
+        _ => None,
+    }
+}

@@ -1,0 +1,99 @@
+//! Headings of files: a line with the file's kind and version, a line of JSON, and the CRC-32C of both.
+
+use std::io::{self, BufRead, ErrorKind, Read};
+
+use photoncard_shared::checksum::checksum;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// Maximum length of the JSON, bytes.
+const MAX_HEAD: u64 = 1 << 24;
+
+/// Kind and version of a file.
+#[derive(Clone, Copy, Debug)]
+pub struct Kind {
+    /// Name of the kind, which begins the first line in all versions.
+    pub name: &'static str,
+    /// Version of the format.
+    pub version: u32,
+}
+
+/// Heading that was read.
+#[derive(Debug)]
+pub struct Heading<T> {
+    /// The JSON.
+    pub head: T,
+    /// Size, bytes.
+    pub bytes: u64,
+    /// CRC-32C of both lines.
+    pub checksum: u32,
+}
+
+/// Fault of a heading.
+#[derive(Debug)]
+pub enum HeadingFault {
+    /// The file is of no version of the kind.
+    Foreign,
+    /// The file is of this version of the kind.
+    Version(u32),
+    /// The heading is cut off or damaged, in words.
+    Damaged(&'static str),
+    /// The file cannot be read.
+    Unreadable(io::Error),
+}
+
+impl From<io::Error> for HeadingFault {
+    fn from(error: io::Error) -> Self {
+        Self::Unreadable(error)
+    }
+}
+
+impl Kind {
+    /// The heading of a file, with `head` as JSON, and the CRC-32C of both lines.
+    ///
+    /// # Errors
+    /// If it is no JSON.
+    pub fn heading(self, head: &impl Serialize) -> serde_json::Result<(Vec<u8>, u32)> {
+        let Self { name, version } = self;
+        let mut bytes = format!("{name} {version}\n{}\n", serde_json::to_string(head)?).into_bytes();
+        let sum = checksum(&bytes);
+        bytes.extend(sum.to_le_bytes());
+        Ok((bytes, sum))
+    }
+
+    /// Reads the heading of a file.
+    ///
+    /// # Errors
+    /// If the file is of another kind or version, damaged or unreadable.
+    pub fn read<T: DeserializeOwned>(self, reader: &mut impl BufRead) -> Result<Heading<T>, HeadingFault> {
+        let mut bytes = Vec::new();
+        // The kind, a blank, a number of 10 digits and the line feed.
+        let title = self.name.len() as u64 + 12;
+        reader.by_ref().take(title).read_until(b'\n', &mut bytes)?;
+        self.check_title(&bytes)?;
+        let title = bytes.len();
+        reader.by_ref().take(MAX_HEAD).read_until(b'\n', &mut bytes)?;
+        let mut sum = [0; 4];
+        reader.read_exact(&mut sum).map_err(|error| match error.kind() {
+            ErrorKind::UnexpectedEof => HeadingFault::Damaged("it ends within its head"),
+            _ => error.into(),
+        })?;
+        let checksum = checksum(&bytes);
+        if checksum.to_le_bytes() != sum {
+            return Err(HeadingFault::Damaged("its head has another checksum"));
+        }
+        let head = bytes.get(title..).and_then(|text| serde_json::from_slice(text).ok());
+        let head = head.ok_or(HeadingFault::Damaged("its head lacks something, or has too much"))?;
+        Ok(Heading { head, bytes: (bytes.len() + sum.len()) as u64, checksum })
+    }
+
+    fn check_title(self, line: &[u8]) -> Result<(), HeadingFault> {
+        let rest = line.strip_prefix(self.name.as_bytes()).and_then(|rest| rest.strip_prefix(b" "));
+        let number = rest.and_then(|rest| str::from_utf8(rest.strip_suffix(b"\n")?).ok()?.parse().ok());
+        match number {
+            Some(version) if version == self.version => Ok(()),
+            Some(other) => Err(HeadingFault::Version(other)),
+            None => Err(HeadingFault::Foreign),
+        }
+    }
+}

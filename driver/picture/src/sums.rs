@@ -1,0 +1,82 @@
+//! Format of the sums of pixels, and the values that they stand for.
+
+use photoncard_shared::image::Header;
+use photoncard_shared::message::{
+    FrameParameters, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, record_bytes,
+};
+
+/// Format of the sums of a tile or a film.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SumFormat {
+    /// True with layers.
+    pub layers: bool,
+    /// Number of samples in each sum.
+    pub samples: u32,
+    /// Number of probes among the samples, whose light counts by half; 0 without adaptive sampling.
+    pub probes: u32,
+    /// Units of the sums.
+    pub scale: SumScale,
+}
+
+/// Values of a pixel, with its layers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FilmPixel {
+    /// Radiance, albedo, normal and depth.
+    pub pixel: Pixel,
+    /// Layers; zero in a film without layers.
+    pub layers: PixelLayers,
+}
+
+impl SumFormat {
+    /// Format of one sample a pixel without layers, in units of 1 W/(sr m^2) and 1 m.
+    pub const ONE: Self =
+        Self { layers: false, samples: 1, probes: 0, scale: SumScale { radiance: 1.0, depth: 1.0 } };
+
+    /// Format of a frame of the image with the header `header`.
+    pub fn new(header: &Header, frame: &FrameParameters) -> Self {
+        let is_adaptive = frame.adaptive_threshold.is_some();
+        Self::of_range(frame.layers, (frame.first_sample, frame.samples), is_adaptive, header.sum_scale())
+    }
+
+    /// Format of a number of samples from a first one on, with or without adaptive sampling.
+    pub fn of_range(layers: bool, (first, samples): (u32, u32), is_adaptive: bool, scale: SumScale) -> Self {
+        let SampleCount { samples, probes } = SampleCount::of_range(first, samples, is_adaptive);
+        Self { layers, samples, probes, scale }
+    }
+
+    /// Format of a number of a picture's samples from a first one on, by the format of all.
+    pub(crate) fn of_part(&self, first: u32, samples: u32) -> Self {
+        Self::of_range(self.layers, (first, samples), self.probes > 0, self.scale)
+    }
+
+    /// Number of the samples.
+    pub fn count(&self) -> SampleCount {
+        SampleCount { samples: self.samples, probes: self.probes }
+    }
+
+    /// Size of the record of a pixel, bytes.
+    pub fn record_bytes(&self) -> usize {
+        record_bytes(self.layers)
+    }
+
+    /// Values that sums stand for.
+    pub fn values(&self, sums: &PixelSums) -> FilmPixel {
+        FilmPixel {
+            pixel: sums.pixel(self.count(), &self.scale),
+            layers: sums.pixel_layers(self.count(), &self.scale).unwrap_or_default(),
+        }
+    }
+
+    /// Sums whose values are nearest to `pixel`.
+    pub fn sums(&self, FilmPixel { pixel, layers }: &FilmPixel) -> PixelSums {
+        let sums = PixelSums::nearest(pixel, self.count(), &self.scale);
+        if self.layers { sums.with_nearest_layers(layers, self.count(), &self.scale) } else { sums }
+    }
+
+    /// Format of the sums of the samples of both; `None` if their units or layers differ.
+    pub fn plus(&self, more: &Self) -> Option<Self> {
+        let is_alike = self.layers == more.layers && self.scale == more.scale;
+        let samples = self.samples.checked_add(more.samples)?;
+        is_alike.then_some(Self { samples, probes: self.probes.saturating_add(more.probes), ..*self })
+    }
+}

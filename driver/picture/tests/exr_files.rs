@@ -1,0 +1,348 @@
+//! `OpenEXR` files: a written film reads back unchanged, and damaged files are rejected.
+
+use std::fs;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use exr::prelude::{
+    Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels,
+    Vec2, WritableImage,
+};
+use photoncard_picture::exr::{ExrError, SampleFormat, is_intact, read_rgb, write};
+use photoncard_picture::film::{Film, FilmPixel, PixelLayers, PixelValue, SumFormat, SumScale, Window};
+use photoncard_picture::layer::Layers;
+use proptest::prelude::{ProptestConfig, any, proptest};
+
+const WINDOW: Window = Window { x0: 3, x1: 20, y0: 5, y1: 45 };
+
+fn value(x: u32, y: u32) -> PixelValue {
+    let (x, y) = (x as f32, y as f32);
+    PixelValue {
+        radiance: [x / 7.0, y / 3.0, 0.01 * x * y],
+        albedo: [0.1, 0.2, 0.3],
+        normal: [0.0, -1.0, 0.5],
+        depth: 1000.0 + x / 1024.0,
+    }
+}
+
+/// Units in which the values of these tests have sums, with room for a dazzling light.
+const FORMAT: SumFormat = SumFormat {
+    samples: 1,
+    probes: 0,
+    layers: false,
+    scale: SumScale { radiance: 1.0, depth: 1.0 / 1024.0 },
+};
+
+fn write_pixel(film: &mut Film, x: u32, y: u32, pixel: PixelValue, layers: PixelLayers) {
+    let sums = film.format().sums(&FilmPixel { pixel, layers });
+    film.write(x, y, &sums).unwrap();
+}
+
+fn film() -> Film {
+    let mut film = Film::new(64, 48, WINDOW, FORMAT).unwrap();
+    for y in WINDOW.y0..WINDOW.y1 {
+        for x in WINDOW.x0..WINDOW.x1 {
+            write_pixel(&mut film, x, y, value(x, y), PixelLayers::default());
+        }
+    }
+    film
+}
+
+fn written(format: SampleFormat, provenance: &str) -> (tempfile::TempDir, std::path::PathBuf) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("picture.exr");
+    write(&path, &film(), &Layers::default(), provenance, format).unwrap();
+    (folder, path)
+}
+
+/// No byte of a file can be changed, added or removed unnoticed.
+#[test]
+fn a_file_is_intact_only_as_it_was_written() {
+    for format in [SampleFormat::Float, SampleFormat::Half] {
+        // The provenance has the text of the checksum itself.
+        let (_folder, path) = written(format, r#"{"name": "photoncard checksum 00000000"}"#);
+        let bytes = fs::read(&path).unwrap();
+        assert!(is_intact(&path));
+        let is_kept = |changed: &[u8]| {
+            fs::write(&path, changed).unwrap();
+            is_intact(&path)
+        };
+        for place in (0..bytes.len()).step_by(97).chain((0..600).step_by(5)) {
+            let mut changed = bytes.clone();
+            changed[place] ^= 1 << (place % 8);
+            assert!(!is_kept(&changed), "byte {place}");
+            assert!(!is_kept(&bytes[..place]), "the first {place} bytes");
+        }
+        assert!(!is_kept(&[&bytes[..], &[0]].concat()));
+        assert!(is_kept(&bytes));
+    }
+    assert!(!is_intact(Path::new("absent.exr")));
+}
+
+#[test]
+fn radiance_is_read_back_to_the_format_s_precision() {
+    for (format, precision) in [(SampleFormat::Float, 0.0), (SampleFormat::Half, 1.0 / 2048.0)] {
+        let (_folder, path) = written(format, "{}");
+        let image = read_rgb(&path).unwrap();
+        assert_eq!((image.width, image.height, image.data_window_origin), (17, 40, [3, 5]));
+        for (index, pixel) in image.pixels.iter().enumerate() {
+            let written = film().pixel(3 + index as u32 % 17, 5 + index as u32 / 17).unwrap();
+            let expected = written.radiance;
+            for (read, expected) in pixel.iter().zip(expected) {
+                assert!((read - expected).abs() <= precision * expected, "{format:?}: {read} {expected}");
+            }
+        }
+    }
+}
+
+/// A picture of 40 x 40 pixels whose blocks are of DWA, and its bytes.
+fn dwa(folder: &std::path::Path, compression: Compression) -> (std::path::PathBuf, Vec<u8>) {
+    let path = folder.join("picture.exr");
+    let channels = SpecificChannels::rgb(|Vec2(x, y)| {
+        (x as f32 * 0.1, (y as f32 * 0.3).sin() + 1.5, if (x / 7 + y / 5) % 2 == 0 { 4.0_f32 } else { 0.5 })
+    });
+    let encoding = Encoding { compression, ..Encoding::default() };
+    let layer = exr::prelude::Layer::new((40, 40), LayerAttributes::default(), encoding, channels);
+    Image::from_layer(layer).write().to_file(&path).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    (path, bytes)
+}
+
+#[test]
+fn pictures_of_dwa_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
+        let (path, _) = dwa(folder.path(), compression);
+        let picture = read_rgb(&path).unwrap();
+        for (index, pixel) in picture.pixels.iter().enumerate() {
+            let (x, y) = (index % 40, index / 40);
+            let blue = if (x / 7 + y / 5) % 2 == 0 { 4.0 } else { 0.5 };
+            let expected = [x as f32 * 0.1, (y as f32 * 0.3).sin() + 1.5, blue];
+            let is_near = |(found, expected): (&f32, f32)| (found - expected).abs() < 0.15;
+            assert!(pixel.iter().zip(expected).all(is_near), "{compression}: {x} {y} {pixel:?}");
+        }
+    }
+}
+
+/// The decoder allocates as much as a block states.
+#[test]
+fn blocks_of_dwa_that_state_too_much_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
+        let (path, bytes) = dwa(folder.path(), compression);
+        // The version of a block, the first of its counters, follows its coordinate and size.
+        let start = (0..bytes.len() - 88).rev().find(|&at| {
+            let counter = |index: usize| u64::from_le_bytes(bytes[at + 8 * index..][..8].try_into().unwrap());
+            counter(0) == 2 && (1..11).all(|index| counter(index) < 1 << 20) && counter(8) > 0
+        });
+        let start = start.unwrap();
+        for counter in [1, 6, 7, 8, 9] {
+            for stated in [1_u64 << 30, 1 << 40, i64::MAX as u64] {
+                let mut hostile = bytes.clone();
+                hostile[start + 8 * counter..][..8].copy_from_slice(&stated.to_le_bytes());
+                std::fs::write(&path, &hostile).unwrap();
+                let error = read_rgb(&path).unwrap_err();
+                let is_refused =
+                    matches!(&error, ExrError::Malformed { reason, .. } if reason.contains("more samples"));
+                assert!(is_refused, "{compression} {counter} {stated}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn windows_channels_and_provenance_are_as_documented() {
+    let (_folder, path) = written(SampleFormat::Half, r#"{"scene":"Küche 🍳"}"#);
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(&path)
+        .unwrap();
+    let display = image.attributes.display_window;
+    assert_eq!((display.position, display.size), (Vec2(0, 0), Vec2(64, 48)));
+    assert_eq!(image.layer_data.attributes.layer_position, Vec2(3, 5));
+    assert_eq!(image.layer_data.size, Vec2(17, 40));
+    assert_eq!(image.layer_data.attributes.layer_name, None);
+    let channels: Vec<_> =
+        image.layer_data.channel_data.list.iter().map(|channel| channel.name.to_string()).collect();
+    assert_eq!(channels, ["B", "G", "N.X", "N.Y", "N.Z", "R", "Z", "albedo.B", "albedo.G", "albedo.R"]);
+    let depth = &image.layer_data.channel_data.list[6].sample_data;
+    assert_eq!(depth.value_by_flat_index(16).to_f32(), value(19, 5).depth);
+    let custom: Vec<_> = image.attributes.other.iter().chain(&image.layer_data.attributes.other).collect();
+    let [(name, attribute)] = custom[..] else { panic!("{custom:?}") };
+    assert_eq!(name.to_string(), "photoncard");
+    let exr::prelude::AttributeValue::Text(json) = attribute else { panic!("{attribute:?}") };
+    let json: serde_json::Value = serde_json::from_str(&json.to_string()).unwrap();
+    assert_eq!(json["scene"], "Küche 🍳");
+}
+
+/// Channels of a file: name, whether single precision, and values.
+fn channels(path: &Path) -> Vec<(String, bool, Vec<f32>)> {
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .unwrap();
+    let list = image.layer_data.channel_data.list.into_iter();
+    list.map(|channel| {
+        let is_single = matches!(channel.sample_data, FlatSamples::F32(_));
+        (channel.name.to_string(), is_single, channel.sample_data.values_as_f32().collect())
+    })
+    .collect()
+}
+
+#[test]
+fn the_layers_that_are_asked_for_are_in_the_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("layers.exr");
+    let layers = PixelLayers {
+        direct: [0.5, 1.0, 1.5],
+        indirect: [2.0, 2.5, 3.0],
+        caustic: [3.5, 4.0, 4.5],
+        gathers: 2049.0,
+    };
+    let format = SumFormat { layers: true, samples: 2100, ..FORMAT };
+    let mut film = Film::new(1, 1, Window::full(1, 1), format).unwrap();
+    write_pixel(&mut film, 0, 0, value(3, 5), layers);
+    let written = |list: &str, format| {
+        write(&path, &film, &list.parse().unwrap(), "{}", format).unwrap();
+        channels(&path)
+    };
+    for format in [SampleFormat::Half, SampleFormat::Float] {
+        let is_float = format == SampleFormat::Float;
+        let names = |list| written(list, format).into_iter().map(|(name, ..)| name).collect::<Vec<_>>();
+        assert_eq!(names("none"), ["B", "G", "R"]);
+        assert_eq!(
+            names("N,direct"),
+            ["B", "G", "N.X", "N.Y", "N.Z", "R", "direct.B", "direct.G", "direct.R"]
+        );
+        let all = written("all", format);
+        assert_eq!(all.len(), 20);
+        let channel = |name: &str| all.iter().find(|(other, ..)| other == name).unwrap();
+        for (name, is_single, value) in [
+            ("direct.R", is_float, 0.5),
+            ("direct.B", is_float, 1.5),
+            ("indirect.G", is_float, 2.5),
+            ("caustic.R", is_float, 3.5),
+            ("N.Y", is_float, -1.0),
+            ("gathers.Y", true, 2049.0),
+            ("Z", true, 1000.0 + 3.0 / 1024.0),
+        ] {
+            assert_eq!(*channel(name), (name.to_owned(), is_single, vec![value]));
+        }
+    }
+}
+
+#[test]
+fn two_writes_give_the_same_bytes() {
+    let provenance = format!(r#"{{"scene":"{}"}}"#, "a".repeat(3000));
+    let (_first_folder, first) = written(SampleFormat::Half, &provenance);
+    for _ in 0..4 {
+        let (_folder, again) = written(SampleFormat::Half, &provenance);
+        assert_eq!(fs::read(&first).unwrap(), fs::read(&again).unwrap());
+    }
+}
+
+#[test]
+fn a_bright_light_stays_finite_in_halves() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bright.exr");
+    let scale = SumScale { radiance: 256.0, ..FORMAT.scale };
+    let mut film = Film::new(2, 1, Window::full(2, 1), SumFormat { scale, ..FORMAT }).unwrap();
+    for (x, radiance) in [[1e6, 65504.0, 65530.0], [1e9, 0.0, 1e-9]].into_iter().enumerate() {
+        let pixel = PixelValue { radiance, ..PixelValue::default() };
+        write_pixel(&mut film, x as u32, 0, pixel, PixelLayers::default());
+    }
+    write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
+    let image = read_rgb(&path).unwrap();
+    assert_eq!(image.pixels, [[65504.0; 3], [65504.0, 0.0, 0.0]]);
+}
+
+#[test]
+fn bad_files_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(matches!(read_rgb(&folder.path().join("absent.exr")), Err(ExrError::Unreadable { .. })));
+    assert!(matches!(read_rgb(folder.path()), Err(ExrError::Unreadable { .. })));
+    let path = folder.path().join("bad.exr");
+    for bytes in [&b""[..], b"text", b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"] {
+        fs::write(&path, bytes).unwrap();
+        assert!(matches!(read_rgb(&path), Err(ExrError::Malformed { .. })));
+    }
+    assert!(matches!(
+        write(Path::new("absent/x.exr"), &film(), &Layers::default(), "{}", SampleFormat::Half),
+        Err(ExrError::Output(_))
+    ));
+    assert!(matches!(
+        write(&path, &film(), &Layers::default(), "", SampleFormat::Half),
+        Err(ExrError::Encode { .. })
+    ));
+}
+
+#[test]
+fn a_grey_picture_has_no_colour() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grey.exr");
+    let grey = exr::image::AnyChannel::new("Y", exr::image::FlatSamples::F32(vec![1.0; 4]));
+    let mut list = exr::prelude::SmallVec::new();
+    list.push(grey);
+    let image = exr::image::Image::from_channels((2, 2), exr::image::AnyChannels::sort(list));
+    exr::prelude::WritableImage::write(&image).to_file(&path).unwrap();
+    let error = read_rgb(&path).unwrap_err();
+    assert!(matches!(error, ExrError::NoColour { .. }) && error.to_string().contains('Y'), "{error}");
+}
+
+/// A window whose pixels the file cannot hold is refused before they are allocated.
+#[test]
+fn absurd_windows_are_refused() {
+    let (_folder, path) = written(SampleFormat::Float, "{}");
+    let whole = fs::read(&path).unwrap();
+    let name = b"dataWindow\0box2i\0";
+    let at = whole.windows(name.len()).position(|window| window == name).unwrap() + name.len() + 4;
+    for (x1, y1) in
+        [(1 << 29, 44), (19, 1 << 29), (1 << 14, 1 << 14), (i32::MAX, i32::MAX), (-1, 5), (3000, 4000)]
+    {
+        let mut bytes = whole.clone();
+        bytes[at + 8..at + 12].copy_from_slice(&i32::to_le_bytes(x1));
+        bytes[at + 12..at + 16].copy_from_slice(&i32::to_le_bytes(y1));
+        fs::write(&path, &bytes).unwrap();
+        let start = Instant::now();
+        assert!(read_rgb(&path).is_err(), "{x1} {y1}");
+        assert!(start.elapsed() < Duration::from_secs(2), "{x1} {y1}");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn damaged_files_are_read_or_refused_quickly(
+        flips in proptest::collection::vec((any::<usize>(), any::<u8>(), any::<bool>()), 1..6),
+        cut in any::<usize>(),
+        is_cut in any::<bool>(),
+    ) {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("picture.exr");
+        let mut film = Film::new(12, 20, Window::full(12, 20), FORMAT).unwrap();
+        write_pixel(&mut film, 1, 1, value(1, 1), PixelLayers::default());
+        write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
+        let mut bytes = fs::read(&path).unwrap();
+        for (at, value, in_header) in flips {
+            // Half of the damage is in the header, which holds the sizes.
+            let at = at % if in_header { bytes.len().min(700) } else { bytes.len() };
+            bytes[at] ^= value;
+        }
+        if is_cut {
+            bytes.truncate(cut % bytes.len());
+        }
+        fs::write(&path, &bytes).unwrap();
+        let start = Instant::now();
+        drop(read_rgb(&path));
+        assert!(start.elapsed() < Duration::from_secs(5));
+    }
+}

@@ -1,0 +1,113 @@
+//! A card's thread on the host, which moves bytes between the card's port and its session.
+
+use std::time::Duration;
+
+use photoncard_cards::scheduler::{CardNumber, Standing};
+use photoncard_cards::session::{Job, SessionError};
+use photoncard_shared::address::LINE_BYTES;
+
+use super::crew::{Crew, EndOthersOnPanic};
+use super::exchange::{WAIT, exchange};
+use super::greeting::GreetedCard;
+use super::reopening::reopen;
+use super::{CardError, Phase, RenderError};
+
+/// Card at work.
+struct CardAtWork<'a> {
+    number: CardNumber,
+    greeted: &'a mut GreetedCard,
+    /// True after the card's loss was reported, until it is loaded again.
+    is_lost: bool,
+    crew: &'a Crew<'a>,
+}
+
+/// Loads the image into a card and renders tiles on it until none is left. A lost card is retried as long as there are
+/// others; a card that answers wrongly, or fails repeatedly, is given up. Returns the time when the card was loaded, since the
+/// start of the crew; zero if it was not.
+pub(super) fn render_on(
+    number: CardNumber,
+    greeted: &mut GreetedCard,
+    job: &Job,
+    crew: &Crew,
+) -> Result<Duration, RenderError> {
+    let _guard = EndOthersOnPanic(&crew.failed);
+    greeted.session.start(job.clone(), crew.start.elapsed());
+    let mut at_work = CardAtWork { number, greeted, is_lost: false, crew };
+    let mut loaded = Duration::ZERO;
+    while !crew.is_complete()? && !at_work.greeted.card.trace_has_failed() && at_work.go_on()? {
+        at_work.tell_progress(&mut loaded, job);
+    }
+    Ok(loaded)
+}
+
+impl CardAtWork<'_> {
+    /// Moves bytes and tiles once. Returns false if the card is given up.
+    fn go_on(&mut self) -> Result<bool, RenderError> {
+        let Self { number, crew, .. } = *self;
+        let dispatcher = &crew.dispatcher;
+        dispatcher.supply(number, &mut self.greeted.session, crew.start.elapsed());
+        if self.greeted.session.is_idle() {
+            dispatcher.wait(WAIT);
+        }
+        let slowest = dispatcher.scheduler().slowest(number);
+        let GreetedCard { card, session, .. } = &mut *self.greeted;
+        let exchanged =
+            dispatcher.check_card(number).and_then(|()| exchange(session, card, slowest, crew.start));
+        // Answers before the error count.
+        self.collect()?;
+        self.is_lost &= !self.greeted.session.is_loaded();
+        exchanged.map_or_else(|error| self.recover(error), |()| Ok(true))
+    }
+
+    fn collect(&mut self) -> Result<(), RenderError> {
+        let collected =
+            self.crew.dispatcher.collect(self.number, &mut self.greeted.session, self.crew.start.elapsed());
+        collected.map_err(|error| self.crew.end(error))
+    }
+
+    /// Returns a card's tiles to the scheduler after an error. Returns whether the card is retried.
+    fn recover(&mut self, error: SessionError) -> Result<bool, RenderError> {
+        let Self { number, crew, .. } = *self;
+        if error.is_wrong() {
+            crew.dispatcher.distrust(number, error.lie());
+        }
+        if !error.may_pass() {
+            self.greeted.session.give_back();
+            self.collect()?;
+            crew.lose(number, CardError::Session(error), Standing::GivenUp, self.is_lost)?;
+            return Ok(false);
+        }
+        let is_closed = matches!(error, SessionError::Port(_));
+        self.greeted.session.greet_again(crew.start.elapsed());
+        self.collect()?;
+        if !std::mem::replace(&mut self.is_lost, true) {
+            crew.lose(number, CardError::Session(error), Standing::Lost, false)?;
+        }
+        if is_closed { self.reopen() } else { Ok(true) }
+    }
+
+    /// Reconnects to a card whose link was closed. Returns false for an emulated card, which cannot be reached again.
+    fn reopen(&mut self) -> Result<bool, RenderError> {
+        let Some(address) = self.greeted.card.close() else { return Ok(false) };
+        if let Some(port) = reopen(&address, &|longest| self.crew.wait_for_end(longest))? {
+            self.greeted.card.go_on_with(port);
+        }
+        Ok(true)
+    }
+
+    fn tell_progress(&self, loaded: &mut Duration, job: &Job) {
+        let Self { greeted, crew, .. } = self;
+        let session = &greeted.session;
+        if session.is_loaded() {
+            if loaded.is_zero() {
+                *loaded = crew.start.elapsed();
+            }
+            let (done, total) = crew.dispatcher.scheduler().progress();
+            crew.outputs.observer.progress(Phase::Tiles, done as u64, total as u64);
+        } else if loaded.is_zero() {
+            let [sent, all] =
+                [session.loaded_lines(), job.upload.lines().len()].map(|lines| (lines * LINE_BYTES) as u64);
+            crew.outputs.observer.progress(Phase::Load, sent, all);
+        }
+    }
+}

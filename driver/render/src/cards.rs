@@ -1,0 +1,322 @@
+//! Executor of tiles on cards: connects to all cards, greets them, and renders on them in parallel. Cards stay open for the next
+//! picture.
+
+use std::panic::resume_unwind;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, PoisonError};
+use std::thread::ScopedJoinHandle;
+use std::time::{Duration, Instant};
+
+use photoncard_cards::dispatcher::Dispatcher;
+use photoncard_cards::scheduler::{CardNumber, Scheduler, Standing};
+use photoncard_cards::session::{Job, PixelLimits, Upload};
+use photoncard_map::pack::CardImage;
+use photoncard_picture::sink::TileSink;
+use photoncard_shared::budget::Budget;
+use photoncard_shared::message::Tile;
+
+use super::card_thread::render_on;
+use super::crew::Crew;
+use super::executor::{BudgetCheck, Executor, Outcome, Work};
+use super::greeting::{GreetedCard, GreetingError, greet};
+use super::open_card::OpenCard;
+use super::outputs::Outputs;
+use super::{CardAddress, CardError, CardSet, Observer, RenderError, RenderSettings};
+use crate::emulator::memory_model::MemoryTraffic;
+use crate::emulator::trace::TraceFile;
+use crate::emulator::{MemoryModel, SharedImage, TileLines};
+
+/// Maximum time without a render after which a card elsewhere is used without a new greeting: it may close a link that is silent.
+const MAX_REST: Duration = Duration::from_secs(5);
+
+/// Cards that have answered the greeting.
+pub(super) struct Cards {
+    set: CardSet,
+    cards: Vec<(String, GreetedCard)>,
+    /// Emulated cards that were left out of the last picture for their budget, and may fit the next.
+    left_out: Vec<(String, GreetedCard)>,
+    /// Names of the cards that the observer knows to be left out.
+    known: Vec<String>,
+    start: Instant,
+    shared: SharedImage,
+    /// Image that the cards were last loaded with.
+    upload: Option<(Arc<CardImage>, Arc<Upload>)>,
+    /// Number of cards that have not answered the greeting, were left out for their budget, or given up in an
+    /// earlier render.
+    lost: usize,
+    /// Time of the end of the last render, or of the greeting.
+    used: Instant,
+}
+
+impl Cards {
+    /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it, the first card's with
+    /// the trace. A card that does not answer counts as lost.
+    ///
+    /// # Errors
+    /// If the trace cannot be written, or fewer cards are left than needed.
+    pub(super) fn connect(settings: &RenderSettings, observer: &dyn Observer) -> Result<Self, RenderError> {
+        let mut trace = settings.cards.trace.as_ref().map(TraceFile::create).transpose()?;
+        let start = Instant::now();
+        let shared = SharedImage::default();
+        let CardSet { addresses, faults, .. } = &settings.cards;
+        let caches = settings.modelled_caches();
+        let each_card = (addresses.iter())
+            .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)))
+            .enumerate();
+        let shared_image = &shared;
+        let greetings = each_card.map(|(index, address)| {
+            let model = caches.map(|caches| MemoryModel { caches, trace: trace.take() });
+            move || {
+                let card = OpenCard::open(index, address, model, shared_image, *faults);
+                let greeted = card.map_err(GreetingError::from).and_then(|card| greet(card, start, observer));
+                (address.name_of(index), greeted)
+            }
+        });
+        let results = on_threads(greetings);
+        let set = settings.cards.clone();
+        let (cards, left_out, known, upload) = (Vec::new(), Vec::new(), Vec::new(), None);
+        let mut this = Self { set, cards, left_out, known, start, shared, upload, lost: 0, used: start };
+        let mut errors = Vec::new();
+        for (name, result) in results {
+            match result {
+                Ok(card) => this.cards.push((name, card)),
+                Err(GreetingError::Card(error)) => errors.push((name, error)),
+                Err(GreetingError::Stopped) => return Err(RenderError::Stopped),
+            }
+        }
+        this.lost = errors.len();
+        this.used = Instant::now();
+        this.lose(errors, settings.needed_cards(), observer)?;
+        Ok(this)
+    }
+
+    /// Returns whether the cards are those of the settings, as many as needed, and can be used without a new greeting.
+    pub(super) fn serve(&self, settings: &RenderSettings) -> bool {
+        let is_remote = |address: &CardAddress| matches!(address, CardAddress::Remote(_));
+        let is_fresh = !self.set.addresses.iter().any(is_remote) || self.used.elapsed() <= MAX_REST;
+        // Each record of a modelled memory is of one render.
+        let is_modelled = settings.modelled_caches().is_some();
+        self.set == settings.cards && !is_modelled && is_fresh && self.cards.len() >= settings.needed_cards()
+    }
+
+    /// Has cards that were left out of the last picture be checked for the next.
+    pub(super) fn take_back(&mut self) {
+        self.lost -= self.left_out.len();
+        self.known = self.left_out.iter().map(|(name, _)| name.clone()).collect();
+        self.cards.append(&mut self.left_out);
+    }
+
+    /// Reports cards that have not answered the greeting, or have too small a budget, to the observer.
+    ///
+    /// # Errors
+    /// If too few are left: the error of the last lost card.
+    fn lose(
+        &self,
+        mut errors: Vec<(String, CardError)>,
+        needed: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError> {
+        let last = errors.pop_if(|_| self.cards.len() < needed);
+        errors.iter().for_each(|(card, error)| observer.lost(card, error));
+        last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
+    }
+
+    /// Has emulated cards to which nothing was loaded hold the image by reference: all of them, or all but the first, whose load is the one
+    /// that is counted. Cards on faulty links are loaded.
+    fn share(&mut self, image: &Arc<CardImage>, checksum: u64, is_image_kept: bool) {
+        let is_faulty = self.set.faults.is_some();
+        for (index, (_, GreetedCard { card, session, .. })) in self.cards.iter_mut().enumerate() {
+            if let Some(memory) = card.take_empty_memory()
+                && (is_image_kept || index > 0)
+                && !is_faulty
+            {
+                memory.give(image.clone(), Some(checksum));
+                session.assume(checksum);
+            }
+        }
+    }
+
+    /// The image as the cards receive it: those that hold the last one receive only its differences.
+    fn upload(&mut self, image: &Arc<CardImage>) -> Arc<Upload> {
+        let upload = match self.upload.take() {
+            Some((last, upload)) if Arc::ptr_eq(&last, image) => upload,
+            Some((_, last)) => Arc::new(Upload::new(image.clone()).after(&last)),
+            None => Arc::new(Upload::new(image.clone())),
+        };
+        self.upload = Some((image.clone(), upload.clone()));
+        upload
+    }
+
+    /// Tiles of the last picture, each with the number of its card.
+    fn homes(&self) -> impl Iterator<Item = (CardNumber, &Tile)> {
+        let cards = self.cards.iter().enumerate();
+        cards.flat_map(|(number, (_, card))| card.tiles.iter().map(move |tile| (number, tile)))
+    }
+
+    /// Renders a scheduler's tiles on all cards, into sinks.
+    fn render(
+        &mut self,
+        job: &Job,
+        scheduler: Scheduler,
+        sinks: Vec<&dyn TileSink>,
+        outputs: &Outputs,
+    ) -> Outcome {
+        let begun = self.start.elapsed();
+        let count = self.cards.len();
+        let names: Vec<String> = self.cards.iter().map(|(name, _)| name.clone()).collect();
+        let lines: Vec<TileLines> = self.cards.iter().map(|(_, card)| card.card.tile_lines()).collect();
+        let rendered = |card: usize, tile: &Tile| {
+            outputs.observer.rendered(&names[card], tile, lines[card].take(tile.id));
+        };
+        let crew = Crew {
+            dispatcher: Dispatcher::new(scheduler, sinks).telling(&rendered),
+            outputs,
+            start: self.start,
+            names: &names,
+            failed: AtomicBool::new(false),
+        };
+        let crew_of_all = &crew;
+        let results = on_threads(
+            (self.cards.iter_mut().enumerate())
+                .map(|(number, (_, card))| move || render_on(number, card, job, crew_of_all)),
+        );
+        let ended = self.start.elapsed();
+        let links = self.cards.iter_mut().map(|(_, card)| card.count_bytes()).collect();
+        let scheduler = crew.dispatcher.scheduler();
+        let (loaded, failure) = match latest(results) {
+            Ok(loaded) => (loaded.max(begun), None),
+            Err(error) => (ended, Some(error)),
+        };
+        let dazzling = names.iter().cloned().enumerate();
+        let dazzling = dazzling.map(|(card, name)| (name, scheduler.dazzling_of(card)));
+        let outcome = Outcome {
+            counters: scheduler.counters(),
+            dazzling: dazzling.filter(|(_, tiles)| *tiles > 0).collect(),
+            links,
+            traffic: None,
+            cards: count + self.lost,
+            cards_given_up: self.lost,
+            tiles: scheduler.counts(),
+            failure,
+            load_seconds: (loaded - begun).as_secs_f64(),
+            render_seconds: (ended - loaded).as_secs_f64(),
+        };
+        if outcome.failure.is_some() {
+            let given_up = (0..count).filter(|&card| scheduler.standing(card) == Standing::GivenUp).count();
+            return Outcome { cards_given_up: self.lost + given_up, ..outcome };
+        }
+        for (number, (_, card)) in self.cards.iter_mut().enumerate() {
+            card.tiles = scheduler.rendered_by(number).copied().collect();
+        }
+        let is_given_up = |card: usize| scheduler.standing(card) == Standing::GivenUp;
+        let given_up: Vec<bool> = (0..count).map(is_given_up).collect();
+        self.lost += given_up.iter().filter(|&&given_up| given_up).count();
+        let mut is_kept = given_up.iter().map(|given_up| !given_up);
+        self.cards.retain(|_| is_kept.next().unwrap_or(true));
+        Outcome { cards_given_up: self.lost, ..outcome }
+    }
+
+    /// Ends cards whose memory is modelled. Returns the sum of their traffic.
+    ///
+    /// # Errors
+    /// If the trace cannot be written.
+    fn finish_models(&mut self) -> Result<MemoryTraffic, RenderError> {
+        let mut sum = MemoryTraffic::ZERO;
+        for (_, card) in self.cards.drain(..) {
+            if let Some(record) = card.card.finish() {
+                sum.add(&record.traffic);
+                record.trace.map_or(Ok(()), TraceFile::finish)?;
+            }
+        }
+        Ok(sum)
+    }
+}
+
+impl Executor for Cards {
+    fn budgets(&self) -> Vec<Budget> {
+        self.cards.iter().map(|(_, card)| card.budget).collect()
+    }
+
+    fn leave_out(
+        &mut self,
+        check: BudgetCheck,
+        needed: usize,
+        observer: &dyn Observer,
+    ) -> Result<(), RenderError> {
+        let mut misfits = Vec::new();
+        for (name, mut card) in std::mem::take(&mut self.cards) {
+            match check(&card.budget) {
+                Ok(()) => self.cards.push((name, card)),
+                Err(error) => {
+                    misfits.push((name.clone(), error));
+                    card.tiles.clear();
+                    self.left_out.extend(card.card.is_emulated().then_some((name, card)));
+                }
+            }
+        }
+        self.lost += misfits.len();
+        let is_alike = |(_, error): &(String, RenderError)| error.to_string() == misfits[0].1.to_string();
+        if self.cards.is_empty() && misfits.iter().all(is_alike) {
+            // The setting is at fault, and no card.
+            return misfits.pop().map_or(Ok(()), |(_, error)| Err(error));
+        }
+        // The last card that is missing is the error of the picture, known or not.
+        let has_enough = self.cards.len() >= needed;
+        let misfits = misfits.into_iter().filter(|(name, _)| !has_enough || !self.known.contains(name));
+        let misfits = misfits.map(|(name, error)| (name, CardError::of_budget(&error)));
+        self.lose(misfits.collect(), needed, observer)
+    }
+
+    fn finishes_tiles_early(&self) -> bool {
+        true
+    }
+
+    fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
+        let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
+        // Emulated cards that receive the shared image store no copy of it.
+        self.shared.give(image.clone(), None);
+        let (scene_image, _) = image.view();
+        let limits = PixelLimits::new(&scene_image.header, frame);
+        let job = Job { upload: self.upload(image), frame: *frame, limits };
+        self.share(image, job.upload.checksum(), is_image_kept);
+        let scheduler = settings.scheduler(tiles, self.cards.len());
+        let mut scheduler = scheduler.with_kept(&film.lock().unwrap_or_else(PoisonError::into_inner));
+        if frame.keep_records && frame.first_sample > 0 {
+            scheduler = scheduler.with_homes(self.homes());
+        }
+        let outcome = self.render(&job, scheduler, sinks, outputs);
+        self.used = Instant::now();
+        if settings.modelled_caches().is_none() {
+            return Ok(outcome);
+        }
+        let traffic = Some(self.finish_models()?);
+        Ok(Outcome { traffic, ..outcome })
+    }
+}
+
+/// Does each piece of work on a thread of its own. Returns the results in the order of the work. A panic of one is the
+/// caller's.
+fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) -> Vec<T> {
+    std::thread::scope(|scope| {
+        let threads: Vec<_> = works.map(|work| scope.spawn(work)).collect();
+        let join = |thread: ScopedJoinHandle<T>| thread.join().unwrap_or_else(|panic| resume_unwind(panic));
+        threads.into_iter().map(join).collect()
+    })
+}
+
+/// Latest time when a card was loaded.
+///
+/// # Errors
+/// The first failure: it has stopped the other cards.
+fn latest(results: Vec<Result<Duration, RenderError>>) -> Result<Duration, RenderError> {
+    let mut latest = Duration::ZERO;
+    let mut is_stopped = false;
+    for result in results {
+        match result {
+            Ok(loaded) => latest = latest.max(loaded),
+            Err(RenderError::Stopped) => is_stopped = true,
+            Err(error) => return Err(error),
+        }
+    }
+    if is_stopped { Err(RenderError::Stopped) } else { Ok(latest) }
+}

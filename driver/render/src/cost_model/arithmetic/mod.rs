@@ -1,0 +1,90 @@
+//! Arithmetic of a frame, counted: the steps of each unit of the chip, times the floating-point operations of a step.
+//!
+//! Counters and the contents of the lines that a chip reads give the number of each [`Step`]. Its operations are constants of the firmware
+//! ([`OPERATIONS`]), counted where the firmware runs without floating-point instructions, so that each operation is a call
+//! (`tests/operations.sh`). `tests/tests/operations.rs` counts them again. A lane of a vector counts only where it is used.
+
+mod operations;
+mod step;
+mod table;
+
+pub use operations::Operations;
+pub use step::{ChipPart, Step, Unit, Work};
+pub use table::OPERATIONS;
+
+use photoncard_picture::choice::Choice;
+
+/// Number of units.
+pub const UNITS: usize = Unit::ALL.len();
+
+/// Operations of each unit of the chip, in the order of [`Unit::ALL`].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Arithmetic(pub [Operations; UNITS]);
+
+impl Arithmetic {
+    /// Operations of some work: the number of each step times the operations of one.
+    pub fn of(work: &Work) -> Self {
+        let mut arithmetic = Self::default();
+        for (step, operations) in Step::ALL.iter().zip(OPERATIONS) {
+            arithmetic.0[step.unit() as usize].add(&operations.times(step.count(work)));
+        }
+        arithmetic
+    }
+
+    /// Adds other operations.
+    pub fn add(&mut self, other: &Self) {
+        self.0.iter_mut().zip(&other.0).for_each(|(operations, other)| operations.add(other));
+    }
+
+    /// The operations of `count` repetitions.
+    #[must_use]
+    pub fn times(&self, count: f64) -> Self {
+        Self(self.0.map(|operations| operations.times(count)))
+    }
+
+    /// Operations of one unit.
+    pub fn unit(&self, unit: Unit) -> &Operations {
+        &self.0[unit as usize]
+    }
+
+    /// Operations of the units that `chosen` selects.
+    pub fn sum(&self, chosen: impl Fn(Unit) -> bool) -> Operations {
+        let mut sum = Operations::default();
+        for unit in Unit::ALL.iter().copied().filter(|&unit| chosen(unit)) {
+            sum.add(self.unit(unit));
+        }
+        sum
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::emulator::contents::Contents;
+    use photoncard_shared::counters::Counters;
+
+    #[test]
+    fn a_box_of_a_node_costs_what_its_slab_test_says() {
+        // For each of six planes a product and a sum; six comparisons of planes, of near with far, and with 0 or the limit.
+        let boxes = Contents { boxes: 1, ..Contents::ZERO };
+        let work = Work::new(&Counters::ZERO, &boxes, 100.0);
+        let traversal = *Arithmetic::of(&work).unit(Unit::Traversal);
+        assert_eq!([traversal.add, traversal.multiply, traversal.compare], [6.0, 6.0, 7.0]);
+        assert_eq!([traversal.divide, traversal.square_root], [0.0, 0.0]);
+    }
+
+    #[test]
+    fn arithmetic_is_the_sum_of_its_steps() {
+        let contents = Contents { photons: 3, photon_boxes: 5, ..Contents::ZERO };
+        let counters = Counters { gathers: 2, gather_rays: 7, ..Counters::ZERO };
+        let both = Arithmetic::of(&Work::new(&counters, &contents, 10.0)).sum(|_| true).flops();
+        let parts = [(Counters::ZERO, contents), (counters, Contents::ZERO)];
+        let sum: f64 = parts
+            .map(|(counters, contents)| {
+                Arithmetic::of(&Work::new(&counters, &contents, 10.0)).sum(|_| true).flops()
+            })
+            .iter()
+            .sum();
+        assert!(both > 0.0 && (both / sum - 1.0).abs() < 1e-12, "{both} {sum}");
+    }
+}

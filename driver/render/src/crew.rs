@@ -1,0 +1,117 @@
+//! State that the threads of all cards share.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use photoncard_cards::dispatcher::Dispatcher;
+use photoncard_cards::scheduler::{CardNumber, SchedulerError, Source, Standing, rectangles};
+
+use super::exchange::WAIT;
+use super::outputs::Outputs;
+use super::{CardError, RenderError};
+
+/// State that the threads of all cards share.
+pub(super) struct Crew<'a> {
+    pub(super) dispatcher: Dispatcher<'a>,
+    pub(super) outputs: &'a Outputs<'a>,
+    pub(super) start: Instant,
+    /// Name of each card in errors.
+    pub(super) names: &'a [String],
+    pub(super) failed: AtomicBool,
+}
+
+/// Guard that stops the threads of the other cards if its own panics: they would wait for its tiles forever.
+pub(super) struct EndOthersOnPanic<'a>(pub(super) &'a AtomicBool);
+
+impl Drop for EndOthersOnPanic<'_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            // No thread waits longer than [`WAIT`] before it reads the flag.
+            self.0.store(true, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Crew<'_> {
+    /// Returns whether all tiles are done.
+    ///
+    /// # Errors
+    /// If the observer or the failure of a card has stopped the render.
+    pub(super) fn is_complete(&self) -> Result<bool, RenderError> {
+        if self.failed.load(Ordering::Relaxed) || self.outputs.observer.is_stopped() {
+            return Err(RenderError::Stopped);
+        }
+        self.outputs.report_failed_viewers();
+        self.outputs.check_partial().map_err(|error| self.fail(error.into()))?;
+        Ok(self.dispatcher.scheduler().is_complete())
+    }
+
+    /// Waits at most `longest` until all tiles are done. Returns whether they are.
+    ///
+    /// # Errors
+    /// As [`Self::is_complete`].
+    pub(super) fn wait_for_end(&self, longest: Duration) -> Result<bool, RenderError> {
+        let begin = Instant::now();
+        while !self.is_complete()? {
+            let left = longest.saturating_sub(begin.elapsed());
+            if left.is_zero() {
+                return Ok(false);
+            }
+            // A stop of the render does not notify this thread.
+            self.dispatcher.wait(left.min(WAIT));
+        }
+        Ok(true)
+    }
+
+    /// Stops the threads of all cards with an error.
+    pub(super) fn fail(&self, error: RenderError) -> RenderError {
+        self.failed.store(true, Ordering::Relaxed);
+        error
+    }
+
+    /// Handles a card that is lost or given up; the others render its tiles. `was_lost` is true if its loss was reported
+    /// before.
+    ///
+    /// # Errors
+    /// If no other card is left.
+    pub(super) fn lose(
+        &self,
+        card: CardNumber,
+        error: CardError,
+        standing: Standing,
+        was_lost: bool,
+    ) -> Result<(), RenderError> {
+        let mut scheduler = self.dispatcher.scheduler();
+        scheduler.set_standing(card, standing);
+        let is_last = !scheduler.has_living();
+        let crashed_at = scheduler.crashed_at();
+        drop(scheduler);
+        let name = self.names[card].clone();
+        if !is_last || was_lost && standing == Standing::Lost {
+            self.outputs.observer.lost(&name, &error);
+            return Ok(());
+        }
+        Err(self.fail(if crashed_at.is_empty() {
+            RenderError::Card { card: name, source: error }
+        } else {
+            RenderError::Unrendered { tiles: rectangles(&crashed_at) }
+        }))
+    }
+
+    /// Stops the render with the scheduler's error.
+    pub(super) fn end(&self, error: SchedulerError) -> RenderError {
+        let name = |source: &Source| match *source {
+            Source::Card(card) => self.names[card].clone(),
+            Source::Kept => "the file of finished tiles".into(),
+        };
+        self.fail(match error {
+            SchedulerError::Disagreement { tile, sources } => RenderError::Disagreement {
+                tile: rectangles(&[tile]),
+                cards: sources.iter().map(name).collect::<Vec<_>>().join(" and "),
+            },
+            SchedulerError::KeptDiffers { tile } => RenderError::KeptDiffers { tile: rectangles(&[tile]) },
+            SchedulerError::Unverified { tile } => RenderError::Unverified { tile: rectangles(&[tile]) },
+            SchedulerError::Unrendered { tiles } => RenderError::Unrendered { tiles: rectangles(&tiles) },
+        })
+    }
+}

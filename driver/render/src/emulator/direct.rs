@@ -1,0 +1,160 @@
+//! Chips without cards and links: tiles rendered straight from a card image, for studies and for whole-frame
+//! reordering.
+
+use photoncard_firmware::chip::{Chip, FinishedPixel, PixelView, Progress};
+use photoncard_firmware::fixed_point::ColourSum;
+use photoncard_firmware::kind::ChipKind;
+use photoncard_firmware::memory::{Lines, MemoryPort};
+use photoncard_firmware::render::{GatherOutlet, RenderJob};
+use photoncard_firmware::scene::SceneImage;
+use photoncard_map::pack::CardImage;
+use photoncard_picture::sums::{FilmPixel, SumFormat};
+use photoncard_shared::budget::sums_of_pixel;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
+use super::memory_model::{MeasuredMemory, MemoryTraffic};
+
+/// A rendered tile, with its work and memory traffic.
+pub struct RenderedTile {
+    /// Light of the pixels, row by row, in the image's radiance units: one sum per pixel, or with layers
+    /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
+    pub sums: Vec<ColourSum>,
+    /// The other channels of the pixels, row by row.
+    pub views: Vec<PixelView>,
+    /// Counts of the work.
+    pub counters: Counters,
+    /// Memory traffic; zero for a memory that is not modelled.
+    pub traffic: MemoryTraffic,
+}
+
+impl RenderedTile {
+    /// The tile of complete pixels, in any order.
+    fn new(mut pixels: Vec<FinishedPixel>, frame: &FrameParameters, counters: Counters) -> Self {
+        pixels.sort_by_key(|pixel| pixel.index);
+        let mut sums = Vec::with_capacity(pixels.len() * sums_of_pixel(frame.layers) as usize);
+        pixels.iter().for_each(|pixel| sums.extend_from_slice(pixel.light.sums(frame)));
+        let views = pixels.into_iter().map(|pixel| pixel.view).collect();
+        Self { sums, views, counters, traffic: MemoryTraffic::ZERO }
+    }
+
+    /// Values of the pixels, row by row, in a format of the frame.
+    pub fn pixels(&self, format: SumFormat) -> impl Iterator<Item = FilmPixel> {
+        let sums = self.sums.chunks(sums_of_pixel(format.layers) as usize);
+        self.views.iter().zip(sums).map(move |(view, light)| format.values(&view.sums(light)))
+    }
+}
+
+/// Error of [`render_tiles_apart`].
+#[derive(Debug, thiserror::Error)]
+pub enum TileError {
+    /// Error of a malformed image, or of a tile that is too large.
+    #[error("{0}")]
+    Fault(Fault),
+    /// The work was stopped.
+    #[error("the render was stopped")]
+    Stopped,
+}
+
+impl From<Fault> for TileError {
+    fn from(fault: Fault) -> Self {
+        Self::Fault(fault)
+    }
+}
+
+/// A new chip. It is built on the stack first: in a frame of its own, as the caller's may be of a thread with a small stack.
+#[inline(never)]
+pub fn new_chip<K: ChipKind>() -> Box<Chip<K>> {
+    Box::new(Chip::new())
+}
+
+/// Renders tiles on chips of the kind `K`, one a thread of `pool`, whose stacks must hold a chip while it is built. Each tile has a new
+/// memory that `model` makes, so that it begins with empty caches. `is_stopped` is polled before each.
+///
+/// # Errors
+/// If the card image is malformed, or the work is stopped.
+pub fn render_tiles_apart<'a, K: ChipKind, M: MeasuredMemory>(
+    pool: &ThreadPool,
+    image: &'a CardImage,
+    frame: &FrameParameters,
+    tiles: &[Tile],
+    model: &(impl Fn(Lines<'a>) -> M + Sync),
+    is_stopped: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<RenderedTile>, TileError> {
+    let (scene, memory) = image.view();
+    let render_one = |chip: &mut Box<Chip<K>>, &tile: &Tile| {
+        if is_stopped() {
+            return Err(TileError::Stopped);
+        }
+        Ok(render_tile(chip, &scene, model(memory), frame, tile, None)?)
+    };
+    pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip::<K>, render_one).collect())
+}
+
+/// Renders a tile on a chip with a memory of its own. With an `outlet` the pixels' gathers are sent to it instead, and the
+/// caller evaluates them and adds them to the sums.
+///
+/// # Errors
+/// If the card image is malformed, or the chip has no room for the tile.
+pub fn render_tile<K: ChipKind>(
+    chip: &mut Chip<K>,
+    scene: &SceneImage,
+    mut memory: impl MeasuredMemory,
+    frame: &FrameParameters,
+    tile: Tile,
+    outlet: Option<&mut (dyn GatherOutlet + 'static)>,
+) -> Result<RenderedTile, Fault> {
+    let outlet = outlet.map(|outlet| outlet as &mut dyn GatherOutlet);
+    let job = &mut RenderJob { scene, memory: &mut memory, frame, outlet };
+    let mut rendered = None;
+    render_tiles(chip, job, &[tile], |_, tile| {
+        rendered = Some(tile);
+        true
+    })?;
+    let rendered = rendered.ok_or(Fault { code: FaultCode::Tile, detail: tile.id })?;
+    Ok(RenderedTile { traffic: memory.traffic(), ..rendered })
+}
+
+/// Renders tiles on a chip, with as many in flight as the frame and the chip allow. `take` is called with each tile when it is done, in
+/// any order, without its traffic, and returns whether to go on.
+///
+/// # Errors
+/// If the card image is malformed, or the chip has no room for a tile.
+pub fn render_tiles<K: ChipKind, M: MemoryPort>(
+    chip: &mut Chip<K>,
+    job: &mut RenderJob<M>,
+    tiles: &[Tile],
+    mut take: impl FnMut(&Tile, RenderedTile) -> bool,
+) -> Result<(), Fault> {
+    chip.clear();
+    let mut next = tiles.iter();
+    let mut in_flight: Vec<(&Tile, Vec<FinishedPixel>)> = Vec::new();
+    loop {
+        match chip.step(job)? {
+            Progress::Busy => {}
+            Progress::Pixel(pixel) => {
+                let of_tile = in_flight.iter_mut().find(|(tile, _)| tile.id == pixel.tile);
+                of_tile.into_iter().for_each(|(_, pixels)| pixels.push(pixel));
+            }
+            Progress::Tile(id, counters) => {
+                let Some(index) = in_flight.iter().position(|(tile, _)| tile.id == id) else { continue };
+                let (tile, pixels) = in_flight.remove(index);
+                if !take(tile, RenderedTile::new(pixels, job.frame, counters)) {
+                    return Ok(());
+                }
+            }
+            Progress::Idle => match next.next() {
+                Some(tile) => {
+                    if !chip.begin(job.memory, job.frame, *tile) {
+                        return Err(Fault { code: FaultCode::Tile, detail: tile.id });
+                    }
+                    in_flight.push((tile, Vec::with_capacity(tile.pixels() as usize)));
+                }
+                None if chip.flush(job.frame) => {}
+                None => return Ok(()),
+            },
+        }
+    }
+}

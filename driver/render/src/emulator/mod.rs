@@ -1,0 +1,283 @@
+//! Emulated cards: the firmware on threads of this process, one chip per thread, each on a loopback link.
+
+pub mod contents;
+pub mod direct;
+mod dram;
+mod measured;
+pub mod memory_model;
+mod tile_lines;
+pub mod trace;
+mod traced;
+pub mod whole_frame;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+
+use photoncard_firmware::card::{Card, sram_bytes};
+use photoncard_firmware::chip::Chip;
+use photoncard_firmware::kind::{
+    self, ChipKind as _, Large, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
+};
+use photoncard_firmware::memory::CardMemory;
+use photoncard_firmware::serve::serve;
+use photoncard_shared::budget::Budget;
+use photoncard_shared::frame::MAX_FRAME;
+use photoncard_shared::link::Port;
+use photoncard_shared::transport::WINDOW;
+
+use self::dram::EmulatedDram;
+pub use self::dram::SharedImage;
+pub use self::measured::Measured;
+use self::memory_model::{CacheSettings, CacheSpec, MeasuredMemory, MemoryTraffic};
+pub use self::tile_lines::TileLines;
+use self::tile_lines::TileMeter;
+use self::trace::TraceFile;
+use self::traced::Traced;
+use photoncard_cards::link::{LoopbackPort, loopback};
+use photoncard_picture::choice::choices;
+
+/// Kind of the chip on an emulated card.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EmulatedKind {
+    /// A chip of the budget [`REFERENCE`](photoncard_firmware::kind::REFERENCE).
+    Reference,
+    /// A chip of the budget [`LARGE`](photoncard_firmware::kind::LARGE).
+    Large,
+    /// A chip of the budget [`MICRO`](photoncard_firmware::kind::MICRO).
+    Micro,
+}
+
+choices!(EmulatedKind {
+    Reference = "emulated": "The reference chip",
+    Large = "emulated-large": "The large chip",
+    Micro = "emulated-micro": "The micro chip",
+});
+
+impl EmulatedKind {
+    /// On-chip memory of the firmware, its caches and stack included, bytes.
+    pub fn sram_bytes(self) -> usize {
+        match self {
+            Self::Reference => sram_bytes::<Reference>(),
+            Self::Large => sram_bytes::<Large>(),
+            Self::Micro => sram_bytes::<Micro>(),
+        }
+    }
+
+    /// On-chip memory that each technique adds, bytes.
+    pub fn techniques(self) -> TechniqueMemory {
+        match self {
+            Self::Reference => Chip::<Reference>::TECHNIQUES,
+            Self::Large => Chip::<Large>::TECHNIQUES,
+            Self::Micro => Chip::<Micro>::TECHNIQUES,
+        }
+    }
+
+    /// On-chip memory of the caches' tags, bytes.
+    pub fn tag_bytes(self) -> usize {
+        tag_bytes(&self.budget())
+    }
+
+    /// Name of the kind of chip with this budget, which may be on a board: `reference`, `large`, `micro` or `other`.
+    pub fn name_of(budget: &Budget) -> &'static str {
+        match *budget {
+            kind::REFERENCE => "reference",
+            kind::LARGE => "large",
+            kind::MICRO => "micro",
+            _ => "other",
+        }
+    }
+
+    /// Budget of a chip of the kind.
+    pub fn budget(self) -> Budget {
+        match self {
+            Self::Reference => Reference::BUDGET,
+            Self::Large => Large::BUDGET,
+            Self::Micro => Micro::BUDGET,
+        }
+    }
+
+    /// Caches of the budget's sizes, of four ways.
+    pub fn caches(self) -> CacheSettings {
+        let budget = self.budget();
+        CacheSettings::Split {
+            photon: CacheSpec { bytes: budget.photon_cache_bytes, ..CacheSpec::PHOTON },
+            scene: CacheSpec { bytes: budget.scene_cache_bytes, ..CacheSpec::SCENE },
+        }
+    }
+
+    /// On-chip memory of the buffers of tile and link, bytes.
+    pub fn buffer_bytes(self) -> usize {
+        let budget = self.budget();
+        self.sram_bytes() - cache_bytes(&budget) - budget.stack_bytes as usize
+    }
+}
+
+/// Capacity of a loopback link in each direction, bytes.
+const LINK_CAPACITY: usize = 64 << 10;
+/// Bytes of a card for which the host is woken: a third of the frames that may be in flight.
+const WOKEN_AT: usize = WINDOW * MAX_FRAME / 3;
+/// Stack of a chip's thread, bytes: the chip's buffers are built there before they move to the heap.
+pub const THREAD_STACK: usize = 16 << 20;
+
+/// Model of an emulated card's memory.
+pub struct MemoryModel {
+    /// Caches between chip and DRAM.
+    pub caches: CacheSettings,
+    /// File that the chip's reads are written to, if any.
+    pub trace: Option<TraceFile>,
+}
+
+/// Record of a modelled memory at the end of its card.
+pub struct MemoryRecord {
+    /// Traffic of the card's whole life.
+    pub traffic: MemoryTraffic,
+    /// Unfinished trace of the reads.
+    pub trace: Option<TraceFile>,
+}
+
+/// A running emulated card. Its thread ends when the port is dropped.
+pub struct EmulatedCard {
+    thread: Option<JoinHandle<Option<MemoryRecord>>>,
+    port: Option<LoopbackPort>,
+    trace_has_failed: Option<Arc<AtomicBool>>,
+    tile_lines: TileLines,
+    /// Image that the memory holds, as long as nothing was loaded.
+    held: Option<SharedImage>,
+}
+
+impl EmulatedCard {
+    /// Starts a card. Without a model its memory has no caches and no counters. A card that is loaded with the image in `shared` keeps no copy
+    /// of it.
+    ///
+    /// # Errors
+    /// If the card's thread cannot be started.
+    pub fn start(
+        kind: EmulatedKind,
+        model: Option<MemoryModel>,
+        shared: SharedImage,
+    ) -> std::io::Result<Self> {
+        let (host, card) = loopback(LINK_CAPACITY);
+        let mut card = card.patient(WOKEN_AT);
+        let trace = model.as_ref().and_then(|model| model.trace.as_ref());
+        let trace_has_failed = trace.map(TraceFile::has_failed);
+        let tile_lines = TileLines::default();
+        let noted = tile_lines.clone();
+        let held = SharedImage::default();
+        let dram = EmulatedDram::new(kind.budget().dram_bytes, shared, held.clone());
+        let held = model.is_none().then_some(held);
+        let thread = std::thread::Builder::new()
+            .name("chip".into())
+            .stack_size(THREAD_STACK)
+            .spawn(move || run(kind, model.map(|model| (model, noted)), dram, &mut card))?;
+        Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
+    }
+
+    /// Takes the empty memory of a card to which nothing was loaded; `None` from the second call on, and of a modelled memory. An image that is
+    /// given to it is held by reference.
+    pub fn take_empty_memory(&mut self) -> Option<SharedImage> {
+        self.held.take()
+    }
+
+    /// The host's end of the link.
+    ///
+    /// # Panics
+    /// Never: the port is there until the card is dropped.
+    pub fn port(&mut self) -> &mut LoopbackPort {
+        self.port.as_mut().expect("the port lives as long as the card")
+    }
+
+    /// Returns whether writing the trace has failed.
+    pub fn trace_has_failed(&self) -> bool {
+        self.trace_has_failed.as_ref().is_some_and(|failed| failed.load(Ordering::Relaxed))
+    }
+
+    /// Lines from DRAM of the tiles that the card has rendered, if its memory is modelled.
+    pub fn tile_lines(&self) -> &TileLines {
+        &self.tile_lines
+    }
+
+    /// Ends the card. Returns the record of its memory, if it is modelled.
+    ///
+    /// # Panics
+    /// If the chip panicked.
+    pub fn finish(mut self) -> Option<MemoryRecord> {
+        drop(self.port.take());
+        let record = self.thread.take()?.join();
+        record.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    }
+}
+
+impl Drop for EmulatedCard {
+    fn drop(&mut self) {
+        drop(self.port.take());
+        if let Some(thread) = self.thread.take() {
+            // A chip that panicked has closed its link already, and the session has reported that.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Serves an emulated card to a host elsewhere, until the port fails.
+///
+/// # Errors
+/// If the card's thread cannot be started.
+///
+/// # Panics
+/// If the chip panicked.
+pub fn serve_card(kind: EmulatedKind, port: &mut (dyn Port + Send)) -> std::io::Result<()> {
+    let dram = EmulatedDram::new(kind.budget().dram_bytes, SharedImage::default(), SharedImage::default());
+    std::thread::scope(|scope| {
+        let thread = std::thread::Builder::new()
+            .name("chip".into())
+            .stack_size(THREAD_STACK)
+            .spawn_scoped(scope, || run(kind, None, dram, port))?;
+        thread.join().map(drop).or_else(|panic| std::panic::resume_unwind(panic))
+    })
+}
+
+fn run(
+    kind: EmulatedKind,
+    model: Option<(MemoryModel, TileLines)>,
+    dram: EmulatedDram,
+    port: &mut dyn Port,
+) -> Option<MemoryRecord> {
+    match model {
+        None => serve_on(kind, dram, port, |_| None),
+        Some((MemoryModel { caches, trace }, tile_lines)) => {
+            let (below, above) = match trace {
+                Some(trace) if trace.is_below_caches() => (Some(trace), None),
+                trace => (None, trace),
+            };
+            let memory = Traced::new(caches.over(Traced::new(dram, below)), above);
+            serve_on(kind, Measured::new(TileMeter::new(memory, tile_lines)), port, |memory| {
+                Some(MemoryRecord { traffic: memory.traffic(), trace: memory.take_trace() })
+            })
+        }
+    }
+}
+
+/// Serves a card with some memory until the host drops its end of the link. Returns the result of `end` on the memory.
+fn serve_on<M: CardMemory, R>(
+    kind: EmulatedKind,
+    memory: M,
+    port: &mut dyn Port,
+    end: impl FnOnce(&mut M) -> R,
+) -> R {
+    match kind {
+        EmulatedKind::Reference => serve_kind::<Reference, M, R>(memory, port, end),
+        EmulatedKind::Large => serve_kind::<Large, M, R>(memory, port, end),
+        EmulatedKind::Micro => serve_kind::<Micro, M, R>(memory, port, end),
+    }
+}
+
+fn serve_kind<K: kind::ChipKind, M: CardMemory, R>(
+    memory: M,
+    port: &mut dyn Port,
+    end: impl FnOnce(&mut M) -> R,
+) -> R {
+    let mut card = Box::new(Card::<K, M>::new(memory));
+    // The end of the link is no error: a host ends a card by closing the link.
+    let _ = serve(&mut *card, port);
+    end(card.memory())
+}

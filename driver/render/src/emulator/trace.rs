@@ -1,0 +1,184 @@
+//! Files of traces of a chip's memory: every read of its tiles, above the caches for a cache simulator, or below them for a DRAM simulator.
+//!
+//! Above the caches a trace has the classic input format of Dinero. Each line of text is one access: a label, a blank, a byte address in
+//! hexadecimal. Label 0 is a read of data; label 4 is Dinero's escape that flushes its caches, written at the beginning of every tile
+//! with address 0. Dinero ignores the rest of a line: a labelled trace has structure, stage and bytes of the read there. Below the
+//! caches, each line of text is a fetch of one line of card memory, in the format of Ramulator 2 or of `DRAMsim3`. See `docs/memory.md`.
+
+use std::fmt::Arguments;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use photoncard_firmware::memory::Stage;
+use photoncard_picture::choice::{Choice, choices};
+use photoncard_picture::output::{OutputError, PendingFile};
+use photoncard_shared::address::Structure;
+
+/// Size of a block of text that is compressed at once, bytes.
+const BUFFER: usize = 64 << 10;
+/// Maximum length of a line: a label, 39 bits in hexadecimal, the names of a structure and of a stage, three digits of bytes, blanks
+/// and the line feed.
+const LONGEST_LINE: usize = 64;
+
+const READ: u8 = 0;
+const FLUSH: u8 = 4;
+
+/// Format of a trace.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TraceFormat {
+    /// Reads above the caches, for Dinero.
+    #[default]
+    Dinero,
+    /// Lines from DRAM, for Ramulator 2's load-store trace.
+    Ramulator,
+    /// Lines from DRAM, for `DRAMsim3`: each a cycle after the one before, so that the DRAM is never without work.
+    Dramsim3,
+}
+
+choices!(TraceFormat {
+    Dinero = "dinero": "Reads above the caches, for Dinero",
+    Ramulator = "ramulator": "Lines from DRAM, for Ramulator 2",
+    Dramsim3 = "dramsim3": "Lines from DRAM, for DRAMsim3",
+});
+
+impl TraceFormat {
+    /// True for traces of the DRAM, false for those of the chip's requests.
+    pub fn is_below_caches(self) -> bool {
+        self != Self::Dinero
+    }
+}
+
+/// File of a trace, and its form.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TraceSettings {
+    /// Path of the file.
+    pub path: PathBuf,
+    /// Format of the lines.
+    pub format: TraceFormat,
+    /// True if each read of [`TraceFormat::Dinero`] is followed by its structure, stage and number of bytes.
+    pub has_labels: bool,
+}
+
+/// Unfinished trace file, compressed by gzip. The file appears under its name only when the trace is finished.
+pub struct TraceFile {
+    encoder: GzEncoder<PendingFile>,
+    buffer: Vec<u8>,
+    settings: TraceSettings,
+    /// Number of fetches written.
+    fetches: u64,
+    /// First failure, after which nothing is written.
+    error: Option<io::Error>,
+    has_failed: Arc<AtomicBool>,
+}
+
+impl TraceFile {
+    /// Creates a trace that will be stored at the path of `settings`.
+    ///
+    /// # Errors
+    /// As [`photoncard_picture::output::check_writable`].
+    pub fn create(settings: &TraceSettings) -> Result<Self, OutputError> {
+        Ok(Self {
+            encoder: GzEncoder::new(PendingFile::create(&settings.path)?, Compression::fast()),
+            buffer: Vec::with_capacity(BUFFER),
+            settings: settings.clone(),
+            fetches: 0,
+            error: None,
+            has_failed: Arc::default(),
+        })
+    }
+
+    /// Flag that is set once the file cannot be written. The render may end then, as there will be no trace.
+    pub fn has_failed(&self) -> Arc<AtomicBool> {
+        self.has_failed.clone()
+    }
+
+    /// Returns whether the trace is of the DRAM.
+    pub fn is_below_caches(&self) -> bool {
+        self.settings.format.is_below_caches()
+    }
+
+    /// Adds a read of `bytes` bytes.
+    pub(super) fn add_read(&mut self, address: u64, structure: Structure, stage: Stage, bytes: usize) {
+        if self.is_below_caches() {
+            self.add_fetch(address);
+        } else if self.settings.has_labels {
+            let (structure, stage) = (structure.name(), stage.name());
+            self.add(format_args!("{READ} {address:x} {structure} {stage} {bytes}"));
+        } else {
+            self.add(format_args!("{READ} {address:x}"));
+        }
+    }
+
+    /// Adds a fetch of a line from DRAM.
+    fn add_fetch(&mut self, address: u64) {
+        let cycle = self.fetches;
+        match self.settings.format {
+            TraceFormat::Ramulator => self.add(format_args!("LD 0x{address:x}")),
+            _ => self.add(format_args!("0x{address:x} READ {cycle}")),
+        }
+        self.fetches += 1;
+    }
+
+    /// Begins a tile: a cache simulator empties its caches.
+    pub(super) fn begin_tile(&mut self) {
+        if !self.is_below_caches() {
+            self.add(format_args!("{FLUSH} 0"));
+        }
+    }
+
+    fn add(&mut self, line: Arguments) {
+        if self.buffer.len() > BUFFER - LONGEST_LINE {
+            self.compress();
+        }
+        // Writing to a vector cannot fail.
+        let _ = writeln!(self.buffer, "{line}");
+    }
+
+    fn compress(&mut self) {
+        if self.error.is_none()
+            && let Err(error) = self.encoder.write_all(&self.buffer)
+        {
+            self.error = Some(error);
+            self.has_failed.store(true, Ordering::Relaxed);
+        }
+        self.buffer.clear();
+    }
+
+    /// Ends the trace and moves the file to its path.
+    ///
+    /// # Errors
+    /// If any part of it could not be written.
+    pub fn finish(mut self) -> Result<(), OutputError> {
+        self.compress();
+        let Self { encoder, settings: TraceSettings { path, .. }, error, .. } = self;
+        let ended = match error {
+            None => encoder.finish(),
+            Some(error) => Err(error),
+        };
+        ended.map_err(|source| OutputError::Write { path, source })?.commit()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_shared::address::LINE_BYTES;
+
+    use super::*;
+
+    /// Text is compressed when the next line might not fit into the buffer.
+    #[test]
+    fn the_longest_line_fits_into_the_room_that_is_kept_for_it() {
+        let longest = |names: Vec<&str>| names.into_iter().map(str::len).max().unwrap();
+        let structure = longest(Structure::ALL.iter().map(|structure| structure.name()).collect());
+        let stage = longest(Stage::ALL.iter().map(|stage| stage.name()).collect());
+        let address = format!("{:x}", u32::MAX as u64 * LINE_BYTES as u64).len();
+        assert!(
+            "0 ".len() + address + " ".len() + structure + " ".len() + stage + " 128\n".len() <= LONGEST_LINE
+        );
+        assert!("0x READ \n".len() + address + u64::MAX.to_string().len() <= LONGEST_LINE);
+    }
+}

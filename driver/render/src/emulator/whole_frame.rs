@@ -1,0 +1,300 @@
+//! All gathers of a frame along one Hilbert curve: the bound that the orders of a chip are compared with.
+//!
+//! No chip can do it: the gathers of a frame are gigabytes. Emulated chips hand their gathers to the host, which sorts
+//! them and has them done when all rays are cast (Steinhurst, Coombe, Lastra 2005). Gathers of irradiance records,
+//! whose results are needed before the pixels, stay on the chips.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::Vec3;
+use photoncard_firmware::chip::{Component, PixelView, ReferenceChip};
+use photoncard_firmware::fixed_point::ColourSum;
+use photoncard_firmware::gather::GatherRequest;
+use photoncard_firmware::kind::ReferenceCandidates;
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::render::final_gather::gathered;
+use photoncard_firmware::render::{Context, GatherOutlet};
+use photoncard_map::pack::CardImage;
+use photoncard_picture::sink::{FinishedTile, TileSink};
+use photoncard_picture::sums::SumFormat;
+use photoncard_shared::budget::sums_of_pixel;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelSums, Tile};
+use rayon::prelude::*;
+
+use super::THREAD_STACK;
+use super::direct::{RenderedTile, new_chip, render_tile};
+use super::measured::Measured;
+use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+
+/// Maximum number of gathers that are kept at once, 32 bytes each: 4.3 GB.
+const MAX_GATHERS: u64 = 1 << 27;
+/// Approximate number of gathers in the tiles of one round of casting, after which the host takes them over.
+const GATHERS_PER_CAST: u64 = 1 << 21;
+/// Number of gathers of one task.
+const GATHERS_PER_TASK: usize = 4096;
+/// Number of gathers of one task where memory is modelled: so many that the empty caches at its beginning hardly count.
+const GATHERS_PER_COUNTED_TASK: usize = 1 << 22;
+/// Minimum number of gathers between two reports of progress.
+const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
+
+/// Error of [`render_along_curve`].
+#[derive(Debug, thiserror::Error)]
+pub enum FrameError {
+    /// The frame may have more gathers than can be kept.
+    #[error(
+        "the frame may have {gathers} gathers, and at most {MAX_GATHERS} are kept at once, as memory allows"
+    )]
+    TooManyGathers {
+        /// Gathers that the frame may have: gather rays of all pixels and samples.
+        gathers: u64,
+    },
+    /// Error of a malformed image.
+    #[error("the card image is malformed: {0}")]
+    Image(Fault),
+    /// The threads cannot be started.
+    #[error("the chips could not be started: {0}")]
+    Start(#[from] rayon::ThreadPoolBuildError),
+    /// The caller stopped the render.
+    #[error("stopped before the picture was complete")]
+    Stopped,
+}
+
+impl From<Fault> for FrameError {
+    fn from(fault: Fault) -> Self {
+        Self::Image(fault)
+    }
+}
+
+/// A gather that waits for its turn along the curve.
+#[derive(Clone, Copy)]
+struct Waiting {
+    /// Index of the sum that it adds to, in [`Frame::sums`].
+    sum: u32,
+    request: GatherRequest,
+}
+
+/// State of a frame: the sums of its pixels, tile after tile, one per pixel or several with layers, and the gathers
+/// that are still to be added to them.
+struct Frame {
+    sums: Vec<ColourSum>,
+    /// The other channels of the pixels.
+    views: Vec<PixelView>,
+    waiting: Vec<Waiting>,
+    counters: Counters,
+    traffic: MemoryTraffic,
+}
+
+/// A tile whose rays are cast, with the gathers that it leaves to the host.
+struct CastTile {
+    tile: RenderedTile,
+    /// Gathers, each with the index of its pixel in the tile.
+    waiting: Vec<(u32, GatherRequest)>,
+}
+
+/// Collector of a chip's gathers.
+struct Outlet(Vec<(u32, GatherRequest)>);
+
+impl GatherOutlet for Outlet {
+    fn take(&mut self, pixel: u32, request: GatherRequest) {
+        self.0.push((pixel, request));
+    }
+}
+
+/// A frame to render along the curve.
+#[derive(Clone, Copy)]
+pub struct CurveJob<'a> {
+    /// The card image.
+    pub image: &'a CardImage,
+    /// The frame's parameters.
+    pub frame: &'a FrameParameters,
+    /// The tiles of the frame, in the order in which their rays are cast.
+    pub tiles: &'a [Tile],
+    /// Number of emulated reference chips, a thread each.
+    pub chips: usize,
+}
+
+/// Work and memory traffic of a frame.
+pub struct CurveOutcome {
+    /// Counts of the work.
+    pub counters: Counters,
+    /// Memory traffic, if the memory is modelled: caches are empty when a tile begins, and at every 2^22-th gather.
+    pub traffic: MemoryTraffic,
+}
+
+/// Renders tiles into sinks, all of them at the end. `progress(done, total)` is called with the work that is done, in
+/// tiles, and returns whether to go on. With `caches` the memory is modelled.
+///
+/// # Errors
+/// If the frame has too many gathers, the card image is malformed, the threads cannot be started, or `progress` returns
+/// false.
+pub fn render_along_curve(
+    job: CurveJob,
+    caches: Option<&CacheSettings>,
+    sinks: &[&dyn TileSink],
+    progress: &(dyn Fn(u64, u64) -> bool + Sync),
+) -> Result<CurveOutcome, FrameError> {
+    match caches {
+        None => render_with(job, GATHERS_PER_TASK, &|memory| memory, sinks, progress),
+        Some(caches) => {
+            let model = |memory| Measured::new(caches.over(memory));
+            render_with(job, GATHERS_PER_COUNTED_TASK, &model, sinks, progress)
+        }
+    }
+}
+
+fn render_with<'a, M: MeasuredMemory>(
+    job: CurveJob<'a>,
+    gathers_per_task: usize,
+    model: &(impl Fn(Lines<'a>) -> M + Sync),
+    sinks: &[&dyn TileSink],
+    progress: &(dyn Fn(u64, u64) -> bool + Sync),
+) -> Result<CurveOutcome, FrameError> {
+    let CurveJob { frame, tiles, chips, .. } = job;
+    let mut all = Frame::with_room_for(frame, tiles)?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).stack_size(THREAD_STACK).build()?;
+    // The rays of a tile count as a tenth of its work, its gathers as the rest.
+    let total = tiles.len() as u64;
+    let cast = AtomicU64::new(0);
+    let go_on = || progress(cast.fetch_add(1, Ordering::Relaxed) / 10, total);
+    let gathers_of_tile = rays_of_pixel(frame) * tiles.iter().map(Tile::pixels).max().unwrap_or(1);
+    let tiles_per_round = (GATHERS_PER_CAST / gathers_of_tile.max(1)).max(2 * chips as u64) as usize;
+    for tiles in tiles.chunks(tiles_per_round) {
+        all.add(frame, pool.install(|| cast_tiles(job, model, tiles, &go_on))?)?;
+    }
+    pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.request.position));
+    let mut done = 0;
+    for waiting in all.waiting.chunks(GATHERS_PER_ROUND.max(chips * gathers_per_task)) {
+        let parts: Result<Vec<_>, Fault> = pool.install(|| {
+            let task = |waiting: &[Waiting]| do_gathers(job, model, waiting);
+            waiting.par_chunks(gathers_per_task).map(task).collect()
+        });
+        for Gathered { brought, counters, traffic } in parts? {
+            all.counters.add(&counters);
+            all.traffic.add(&traffic);
+            for (sum, brought) in brought {
+                all.sums[sum as usize].add_light(brought);
+            }
+        }
+        done += waiting.len() as u64;
+        if !progress(total / 10 + (total - total / 10) * done / all.waiting.len() as u64, total) {
+            return Err(FrameError::Stopped);
+        }
+    }
+    complete(job, &all, sinks)?;
+    Ok(CurveOutcome { counters: all.counters, traffic: all.traffic })
+}
+
+/// Number of gather rays per pixel; an estimate with the irradiance cache and with adaptive sampling.
+fn rays_of_pixel(frame: &FrameParameters) -> u64 {
+    let samples = frame.samples as u64;
+    match frame.irradiance_error {
+        None => samples * frame.gather_rays as u64,
+        Some(_) => samples * u64::from(frame.gather_rays.div_ceil(frame.planned_samples.max(1))),
+    }
+}
+
+impl Frame {
+    fn with_room_for(frame: &FrameParameters, tiles: &[Tile]) -> Result<Self, FrameError> {
+        let pixels: u64 = tiles.iter().map(Tile::pixels).sum();
+        let gathers = pixels * rays_of_pixel(frame);
+        let too_many = || FrameError::TooManyGathers { gathers };
+        let sums = pixels * u64::from(sums_of_pixel(frame.layers));
+        if gathers > MAX_GATHERS || sums > u32::MAX as u64 {
+            return Err(too_many());
+        }
+        let mut all = Self {
+            sums: Vec::new(),
+            views: Vec::new(),
+            waiting: Vec::new(),
+            counters: Counters::ZERO,
+            traffic: MemoryTraffic::ZERO,
+        };
+        all.sums.try_reserve_exact(sums as usize).map_err(|_| too_many())?;
+        all.views.try_reserve_exact(pixels as usize).map_err(|_| too_many())?;
+        all.waiting.try_reserve_exact(gathers as usize).map_err(|_| too_many())?;
+        Ok(all)
+    }
+
+    /// Takes over the sums and gathers of tiles. Only the gathers of glossy lobes beside an irradiance cache, and of several paths a sample, can exceed
+    /// the room that is reserved.
+    fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), FrameError> {
+        for CastTile { tile, waiting } in tiles {
+            let gathers = (self.waiting.len() + waiting.len()) as u64;
+            let too_many = || FrameError::TooManyGathers { gathers };
+            if gathers > MAX_GATHERS {
+                return Err(too_many());
+            }
+            self.waiting.try_reserve(waiting.len()).map_err(|_| too_many())?;
+            let first = self.sums.len() as u32;
+            self.sums.extend(tile.sums);
+            self.views.extend(tile.views);
+            self.counters.add(&tile.counters);
+            self.traffic.add(&tile.traffic);
+            let sum_of = |pixel: u32| first + Component::Indirect.sum_of(frame, pixel as usize) as u32;
+            let waiting = waiting.into_iter();
+            self.waiting.extend(waiting.map(|(pixel, request)| Waiting { sum: sum_of(pixel), request }));
+        }
+        Ok(())
+    }
+}
+
+fn cast_tiles<'a, M: MeasuredMemory>(
+    job: CurveJob<'a>,
+    model: &(impl Fn(Lines<'a>) -> M + Sync),
+    tiles: &[Tile],
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<CastTile>, FrameError> {
+    let cast_one = |chip: &mut Box<ReferenceChip>, &tile: &Tile| {
+        if !go_on() {
+            return Err(FrameError::Stopped);
+        }
+        let mut outlet = Outlet(Vec::new());
+        let (scene, memory) = job.image.view();
+        let tile = render_tile(chip, &scene, model(memory), job.frame, tile, Some(&mut outlet))?;
+        Ok(CastTile { tile, waiting: outlet.0 })
+    };
+    tiles.par_iter().map_init(new_chip, cast_one).collect()
+}
+
+/// Puts the tiles into sinks.
+fn complete(job: CurveJob, all: &Frame, sinks: &[&dyn TileSink]) -> Result<(), FrameError> {
+    let (scene, _) = job.image.view();
+    let format = SumFormat::new(&scene.header, job.frame);
+    let sums_of_pixel = sums_of_pixel(job.frame.layers) as usize;
+    let mut pixels = all.views.iter().zip(all.sums.chunks_exact(sums_of_pixel));
+    for tile in job.tiles {
+        let of_tile = pixels.by_ref().take(tile.pixels() as usize);
+        let sums: Vec<PixelSums> = of_tile.map(|(view, light)| view.sums(light)).collect();
+        let finished = FinishedTile::of_pixels(*tile, sums, format)
+            .ok_or(Fault { code: FaultCode::Tile, detail: tile.id })?;
+        sinks.iter().for_each(|sink| sink.put(&finished));
+    }
+    Ok(())
+}
+
+/// Results of some gathers.
+struct Gathered {
+    /// Light to be added, with the index of its sum.
+    brought: Vec<(u32, Vec3)>,
+    counters: Counters,
+    traffic: MemoryTraffic,
+}
+
+fn do_gathers<'a, M: MeasuredMemory>(
+    job: CurveJob<'a>,
+    model: &impl Fn(Lines<'a>) -> M,
+    waiting: &[Waiting],
+) -> Result<Gathered, Fault> {
+    let (scene, memory) = job.image.view();
+    let mut memory = model(memory);
+    let mut counters = Counters::ZERO;
+    let mut context =
+        Context { scene: &scene, memory: &mut memory, frame: job.frame, counters: &mut counters };
+    let mut candidates = ReferenceCandidates::new();
+    let mut brought = Vec::with_capacity(waiting.len());
+    for Waiting { sum, request, .. } in waiting {
+        brought.push((*sum, gathered(&mut context, request, candidates.view())?));
+    }
+    Ok(Gathered { brought, counters, traffic: memory.traffic() })
+}

@@ -1,0 +1,141 @@
+//! Greeting of a card: the first message and its reply.
+
+use std::hash::{BuildHasher, RandomState};
+use std::time::{Duration, Instant};
+
+use photoncard_cards::session::{LinkBytes, Session, SessionError};
+use photoncard_shared::budget::Budget;
+use photoncard_shared::link::{Port, PortError};
+use photoncard_shared::message::{MemoryUse, Tile};
+
+use super::exchange::exchange;
+use super::open_card::OpenCard;
+use super::{CardAddress, CardError, Observer, RenderError, Unobserved};
+use crate::emulator::SharedImage;
+
+/// Card that has answered the greeting.
+pub(super) struct GreetedCard {
+    pub(super) card: OpenCard,
+    pub(super) session: Session,
+    pub(super) budget: Budget,
+    /// Bytes of the link that statistics of earlier renders hold.
+    pub(super) counted: LinkBytes,
+    /// Tiles of the last picture that the card alone has rendered.
+    pub(super) tiles: Vec<Tile>,
+}
+
+impl GreetedCard {
+    /// Bytes of the link since the last call.
+    pub(super) fn count_bytes(&mut self) -> LinkBytes {
+        let all = self.session.link_bytes();
+        let earlier = std::mem::replace(&mut self.counted, all);
+        all.since(&earlier)
+    }
+}
+
+/// Error of a greeting, or of the self-test after it.
+pub(super) enum GreetingError {
+    /// Error of the card.
+    Card(CardError),
+    /// The observer stopped the work.
+    Stopped,
+}
+
+impl GreetingError {
+    /// The error of a card of this name.
+    pub(super) fn of_card(self, card: String) -> RenderError {
+        match self {
+            Self::Card(source) => RenderError::Card { card, source },
+            Self::Stopped => RenderError::Stopped,
+        }
+    }
+}
+
+impl From<CardError> for GreetingError {
+    fn from(error: CardError) -> Self {
+        Self::Card(error)
+    }
+}
+
+/// Information that a card reports about itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CardInfo {
+    /// Name and version of its firmware.
+    pub build: String,
+    /// Capacities and limits of the chip.
+    pub budget: Budget,
+    /// On-chip memory that the firmware takes; `None` for a card that does not measure it.
+    pub memory_use: Option<MemoryUse>,
+}
+
+/// Greets the first card at an address.
+///
+/// # Errors
+/// If the card cannot be started or reached, or its reply is invalid.
+pub fn card_info(address: &CardAddress) -> Result<CardInfo, RenderError> {
+    let GreetedCard { session, budget, .. } = greet_alone(address, open(address)?, Instant::now())?;
+    Ok(CardInfo { build: session.build().to_owned(), budget, memory_use: session.memory_use() })
+}
+
+/// Greets the first card at an address `count` times. Returns the time until each reply.
+///
+/// # Errors
+/// If the card cannot be started or reached, or its reply is invalid.
+pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, RenderError> {
+    let mut card = open(address)?;
+    let mut answers = Vec::with_capacity(count);
+    for _ in 0..count {
+        let start = Instant::now();
+        card = greet_alone(address, card, start)?.card;
+        answers.push(start.elapsed());
+    }
+    Ok(answers)
+}
+
+/// Starts or connects to the first card at an address.
+pub(super) fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
+    let card = OpenCard::open(0, address, None, &SharedImage::default(), None);
+    card.map_err(|source| RenderError::Card { card: address.name_of(0), source })
+}
+
+fn greet_alone(address: &CardAddress, card: OpenCard, start: Instant) -> Result<GreetedCard, RenderError> {
+    greet(card, start, &Unobserved).map_err(|error| error.of_card(address.name_of(0)))
+}
+
+/// Sends the greeting and waits for the reply.
+pub(super) fn greet(
+    mut card: OpenCard,
+    start: Instant,
+    observer: &dyn Observer,
+) -> Result<GreetedCard, GreetingError> {
+    let (session, budget) = greet_port(&mut card, start, observer)?;
+    Ok(GreetedCard { card, session, budget, counted: LinkBytes::default(), tiles: Vec::new() })
+}
+
+/// [`greet`], on any port.
+pub(super) fn greet_port(
+    port: &mut impl Port,
+    start: Instant,
+    observer: &dyn Observer,
+) -> Result<(Session, Budget), GreetingError> {
+    let mut session = Session::new(session_number(), start.elapsed());
+    loop {
+        if let Some(&budget) = session.budget() {
+            return Ok((session, budget));
+        }
+        if observer.is_stopped() {
+            return Err(GreetingError::Stopped);
+        }
+        exchange(&mut session, port, None, start).map_err(|error| match error {
+            SessionError::Port(PortError::Closed) => CardError::Refused,
+            error => CardError::Session(error),
+        })?;
+    }
+}
+
+/// Random number of a session, to distinguish it from frames of earlier sessions on the line; two coincide with probability
+/// 2^-32.
+fn session_number() -> u32 {
+    // The standard library's hashers have random keys.
+    RandomState::new().hash_one(std::process::id()) as u32
+}

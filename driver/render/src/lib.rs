@@ -1,0 +1,91 @@
+//! A render, from a loaded scene to a complete film.
+//!
+//! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, executor, statistics. The executor
+//! fills the film: cards over their links, or for the order `hilbert` emulated chips with the host. [`render`] is a renderer's first
+//! picture.
+#![forbid(unsafe_code)]
+
+mod address;
+mod card_thread;
+mod cards;
+pub mod cost_model;
+mod crew;
+pub mod display;
+pub mod emulator;
+mod error;
+mod exchange;
+mod executor;
+mod greeting;
+mod memory;
+mod noise;
+mod observer;
+mod open_card;
+mod outputs;
+pub mod partial;
+pub mod parts;
+mod passes;
+mod preparation;
+mod prepared;
+mod provenance;
+pub mod quality;
+mod renderer;
+mod reopening;
+mod self_test;
+mod settings;
+mod statistics;
+mod times;
+mod verification;
+mod whole_frame;
+
+pub use address::{CardAddress, RemoteAddress};
+pub use error::{CardError, RenderError};
+pub use greeting::{CardInfo, card_info, card_ping};
+pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};
+pub use observer::{Observer, Phase, Unobserved};
+pub use passes::{Aim, Ending, Passes};
+pub use photoncard_shared::budget::MAX_BINS;
+pub use photoncard_shared::message::{Filter, Radiance, Sampling};
+pub use photoncard_shared::message::{MemoryPattern, MemoryUse, WrongWord, WrongWords};
+pub use prepared::{PreparedError, PreparedScene};
+pub use provenance::Provenance;
+pub use renderer::{Chosen, Renderer, Rendering};
+pub use self_test::{
+    ArithmeticTest, PatternTest, SelfTest, WrongResult, WrongResults, card_self_test, self_test_on,
+};
+pub use settings::{
+    CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
+    Picture, RenderSettings, Schedule, TileOutputs,
+};
+pub use statistics::{LinkStatistics, Rays, Statistics};
+pub use times::Times;
+
+use photoncard_map::pack::PackedScene;
+use photoncard_scene::Scene;
+
+/// Renders a scene. For further pictures on the same cards use a [`Renderer`].
+///
+/// A serial port may be held open for about a second after the end: an attempt to reopen it runs on a detached thread.
+///
+/// # Errors
+/// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
+pub fn render(
+    scene: &Scene,
+    settings: &RenderSettings,
+    observer: &dyn Observer,
+) -> Result<Rendering, RenderError> {
+    Renderer::default().render(scene, settings, observer)
+}
+
+/// Renders a scene with photons and an integrator that are chosen when the cards have answered and the scene is packed. `choose` takes
+/// the packed scene; everything else is by `settings`.
+///
+/// # Errors
+/// As [`render`], and those of `choose`.
+pub fn render_chosen(
+    scene: &Scene,
+    settings: &RenderSettings,
+    choose: &dyn Fn(&PackedScene) -> Chosen,
+    observer: &dyn Observer,
+) -> Result<Rendering, RenderError> {
+    Renderer::default().render_chosen(scene, settings, choose, observer)
+}

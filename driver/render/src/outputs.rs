@@ -1,0 +1,120 @@
+//! Outputs of a render while it runs: the file of finished tiles, the viewers and the observer.
+
+use std::sync::{Arc, Mutex};
+
+use photoncard_picture::film::Film;
+use photoncard_picture::sink::{FinishedTile, TileSink};
+use photoncard_picture::viewer::Viewer;
+use photoncard_scene::FixedScene;
+use photoncard_shared::message::Tile;
+
+use super::{Observer, RenderSettings};
+use crate::display::Display;
+use crate::partial::{PartialError, PartialRender};
+
+/// Outputs of a render while it runs, as far as the settings ask for them.
+pub(super) struct Outputs<'a> {
+    partial: Option<PartialRender>,
+    /// Samples that the render adds to: all that are shown have them.
+    pub(super) base: Option<Arc<Film>>,
+    viewers: Vec<Box<dyn Viewer>>,
+    pub(super) observer: &'a dyn Observer,
+}
+
+impl<'a> Outputs<'a> {
+    /// Opens the outputs. Tiles of the render that is resumed are written into the film, and shown. Samples that are complete in
+    /// the render that is resumed take the place of `base`, and the film is of the others.
+    ///
+    /// # Errors
+    /// If the file of finished tiles cannot be read or is not the file of this picture.
+    pub(super) fn open(
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        tiles: &[Tile],
+        (film, base): (&mut Film, Option<Arc<Film>>),
+        observer: &'a dyn Observer,
+    ) -> Result<Self, PartialError> {
+        let begin = |partial| {
+            let mut identity = settings.identity_of(scene);
+            // The file is of any number of samples, and states those that rays are divided among.
+            identity.remove("spp");
+            if settings.integrator.irradiance_error.is_some() {
+                identity.insert("planned-spp".to_owned(), settings.integrator.planned().into());
+            }
+            PartialRender::begin(partial, identity.into(), film)
+        };
+        let begun = settings.outputs.partial.as_ref().map(begin).transpose()?;
+        let (partial, kept) = begun.map_or((None, None), |(partial, kept)| (Some(partial), kept));
+        let base = kept.map(Arc::new).or(base);
+        let outputs = Self { partial, viewers: viewers(settings, film), base, observer };
+        outputs.report_kept();
+        let resumed: Vec<&Tile> = tiles.iter().filter(|tile| film.has(tile)).collect();
+        resumed.iter().filter_map(|tile| film.finished(tile)).for_each(|tile| outputs.put(&tile));
+        if !resumed.is_empty() {
+            observer.resumed(resumed.len(), tiles.len());
+        }
+        Ok(outputs)
+    }
+
+    /// Sinks of finished tiles: the film, the outputs that show them, and the file if tiles are finished early.
+    pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>, finished_early: bool) -> Vec<&'s dyn TileSink> {
+        let mut sinks: Vec<&dyn TileSink> = vec![film, self];
+        let partial = self.partial.as_ref().filter(|_| finished_early);
+        sinks.extend(partial.map(|partial| partial as &dyn TileSink));
+        sinks
+    }
+
+    /// Checks that finished tiles could be written into their file.
+    ///
+    /// # Errors
+    /// If one could not.
+    pub(super) fn check_partial(&self) -> Result<(), PartialError> {
+        self.partial.as_ref().map_or(Ok(()), PartialRender::check)
+    }
+
+    /// Reports to the observer that finished tiles are in the file, if any are.
+    pub(super) fn report_kept(&self) {
+        if self.partial.as_ref().is_some_and(PartialRender::holds_tiles) {
+            self.observer.kept();
+        }
+    }
+
+    /// Reports to the observer, once for each viewer that has failed, why the picture is not shown.
+    pub(super) fn report_failed_viewers(&self) {
+        for error in self.viewers.iter().filter_map(|viewer| viewer.failure()) {
+            self.observer.not_shown(error.as_ref());
+        }
+    }
+
+    /// Shows the rest of the picture. Returns the file of finished tiles.
+    pub(super) fn finish(self, film: &Film) -> Option<PartialRender> {
+        self.viewers.iter().for_each(|viewer| viewer.finish(film));
+        self.report_failed_viewers();
+        self.partial
+    }
+}
+
+/// Shows tiles by the viewers and the observer, with the samples of the base added.
+impl TileSink for Outputs<'_> {
+    fn put(&self, tile: &FinishedTile) {
+        let added = self.base.as_ref().and_then(|base| base.added_to(tile));
+        let tile = added.as_ref().unwrap_or(tile);
+        self.viewers.iter().for_each(|viewer| viewer.put(tile));
+        self.observer.tiles().into_iter().for_each(|sink| sink.put(tile));
+    }
+
+    fn revoke(&self, tile: &Tile) {
+        self.viewers.iter().for_each(|viewer| viewer.revoke(tile));
+        self.observer.tiles().into_iter().for_each(|sink| sink.revoke(tile));
+    }
+}
+
+/// The viewers that the settings ask for.
+fn viewers(settings: &RenderSettings, film: &Film) -> Vec<Box<dyn Viewer>> {
+    let channels = settings.picture.layers.channels();
+    let mut viewers: Vec<Box<dyn Viewer>> = Vec::new();
+    if let Some(display) = &settings.outputs.display {
+        viewers.push(Box::new(Display::open(display, film.window(), &channels)));
+    }
+    viewers
+}

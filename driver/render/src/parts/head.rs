@@ -1,0 +1,114 @@
+//! Head of a part's file: the part, and all that the picture is made of beside its pixels.
+
+use photoncard_picture::film::{Film, FilmError, SumFormat, Window};
+use photoncard_picture::layer::Layers;
+use photoncard_shared::message::SumScale;
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
+use serde_json::{Map, Value};
+
+use super::dealing::Part;
+
+/// Head of a part's file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartHead {
+    /// The part.
+    #[serde(serialize_with = "write_part", deserialize_with = "read_part")]
+    pub part: Part,
+    /// Provenance of the picture: all that its pixels depend on, by the names of options.
+    pub settings: Map<String, Value>,
+    /// Layers of the picture, as in `--aov`.
+    pub layers: String,
+    /// Arguments of the command that has made the part.
+    pub command: Vec<String>,
+    /// Bits of the units of the sums of radiance and depth, single precision.
+    pub units: [u32; 2],
+}
+
+impl PartHead {
+    /// Head of a part of the picture that `film` is a part of.
+    pub fn new(
+        part: Part,
+        film: &Film,
+        settings: Map<String, Value>,
+        layers: &Layers,
+        command: Vec<String>,
+    ) -> Self {
+        let SumScale { radiance, depth } = film.format().scale;
+        let units = [radiance, depth].map(f32::to_bits);
+        Self { part, settings, layers: layers.to_string(), command, units }
+    }
+
+    /// Picture of the head; `None` if the settings do not state one.
+    pub(super) fn picture(&self) -> Option<PartPicture> {
+        let numbers = |name: &str| -> Option<Vec<u32>> {
+            let numbers = self.settings.get(name)?.as_array()?.iter();
+            numbers.map(|number| number.as_u64()?.try_into().ok()).collect()
+        };
+        let [width, height] = numbers("size")?.try_into().ok()?;
+        let [x0, x1, y0, y1] = numbers("crop")?.try_into().ok()?;
+        let samples = self.settings.get("spp")?.as_u64()?.try_into().ok()?;
+        let layers: Layers = self.layers.parse().ok()?;
+        let [radiance, depth] = self.units.map(f32::from_bits);
+        let is_unit = |unit: f32| unit.is_normal() && unit > 0.0;
+        let is_adaptive = self.settings.get("adaptive").is_some_and(Value::is_number);
+        let scale = SumScale { radiance, depth };
+        let format = SumFormat::of_range(layers.are_of_chip(), (0, samples), is_adaptive, scale);
+        let window = Window { x0, x1, y0, y1 };
+        let is_possible =
+            Film::check(width, height, window).is_ok() && samples > 0 && is_unit(radiance) && is_unit(depth);
+        is_possible.then_some(PartPicture { size: [width, height], window, format, layers })
+    }
+
+    /// Descriptions of the settings that differ from another head of the picture, by name.
+    pub(super) fn differences(&self, other: &Self, [own, others]: [&str; 2]) -> Vec<String> {
+        let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
+        let names = self
+            .settings
+            .keys()
+            .chain(other.settings.keys().filter(|name| !self.settings.contains_key(*name)));
+        let differing = names.filter(|name| self.settings.get(*name) != other.settings.get(*name));
+        let of_settings = differing.map(|name| {
+            let [a, b] = [self, other].map(|head| say(head.settings.get(name)));
+            format!("{name}: {a} in {own}, {b} in {others}")
+        });
+        let of_head = [
+            ("number of parts", [self, other].map(|head| head.part.count().to_string())),
+            ("layers", [self, other].map(|head| head.layers.clone())),
+            ("units", [self, other].map(|head| format!("{:x?}", head.units))),
+        ];
+        let of_head = of_head.into_iter().filter(|(_, [a, b])| a != b);
+        of_settings
+            .chain(of_head.map(|(name, [a, b])| format!("{name}: {a} in {own}, {b} in {others}")))
+            .collect()
+    }
+}
+
+/// Picture that a part is of.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct PartPicture {
+    size: [u32; 2],
+    pub(super) window: Window,
+    pub(super) format: SumFormat,
+    pub(super) layers: Layers,
+}
+
+impl PartPicture {
+    /// Empty film of the picture.
+    ///
+    /// # Errors
+    /// If it does not fit in memory.
+    pub(super) fn film(&self) -> Result<Film, FilmError> {
+        let [width, height] = self.size;
+        Film::new(width, height, self.window, self.format)
+    }
+}
+
+fn write_part<S: serde::Serializer>(part: &Part, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(part)
+}
+
+fn read_part<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Part, D::Error> {
+    String::deserialize(deserializer)?.parse().map_err(D::Error::custom)
+}

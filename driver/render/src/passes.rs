@@ -1,0 +1,193 @@
+//! Pictures by passes: samples are added until the time is over or the noise is low enough.
+//!
+//! The numbers of samples double. A pass and the picture before it are then estimates of equally many samples, whose difference shows the
+//! noise of their mean ([`NoiseEstimate`]).
+
+use std::cell::RefCell;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use photoncard_map::pack::PackedScene;
+use photoncard_scene::FixedScene;
+
+use super::noise::NoiseEstimate;
+use super::renderer::{Chosen, Renderer, Rendering};
+use super::{Integrator, Observer, RenderError, RenderSettings};
+
+/// Maximum number of samples of a pixel: that of the kinds of chips.
+const MAX_SAMPLES: u32 = 4096;
+/// Minimum number of samples whose noise is trusted to be below a limit.
+const MIN_SAMPLES: u32 = 16;
+/// Number of samples of a first pass.
+const FIRST_SAMPLES: u32 = 1;
+/// Share of the remaining time that a pass is planned for.
+const PLANNED_SHARE: f64 = 0.95;
+
+/// Aim of a picture by passes: the first of the two, and 4096 samples a pixel in any case.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Aim {
+    /// Time of the render; the first pass may take longer, and without room for irradiance records on a card the second.
+    pub time: Option<Duration>,
+    /// Noise: estimated standard error of the pixels (root mean square), relative to the mean of the picture.
+    pub noise: Option<f64>,
+}
+
+/// Picture by passes.
+pub struct Passes {
+    /// The picture of all complete passes. Its statistics of the work are those of the last pass.
+    pub rendering: Rendering,
+    /// Estimated noise, as in [`Aim::noise`]; `None` after a single pass.
+    pub noise: Option<f64>,
+    /// Number of complete passes.
+    pub count: u32,
+    /// End of the passes.
+    pub ending: Ending,
+}
+
+/// End of the passes of a picture.
+#[derive(Debug)]
+pub enum Ending {
+    /// The aim is reached.
+    Reached,
+    /// The aim is not reached, and the picture has the maximum number of samples.
+    MaxSamples,
+    /// The picture is black: noise relative to its mean has no measure.
+    Black,
+    /// Error that ended a pass after the first, or the observer's stop.
+    Failed(RenderError),
+}
+
+impl Renderer {
+    /// Renders a picture by passes until an aim is reached. Photons and integrator are chosen as by [`Self::render_chosen`]; the number of
+    /// samples chosen is the planned one. The picture is, to the bit, that of one render of as many samples with as many planned.
+    ///
+    /// # Errors
+    /// As [`Self::render_chosen`], in the first pass.
+    pub fn render_until(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        choose: &dyn Fn(&PackedScene) -> Chosen,
+        aim: Aim,
+        observer: &dyn Observer,
+    ) -> Result<Passes, RenderError> {
+        let start = Instant::now();
+        let chosen = RefCell::new((settings.photons.clone(), settings.integrator.clone()));
+        let first = |packed: &PackedScene| {
+            let (photons, integrator) = choose(packed)?;
+            let planned_samples = Some(integrator.planned());
+            let integrator = Integrator { samples: FIRST_SAMPLES, planned_samples, ..integrator };
+            *chosen.borrow_mut() = (photons.clone(), integrator.clone());
+            Ok((photons, integrator))
+        };
+        let settings = settings.clone().with(|settings| settings.schedule.keep_records = true);
+        let rendering = self.render_chosen_fixed(scene, &settings, &first, observer)?;
+        let (photons, integrator) = chosen.into_inner();
+        let mut settings = RenderSettings { photons, integrator, ..settings };
+        let mut passes = Passes { rendering, noise: None, count: 1, ending: Ending::Reached };
+        let mut estimate = NoiseEstimate::default();
+        let mut pace = Pace::default();
+        if settings.integrator.irradiance_error.is_none() {
+            pace.add(settings.integrator.samples, passes.rendering.statistics.time_s.render);
+        }
+        loop {
+            let more = match next_pass(&passes, &estimate, &pace, aim, start.elapsed()) {
+                Ok(more) => more,
+                Err(ending) => {
+                    passes.ending = ending;
+                    break;
+                }
+            };
+            let before = Arc::new(passes.rendering.film.clone());
+            settings.integrator.samples += more;
+            let begun = Instant::now();
+            match self.refine(scene, &settings, before.clone(), observer) {
+                Ok(rendering) => passes.rendering = rendering,
+                Err(error) => {
+                    passes.ending = Ending::Failed(error);
+                    break;
+                }
+            }
+            pace.add(more, begun.elapsed().as_secs_f64());
+            passes.count += 1;
+            estimate.add(&before, &passes.rendering.film);
+            passes.noise = estimate.noise();
+        }
+        passes.rendering.statistics.time_s.total = start.elapsed().as_secs_f64();
+        Ok(passes)
+    }
+}
+
+/// Number of samples of the next pass.
+///
+/// # Errors
+/// The end of the passes.
+fn next_pass(
+    passes: &Passes,
+    estimate: &NoiseEstimate,
+    pace: &Pace,
+    aim: Aim,
+    elapsed: Duration,
+) -> Result<u32, Ending> {
+    let samples = passes.rendering.film.format().samples;
+    let mut more = samples;
+    if let Some(aim) = aim.noise
+        && samples >= MIN_SAMPLES
+    {
+        if estimate.is_of_black() {
+            return Err(Ending::Black);
+        }
+        more = more.min(estimate.samples_to(aim).unwrap_or(more));
+    }
+    if let Some(time) = aim.time {
+        let left = time.saturating_sub(elapsed).as_secs_f64();
+        more = more.min(pace.samples_in(PLANNED_SHARE * left));
+    }
+    match more.min(MAX_SAMPLES.saturating_sub(samples)) {
+        0 if more > 0 => Err(Ending::MaxSamples),
+        0 => Err(Ending::Reached),
+        more => Ok(more),
+    }
+}
+
+/// Time of passes: a part that each has, and one in proportion to its samples.
+#[derive(Default)]
+struct Pace {
+    /// Samples and seconds of the last two passes, without a first one that gathers irradiance records for all.
+    last: [Option<(f64, f64)>; 2],
+}
+
+impl Pace {
+    fn add(&mut self, samples: u32, seconds: f64) {
+        self.last = [self.last[1], Some((f64::from(samples), seconds))];
+    }
+
+    /// Number of samples that a pass of this time has.
+    fn samples_in(&self, seconds: f64) -> u32 {
+        let Some((samples, time)) = self.last[1] else { return u32::from(seconds > 0.0) };
+        let slope = self.last[0].filter(|(before, _)| *before != samples);
+        let slope = slope.map(|(before, other)| (time - other) / (samples - before));
+        // The time of a sample is at most what it would be without a part that each pass has, and not much less.
+        let most = time / samples;
+        let each = slope.unwrap_or(most).clamp(0.25 * most, most).max(f64::MIN_POSITIVE);
+        let fixed = time - each * samples;
+        ((seconds - fixed) / each).clamp(0.0, f64::from(MAX_SAMPLES)) as u32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pass_fits_the_time_that_is_left() {
+        let mut pace = Pace::default();
+        pace.add(1, 3.0);
+        assert_eq!(pace.samples_in(9.5), 3);
+        // Two seconds, and one for each sample.
+        pace.add(2, 4.0);
+        assert_eq!((pace.samples_in(10.0), pace.samples_in(2.9), pace.samples_in(-1.0)), (8, 0, 0));
+        pace.add(2, 0.0);
+        assert_eq!(pace.samples_in(1e9), MAX_SAMPLES);
+    }
+}

@@ -1,0 +1,161 @@
+//! Head of a prepared scene's file: everything but the card image.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use glam::Vec3;
+use photoncard_map::pack::CardImage;
+use photoncard_map::photon_map::PhotonsFor;
+use photoncard_scene::{Camera, FixedScene};
+use photoncard_shared::address::Line;
+use photoncard_shared::checksum::Checksum;
+use photoncard_shared::message::CausticGather;
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::scene::{PreparedScene, View, is_camera};
+use crate::preparation::Prepared;
+use crate::renderer::Kept;
+use crate::{Integrator, PROGRAM, PhotonMaps, RenderSettings};
+
+/// Head of the file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Head {
+    /// Name and version of the program that has traced the photons.
+    pub(super) program: String,
+    /// Number of the card image's lines.
+    pub(super) lines: u32,
+    /// CRC-32C of the card image.
+    pub(super) checksum: u32,
+    cameras: Vec<StoredCamera>,
+    /// Place of the scene's origin in the coordinates of its file.
+    offset: [f64; 3],
+    /// Checksums of the scene, with and without cameras.
+    scene: [String; 2],
+    is_specular: bool,
+    photons: PhotonMaps,
+    integrator: Integrator,
+    max_distance: f32,
+    caustics: Option<CausticGather>,
+    paths: u64,
+    /// Views of frames, by their numbers.
+    frames: BTreeMap<u32, StoredView>,
+    notes: Map<String, Value>,
+}
+
+impl Head {
+    pub(super) fn new(scene: &PreparedScene) -> Self {
+        let PreparedScene { scene, photons, integrator, kept, frames, notes } = scene;
+        let Prepared { image, max_distance, caustics, paths, guiding: _ } = &kept.prepared;
+        Self {
+            program: PROGRAM.to_owned(),
+            lines: image.lines().len() as u32,
+            checksum: checksum(image.lines()),
+            cameras: scene.cameras.iter().map(StoredCamera::new).collect(),
+            offset: scene.offset.to_array(),
+            scene: [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
+            is_specular: scene.is_specular(),
+            photons: photons.clone(),
+            integrator: integrator.clone(),
+            max_distance: *max_distance,
+            caustics: *caustics,
+            paths: *paths,
+            frames: frames.iter().map(|(number, view)| (*number, StoredView::new(view))).collect(),
+            notes: notes.clone(),
+        }
+    }
+
+    /// The prepared scene of an image.
+    ///
+    /// # Errors
+    /// If there is no such camera or distance, or the photons are for one camera.
+    pub(super) fn into_scene(self, image: CardImage) -> Result<PreparedScene, &'static str> {
+        let Self {
+            cameras, offset, photons, integrator, max_distance, caustics, paths, frames, notes, ..
+        } = self;
+        let is_distance = |distance: f32| distance.is_normal() && distance > 0.0;
+        let distances = [Some(max_distance), caustics.map(|gather| gather.max_distance)];
+        if !distances.into_iter().flatten().all(is_distance) {
+            return Err("its distances of gathers are none");
+        }
+        if photons.photons_for != PhotonsFor::Scene {
+            return Err("its photons are not for all cameras");
+        }
+        let cameras: Vec<Camera> = cameras.into_iter().map(StoredCamera::camera).collect();
+        let frames: BTreeMap<u32, View> =
+            frames.into_iter().map(|(number, view)| (number, view.view())).collect();
+        let is_seen = |cameras: &[Camera]| !cameras.is_empty() && cameras.iter().all(is_camera);
+        if !is_seen(&cameras) || !frames.values().all(|view| is_seen(&view.cameras)) {
+            return Err("its cameras are none");
+        }
+        if !offset.into_iter().all(f64::is_finite) {
+            return Err("its place is none");
+        }
+        let settings = RenderSettings { photons, integrator, ..RenderSettings::default() };
+        let prepared = Prepared { image: Arc::new(image), max_distance, caustics, paths, guiding: None };
+        let kept = Kept {
+            scene: self.scene[1].clone(),
+            photons: settings.photon_settings_if(self.is_specular),
+            prepared,
+        };
+        let RenderSettings { photons, integrator, .. } = settings;
+        let scene = FixedScene::of_cameras(cameras, offset.into(), self.scene, self.is_specular);
+        Ok(PreparedScene { scene, photons, integrator, kept, frames, notes })
+    }
+}
+
+/// CRC-32C of lines.
+fn checksum(lines: &[Line]) -> u32 {
+    let mut sum = Checksum::default();
+    lines.iter().for_each(|line| sum.update(&line.0));
+    sum.value()
+}
+
+/// View of a frame in a file.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredView {
+    checksum: String,
+    cameras: Vec<StoredCamera>,
+}
+
+impl StoredView {
+    fn new(view: &View) -> Self {
+        let View { cameras, checksum } = view;
+        Self { checksum: checksum.clone(), cameras: cameras.iter().map(StoredCamera::new).collect() }
+    }
+
+    fn view(self) -> View {
+        let Self { cameras, checksum } = self;
+        View { checksum, cameras: cameras.into_iter().map(StoredCamera::camera).collect() }
+    }
+}
+
+/// Camera in a file: numbers that parse back exactly.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StoredCamera {
+    name: String,
+    origin: [f32; 3],
+    right: [f32; 3],
+    up: [f32; 3],
+    forward: [f32; 3],
+    vertical_fov: f32,
+    aspect: Option<f32>,
+}
+
+impl StoredCamera {
+    fn new(camera: &Camera) -> Self {
+        let Camera { name, origin, right, up, forward, vertical_fov, aspect } = camera;
+        let [origin, right, up, forward] = [origin, right, up, forward].map(Vec3::to_array);
+        let (name, vertical_fov, aspect) = (name.clone(), *vertical_fov, *aspect);
+        Self { name, origin, right, up, forward, vertical_fov, aspect }
+    }
+
+    fn camera(self) -> Camera {
+        let Self { name, origin, right, up, forward, vertical_fov, aspect } = self;
+        let [origin, right, up, forward] = [origin, right, up, forward].map(Into::into);
+        Camera { name, origin, right, up, forward, vertical_fov, aspect }
+    }
+}

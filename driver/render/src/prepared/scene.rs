@@ -1,0 +1,143 @@
+//! A scene with all that its pictures need.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use photoncard_map::pack::PackedScene;
+use photoncard_map::photon_map::PhotonsFor;
+use photoncard_picture::choice::Choice;
+use photoncard_scene::{Camera, FixedScene};
+use photoncard_shared::budget::Budget;
+use serde_json::{Map, Value};
+
+use crate::executor::BudgetCheck;
+use crate::renderer::{Chosen, Kept, Renderer, Source};
+use crate::times::Times;
+use crate::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
+
+/// A scene with its photon map, as a card image, and the settings that it depends on.
+pub struct PreparedScene {
+    /// The cameras of the scene, and what is known of the rest.
+    pub(super) scene: FixedScene<'static>,
+    pub(super) photons: PhotonMaps,
+    pub(super) integrator: Integrator,
+    pub(super) kept: Kept,
+    /// Views of frames, by their numbers.
+    pub(super) frames: BTreeMap<u32, View>,
+    pub(super) notes: Map<String, Value>,
+}
+
+/// Cameras of a frame, and the checksum of the scene with them.
+pub(super) struct View {
+    pub(super) cameras: Vec<Camera>,
+    pub(super) checksum: String,
+}
+
+impl PreparedScene {
+    /// Prepares a scene: packs it, has photons and integrator chosen, and traces photons. The image must fit cards with `budgets`. `notes` are
+    /// the caller's, such as names of the inputs.
+    ///
+    /// # Errors
+    /// As of [`Renderer::render_chosen`].
+    pub fn new(
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        budgets: &[Budget],
+        choose: &dyn Fn(&PackedScene) -> Chosen,
+        notes: Map<String, Value>,
+        observer: &dyn Observer,
+    ) -> Result<Self, RenderError> {
+        settings.camera(scene)?;
+        settings.check()?;
+        check_cameras(settings.photons.photons_for)?;
+        let mut times = Times::default();
+        let (mut settings, source) = Source::new(scene, settings, Some(choose), &mut None, &mut times)?;
+        settings.photons.photons_for = settings.photons.photons_for.resolved();
+        settings.check()?;
+        settings.check_budgets(budgets)?;
+        let fit = &mut |check: BudgetCheck| budgets.iter().try_for_each(check);
+        let kept = source.prepare(scene, &settings, fit, &mut times, observer)?;
+        let RenderSettings { photons, integrator, .. } = settings;
+        let scene = FixedScene::of_cameras(
+            scene.cameras.clone(),
+            scene.offset,
+            [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
+            scene.is_specular(),
+        );
+        Ok(Self { scene, photons, integrator, kept, frames: BTreeMap::new(), notes })
+    }
+
+    /// Adds a frame, which is seen by the cameras of `scene`. Returns false, and adds none, if more than its cameras differs from the
+    /// prepared scene.
+    pub fn add_frame(&mut self, number: u32, scene: &FixedScene) -> bool {
+        let is_same = scene.checksum_without_cameras() == self.scene.checksum_without_cameras();
+        if is_same {
+            let view = View { cameras: scene.cameras.clone(), checksum: scene.checksum().to_owned() };
+            self.frames.insert(number, view);
+        }
+        is_same
+    }
+
+    /// Numbers of the frames, increasing; none if the scene was prepared as it stands.
+    pub fn frames(&self) -> impl Iterator<Item = u32> {
+        self.frames.keys().copied()
+    }
+
+    /// Cameras of a frame, as [`Self::scene`]; `None` without such a frame.
+    pub fn frame(&self, number: u32) -> Option<FixedScene<'static>> {
+        let View { cameras, checksum } = self.frames.get(&number)?;
+        let checksums = [checksum, self.scene.checksum_without_cameras()].map(str::to_owned);
+        let offset = self.scene.offset;
+        Some(FixedScene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
+    }
+
+    /// Cameras of the scene, without anything else of it.
+    pub fn scene(&self) -> &FixedScene<'static> {
+        &self.scene
+    }
+
+    /// Notes of the caller that prepared the scene.
+    pub fn notes(&self) -> &Map<String, Value> {
+        &self.notes
+    }
+
+    /// Size of the card image, bytes.
+    pub fn image_bytes(&self) -> u64 {
+        self.kept.prepared.image.bytes()
+    }
+
+    /// Settings with the photons and the integrator that the scene was prepared for.
+    #[must_use]
+    pub fn settings(&self, settings: RenderSettings) -> RenderSettings {
+        let (photons, integrator) = (self.photons.clone(), self.integrator.clone());
+        RenderSettings { photons, integrator, ..settings }
+    }
+
+    /// Renderer that has the card image: it renders [`Self::scene`] and [`Self::frame`] with [`Renderer::render_fixed`] by [`Self::settings`].
+    pub fn renderer(&self) -> Renderer {
+        Renderer::with_image(self.kept.clone())
+    }
+}
+
+/// Checks that photons are for all cameras of a scene.
+fn check_cameras(photons_for: PhotonsFor) -> Result<(), RenderError> {
+    match photons_for {
+        PhotonsFor::Scene | PhotonsFor::Auto => Ok(()),
+        PhotonsFor::Camera => Err(RenderError::Setting {
+            option: "--photons-for",
+            value: photons_for.name().into(),
+            reason: "a prepared scene has photons for all its cameras".into(),
+            remedy: "leave it out".into(),
+        }),
+    }
+}
+
+/// Returns whether a camera is one: finite, and with an opening.
+pub(super) fn is_camera(camera: &Camera) -> bool {
+    let Camera { name: _, origin, right, up, forward, vertical_fov, aspect } = camera;
+    let is_length = |length: f32| length.is_normal() && length > 0.0;
+    [origin, right, up, forward].into_iter().all(|vector| Vec3::is_finite(*vector))
+        && is_length(*vertical_fov)
+        && *vertical_fov < std::f32::consts::PI
+        && aspect.is_none_or(is_length)
+}

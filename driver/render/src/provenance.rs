@@ -1,0 +1,75 @@
+//! Provenance of a render: everything that its picture and its statistics depend on, by the names of options.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use photoncard_scene::{Camera, FixedScene};
+use photoncard_shared::budget::Budget;
+use photoncard_shared::message::{FrameParameters, PROTOCOL_VERSION};
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use super::{NamedSettings, RenderSettings};
+use crate::emulator::EmulatedKind;
+
+/// Provenance of a render. The caller of a render adds the names of its inputs, which the library does not know.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Provenance {
+    /// Everything that pixels depend on: the provenance that pictures store. It is equal for all orders, caches and cards.
+    pub pixels: NamedSettings,
+    /// Everything else that the work depends on: order, photon map layout, cards, caches.
+    pub work: NamedSettings,
+}
+
+impl Provenance {
+    /// Provenance of a render of `scene`, seen by `camera`, on chips with `budgets`.
+    pub(super) fn new(
+        settings: &RenderSettings,
+        scene: &FixedScene,
+        camera: &Camera,
+        frame: &FrameParameters,
+        budgets: &[Budget],
+    ) -> Self {
+        let mut pixels = settings.identity_of(scene);
+        // All layers of the picture: those of the host are in the identity of no tile.
+        pixels.insert("aov".to_owned(), json!(settings.picture.layers.to_string()));
+        // The automatic distance, if none is given.
+        pixels.insert("max-distance".to_owned(), json!(frame.max_distance));
+        pixels.insert("view".to_owned(), view(camera));
+        let mut work = settings.of_work();
+        work.extend(settings.of_cards());
+        work.insert("chips".to_owned(), json!(chips(budgets)));
+        work.insert("protocol".to_owned(), json!(PROTOCOL_VERSION));
+        Self { pixels, work }
+    }
+}
+
+/// The camera with all changes of it applied: name, place in metres, unit vectors, vertical field of view in degrees.
+fn view(camera: &Camera) -> Value {
+    let Camera { name, origin, right: _, up, forward, vertical_fov, aspect: _ } = camera;
+    let [origin, up, forward] = [origin, up, forward].map(Vec3::to_array);
+    json!({"camera": name, "at": origin, "forward": forward, "up": up, "fov": vertical_fov.to_degrees()})
+}
+
+/// Number of chips by kind.
+fn chips(budgets: &[Budget]) -> BTreeMap<&'static str, usize> {
+    let mut chips = BTreeMap::new();
+    for budget in budgets {
+        *chips.entry(EmulatedKind::name_of(budget)).or_default() += 1;
+    }
+    chips
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::kind::{MICRO, REFERENCE};
+
+    use super::*;
+
+    #[test]
+    fn chips_are_counted_by_the_kind_of_their_budget() {
+        let other = Budget { samples: REFERENCE.samples + 1, ..REFERENCE };
+        let counted = chips(&[REFERENCE, MICRO, REFERENCE, other]);
+        assert_eq!(json!(counted), json!({"micro": 1, "other": 1, "reference": 2}));
+    }
+}

@@ -1,0 +1,109 @@
+//! Qualities: worth of accuracy, bounds, and settings for a scene that is not known.
+
+use std::ops::RangeInclusive;
+
+use photoncard_picture::choice::choices;
+
+use crate::{Filter, Integrator, PhotonMaps, Picture, RenderSettings};
+
+/// Quality of a picture, by which settings that are not stated are chosen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Quality {
+    /// A look at the scene.
+    Draft,
+    /// A picture to show.
+    #[default]
+    Good,
+    /// A picture to keep.
+    Final,
+    /// The dissertation's nominal values (Table 7.1): those of studies.
+    Paper,
+}
+
+choices!(Quality {
+    Draft = "draft": "A look at the scene: visible noise, 8 to 16 samples a pixel",
+    Good = "good": "A picture to show: without visible noise in a room, 24 to 48 samples a pixel",
+    Final = "final": "A picture to keep: 64 to 256 samples a pixel",
+    Paper = "paper": "The dissertation's nominal values, for studies: one sample a pixel, a hundred gather rays, no cache",
+});
+
+/// Photons that a gather searches for: fewer blur less, and 24 leave the noise of gather rays as it is.
+const NEIGHBORS: u32 = 24;
+
+/// Values of a quality whose settings depend on the scene: the worth of accuracy, and bounds of what is chosen by it.
+pub(super) struct Level {
+    /// Worth of accuracy, `w` in [`Self::fit`]: a relative variance of 1 in a pixel is worth the time of `w^2` samples.
+    pub(super) worth: f64,
+    /// Number of samples of a pixel.
+    pub(super) samples: RangeInclusive<u32>,
+    /// Number of gather rays of a pixel, and of an irradiance record.
+    pub(super) gather_rays: RangeInclusive<u32>,
+    /// Number of photons in the map.
+    pub(super) photons: RangeInclusive<usize>,
+    /// Number of photons of the caustic map.
+    caustic_photons: usize,
+    /// Relative error of interpolated irradiance.
+    irradiance_error: f32,
+}
+
+impl Quality {
+    /// Values of this quality; `None` where no setting depends on the scene.
+    pub(super) fn level(self) -> Option<Level> {
+        Some(match self {
+            Self::Draft => Level {
+                worth: 50.0,
+                samples: 8..=16,
+                gather_rays: 32..=128,
+                photons: 100_000..=400_000,
+                caustic_photons: 50_000,
+                irradiance_error: 0.2,
+            },
+            Self::Good => Level {
+                worth: 400.0,
+                samples: 24..=48,
+                gather_rays: 128..=1024,
+                photons: 200_000..=1_000_000,
+                caustic_photons: 200_000,
+                irradiance_error: 0.1,
+            },
+            Self::Final => Level {
+                worth: 2500.0,
+                samples: 64..=256,
+                gather_rays: 200..=2000,
+                photons: 1_000_000..=4_000_000,
+                caustic_photons: 500_000,
+                irradiance_error: 0.05,
+            },
+            Self::Paper => return None,
+        })
+    }
+
+    /// Settings of this quality for a scene that is not known: the fewest samples, and middle numbers of rays and photons, where [`Self::fit`]
+    /// chooses.
+    pub fn settings(self) -> RenderSettings {
+        let Some(level) = self.level() else { return RenderSettings::default() };
+        RenderSettings {
+            picture: Picture { filter: Filter::BlackmanHarris, ..Picture::default() },
+            photons: PhotonMaps {
+                count: middle(*level.photons.start(), *level.photons.end()),
+                neighbors: NEIGHBORS,
+                caustic_photons: Some(level.caustic_photons),
+                ..PhotonMaps::default()
+            },
+            integrator: Integrator {
+                samples: *level.samples.start(),
+                gather_rays: middle(*level.gather_rays.start() as usize, *level.gather_rays.end() as usize)
+                    as u32,
+                shadow_rays: 4,
+                irradiance_error: Some(level.irradiance_error),
+                ..Integrator::default()
+            },
+            ..RenderSettings::default()
+        }
+    }
+}
+
+/// Geometric mean of two numbers.
+fn middle(low: usize, high: usize) -> usize {
+    (low * high).isqrt()
+}

@@ -1,0 +1,385 @@
+//! Pilot renders: pixels spread over the picture, rendered on emulated chips of this process.
+
+use glam::Vec3;
+use photoncard_firmware::kind::Reference;
+use photoncard_firmware::sampler::hash;
+use photoncard_map::pack::PackedScene;
+use photoncard_map::photon_map::{MappedImage, PhotonSettings, PhotonsFor, TracedPhotons, map_traced};
+use photoncard_picture::film::Window;
+use photoncard_picture::sums::SumFormat;
+use photoncard_scene::Scene;
+use photoncard_shared::message::{CausticGather, FrameParameters, PixelLayers, Tile};
+use rayon::ThreadPool;
+
+use super::paths::Deviations;
+use super::spread::Levels;
+use crate::emulator::THREAD_STACK;
+use crate::emulator::direct::{RenderedTile, render_tiles_apart};
+use crate::{Observer, Phase, RenderError, RenderSettings, Sampling};
+
+/// Tiles in a grid of cells, for the noise: each at a place in its cell by a hash.
+const SPREAD: Grid = Grid { cells: 8, side: 4 };
+/// Tiles in which irradiance records are placed: large, as tiles compute records at their borders of their own.
+const SURVEYED: Grid = Grid { cells: 4, side: 32 };
+/// Maximum share of the photons that are where the picture uses any for which maps for the camera are measured: in rooms, halls and Cornell
+/// boxes, where guiding gains nothing, it is greater.
+const MAX_USED_SHARE: f64 = 0.3;
+/// Photons of the smaller map; the larger one has four times as many.
+const FEW_PHOTONS: usize = 16_384;
+const MORE: usize = 4;
+/// Seeds of a pair of renders, and of the photons: of none of the picture's random numbers, so that pictures of all seeds have equal
+/// settings.
+const SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
+const PHOTON_SEED: u32 = 0x5eed_0003;
+/// Minimum side of the picture, pixels: tiles of smaller ones would overlap.
+const MIN_SIDE: u32 = SPREAD.cells * SPREAD.side;
+/// Numbers of rays that are compared.
+pub(super) const SHADOW_RAYS: [u32; 2] = [1, 4];
+const GATHER_RAYS: [u32; 2] = [8, 32];
+
+/// Variances and errors that the settings follow from, relative to the radiance of the pixels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Variances {
+    /// Variance of a sample by its place: by edges and textures in a pixel. A lower bound: strata make that of several rays less than `v / n`.
+    pub(super) place: f64,
+    /// Variance of a sample by one shadow ray.
+    pub(super) shadow_ray: f64,
+    /// Variance of a sample by one gather ray.
+    pub(super) gather_ray: f64,
+    /// Mean squared error that a map of one photon would make in the light of 4x4 pixels, by the law `1 / N`.
+    pub(super) photon: f64,
+    /// Maps for the camera; `None` where the camera uses most photons anyway, or photons are stated to be for either.
+    pub(super) for_camera: Option<ForCamera>,
+    /// Share of the samples that see a surface with a Lambertian part.
+    pub(super) lambertian: f64,
+    /// Number of gather rays that a pixel costs for each one of its own: those of irradiance records, and of samples between which
+    /// nothing is interpolated.
+    pub(super) gather_rays_per_ray: f64,
+    /// Radiance of the median pixel, W/(sr m^2); 1 in a black picture.
+    pub(super) level: f64,
+    /// Deviations of the direct light of a sample with the greater numbers of [`SHADOW_RAYS`] and [`GATHER_RAYS`].
+    pub(super) deviations: Deviations,
+}
+
+/// Errors of maps for the camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ForCamera {
+    /// [`Variances::photon`] of a map for the camera.
+    pub(super) photon: f64,
+    /// Squared error of a map for the camera over that of one of as many photons for any camera, blur included: where few photons are used, two
+    /// maps for any camera are blurred alike, and differ by less than they err.
+    pub(super) ratio: f64,
+}
+
+impl ForCamera {
+    /// Errors by maps of fewer and more photons for the camera, and the map of more photons for any camera.
+    fn new(best: &[Pixels; 2], [few, more]: [Pixels; 2], of_scene: &Pixels) -> Self {
+        let photon = of_photon(best, [&few, &more]);
+        let own = photon / (MORE * FEW_PHOTONS) as f64;
+        let of_scene = (difference(best, [of_scene, &more]) - own).max(0.0);
+        Self { photon, ratio: own / of_scene }
+    }
+}
+
+/// Renders the pilots of a picture.
+///
+/// # Errors
+/// If photons cannot be traced, the settings have no possible camera, or the observer stops the render.
+pub(super) fn measure(
+    scene: &Scene,
+    packed: &PackedScene,
+    settings: &RenderSettings,
+    observer: &dyn Observer,
+) -> Result<Variances, RenderError> {
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
+    let pool = threads.stack_size(THREAD_STACK).build().map_err(RenderError::Chips)?;
+    let settings = &enlarged(settings);
+    // Of the whole picture: a part of it has equal pixels.
+    let window = Window::full(settings.picture.width, settings.picture.height);
+    let tiles = SPREAD.tiles(window);
+    let pilot = |photons| Pilot::new(scene, packed, settings, photons, &pool, observer);
+    let [few, more] = [pilot(FEW_PHOTONS)?, pilot(MORE * FEW_PHOTONS)?];
+    let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
+        let render = |seed| {
+            let settings = settings.clone().with(|settings| {
+                let integrator = &mut settings.integrator;
+                (integrator.shadow_rays, integrator.gather_rays) = (shadow_rays, gather_rays);
+                integrator.seed = seed;
+            });
+            more.render_pixels(&settings, &tiles)
+        };
+        Ok([render(SEEDS[0])?, render(SEEDS[1])?])
+    };
+    let [few_shadow_rays, shadow_rays] = SHADOW_RAYS;
+    let [few_gather_rays, gather_rays] = GATHER_RAYS;
+    // Light by both kinds of rays has the noise of both: each is varied where there are more of the other.
+    let by_few_shadow_rays = pair(few_shadow_rays, gather_rays)?;
+    let by_few_gather_rays = pair(shadow_rays, few_gather_rays)?;
+    let best = pair(shadow_rays, gather_rays)?;
+    // Rays of equal directions in both maps: what differs is the map.
+    let by_map = settings.clone().with(|settings| {
+        settings.integrator.shadow_rays = 0;
+        settings.integrator.gather_rays = gather_rays;
+        settings.integrator.sampling = Sampling::Reflection;
+        settings.integrator.seed = SEEDS[0];
+    });
+    let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
+    let maps = [render_map(&few)?, render_map(&more)?];
+    let for_camera = if more.used_share.is_some_and(|share| share < MAX_USED_SHARE) {
+        let settings = settings.clone().with(|settings| settings.photons.photons_for = PhotonsFor::Camera);
+        let pilot = |photons| Pilot::new(scene, packed, &settings, photons, &pool, observer);
+        let guided = [render_map(&pilot(FEW_PHOTONS)?)?, render_map(&pilot(MORE * FEW_PHOTONS)?)?];
+        Some(ForCamera::new(&best, guided, &maps[1]))
+    } else {
+        None
+    };
+    let [shadow_ray, gather_ray] =
+        [of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best), of_ray(GATHER_RAYS, &by_few_gather_rays, &best)];
+    let of_rays = shadow_ray / f64::from(shadow_rays) + gather_ray / f64::from(gather_rays);
+    Ok(Variances {
+        place: (of_pairs([&best])[0] - of_rays).max(0.0),
+        shadow_ray,
+        gather_ray,
+        photon: of_photon(&best, [&maps[0], &maps[1]]),
+        for_camera,
+        lambertian: best[0].lambertian,
+        gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
+        level: level_of(&best),
+        deviations: deviations(&best),
+    })
+}
+
+/// Variance of a sample by one ray, from a pair of renders by fewer `rays` and the best pair. The variance by `n` rays is `a + v / n`,
+/// with `a` that of the places of the samples and of other rays: two numbers of rays give `v`.
+fn of_ray(rays: [u32; 2], noisy: &[Pixels; 2], best: &[Pixels; 2]) -> f64 {
+    let [more, less] = of_pairs([noisy, best]);
+    ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
+}
+
+/// Variances of a sample in pairs of renders, where all see a surface, relative to the radiance in the last pair.
+fn of_pairs<const N: usize>(pairs: [&[Pixels; 2]; N]) -> [f64; N] {
+    let seen: Vec<usize> = pixels_with_surfaces(&pairs).collect();
+    let radiances = |pixels: &Pixels| seen.iter().map(|&pixel| pixels.radiance(pixel)).collect::<Vec<_>>();
+    let pairs = pairs.map(|pair| pair.each_ref().map(radiances));
+    let best = pairs.last().into_iter().flat_map(|[first, second]| first.iter().zip(second));
+    let levels = Levels::new(best.map(|(first, second)| 0.5 * (first + second)));
+    pairs.map(|[first, second]| 0.5 * levels.mean_square(first, second))
+}
+
+/// Pixels that see a surface in all renders.
+fn pixels_with_surfaces(pairs: &[&[Pixels; 2]]) -> impl Iterator<Item = usize> {
+    let pixels = pairs.first().map_or(0, |[first, _]| first.direct.len());
+    (0..pixels).filter(move |&pixel| pairs.iter().copied().flatten().all(|pixels| pixels.is_seen[pixel]))
+}
+
+/// Median radiance of the lit pixels of a pair, W/(sr m^2).
+fn level_of(best: &[Pixels; 2]) -> f64 {
+    let [first, second] = best;
+    Levels::new((0..first.direct.len()).map(|pixel| 0.5 * (first.radiance(pixel) + second.radiance(pixel))))
+        .median()
+}
+
+/// Deviations of the pixels of a pair.
+fn deviations(pair: &[Pixels; 2]) -> Deviations {
+    let renders = pair.each_ref();
+    Deviations::new((0..pair[0].direct.len()).map(|pixel| {
+        let [first, second] = renders.map(|pixels| pixels.radiance(pixel));
+        (renders.map(|pixels| pixels.direct[pixel]), 0.5 * (first + second))
+    }))
+}
+
+/// Mean squared error of tiles by a map of one photon, from the difference of two maps of fewer and more photons whose errors are independent.
+fn of_photon(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
+    difference(best, maps) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
+}
+
+/// Mean squared difference of tiles by two maps.
+fn difference(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
+    // All tiles are of equal size.
+    let pixels_of_tile = (best[0].direct.len() / SPREAD.number()).max(1);
+    let mut tiles = vec![Vec::new(); SPREAD.number()];
+    let all_see = |&pixel: &usize| maps.iter().all(|map| map.is_seen[pixel]);
+    for pixel in pixels_with_surfaces(&[best]).filter(all_see) {
+        tiles[pixel / pixels_of_tile].push(pixel);
+    }
+    tiles.retain(|pixels| 2 * pixels.len() > pixels_of_tile);
+    let means = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let mean =
+            |pixels: &Vec<usize>| pixels.iter().map(|&pixel| value(pixel)).sum::<f64>() / pixels.len() as f64;
+        tiles.iter().map(mean).collect()
+    };
+    let levels = Levels::new(means(&|pixel| 0.5 * (best[0].radiance(pixel) + best[1].radiance(pixel))));
+    let [first, second] = maps.map(|map| means(&|pixel| map.indirect[pixel]));
+    levels.mean_square(first, second)
+}
+
+/// Photon map of a pilot, with the scene, and the threads of its chips.
+struct Pilot<'a> {
+    scene: &'a Scene,
+    mapped: MappedImage,
+    pool: &'a ThreadPool,
+    observer: &'a dyn Observer,
+    /// If the picture has a caustic map, which takes that light from gather rays.
+    has_caustics: bool,
+    /// Share of the photons that are where the picture uses any; `None` where nothing follows from it.
+    used_share: Option<f64>,
+}
+
+impl<'a> Pilot<'a> {
+    fn new(
+        scene: &'a Scene,
+        packed: &PackedScene,
+        settings: &RenderSettings,
+        photons: usize,
+        pool: &'a ThreadPool,
+        observer: &'a dyn Observer,
+    ) -> Result<Self, RenderError> {
+        observer.progress(Phase::Pilot, 0, 1);
+        let of_picture = settings.photon_settings(scene);
+        // Caustics add no noise: gathers find an empty map instead of one of its own.
+        let photons = PhotonSettings { photons, seed: PHOTON_SEED, caustic_photons: 0, ..of_picture };
+        let go_on = |_| !observer.is_stopped();
+        let traced = TracedPhotons::new(packed, &photons, &go_on)?;
+        let is_open = settings.photons.photons_for == PhotonsFor::Auto;
+        let camera = settings.pinhole(&settings.camera(scene)?);
+        let used_share = is_open.then(|| traced.used_share(packed, &camera)).transpose()?;
+        let mapped = map_traced(packed.clone(), traced, &photons, &go_on)?;
+        let has_caustics = of_picture.caustic_photons > 0;
+        Ok(Self { scene, mapped, pool, observer, has_caustics, used_share })
+    }
+
+    /// Number of gather rays of tiles with the irradiance cache, for each ray of a pixel.
+    fn gather_rays_per_ray(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<f64, RenderError> {
+        let mut frame = self.frame(settings)?;
+        (frame.samples, frame.planned_samples, frame.shadow_rays, frame.gather_rays, frame.seed) =
+            (1, 1, 0, 1, SEEDS[0]);
+        let rendered = self.render(&frame, tiles)?;
+        let rays: u64 = rendered.iter().map(|tile| tile.counters.gather_rays).sum();
+        let pixels: usize = tiles.iter().map(|tile| tile.pixels() as usize).sum();
+        Ok(rays as f64 / pixels.max(1) as f64)
+    }
+
+    /// Renders one sample of each pixel of the tiles, without the irradiance cache.
+    fn render_pixels(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<Pixels, RenderError> {
+        let mut frame = self.frame(settings)?;
+        (frame.samples, frame.planned_samples, frame.irradiance_error, frame.layers) = (1, 1, None, true);
+        let rendered = self.render(&frame, tiles)?;
+        Ok(Pixels::new(&rendered, SumFormat::new(&self.mapped.image.view().0.header, &frame)))
+    }
+
+    fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
+        let camera = settings.camera(self.scene)?;
+        let max_distance = self.mapped.max_distance;
+        let neighbors = settings.photons.caustic_neighbors;
+        let caustics = self.has_caustics.then_some(CausticGather { neighbors, max_distance });
+        Ok(settings.frame(&camera, max_distance, caustics))
+    }
+
+    fn render(&self, frame: &FrameParameters, tiles: &[Tile]) -> Result<Vec<RenderedTile>, RenderError> {
+        let is_stopped = || self.observer.is_stopped();
+        let image = &self.mapped.image;
+        Ok(render_tiles_apart::<Reference, _>(self.pool, image, frame, tiles, &|memory| memory, &is_stopped)?)
+    }
+}
+
+/// Light of the pixels of a pilot render, means over the channels, W/(sr m^2).
+struct Pixels {
+    direct: Vec<f64>,
+    indirect: Vec<f64>,
+    /// If the sample gathers: it sees a surface that reflects more than mirror images.
+    is_seen: Vec<bool>,
+    /// Share of the samples that see a surface with a Lambertian part.
+    lambertian: f64,
+}
+
+impl Pixels {
+    fn new(tiles: &[RenderedTile], format: SumFormat) -> Self {
+        let mean = |light: [f32; 3]| f64::from(Vec3::from(light).element_sum()) / 3.0;
+        let layers: Vec<PixelLayers> =
+            tiles.iter().flat_map(|tile| tile.pixels(format).map(|pixel| pixel.layers)).collect();
+        let direct = layers.iter().map(|layers| mean(layers.direct)).collect();
+        let indirect = layers.iter().map(|layers| mean(layers.indirect)).collect();
+        let is_seen: Vec<bool> = layers.iter().map(|layers| layers.gathers > 0.0).collect();
+        let seen = is_seen.iter().filter(|is_seen| **is_seen).count();
+        let lambertian: u64 = tiles.iter().map(|tile| tile.counters.lambertian_samples).sum();
+        Self { direct, indirect, is_seen, lambertian: lambertian as f64 / seen.max(1) as f64 }
+    }
+
+    fn radiance(&self, pixel: usize) -> f64 {
+        self.direct[pixel] + self.indirect[pixel]
+    }
+}
+
+/// Settings of a picture of equal aspect whose sides are at least [`MIN_SIDE`].
+fn enlarged(settings: &RenderSettings) -> RenderSettings {
+    let [width, height] = [settings.picture.width, settings.picture.height];
+    let factor = MIN_SIDE.div_ceil(width.min(height).max(1));
+    settings.clone().with(|settings| {
+        let picture = &mut settings.picture;
+        (picture.width, picture.height) = (width.saturating_mul(factor), height.saturating_mul(factor));
+    })
+}
+
+/// A grid of cells over a picture, with a tile in each.
+struct Grid {
+    /// Rows and columns.
+    cells: u32,
+    /// Side of a tile, pixels.
+    side: u32,
+}
+
+impl Grid {
+    /// Number of tiles.
+    const fn number(&self) -> usize {
+        (self.cells * self.cells) as usize
+    }
+
+    /// Tiles of equal size in a window, each at a place in its cell by a hash; fewer, or of the window's size, if that is small.
+    fn tiles(&self, window: Window) -> Vec<Tile> {
+        let side = self.side;
+        let [width, height] = [window.width(), window.height()];
+        let [columns, rows] = [width, height].map(|extent| self.cells.min(extent.div_ceil(side)));
+        let (tile_width, tile_height) = (side.min(width), side.min(height));
+        let place = |cell: u32, cells: u32, extent: u32, side: u32, salt: u32| {
+            let free = u64::from(extent - side) + 1;
+            let [low, high] = [cell, cell + 1].map(|cell| free * u64::from(cell) / u64::from(cells));
+            low as u32 + hash(salt) % (high - low).max(1) as u32
+        };
+        (0..columns * rows)
+            .map(|id| Tile {
+                id,
+                x: window.x0 + place(id % columns, columns, width, tile_width, 2 * id),
+                y: window.y0 + place(id / columns, rows, height, tile_height, 2 * id + 1),
+                width: tile_width,
+                height: tile_height,
+            })
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_lie_in_the_window_and_are_spread_over_it() {
+        for (x1, y1) in [(512, 512), (640, 48), (33, 3), (1, 1)] {
+            let window = Window { x0: 7, x1: 7 + x1, y0: 5, y1: 5 + y1 };
+            let tiles = SPREAD.tiles(window);
+            assert_eq!(tiles.len() as u32, x1.div_ceil(4).min(8) * y1.div_ceil(4).min(8));
+            for tile in &tiles {
+                assert!(window.contains(tile.x, tile.y), "{tile:?}");
+                assert!(window.contains(tile.x + tile.width - 1, tile.y + tile.height - 1), "{tile:?}");
+            }
+            let of_quarter = |quarter: usize| {
+                let is_inside = |tile: &&Tile| {
+                    [(tile.x - 7) >= x1 / 2, (tile.y - 5) >= y1 / 2] == [quarter % 2 == 1, quarter / 2 == 1]
+                };
+                tiles.iter().filter(is_inside).count()
+            };
+            if x1 >= 64 && y1 >= 64 {
+                assert!((0..4).all(|quarter| of_quarter(quarter).abs_diff(16) <= 4));
+            }
+        }
+    }
+}

@@ -1,0 +1,331 @@
+//! Pictures one after another on the same cards.
+
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
+
+use photoncard_map::pack::PackedScene;
+use photoncard_map::photon_map::{PhotonSettings, check_image};
+use photoncard_picture::film::{Film, FilmError};
+use photoncard_scene::{FixedScene, Scene};
+use photoncard_shared::message::{FrameParameters, SumScale};
+
+use super::cards::Cards;
+use super::executor::{BudgetCheck, Executor, FitChips, Work};
+use super::outputs::Outputs;
+use super::preparation::{Prepared, prepare};
+use super::times::Times;
+use super::whole_frame::WholeFrame;
+use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
+use crate::partial::{PartialRender, PartialSettings};
+
+/// Finished picture.
+pub struct Rendering {
+    /// Pixels of the picture.
+    pub film: Film,
+    /// Statistics of the work.
+    pub statistics: Statistics,
+    /// File of finished tiles, to be removed after the picture is written.
+    pub partial: Option<PartialRender>,
+}
+
+/// Photons and integrator that are chosen for a packed scene.
+pub type Chosen = Result<(PhotonMaps, Integrator), RenderError>;
+
+/// Choice of photons and integrator by the packed scene.
+type Choice<'a> = &'a dyn Fn(&PackedScene) -> Chosen;
+
+/// Renders pictures one after another on the same cards, which stay open between them.
+///
+/// A picture of another camera, of the same scene and photons, takes the host no photons and the cards no image: nothing but tiles is
+/// sent. After a change of the scene or its photons the host makes the image anew, and a card receives the lines that have changed; it
+/// checks the checksum of the whole image, and receives the image as a whole if that differs, or if it was reset or lost. A picture never
+/// depends on those before it.
+///
+/// Cards are connected again for settings with other cards, for each picture with modelled memory, after a render that has failed, and,
+/// if any are remote, after some seconds without a picture.
+#[derive(Default)]
+pub struct Renderer {
+    cards: Option<Cards>,
+    kept: Option<Kept>,
+}
+
+impl Renderer {
+    /// Renderer with the card image of a prepared scene.
+    pub(super) fn with_image(kept: Kept) -> Self {
+        Self { cards: None, kept: Some(kept) }
+    }
+
+    /// Renders a picture of a scene.
+    ///
+    /// # Errors
+    /// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
+    pub fn render(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_fixed(&scene.into(), settings, observer)
+    }
+
+    /// Renders a picture of a scene that stays as it is between pictures: for another camera neither triangles nor texels are read.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub fn render_fixed(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, None, None, observer)
+    }
+
+    /// Adds samples to a picture: renders those from the `base`'s on, and returns the picture of all samples of the settings. It is, to
+    /// the bit, the picture of one render of as many. [`Integrator::planned_samples`] and all else that pixels depend on must be those of
+    /// the base.
+    ///
+    /// # Errors
+    /// As [`Self::render`]; if the base does not have fewer samples, or is of another size, crop window or other layers.
+    pub fn refine(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        base: Arc<Film>,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, None, Some(base), observer)
+    }
+
+    /// Closes the cards: the next picture connects to them again, and to those that were lost.
+    pub fn close_cards(&mut self) {
+        self.cards = None;
+    }
+
+    /// Renders a picture of a scene with photons and an integrator that are chosen when the cards have answered and the scene is packed.
+    ///
+    /// # Errors
+    /// As [`Self::render`], and those of `choose`.
+    pub fn render_chosen(
+        &mut self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        choose: &dyn Fn(&PackedScene) -> Chosen,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_chosen_fixed(&scene.into(), settings, choose, observer)
+    }
+
+    /// [`Self::render_chosen`] of a scene that stays as it is between pictures.
+    ///
+    /// # Errors
+    /// As [`Self::render_chosen`].
+    pub fn render_chosen_fixed(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        choose: &dyn Fn(&PackedScene) -> Chosen,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        self.render_by(scene, settings, Some(choose), None, observer)
+    }
+
+    fn render_by(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        choose: Option<Choice>,
+        base: Option<Arc<Film>>,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        let result = self.render_on_cards(scene, settings, choose, base, observer);
+        if matches!(&result, Err(error) if !error.is_input() && !matches!(error, RenderError::Stopped)) {
+            self.cards = None;
+        }
+        result
+    }
+
+    fn render_on_cards(
+        &mut self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        choose: Option<Choice>,
+        base: Option<Arc<Film>>,
+        observer: &dyn Observer,
+    ) -> Result<Rendering, RenderError> {
+        let start = Instant::now();
+        let camera = settings.camera(scene)?;
+        settings.check()?;
+        let Self { cards, kept } = self;
+        let mut whole_frame;
+        let executor: &mut dyn Executor = if settings.schedule.order.is_of_whole_frame() {
+            whole_frame = WholeFrame::new(settings)?;
+            &mut whole_frame
+        } else {
+            connected(cards, settings, observer)?
+        };
+        let needed = settings.needed_cards();
+        executor.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
+        settings.outputs.partial.as_ref().map(PartialSettings::check_free).transpose()?;
+        let mut times = Times::default();
+        let (settings, source) = Source::new(scene, settings, choose, kept, &mut times)?;
+        executor.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
+        let tile = settings.tile_side(&executor.budgets());
+        let settings = &settings.with(|s| s.schedule.tile = Some(tile));
+        settings.check()?;
+        settings.check_budgets(&executor.budgets())?;
+        // A film may be large: it is allocated after the settings are checked.
+        let mut film = settings.film(source.sum_scale())?;
+        base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
+        let tiles = settings.tiles(tile);
+        let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
+        let is_image_kept = matches!(source, Source::Kept(_));
+        let fit = &mut |check: BudgetCheck| executor.leave_out(check, needed, observer);
+        let made = source.prepare(scene, settings, fit, &mut times, observer)?;
+        let prepared = &kept.insert(made).prepared;
+        let frame = FrameParameters {
+            first_sample: outputs.base.as_ref().map_or(0, |base| base.format().samples),
+            samples: film.format().samples,
+            ..settings.frame(&camera, prepared.max_distance, prepared.caustics)
+        };
+        let film = Mutex::new(film);
+        let sinks = outputs.sinks(&film, executor.finishes_tiles_early());
+        let image = &prepared.image;
+        let work = Work {
+            settings,
+            image,
+            is_image_kept,
+            frame: &frame,
+            tiles,
+            film: &film,
+            sinks,
+            outputs: &outputs,
+        };
+        let budgets = executor.budgets();
+        let mut outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
+        times.load = outcome.load_seconds;
+        times.render = outcome.render_seconds;
+        times.total = start.elapsed().as_secs_f64();
+        let provenance = Provenance::new(settings, scene, &camera, &frame, &budgets);
+        let statistics = Statistics::new(settings, &frame, prepared, &outcome, times, provenance);
+        if let Some(error) = outcome.failure.take() {
+            outputs.report_kept();
+            observer.failed(serde_json::to_value(&statistics).unwrap_or_default());
+            return Err(error);
+        }
+        let mut film = film.into_inner().unwrap_or_else(PoisonError::into_inner);
+        outputs.base.as_ref().map_or(Ok(()), |base| film.add(base)).map_err(not_more(settings))?;
+        let partial = outputs.finish(&film);
+        Ok(Rendering { film, statistics, partial })
+    }
+}
+
+/// Error of a picture whose samples cannot be added to those of another.
+fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
+    let samples = settings.integrator.samples;
+    move |error| RenderError::Setting {
+        option: "--spp",
+        value: samples.to_string(),
+        reason: error.to_string(),
+        remedy: "go on from a finished picture of fewer samples and of equal settings".into(),
+    }
+}
+
+/// The open cards, if they are those of the settings, or newly connected ones.
+fn connected<'c>(
+    cards: &'c mut Option<Cards>,
+    settings: &RenderSettings,
+    observer: &dyn Observer,
+) -> Result<&'c mut Cards, RenderError> {
+    // Others are closed before: a card serves one host at a time.
+    let open = cards.take().filter(|cards| cards.serve(settings));
+    Ok(cards.insert(match open {
+        Some(mut open) => {
+            open.take_back();
+            open
+        }
+        None => Cards::connect(settings, observer)?,
+    }))
+}
+
+/// A card image, and what it was made of.
+#[derive(Clone)]
+pub(super) struct Kept {
+    /// [`Scene::checksum_without_cameras`].
+    pub(super) scene: String,
+    pub(super) photons: PhotonSettings,
+    pub(super) prepared: Prepared,
+}
+
+impl Kept {
+    /// Returns whether the image is that of a scene, with the photons of the settings.
+    fn is_of(&self, scene: &FixedScene, settings: &RenderSettings) -> bool {
+        self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings_of(scene)
+    }
+}
+
+/// Origin of the card image.
+pub(super) enum Source {
+    /// The image of an earlier picture.
+    Kept(Kept),
+    /// The packed scene; its photons are to be traced.
+    Packed(Box<PackedScene>),
+}
+
+impl Source {
+    /// Source of the image, with the settings that are stated or chosen.
+    pub(super) fn new(
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        choose: Option<Choice>,
+        kept: &mut Option<Kept>,
+        times: &mut Times,
+    ) -> Result<(RenderSettings, Self), RenderError> {
+        if let Some(kept) = kept.take_if(|kept| choose.is_none() && kept.is_of(scene, settings)) {
+            return Ok((settings.clone(), Self::Kept(kept)));
+        }
+        let packing = Instant::now();
+        let packed = PackedScene::new(scene)?;
+        times.hierarchy = packing.elapsed().as_secs_f64();
+        times.pack = times.hierarchy;
+        let Some(choose) = choose else { return Ok((settings.clone(), Self::Packed(Box::new(packed)))) };
+        let choosing = Instant::now();
+        let (photons, integrator) = choose(&packed)?;
+        times.pilot = choosing.elapsed().as_secs_f64();
+        Ok((RenderSettings { photons, integrator, ..settings.clone() }, Self::Packed(Box::new(packed))))
+    }
+
+    /// Units of the sums of pixels.
+    fn sum_scale(&self) -> SumScale {
+        match self {
+            Self::Kept(kept) => kept.prepared.image.view().0.header.sum_scale(),
+            Self::Packed(packed) => packed.sum_scale(),
+        }
+    }
+
+    /// The card image.
+    ///
+    /// # Errors
+    /// If it does not fit the chips, the photons cannot be traced, or the observer stops the render.
+    pub(super) fn prepare(
+        self,
+        scene: &FixedScene,
+        settings: &RenderSettings,
+        fit: &mut FitChips,
+        times: &mut Times,
+        observer: &dyn Observer,
+    ) -> Result<Kept, RenderError> {
+        let packed = match self {
+            Self::Packed(packed) => *packed,
+            Self::Kept(kept) => {
+                fit(&|budget| Ok(check_image(&kept.prepared.image, budget)?))?;
+                return Ok(kept);
+            }
+        };
+        Ok(Kept {
+            scene: scene.checksum_without_cameras().to_owned(),
+            photons: settings.photon_settings_of(scene),
+            prepared: prepare(scene, packed, settings, fit, times, observer)?,
+        })
+    }
+}

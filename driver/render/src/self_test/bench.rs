@@ -1,0 +1,48 @@
+//! A card under test, its link and its clock.
+
+use std::time::{Duration, Instant};
+
+use photoncard_cards::session::{Event, Session};
+use photoncard_shared::link::Port;
+
+use crate::exchange::exchange;
+use crate::greeting::GreetingError;
+use crate::{CardError, Observer};
+
+/// Card under test.
+pub(super) struct Bench<'a, P> {
+    pub(super) session: Session,
+    port: &'a mut P,
+    start: Instant,
+    /// Number of times that the card was greeted again before the test.
+    resets: u64,
+    pub(super) observer: &'a dyn Observer,
+}
+
+impl<'a, P: Port> Bench<'a, P> {
+    /// A card that has said hello in `session`.
+    pub(super) fn new(session: Session, port: &'a mut P, start: Instant, observer: &'a dyn Observer) -> Self {
+        let resets = session.link_bytes().resets;
+        Self { session, port, start, resets, observer }
+    }
+
+    pub(super) fn now(&self) -> Duration {
+        self.start.elapsed()
+    }
+
+    /// Waits for the next result.
+    pub(super) fn next_event(&mut self) -> Result<Event, GreetingError> {
+        loop {
+            if let Some(event) = self.session.next_event() {
+                return Ok(event);
+            }
+            if self.observer.is_stopped() {
+                return Err(GreetingError::Stopped);
+            }
+            exchange(&mut self.session, self.port, None, self.start).map_err(CardError::Session)?;
+            if self.session.link_bytes().resets > self.resets {
+                return Err(CardError::Reset.into());
+            }
+        }
+    }
+}

@@ -1,0 +1,58 @@
+//! Test of card memory: patterns, their times and their wrong words.
+
+use std::time::Duration;
+
+use photoncard_cards::session::Event;
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::link::Port;
+use photoncard_shared::message::{MemoryPattern, MemoryTest, WrongWords};
+
+use super::bench::Bench;
+use crate::Phase;
+use crate::greeting::GreetingError;
+
+/// Test of a memory by one pattern.
+#[derive(Clone, Copy, Debug)]
+pub struct PatternTest {
+    /// The pattern.
+    pub pattern: MemoryPattern,
+    /// Time of writing it over the memory, as the host measures it.
+    pub write: Duration,
+    /// Time of reading it back.
+    pub check: Duration,
+    /// Words that hold another value.
+    pub wrong: WrongWords,
+}
+
+/// Runs the test. Returns the lines of the memory, and its patterns.
+pub(super) fn test<P: Port>(bench: &mut Bench<P>) -> Result<(u32, Vec<PatternTest>), GreetingError> {
+    let mut patterns = Vec::new();
+    bench.session.test_memory(bench.now());
+    let mut before = bench.now();
+    let mut write = Duration::ZERO;
+    loop {
+        let Event::MemoryTested(progress) = bench.next_event()? else { continue };
+        let (done, total) = bytes(&progress);
+        bench.observer.progress(Phase::SelfTest, done, total);
+        let now = bench.now();
+        if progress.written == progress.lines && progress.checked == 0 {
+            write = now - std::mem::replace(&mut before, now);
+        }
+        if progress.is_end_of_pattern() {
+            let check = now - std::mem::replace(&mut before, now);
+            patterns.push(PatternTest { pattern: progress.pattern, write, check, wrong: progress.wrong });
+        }
+        if progress.is_over() {
+            return Ok((progress.lines, patterns));
+        }
+    }
+}
+
+/// Bytes that were written or read, and those of the whole test.
+fn bytes(progress: &MemoryTest) -> (u64, u64) {
+    let MemoryTest { lines, pattern, written, checked, .. } = *progress;
+    let [lines, written, checked] = [lines, written, checked].map(u64::from);
+    let done = pattern as u64 * 2 * lines + written + checked;
+    let total = MemoryPattern::ALL.len() as u64 * 2 * lines;
+    (done * LINE_BYTES as u64, total * LINE_BYTES as u64)
+}

@@ -1,0 +1,270 @@
+//! Settings of a render.
+
+mod camera;
+mod check;
+mod dependence;
+mod groups;
+
+use glam::Vec3;
+pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
+use photoncard_firmware::importance::ENTRIES;
+use photoncard_shared::budget::Budget;
+use photoncard_shared::message::{self, CausticGather, FrameParameters, SumScale, Tile};
+
+pub use self::dependence::{NamedSettings, PROGRAM};
+pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
+use crate::emulator::memory_model::CacheSettings;
+use photoncard_cards::scheduler::tiles;
+use photoncard_map::photon_map::{PhotonSettings, PhotonsFor};
+use photoncard_picture::film::{Film, FilmError, Window};
+use photoncard_picture::sums::SumFormat;
+use photoncard_scene::{Camera, FixedScene, Scene};
+
+/// Settings of a render: each field is an option of the command line, in groups.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RenderSettings {
+    /// The picture and the camera that sees it.
+    pub picture: Picture,
+    /// Photon map and caustic map.
+    pub photons: PhotonMaps,
+    /// Estimation of light by rays.
+    pub integrator: Integrator,
+    /// Order of the work.
+    pub schedule: Schedule,
+    /// Cards that render.
+    pub cards: CardSet,
+    /// Destinations of finished tiles besides the film.
+    pub outputs: TileOutputs,
+}
+
+/// Default number of direction bins: three per entry of the table that samples directions.
+const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
+
+/// Minimum number of tiles for each of several cards by default. A card waits for the last tile of another half a tile's time on average.
+const TILES_OF_CARD: u64 = 4;
+
+/// Side of tiles that are not divided for more cards by default, pixels: that of the coarsest cells of irradiance records, which
+/// narrower tiles would compute several times.
+const NARROWEST_TILE: u32 = 16;
+
+/// Default number of caustic photons for a scene with a specular surface.
+pub const DEFAULT_CAUSTIC_PHOTONS: usize = 200_000;
+
+impl RenderSettings {
+    /// Settings with a change.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+        change(&mut self);
+        self
+    }
+
+    /// Window of the picture to render.
+    pub fn window(&self) -> Window {
+        self.picture.crop.unwrap_or(Window::full(self.picture.width, self.picture.height))
+    }
+
+    /// Side of the tiles on cards of `budgets`, pixels: [`Schedule::tile`]; without one the widest that each card has room for, as
+    /// it reads the least memory; for several cards halved while the window has fewer than four tiles for each, down to 16 pixels.
+    pub fn tile_side(&self, budgets: &[Budget]) -> u32 {
+        if let Some(side) = self.schedule.tile {
+            return side;
+        }
+        let room = budgets.iter().map(|budget| budget.pixels_of_tile(self.picture.layers.are_of_chip()));
+        let widest = room.min().unwrap_or(NARROWEST_TILE.pow(2)).isqrt().max(1);
+        let window = self.window();
+        let wanted = if budgets.len() > 1 { TILES_OF_CARD * budgets.len() as u64 } else { 1 };
+        let tiles = |side: u32| {
+            [window.x1 - window.x0, window.y1 - window.y0]
+                .map(|extent| u64::from(extent.div_ceil(side)))
+                .iter()
+                .product::<u64>()
+        };
+        let narrower = |&side: &u32| (side / 2 >= NARROWEST_TILE && tiles(side) < wanted).then_some(side / 2);
+        std::iter::successors(Some(widest), narrower).last().unwrap_or(widest)
+    }
+
+    /// Tiles to render, each of at most `side * side` pixels.
+    pub fn tiles(&self, side: u32) -> Vec<Tile> {
+        let order = self.schedule.order;
+        match self.schedule.part {
+            Some(part) => part.tiles(self.window(), side, order),
+            None => tiles(self.window(), side, order),
+        }
+    }
+
+    /// Empty film for the picture, with sums in units of `scale`.
+    ///
+    /// # Errors
+    /// If its size or its crop window is not possible.
+    pub fn film(&self, scale: SumScale) -> Result<Film, FilmError> {
+        let layers = self.picture.layers.are_of_chip();
+        let Integrator { samples, adaptive_threshold, .. } = self.integrator;
+        let format = SumFormat::of_range(layers, (0, samples), adaptive_threshold.is_some(), scale);
+        Film::new(self.picture.width, self.picture.height, self.window(), format)
+    }
+
+    /// Caches of the memory model; `None` if memory is not modelled.
+    pub fn modelled_caches(&self) -> Option<CacheSettings> {
+        self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| self.cards.own_caches()))
+    }
+
+    /// Photons of the caustic map of a scene that is specular or not; 0 for no map.
+    fn caustic_photons(&self, is_specular: bool) -> usize {
+        let asked = self.photons.caustic_photons.unwrap_or(DEFAULT_CAUSTIC_PHOTONS);
+        if is_specular { asked } else { 0 }
+    }
+
+    /// Canonical settings, equal for all settings that give the scene equal pixels: the number of caustic photons is the
+    /// scene's, photons that no pilot has chosen are for any camera, and without a caustic map the neighbours of its gathers are the default's.
+    #[must_use]
+    pub fn resolved(&self, scene: &Scene) -> Self {
+        self.resolved_if(scene.is_specular())
+    }
+
+    /// [`Self::resolved`] for a scene that is specular or not.
+    pub(super) fn resolved_if(&self, is_specular: bool) -> Self {
+        let caustic_photons = self.caustic_photons(is_specular);
+        self.clone().with(|settings| {
+            settings.photons.caustic_photons = Some(caustic_photons);
+            settings.photons.photons_for = settings.photons.photons_for.resolved();
+            if caustic_photons == 0 {
+                settings.photons.caustic_neighbors = PhotonMaps::default().caustic_neighbors;
+            }
+        })
+    }
+
+    /// Parameters of the photon maps of a scene.
+    pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
+        self.photon_settings_of(&scene.into())
+    }
+
+    /// [`Self::photon_settings`] of a scene that stays as it is. A camera that the scene does not have is any.
+    pub(super) fn photon_settings_of(&self, scene: &FixedScene) -> PhotonSettings {
+        let camera = match self.photons.photons_for {
+            PhotonsFor::Scene | PhotonsFor::Auto => None,
+            PhotonsFor::Camera => self.camera(scene).ok().map(|camera| self.pinhole(&camera)),
+        };
+        PhotonSettings { camera, ..self.photon_settings_if(scene.is_specular()) }
+    }
+
+    /// [`Self::photon_settings`] for any camera of a scene that is specular or not.
+    pub(super) fn photon_settings_if(&self, is_specular: bool) -> PhotonSettings {
+        PhotonSettings {
+            camera: None,
+            caustic_photons: self.caustic_photons(is_specular),
+            caustic_neighbors: self.photons.caustic_neighbors,
+            seed: self.integrator.seed,
+            photons: self.photons.count,
+            neighbors: self.photons.neighbors,
+            max_distance: self.photons.max_distance,
+            layout: self.photons.layout,
+            radiance: self.photons.radiance,
+        }
+    }
+
+    /// Returns whether cards keep irradiance records for pictures of other samples.
+    fn keeps_records(&self) -> bool {
+        self.schedule.keep_records
+            && self.integrator.irradiance_error.is_some()
+            && self.cards.verify.is_none()
+    }
+
+    /// Parameters of the frame for a camera of the scene.
+    pub fn frame(
+        &self,
+        camera: &Camera,
+        max_distance: f32,
+        caustics: Option<CausticGather>,
+    ) -> FrameParameters {
+        FrameParameters {
+            width: self.picture.width,
+            height: self.picture.height,
+            camera: self.pinhole(camera),
+            seed: self.integrator.seed,
+            first_sample: 0,
+            samples: self.integrator.samples,
+            planned_samples: self.integrator.planned(),
+            gather_rays: self.integrator.gather_rays,
+            shadow_rays: self.integrator.shadow_rays,
+            neighbors: self.photons.neighbors,
+            max_distance,
+            sampling: self.integrator.sampling,
+            irradiance_error: self.integrator.irradiance_error,
+            bins: if self.schedule.order.has_bins() { self.schedule.bins.unwrap_or(DEFAULT_BINS) } else { 1 },
+            drain: self.schedule.order.drain(),
+            queue: self.schedule.queue.unwrap_or(u32::MAX),
+            radiance: self.photons.radiance,
+            caustics,
+            layers: self.picture.layers.are_of_chip(),
+            filter: self.picture.filter,
+            in_flight: self.schedule.in_flight.unwrap_or(u32::MAX),
+            keep_records: self.keeps_records(),
+            adaptive_threshold: self.integrator.adaptive_threshold,
+        }
+    }
+
+    /// Pinhole camera of the frame. The vertical field of view is the camera's; the horizontal one follows from the
+    /// picture's size.
+    pub(crate) fn pinhole(&self, camera: &Camera) -> message::Camera {
+        let half_height = libm::tanf(0.5 * camera.vertical_fov);
+        let half_width = half_height * self.picture.width as f32 / self.picture.height as f32;
+        let scaled = |axis: Vec3, length: f32| (axis * length).to_array();
+        message::Camera {
+            origin: camera.origin.to_array(),
+            forward: camera.forward.to_array(),
+            right: scaled(camera.right, half_width),
+            up: scaled(camera.up, half_height),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::kind::{MICRO, REFERENCE};
+
+    use photoncard_picture::layer::Layers;
+
+    use super::*;
+
+    #[test]
+    fn tiles_are_as_wide_as_all_cards_have_room_for_while_each_has_several() {
+        let side = |width, height, budgets: &[Budget]| {
+            let picture = Picture { width, height, ..Picture::default() };
+            RenderSettings { picture, ..RenderSettings::default() }.tile_side(budgets)
+        };
+        assert_eq!(side(512, 512, &[REFERENCE; 2]), 64);
+        assert_eq!(side(10, 10, &[REFERENCE]), 64);
+        assert_eq!(side(512, 512, &[REFERENCE; 16]), 64);
+        assert_eq!(side(512, 512, &[REFERENCE; 17]), 32);
+        assert_eq!(side(512, 512, &[REFERENCE; 1000]), 16);
+        assert_eq!(side(20, 10, &[REFERENCE; 2]), 16);
+        assert_eq!(side(1 << 16, 1 << 16, &[REFERENCE, MICRO, REFERENCE]), 16);
+    }
+
+    #[test]
+    fn tiles_with_layers_fit_and_a_stated_side_stays() {
+        let settings = RenderSettings::default().with(|s| s.picture.layers = Layers::all());
+        assert_eq!(settings.tile_side(&[REFERENCE]), 32);
+        assert_eq!(settings.tile_side(&[MICRO]), 8);
+        assert_eq!(settings.with(|s| s.schedule.tile = Some(5)).tile_side(&[REFERENCE; 3]), 5);
+    }
+
+    #[test]
+    fn photons_for_the_scene_depend_on_no_camera() {
+        let [right, up, forward] = [Vec3::X, Vec3::Y, Vec3::NEG_Z];
+        let seen_from = |origin: Vec3| {
+            let name = "camera".to_owned();
+            let camera = Camera { name, origin, right, up, forward, vertical_fov: 1.0, aspect: None };
+            Scene { cameras: vec![camera], ..Scene::default() }
+        };
+        for (photons_for, is_of_camera) in [(PhotonsFor::Scene, false), (PhotonsFor::Camera, true)] {
+            let settings = RenderSettings::default().with(|s| s.photons.photons_for = photons_for);
+            let [of_first, of_second] =
+                [Vec3::ZERO, Vec3::X].map(|origin| settings.photon_settings(&seen_from(origin)));
+            assert_eq!(of_first != of_second, is_of_camera);
+            // A crop is a part of the same picture.
+            let cropped = settings.with(|s| s.picture.crop = Some(Window { x0: 1, x1: 2, y0: 3, y1: 4 }));
+            assert_eq!(cropped.photon_settings(&seen_from(Vec3::ZERO)), of_first);
+        }
+    }
+}

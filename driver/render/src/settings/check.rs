@@ -1,0 +1,295 @@
+//! The settings against each other, and against what a card can hold.
+
+use photoncard_firmware::card::MAX_PICTURE_SIDE;
+use photoncard_picture::choice::Choice;
+use photoncard_picture::film::Film;
+use photoncard_shared::budget::{Budget, MAX_BINS};
+
+use super::{MIN_IRRADIANCE_ERROR, RenderSettings};
+use crate::address::{CardAddress, check_chips, first_remote, is_one_emulated_chip};
+use crate::emulator::EmulatedKind;
+use crate::error::RenderError;
+
+/// Photons that a gather of caustics looks for at the least.
+const MIN_CAUSTIC_NEIGHBORS: u32 = 8;
+
+/// Maximum number of photons.
+const MAX_PHOTONS: usize = 1 << 27;
+
+impl RenderSettings {
+    /// Checks what needs no card to be known: each setting alone, and against the others.
+    ///
+    /// # Errors
+    /// The first setting that is not possible on any card.
+    pub fn check(&self) -> Result<(), RenderError> {
+        within("--size", self.picture.width.max(self.picture.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
+        Film::check(self.picture.width, self.picture.height, self.window())?;
+        within("--photons", self.photons.count as u64, 1, MAX_PHOTONS as u64)?;
+        within("--caustic-photons", self.photons.caustic_photons.unwrap_or(0) as u64, 0, MAX_PHOTONS as u64)?;
+        within("--bins", self.schedule.bins.unwrap_or(1) as u64, 1, MAX_BINS as u64)?;
+        self.check_irradiance_error()?;
+        self.check_max_distance()?;
+        self.check_adaptive_threshold()?;
+        check_chips(self.cards.addresses.iter().map(CardAddress::emulated_chips).sum())?;
+        self.check_trace()?;
+        self.check_memory_model()?;
+        self.check_verification()?;
+        self.check_resume()
+    }
+
+    /// Checks the settings against the budget of each card.
+    ///
+    /// # Errors
+    /// As [`Self::check_budget`].
+    pub fn check_budgets(&self, budgets: &[Budget]) -> Result<(), RenderError> {
+        budgets.iter().try_for_each(|budget| self.check_budget(budget))
+    }
+
+    /// Checks the settings against what a card can hold.
+    ///
+    /// # Errors
+    /// The first setting that is not possible on the card.
+    pub fn check_budget(&self, budget: &Budget) -> Result<(), RenderError> {
+        on_card("--neighbors", self.photons.neighbors, 2, budget.neighbors)?;
+        if self.photons.caustic_photons != Some(0) {
+            let neighbors = self.photons.caustic_neighbors;
+            on_card("--caustic-neighbors", neighbors, MIN_CAUSTIC_NEIGHBORS, budget.neighbors)?;
+        }
+        on_card("--gather-rays", self.integrator.gather_rays, 0, budget.gather_rays)?;
+        on_card("--shadow-rays", self.integrator.shadow_rays, 0, budget.shadow_rays)?;
+        on_card("--spp", self.integrator.samples, 1, budget.samples)?;
+        on_card("--planned-spp", self.integrator.planned(), 1, budget.samples)?;
+        if self.schedule.queue.is_some() || self.schedule.order.has_queue() {
+            on_card("--queue", self.schedule.queue.unwrap_or(1), 1, budget.gather_queue)?;
+        }
+        if let Some(in_flight) = self.schedule.in_flight {
+            on_card("--in-flight", in_flight, 1, budget.in_flight)?;
+        }
+        on_card("--tile", self.schedule.tile.unwrap_or(1), 1, budget.pixels_of_tile(false).isqrt())?;
+        self.check_tile_with_layers(budget)
+    }
+
+    /// Checks that the error of interpolated irradiance is one, if any is interpolated.
+    fn check_irradiance_error(&self) -> Result<(), RenderError> {
+        match self.integrator.irradiance_error {
+            Some(error) if !(MIN_IRRADIANCE_ERROR..=1.0).contains(&error) => Err(RenderError::Setting {
+                option: "--ic-error",
+                value: error.to_string(),
+                reason: format!("an error is a share of the irradiance, {MIN_IRRADIANCE_ERROR} to 1"),
+                remedy: "give a number such as 0.025".into(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that the greatest distance of a gather is one, if it is given.
+    fn check_max_distance(&self) -> Result<(), RenderError> {
+        match self.photons.max_distance {
+            Some(distance) if !(distance.is_finite() && distance > 0.0) => Err(RenderError::Setting {
+                option: "--max-distance",
+                value: distance.to_string(),
+                reason: "a distance is a positive number of metres".into(),
+                remedy: "give a positive number, or `auto`".into(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that the threshold of adaptive sampling is one, if there is any.
+    fn check_adaptive_threshold(&self) -> Result<(), RenderError> {
+        match self.integrator.adaptive_threshold {
+            Some(threshold) if !(threshold.is_finite() && threshold > 0.0) => Err(RenderError::Setting {
+                option: "--adaptive",
+                value: threshold.to_string(),
+                reason: "a threshold is a positive number".into(),
+                remedy: "give a number such as 0.1, or `off`".into(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that a chip has room for a tile with layers, if the picture has layers of chips.
+    fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
+        let most = budget.pixels_of_tile(self.picture.layers.are_of_chip()).isqrt();
+        let side = self.schedule.tile.unwrap_or(1);
+        if side <= most {
+            return Ok(());
+        }
+        let leave_out = "leave direct, indirect, caustic and gathers out of --aov: with them a chip keeps four sums a pixel";
+        if most == 0 {
+            return Err(RenderError::Setting {
+                option: "--aov",
+                value: self.picture.layers.to_string(),
+                reason: "this card has no room for a tile with these layers".into(),
+                remedy: format!("render on another card, or {leave_out}"),
+            });
+        }
+        Err(RenderError::Setting {
+            option: "--tile",
+            value: side.to_string(),
+            reason: format!("with --aov {} it must be 1 to {most} on this card", self.picture.layers),
+            remedy: format!("choose {most} or less, or {leave_out}"),
+        })
+    }
+
+    /// Checks that the reads of the cards can be traced, if they are to be.
+    ///
+    /// # Errors
+    /// If there is no one order of them.
+    fn check_trace(&self) -> Result<(), RenderError> {
+        let Some(trace) = &self.cards.trace else { return Ok(()) };
+        let refuse = |reason: &str, remedy: &str| {
+            let value = trace.path.display().to_string();
+            Err(RenderError::Setting {
+                option: "--trace",
+                value,
+                reason: reason.into(),
+                remedy: remedy.into(),
+            })
+        };
+        if trace.has_labels && trace.format.is_below_caches() {
+            return refuse(
+                "a trace of the DRAM has no labels",
+                "leave --trace-labels out, or use --trace-format dinero",
+            );
+        }
+        if self.schedule.order.is_of_whole_frame() {
+            return refuse(
+                "with --order hilbert no one chip reads the photon map",
+                "use another --order, such as sort",
+            );
+        }
+        if !is_one_emulated_chip(&self.cards.addresses) {
+            let one_chip: Vec<_> =
+                EmulatedKind::ALL.iter().map(|kind| format!("--card {}:1", kind.name())).collect();
+            return refuse(
+                "several chips read in no one order, and a chip that is not emulated tells nothing of its reads",
+                &format!("use {}", one_chip.join(" or ")),
+            );
+        }
+        Ok(())
+    }
+
+    /// Checks that the memory of every card can be modelled, if it is to be.
+    ///
+    /// # Errors
+    /// If a card is not emulated in this process.
+    fn check_memory_model(&self) -> Result<(), RenderError> {
+        match first_remote(&self.cards.addresses).filter(|_| self.modelled_caches().is_some()) {
+            None => Ok(()),
+            Some(address) => Err(RenderError::Setting {
+                option: "--counters",
+                value: format!("with --card {address}"),
+                reason: "only the memory of cards that are emulated in this process is modelled".into(),
+                remedy: "use --card emulated:CHIPS, or leave --counters and --cache out".into(),
+            }),
+        }
+    }
+
+    /// Checks that there are tiles to go on with: an order of the whole frame completes all tiles at once.
+    ///
+    /// # Errors
+    /// If the render is to be resumed in such an order.
+    fn check_resume(&self) -> Result<(), RenderError> {
+        let resumes = self.outputs.partial.as_ref().is_some_and(|partial| partial.resume);
+        if !(resumes && self.schedule.order.is_of_whole_frame()) {
+            return Ok(());
+        }
+        Err(RenderError::Setting {
+            option: "--resume",
+            value: "with --order hilbert".into(),
+            reason: "that order completes all tiles at the end, and keeps none".into(),
+            remedy: "use another --order, the picture is the same; or leave --resume out".into(),
+        })
+    }
+}
+
+/// Checks that a value lies in a range that is the same for every card.
+fn within(option: &'static str, value: u64, least: u64, most: u64) -> Result<(), RenderError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    let reason = format!("it must be {least} to {most}");
+    let remedy =
+        if value < least { format!("choose {least} or more") } else { format!("choose {most} or less") };
+    Err(RenderError::Setting { option, value: value.to_string(), reason, remedy })
+}
+
+/// Checks that a value lies in the range of a card.
+fn on_card(option: &'static str, value: u32, least: u32, most: u32) -> Result<(), RenderError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    let info = "`photoncard card info` tells what a card can hold";
+    let (reason, remedy) = if most < least {
+        let reason = format!("it must be {least} or more, and this card has room for {most}");
+        (reason, format!("no value will do on this card: render on another; {info}"))
+    } else {
+        let remedy = if value < least {
+            format!("choose {least} or more")
+        } else {
+            format!("choose {most} or less; {info}")
+        };
+        let range = if least == most { least.to_string() } else { format!("{least} to {most}") };
+        (format!("it must be {range} on this card"), remedy)
+    };
+    Err(RenderError::Setting { option, value: value.to_string(), reason, remedy })
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::kind::REFERENCE;
+
+    use photoncard_cards::scheduler::GatherOrder;
+
+    use super::super::{PhotonMaps, Picture, Schedule};
+    use super::*;
+
+    fn refusal(settings: &RenderSettings, budget: &Budget) -> (String, String) {
+        match settings.check_budget(budget) {
+            Err(RenderError::Setting { option, reason, remedy, .. }) => {
+                (format!("{option}: {reason}"), remedy)
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_card_without_room_for_any_value_is_to_be_another() {
+        let settings = RenderSettings::default();
+        settings.check_budget(&REFERENCE).unwrap();
+        for (option, budget) in [
+            ("--neighbors", Budget { neighbors: 0, ..REFERENCE }),
+            ("--neighbors", Budget { neighbors: 1, ..REFERENCE }),
+            ("--spp", Budget { samples: 0, ..REFERENCE }),
+            ("--queue", Budget { gather_queue: 0, ..REFERENCE }),
+            ("--tile", Budget { tile_pixels: 0, ..REFERENCE }),
+        ] {
+            let (reason, remedy) = refusal(&settings, &budget);
+            assert!(reason.starts_with(option) && reason.contains("this card has room for"), "{reason}");
+            assert!(remedy.contains("render on another") && !remedy.contains("choose"), "{option}: {remedy}");
+        }
+        let layers = RenderSettings {
+            picture: Picture { layers: "all".parse().unwrap(), ..Picture::default() },
+            schedule: Schedule { tile: Some(1), ..Schedule::default() },
+            ..RenderSettings::default()
+        };
+        let (reason, remedy) = refusal(&layers, &Budget { tile_pixels: 1, ..REFERENCE });
+        assert!(
+            reason.starts_with("--aov") && remedy.contains("render on another card, or leave"),
+            "{reason} {remedy}"
+        );
+    }
+
+    #[test]
+    fn what_is_not_used_needs_no_room() {
+        let few = Budget { neighbors: 7, gather_queue: 0, ..REFERENCE };
+        let settings = RenderSettings {
+            photons: PhotonMaps { neighbors: 7, ..PhotonMaps::default() },
+            schedule: Schedule { order: GatherOrder::DirectionBins, ..Schedule::default() },
+            ..RenderSettings::default()
+        };
+        assert!(refusal(&settings, &few).0.starts_with("--caustic-neighbors"));
+        settings.with(|s| s.photons.caustic_photons = Some(0)).check_budget(&few).unwrap();
+    }
+}

@@ -1,0 +1,150 @@
+//! Settings by the names of their options, in lists: those that pixels depend on, those that only the work depends on, and
+//! those of the cards.
+//!
+//! The lists destructure the groups field by field, so that a new field cannot be forgotten.
+
+use photoncard_picture::choice::Choice;
+use photoncard_scene::{FixedScene, Scene};
+use photoncard_shared::image::LAYOUT_VERSION;
+use serde_json::{Map, Value, json};
+
+use super::RenderSettings;
+use super::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
+
+/// Values by the names of their options.
+pub type NamedSettings = Map<String, Value>;
+
+impl RenderSettings {
+    /// All settings that pixels depend on.
+    pub fn of_pixels(&self) -> NamedSettings {
+        let Self { picture, photons, integrator, schedule, cards, outputs } = self;
+        let Schedule {
+            tile: _,
+            order: _,
+            bins: _,
+            queue: _,
+            in_flight: _,
+            focus: _,
+            part: _,
+            keep_records: _,
+        } = schedule;
+        let CardSet { addresses: _, faults: _, verify: _, caches: _, trace: _ } = cards;
+        let TileOutputs { partial: _, display: _ } = outputs;
+        let Picture { width, height, crop: _, camera, camera_at, look_at, fov, layers, filter } = picture;
+        let PhotonMaps {
+            count,
+            photons_for,
+            layout: _,
+            neighbors,
+            max_distance,
+            caustic_photons,
+            caustic_neighbors,
+            radiance,
+        } = photons;
+        let Integrator {
+            seed,
+            samples,
+            planned_samples: _,
+            gather_rays,
+            shadow_rays,
+            sampling,
+            irradiance_error,
+            adaptive_threshold,
+        } = integrator;
+        let window = self.window();
+        let mut settings = named([
+            ("size", json!([width, height])),
+            ("crop", json!([window.x0, window.x1, window.y0, window.y1])),
+            ("camera", json!(camera)),
+            ("camera-at", json!(camera_at)),
+            ("look-at", json!(look_at)),
+            ("fov", json!(fov)),
+            ("filter", json!(filter.name())),
+            ("aov", json!(layers.of_chip().to_string())),
+            ("photons", json!(count)),
+            ("photons-for", json!(photons_for.resolved().name())),
+            ("neighbors", json!(neighbors)),
+            ("max-distance", json!(max_distance)),
+            ("caustic-photons", json!(caustic_photons)),
+            ("caustic-neighbors", json!(caustic_neighbors)),
+            ("radiance", json!(radiance.name())),
+            ("seed", json!(seed)),
+            ("spp", json!(samples)),
+            ("gather-rays", json!(gather_rays)),
+            ("shadow-rays", json!(shadow_rays)),
+            ("sampling", json!(sampling.name())),
+            ("ic-error", json!(irradiance_error)),
+            ("adaptive", json!(adaptive_threshold)),
+        ]);
+        // Rays are divided among the planned samples with the irradiance cache alone.
+        if irradiance_error.is_some() && integrator.planned() != *samples {
+            settings.insert("planned-spp".to_owned(), json!(integrator.planned()));
+        }
+        settings
+    }
+
+    /// Every setting that a chip's work and memory traffic depend on besides the kind of chip and its caches, and no pixel; for a picture of
+    /// its own.
+    pub fn of_work(&self) -> NamedSettings {
+        let Self { picture: _, photons, integrator: _, schedule, cards: _, outputs: _ } = self;
+        let PhotonMaps {
+            count: _,
+            photons_for: _,
+            layout,
+            neighbors: _,
+            max_distance: _,
+            caustic_photons: _,
+            caustic_neighbors: _,
+            radiance: _,
+        } = photons;
+        let Schedule { tile, order, bins, queue, in_flight, focus: _, part: _, keep_records: _ } = schedule;
+        named([
+            ("photon-map", json!(layout.name())),
+            ("tile", json!(tile)),
+            ("order", json!(order.name())),
+            ("bins", json!(bins)),
+            ("queue", json!(queue)),
+            ("in-flight", json!(in_flight)),
+        ])
+    }
+
+    /// Settings of cards, of their links and of the model of their memory. No pixel depends on them.
+    pub fn of_cards(&self) -> NamedSettings {
+        let CardSet { addresses, faults, verify, caches: _, trace: _ } = &self.cards;
+        let addresses: Vec<_> = addresses.iter().map(ToString::to_string).collect();
+        named([
+            ("card", json!(addresses)),
+            ("faults", json!(faults.map(|faults| faults.to_string()))),
+            ("verify", json!(verify)),
+            ("cache", json!(self.modelled_caches().map(|caches| caches.to_string()))),
+        ])
+    }
+
+    /// Everything that the pixels of a scene depend on: program, scene and settings.
+    pub fn identity(&self, scene: &Scene) -> NamedSettings {
+        self.identity_of(&scene.into())
+    }
+
+    /// [`Self::identity`] for a scene that stays as it is.
+    pub fn identity_of(&self, scene: &FixedScene) -> NamedSettings {
+        self.resolved_if(scene.is_specular()).identity_with(scene.checksum())
+    }
+
+    /// [`Self::identity`] of settings that are [`Self::resolved`], and of a scene of this checksum.
+    pub fn identity_with(&self, checksum: &str) -> NamedSettings {
+        let mut identity = self.of_pixels();
+        identity.extend(named([
+            ("program", json!(PROGRAM)),
+            ("layout", json!(LAYOUT_VERSION)),
+            ("scene-checksum", json!(checksum)),
+        ]));
+        identity
+    }
+}
+
+/// Name and version of this program.
+pub const PROGRAM: &str = concat!("photoncard ", env!("CARGO_PKG_VERSION"));
+
+fn named<const N: usize>(settings: [(&str, Value); N]) -> NamedSettings {
+    settings.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
+}

@@ -1,0 +1,246 @@
+//! The groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated reference chip.
+
+use photoncard_cards::link::LineFaults;
+use photoncard_cards::scheduler::GatherOrder;
+use photoncard_map::photon_map::{PhotonLayout, PhotonsFor};
+use photoncard_picture::film::Window;
+use photoncard_picture::layer::Layers;
+use photoncard_shared::message::{Filter, Radiance, Sampling};
+use serde::{Deserialize, Serialize};
+
+use crate::address::CardAddress;
+use crate::display::DisplaySettings;
+use crate::emulator::EmulatedKind;
+use crate::emulator::memory_model::CacheSettings;
+use crate::emulator::trace::TraceSettings;
+use crate::partial::PartialSettings;
+use crate::parts::Part;
+
+/// The picture and the camera that sees it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// Window to render; `None` for the whole picture.
+    pub crop: Option<Window>,
+    /// Name of the camera; `None` for the first.
+    pub camera: Option<String>,
+    /// Place of the camera in the coordinates of the scene's file, metres; `None` for its own.
+    pub camera_at: Option<[f64; 3]>,
+    /// Place in the middle of the picture, likewise, with +y upwards; `None` for the camera's own direction.
+    pub look_at: Option<[f64; 3]>,
+    /// Vertical field of view, degrees; `None` for the camera's own.
+    pub fov: Option<f32>,
+    /// Layers of the picture besides radiance.
+    pub layers: Layers,
+    /// Pixel filter.
+    pub filter: Filter,
+}
+
+impl Picture {
+    /// Returns whether place and direction of the camera are stated, so that nothing of the file's view is left.
+    pub fn states_view(&self) -> bool {
+        self.camera_at.is_some() && self.look_at.is_some()
+    }
+}
+
+impl Default for Picture {
+    fn default() -> Self {
+        Self {
+            width: 512,
+            height: 512,
+            crop: None,
+            camera: None,
+            camera_at: None,
+            look_at: None,
+            fov: None,
+            layers: Layers::default(),
+            filter: Filter::Box,
+        }
+    }
+}
+
+/// Photon map and caustic map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PhotonMaps {
+    /// Number of photons in the map.
+    pub count: usize,
+    /// What guides the photons: the scene, or the picture's camera.
+    pub photons_for: PhotonsFor,
+    /// Layout of the photon map in card memory; no pixel depends on it.
+    pub layout: PhotonLayout,
+    /// Number of photons that a gather searches for.
+    pub neighbors: u32,
+    /// Maximum distance of a gather, metres; `None` to derive it from the density of the photons.
+    pub max_distance: Option<f32>,
+    /// Number of photons in the caustic map; `None` for [`DEFAULT_CAUSTIC_PHOTONS`](super::DEFAULT_CAUSTIC_PHOTONS) if the
+    /// scene has a specular surface, and no map otherwise.
+    pub caustic_photons: Option<usize>,
+    /// Number of photons that a gather of caustics searches for.
+    pub caustic_neighbors: u32,
+    /// Estimate of the radiance at the ends of gather rays.
+    pub radiance: Radiance,
+}
+
+impl Default for PhotonMaps {
+    fn default() -> Self {
+        Self {
+            count: 500_000,
+            photons_for: PhotonsFor::default(),
+            layout: PhotonLayout::default(),
+            neighbors: 100,
+            max_distance: None,
+            caustic_photons: None,
+            caustic_neighbors: 50,
+            radiance: Radiance::Density,
+        }
+    }
+}
+
+/// Estimation of light by rays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Integrator {
+    /// Seed of all random numbers, including photon paths.
+    pub seed: u32,
+    /// Number of samples per pixel.
+    pub samples: u32,
+    /// Number of samples per pixel among which the irradiance cache divides the gather rays of a pixel; `None` for `samples`. It is
+    /// equal in all passes of a picture.
+    pub planned_samples: Option<u32>,
+    /// Number of final gather rays per sample; with an irradiance cache per record, and per pixel of other samples.
+    pub gather_rays: u32,
+    /// Number of shadow rays per sample.
+    pub shadow_rays: u32,
+    /// Sampling density of the directions of gather rays.
+    pub sampling: Sampling,
+    /// Maximum relative error of interpolated irradiance; `None` to interpolate none.
+    pub irradiance_error: Option<f32>,
+    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m): samples of a pixel whose first ones deviate by more, over the root of their mean, are means of
+    /// several paths. `None` for one path a sample.
+    pub adaptive_threshold: Option<f32>,
+}
+
+impl Integrator {
+    /// Number of samples per pixel that rays are divided among.
+    pub fn planned(&self) -> u32 {
+        self.planned_samples.unwrap_or(self.samples)
+    }
+}
+
+impl Default for Integrator {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            samples: 1,
+            planned_samples: None,
+            gather_rays: 100,
+            shadow_rays: 8,
+            sampling: Sampling::Product,
+            irradiance_error: None,
+            adaptive_threshold: None,
+        }
+    }
+}
+
+/// Order of the work. No pixel depends on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Schedule {
+    /// Side of a tile, pixels; `None` for one that suits cards and picture ([`tile_side`](super::RenderSettings::tile_side)).
+    pub tile: Option<u32>,
+    /// Order of the photon gathers.
+    pub order: GatherOrder,
+    /// Number of direction bins of the gather rays, for orders with bins; `None` for the default.
+    pub bins: Option<u32>,
+    /// Maximum number of gathers that wait on a chip, for orders with a queue; `None` for the chip's capacity.
+    pub queue: Option<u32>,
+    /// Maximum number of tiles in flight on a chip; `None` for the chip's own.
+    pub in_flight: Option<u32>,
+    /// Pixel near which tiles are rendered first; `None` to spread them over the picture. With modelled memory it has no effect.
+    pub focus: Option<[u32; 2]>,
+    /// Part of the picture to render; `None` for all of it.
+    pub part: Option<Part>,
+    /// `true` for one of several pictures whose samples are added ([`Renderer::refine`](crate::Renderer::refine)): cards keep
+    /// irradiance records between them, each in its memory beyond the image. Not with `verify`, which compares the work of cards.
+    pub keep_records: bool,
+}
+
+impl Default for Schedule {
+    fn default() -> Self {
+        Self {
+            tile: None,
+            order: GatherOrder::Sort,
+            bins: None,
+            queue: None,
+            in_flight: None,
+            focus: None,
+            part: None,
+            keep_records: false,
+        }
+    }
+}
+
+/// Cards that render, with tests and models of them. No pixel depends on them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CardSet {
+    /// Addresses of the cards.
+    pub addresses: Vec<CardAddress>,
+    /// Injected faults of the links to the cards; `None` for no faults.
+    pub faults: Option<LineFaults>,
+    /// Share of the tiles that two cards render for comparison; `None` for no tile.
+    pub verify: Option<f64>,
+    /// Caches of the memory model; `None` to model none, which costs nothing.
+    pub caches: Option<CacheSettings>,
+    /// Trace of every read of the chip. It takes a single chip; without `caches` the default caches are modelled.
+    pub trace: Option<TraceSettings>,
+}
+
+impl CardSet {
+    /// Number of cards, one chip each.
+    pub fn count(&self) -> usize {
+        self.addresses.iter().map(|address| address.emulated_chips().max(1)).sum()
+    }
+
+    /// Names of the cards in the reports of a render.
+    pub fn names(&self) -> Vec<String> {
+        let each_card = self
+            .addresses
+            .iter()
+            .flat_map(|address| std::iter::repeat_n(address, address.emulated_chips().max(1)));
+        each_card.enumerate().map(|(index, address)| address.name_of(index)).collect()
+    }
+
+    /// Caches of the kind of the first emulated card.
+    pub fn own_caches(&self) -> CacheSettings {
+        let kind = self.addresses.iter().find_map(|address| match address {
+            CardAddress::Emulated { kind, .. } => Some(*kind),
+            CardAddress::Remote(_) => None,
+        });
+        kind.unwrap_or(EmulatedKind::Reference).caches()
+    }
+}
+
+impl Default for CardSet {
+    fn default() -> Self {
+        Self {
+            addresses: vec![CardAddress::default()],
+            faults: None,
+            verify: None,
+            caches: None,
+            trace: None,
+        }
+    }
+}
+
+/// Destinations of finished tiles besides the film. No pixel depends on them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TileOutputs {
+    /// File in which finished tiles are kept until the picture is written; `None` to keep none. Not possible with the order
+    /// [`Hilbert`](GatherOrder::Hilbert), whose tiles are finished at the end together.
+    pub partial: Option<PartialSettings>,
+    /// Viewer that shows tiles as they are finished; `None` to show none.
+    pub display: Option<DisplaySettings>,
+}

@@ -1,0 +1,235 @@
+//! Statistics of a render: the keys of `--stats`.
+
+use photoncard_cards::session::LinkBytes;
+use photoncard_map::photon_map::Guiding;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{LEAF_PHOTONS, Photon, PhotonLeaf, Record};
+use photoncard_shared::message::FrameParameters;
+use serde::Serialize;
+
+use super::executor::Outcome;
+use super::preparation::Prepared;
+use super::times::Times;
+use super::{MemoryStatistics, Provenance, RenderSettings};
+use crate::cost_model::Flops;
+
+/// Contents of the statistics file. The keys are stable.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Statistics {
+    /// Everything that the render depended on.
+    pub provenance: Provenance,
+    /// Width of the whole picture, pixels.
+    pub width: u32,
+    /// Height of the whole picture, pixels.
+    pub height: u32,
+    /// Number of samples per pixel.
+    pub samples: u32,
+    /// Number of photons in the map.
+    pub photons: u64,
+    /// Number of paths traced from the lights for the photons.
+    pub photon_paths: u64,
+    /// Guiding of these paths; absent for photons of any camera.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub photon_guiding: Option<Guiding>,
+    /// Maximum distance of a gather, metres.
+    pub max_distance: f32,
+    /// Number of cards, one chip each.
+    pub cards: usize,
+    /// Number of cards that were given up, left out for their budget, or have never answered the greeting.
+    pub cards_given_up: usize,
+    /// Number of tiles that two cards have rendered equally.
+    pub verified_tiles: usize,
+    /// Number of tiles rendered once more, for verification or because another card took too long. Not included in the
+    /// other counts.
+    pub repeated_tiles: usize,
+    /// Number of tiles with light far beyond that of the scene's surfaces for which there was no second card to verify
+    /// them.
+    pub dazzling_tiles: usize,
+    /// Names of the cards that have rendered these.
+    #[serde(skip)]
+    pub dazzling_cards: Vec<String>,
+    /// Number of tiles rendered again because their card was outvoted. The other counts include each once.
+    pub revoked_tiles: usize,
+    /// Time of each phase, seconds.
+    pub time_s: Times,
+    /// Number of rays cast on the chips.
+    pub rays: Rays,
+    /// Number of paths that exceeded the limit of specular bounces, or met a surface that absorbs all light; they
+    /// contribute nothing.
+    pub lost_paths: u64,
+    /// Number of searches of the caustic map.
+    pub caustic_gathers: u64,
+    /// Number of searches of the photon map.
+    pub gathers: u64,
+    /// Number of these searches that filled an importance table.
+    pub tables: u64,
+    /// Number of irradiance records gathered; a record that two tiles use counts twice.
+    pub records: u64,
+    /// Number of irradiance records of an earlier pass that were used again.
+    pub kept_records: u64,
+    /// Share of interpolated irradiance among the samples that see a surface with a Lambertian part.
+    pub interpolated_share: f64,
+    /// Number of photons whose distance was computed.
+    pub photons_tested: u64,
+    /// Number of photons that became candidates of a search.
+    pub photons_taken: u64,
+    /// Number of candidates processed by selections of the k nearest.
+    pub photons_selected: u64,
+    /// Number of photons that the searches returned.
+    pub photons_found: u64,
+    /// Number of searches for the nearest irradiance point.
+    pub lookups: u64,
+    /// Number of irradiance points whose distance was computed.
+    pub points_tested: u64,
+    /// Number of times that a chip's queue of gathers was emptied.
+    pub drains: u64,
+    /// Maximum number of gathers that waited at once on any chip.
+    pub most_waiting: u64,
+    /// Floating-point operations of the counted work by the constants of Table 7.1 (`docs/scaling.md`), without lookups of irradiance.
+    pub flops: Flops,
+    /// Bytes of the card image.
+    pub image_bytes: u64,
+    /// Bytes over all links.
+    pub link: LinkStatistics,
+    /// Reads of card memory; absent if memory is not modelled.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub memory: Option<MemoryStatistics>,
+    /// Maximum resident memory of the process, bytes; absent if the system does not report it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_memory_bytes: Option<u64>,
+}
+
+impl Statistics {
+    /// Statistics of a finished render.
+    pub(super) fn new(
+        settings: &RenderSettings,
+        frame: &FrameParameters,
+        prepared: &Prepared,
+        outcome: &Outcome,
+        time_s: Times,
+        provenance: Provenance,
+    ) -> Self {
+        let counters = &outcome.counters;
+        Self {
+            provenance,
+            width: frame.width,
+            height: frame.height,
+            samples: settings.integrator.samples,
+            photons: photons(settings.photons.count as u64, prepared),
+            photon_paths: prepared.paths,
+            photon_guiding: prepared.guiding,
+            max_distance: frame.max_distance,
+            cards: outcome.cards,
+            cards_given_up: outcome.cards_given_up,
+            verified_tiles: outcome.tiles.verified,
+            repeated_tiles: outcome.tiles.repeated,
+            dazzling_tiles: outcome.dazzling.iter().map(|(_, tiles)| tiles).sum(),
+            dazzling_cards: outcome.dazzling.iter().map(|(card, _)| card.clone()).collect(),
+            revoked_tiles: outcome.tiles.revoked,
+            time_s,
+            rays: Rays {
+                eye: counters.eye_rays,
+                shadow: counters.shadow_rays,
+                gather: counters.gather_rays,
+                survey: counters.survey_rays,
+                specular: counters.specular_rays,
+            },
+            lost_paths: counters.lost_paths,
+            caustic_gathers: counters.caustic_gathers,
+            gathers: counters.gathers,
+            tables: counters.tables,
+            records: counters.records,
+            kept_records: counters.kept_records,
+            interpolated_share: counters.interpolated_samples as f64
+                / counters.lambertian_samples.max(1) as f64,
+            photons_tested: counters.photons_tested,
+            photons_taken: counters.photons_taken,
+            photons_selected: counters.photons_selected,
+            photons_found: counters.photons_found,
+            lookups: counters.lookups,
+            points_tested: counters.points_tested,
+            drains: counters.drains,
+            most_waiting: counters.most_waiting,
+            flops: Flops::by_table(counters, frame.gather_rays),
+            image_bytes: prepared.image.bytes(),
+            link: LinkStatistics::new(&outcome.links),
+            memory: settings.modelled_caches().zip(outcome.traffic.as_ref()).map(MemoryStatistics::new),
+            peak_memory_bytes: peak_memory_bytes(),
+        }
+    }
+}
+
+/// Number of photons in the map of an image that `count` were requested for. They are counted where leaves
+/// have no room for as many.
+fn photons(count: u64, prepared: &Prepared) -> u64 {
+    let leaves = prepared.image.section(SectionKind::PhotonLeaves);
+    let nodes = prepared.image.section(SectionKind::Photons).len() * Photon::PER_LINE;
+    let room = leaves.len() * LEAF_PHOTONS + nodes;
+    if room as u64 >= count {
+        return count;
+    }
+    let in_leaves: u64 = leaves.iter().map(|line| u64::from(PhotonLeaf::read(&line.0).photons())).sum();
+    in_leaves + nodes as u64
+}
+
+/// Rays by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Rays {
+    /// Eye rays: one per sample, cast twice, with the irradiance cache three times; and rays to points of its lattice.
+    pub eye: u64,
+    /// Shadow rays.
+    pub shadow: u64,
+    /// Final gather rays.
+    pub gather: u64,
+    /// Rays that survey the surroundings of irradiance records.
+    pub survey: u64,
+    /// Rays from specular surfaces, continuing any of these but shadow rays.
+    pub specular: u64,
+}
+
+/// Bytes over all links.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct LinkStatistics {
+    /// Bytes of image lines sent to each card: those that it lacked.
+    pub image_bytes: Vec<u64>,
+    /// Bytes of image lines and pixels.
+    pub payload_bytes: u64,
+    /// All bytes in both directions.
+    pub wire_bytes: u64,
+    /// Frames sent more than once.
+    pub retransmitted_frames: u64,
+    /// Damaged frames from cards.
+    pub damaged_frames: u64,
+    /// Repeated frames from cards.
+    pub duplicate_frames: u64,
+    /// Number of probes sent to silent cards.
+    pub probes: u64,
+    /// Number of times that a card was greeted again.
+    pub resets: u64,
+}
+
+impl LinkStatistics {
+    /// Statistics of the link of each card.
+    fn new(links: &[LinkBytes]) -> Self {
+        let mut sum = LinkBytes::default();
+        links.iter().for_each(|link| sum.add(link));
+        Self {
+            image_bytes: links.iter().map(|link| link.image).collect(),
+            payload_bytes: sum.payload,
+            wire_bytes: sum.wire,
+            retransmitted_frames: sum.line.repeated,
+            damaged_frames: sum.line.damaged,
+            duplicate_frames: sum.line.duplicates,
+            probes: sum.line.probes,
+            resets: sum.resets,
+        }
+    }
+}
+
+/// Peak resident memory of the process, bytes, from `/proc`.
+fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kilobytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kilobytes << 10)
+}

@@ -1,0 +1,136 @@
+//! Place of a scene in its file: the offset of its origin from the file's, by the scene at rest.
+
+use std::collections::BTreeMap;
+
+use glam::{DMat4, DVec3};
+
+use super::accessor::Source;
+use super::instances::Instances;
+use super::limits::MAX_TRIANGLES;
+use super::mesh::MeshPlacer;
+use super::offset::{Bounds, translation};
+use super::primitive::Primitive;
+use super::skin::Skin;
+use super::stated_places;
+use crate::Scene;
+use crate::error::SceneError;
+
+/// Offset of a scene's origin, and what its nodes state.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Anchor {
+    pub(super) offset: DVec3,
+    /// Translations of all nodes in double precision; empty without an offset.
+    stated: Vec<Option<DVec3>>,
+}
+
+impl Anchor {
+    /// Anchor of a scene whose nodes have these world transforms at rest.
+    pub(super) fn of(
+        source: &Source<'_>,
+        meshes: &mut MeshPlacer<'_>,
+        nodes: &[(usize, DMat4)],
+        scene: &mut Scene,
+    ) -> Result<Self, SceneError> {
+        let bounds = Extent { source, meshes, nodes, locals: BTreeMap::new() }.bounds(scene)?;
+        let root = &source.document.root;
+        let chosen = root.scenes.get(root.scene.map_or(0, |scene| scene.value()));
+        let tops: Vec<usize> =
+            chosen.iter().flat_map(|scene| &scene.nodes).map(gltf::json::Index::value).collect();
+        let is_above = |index: &usize| tops.contains(index) && root.nodes[*index].mesh.is_none();
+        let above =
+            nodes.iter().filter(|(index, _)| is_above(index) && root.nodes[*index].children.is_some());
+        let above: Vec<DVec3> = above.map(|(_, world)| world.w_axis.truncate()).collect();
+        let offset = bounds.offset(&above);
+        let has_offset = offset != DVec3::ZERO;
+        let stated = if has_offset { stated_places::read(source.document) } else { Vec::new() };
+        Ok(Self { offset, stated })
+    }
+
+    /// Local transform of a node about the scene's origin, from that about the file's. `is_posed` if an animation states its translation.
+    pub(super) fn placed(&self, node: usize, mut local: DMat4, is_posed: bool, is_root: bool) -> DMat4 {
+        if self.offset != DVec3::ZERO {
+            let stated = self.stated.get(node).copied().flatten().filter(|_| !is_posed);
+            let place = stated.unwrap_or(local.w_axis.truncate());
+            local.w_axis = translation(place, self.offset, is_root).extend(1.0);
+        }
+        local
+    }
+}
+
+/// Bounds of the triangles of a scene at rest.
+struct Extent<'e, 's, 'a> {
+    source: &'e Source<'s>,
+    meshes: &'e mut MeshPlacer<'a>,
+    nodes: &'e [(usize, DMat4)],
+    locals: BTreeMap<usize, Local>,
+}
+
+/// Bounds of the primitives of a mesh that have triangles, in its own space, and the number of these.
+#[derive(Clone, Default)]
+struct Local {
+    bounds: Vec<Bounds>,
+    triangles: u64,
+}
+
+impl Extent<'_, '_, '_> {
+    fn bounds(&mut self, scene: &mut Scene) -> Result<Bounds, SceneError> {
+        let root = &self.source.document.root;
+        let mut worlds = vec![None; root.nodes.len()];
+        self.nodes.iter().for_each(|&(index, world)| worlds[index] = Some(world));
+        let (mut bounds, mut placed) = (Bounds::EMPTY, 0_u64);
+        for &(index, world) in self.nodes {
+            let node = &root.nodes[index];
+            let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { continue };
+            let Local { bounds: locals, triangles } = self.locals(mesh, scene)?;
+            let mut add = |transform: &DMat4| {
+                locals.iter().for_each(|local| bounds.add_placed(transform, local));
+            };
+            if triangles == 0 {
+                continue;
+            }
+            if let Some(skin) = node.skin {
+                Skin::new(self.source, skin.value(), &worlds)?.joints().iter().for_each(&mut add);
+                continue;
+            }
+            let Some(instances) = Instances::of(self.source, index, node)? else {
+                add(&world);
+                continue;
+            };
+            placed = placed.saturating_add(triangles.saturating_mul(instances.count));
+            if placed > MAX_TRIANGLES as u64 {
+                // No scene is so large: the loader says so.
+                break;
+            }
+            // The loader names an instance without a sound transform.
+            let transforms =
+                (0..instances.count).filter_map(|index| instances.transform(self.source, index).ok());
+            transforms.for_each(|transform| add(&(world * transform)));
+        }
+        Ok(bounds)
+    }
+
+    /// Bounds of the primitives of a mesh.
+    fn locals(&mut self, mesh: usize, scene: &mut Scene) -> Result<Local, SceneError> {
+        if let Some(locals) = self.locals.get(&mesh) {
+            return Ok(locals.clone());
+        }
+        let primitives = self.meshes.primitives(mesh, scene)?;
+        let shown = primitives.iter().filter(|primitive| primitive.triangles > 0);
+        let triangles = shown.clone().map(|primitive| primitive.triangles).sum();
+        let locals = Local { bounds: shown.map(local).collect(), triangles };
+        self.locals.insert(mesh, locals.clone());
+        Ok(locals)
+    }
+}
+
+/// Bounds of the vertices that a primitive's triangles have.
+fn local(primitive: &Primitive<'_>) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
+    for corner in (0..primitive.triangles).flat_map(|triangle| primitive.corners(triangle)) {
+        let vertex = primitive.indices.as_ref().map_or(corner, |indices| indices.unsigned(corner));
+        if vertex < primitive.positions.count {
+            bounds.add(DVec3::from(primitive.positions.vec3(vertex).map(f64::from)));
+        }
+    }
+    bounds
+}

@@ -1,0 +1,247 @@
+//! Images that textures refer to, decoded in parallel.
+
+use std::sync::Arc;
+
+use rayon::prelude::*;
+
+use super::accessor::Source;
+use super::files::Bytes;
+use super::origin::Origin;
+use super::room::Room;
+use super::specular_glossiness::{Conversion, Grid};
+use super::uri::{decode_data, is_data, locate};
+use crate::error::SceneError;
+use crate::raster::{Deep, Fault, Kind};
+use crate::{Encoding, Image, MAX_TEXELS};
+
+const EXPORT_AGAIN: &str = "export the scene again, with its images";
+const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
+
+/// Maximum size of all image files together, bytes: in every format a texel takes at most eight.
+const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
+
+/// Image that textures take.
+#[derive(Clone, Copy)]
+pub(super) struct Wanted {
+    pub(super) origin: Origin,
+    /// Encoding of an image of 8 bits a channel.
+    pub(super) encoding: Encoding,
+    /// Form of an image of more than 8 bits, if it keeps them.
+    pub(super) deep: Option<Deep>,
+}
+
+/// An image file whose header is read.
+struct File<'a> {
+    origin: Origin,
+    kind: Kind,
+    size: [u32; 2],
+    bytes: Bytes<'a>,
+}
+
+/// An image before it is decoded.
+enum Found<'a> {
+    File(File<'a>),
+    /// Image that is made from two others, as far as these can be read.
+    Converted(&'a Conversion, [Option<File<'a>>; 2]),
+}
+
+/// Texels of an image, `None` if it cannot be read, and the faults of all files that it takes.
+struct Decoded {
+    size: [u32; 2],
+    texels: Option<Vec<[u8; 4]>>,
+    deep: Option<Deep>,
+    faults: Vec<(Origin, Fault)>,
+}
+
+/// Failure to read an image.
+enum Failure {
+    /// Fault of the image.
+    Image(Fault),
+    /// Fault of the buffers, which other parts of the scene need.
+    Scene(SceneError),
+}
+
+impl From<Fault> for Failure {
+    fn from(fault: Fault) -> Self {
+        Self::Image(fault)
+    }
+}
+
+/// Decodes images. Those that cannot be read are `None`, and described in `unreadable`. All indices exist.
+///
+/// # Errors
+/// If the images exceed a limit, or the memory of process or card.
+pub(super) fn load(
+    source: &Source<'_>,
+    wanted: &[Wanted],
+    room: &mut Room,
+    unreadable: &mut Vec<String>,
+) -> Result<Vec<Option<Image>>, SceneError> {
+    let (mut texels, mut bytes) = (0, 0);
+    let mut found = Vec::with_capacity(wanted.len());
+    for &Wanted { origin, .. } in wanted {
+        let image = find(source, origin, unreadable)?;
+        if let Some(image) = &image {
+            let size = image.size();
+            texels += u64::from(size[0]) * u64::from(size[1]);
+            bytes += image.bytes();
+            let (count, limit, unit) = if texels > MAX_TEXELS {
+                (texels, MAX_TEXELS, "texels")
+            } else {
+                (bytes, MAX_FILE_BYTES, "bytes")
+            };
+            if count > limit {
+                let reason = format!("the images up to this one have {count} {unit}, more than {limit}");
+                return Err(error(source, origin, reason, "scale the images down, or use fewer"));
+            }
+            room.texels(size)?;
+        }
+        found.push(image);
+    }
+    let decoded: Vec<_> = found
+        .into_par_iter()
+        .zip(wanted)
+        .map(|(image, wanted)| image.map(|image| image.decode(wanted.deep)))
+        .collect();
+    // The first error in the order of the file is returned, whichever thread failed first.
+    let images = decoded.into_iter().zip(wanted).map(|(decoded, &Wanted { origin, encoding, .. })| {
+        let Some(Decoded { size: [width, height], texels, faults, deep }) = decoded else {
+            return Ok(None);
+        };
+        let encoding = deep.map_or(encoding, Deep::encoding);
+        for (origin, fault) in faults {
+            unreadable.push(description(source, origin, fault)?);
+        }
+        Ok(texels.map(|texels| Image { name: name(source, origin), width, height, texels, encoding }))
+    });
+    images.collect()
+}
+
+impl Found<'_> {
+    fn size(&self) -> [u32; 2] {
+        match self {
+            Self::File(file) => file.size,
+            Self::Converted(_, files) => {
+                Conversion::size(files.each_ref().map(|file| Some(file.as_ref()?.size)))
+            }
+        }
+    }
+
+    /// Size of the files, bytes.
+    fn bytes(&self) -> u64 {
+        match self {
+            Self::File(file) => file.bytes.len() as u64,
+            Self::Converted(_, files) => files.iter().flatten().map(|file| file.bytes.len() as u64).sum(),
+        }
+    }
+
+    /// Texels, in the form `deep` if the image has more than 8 bits a channel.
+    fn decode(&self, deep: Option<Deep>) -> Decoded {
+        let size = self.size();
+        let deep = match self {
+            Self::File(file) => deep.filter(|_| file.kind.is_deep(&file.bytes)),
+            Self::Converted(..) => None,
+        };
+        let mut faults = Vec::new();
+        let mut decode = |file: &File<'_>| {
+            let texels = file.kind.decode(&file.bytes, file.size, deep);
+            texels.map_err(|fault| faults.push((file.origin, fault))).ok()
+        };
+        let texels = match self {
+            Self::File(file) => decode(file),
+            Self::Converted(conversion, files) => {
+                let decoded = files.each_ref().map(|file| {
+                    let file = file.as_ref()?;
+                    Some((file.size, decode(file)?))
+                });
+                let grids = decoded.each_ref().map(|grid| {
+                    let (size, texels) = grid.as_ref()?;
+                    Some(Grid { size: *size, texels })
+                });
+                Some(conversion.texels(size, grids))
+            }
+        };
+        Decoded { size, texels, deep, faults }
+    }
+}
+
+fn error(source: &Source<'_>, origin: Origin, reason: String, remedy: &'static str) -> SceneError {
+    let item = match origin {
+        Origin::Image(index) => format!("images[{index}]"),
+        Origin::Absent(texture) => format!("textures[{texture}]"),
+    };
+    SceneError::Image { location: source.document.location(item), reason, remedy }
+}
+
+/// Description of an image that cannot be read; an error for one beyond a limit.
+fn description(source: &Source<'_>, origin: Origin, fault: Fault) -> Result<String, SceneError> {
+    let Fault { reason, remedy, is_limit } = fault;
+    if is_limit {
+        return Err(error(source, origin, reason, remedy));
+    }
+    Ok(format!("'{}' ({reason})", name(source, origin)))
+}
+
+/// Name of the image, or of its file, or `image N`.
+fn name(source: &Source<'_>, origin: Origin) -> String {
+    let Origin::Image(index) = origin else { return "none".to_owned() };
+    let image = &source.document.root.images[index];
+    let file = image.uri.as_ref().filter(|uri| !is_data(uri));
+    image.name.as_ref().or(file).cloned().unwrap_or_else(|| format!("image {index}"))
+}
+
+fn find<'a>(
+    source: &Source<'a>,
+    origin: Origin,
+    unreadable: &mut Vec<String>,
+) -> Result<Option<Found<'a>>, SceneError> {
+    let mut file = |origin| match find_file(source, origin) {
+        Ok(file) => Ok(Some(file)),
+        Err(Failure::Scene(error)) => Err(error),
+        Err(Failure::Image(fault)) => {
+            unreadable.push(description(source, origin, fault)?);
+            Ok(None)
+        }
+    };
+    let conversion = match origin {
+        Origin::Image(index) => source.document.conversions.images.get(&index),
+        Origin::Absent(_) => None,
+    };
+    let Some(conversion) = conversion else { return Ok(file(origin)?.map(Found::File)) };
+    let [diffuse, specular] = conversion.sources.map(|origin| origin.map_or(Ok(None), &mut file));
+    Ok(Some(Found::Converted(conversion, [diffuse?, specular?])))
+}
+
+fn find_file<'a>(source: &Source<'a>, origin: Origin) -> Result<File<'a>, Failure> {
+    let Origin::Image(index) = origin else {
+        return Err(Fault::unreadable("the texture has no image in a format that is read", CONVERT).into());
+    };
+    let bytes = bytes(source, index)?;
+    // The format follows from the bytes: exporters state wrong media types.
+    let kind = Kind::of(&bytes)?;
+    let size = kind.size(&bytes)?;
+    Ok(File { origin, kind, size, bytes })
+}
+/// Bytes of an image.
+fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<Bytes<'a>, Failure> {
+    let document = source.document;
+    let image = &document.root.images[index];
+    let unreadable = |reason: String| Failure::Image(Fault::unreadable(reason, EXPORT_AGAIN));
+    match (&image.uri, image.buffer_view) {
+        (Some(uri), None) if is_data(uri) => {
+            let (_, bytes) = decode_data(uri).map_err(unreadable)?;
+            Ok(Bytes::Shared(Arc::new(bytes)))
+        }
+        (Some(uri), None) => {
+            let file = locate(&document.path, uri).map_err(unreadable)?;
+            let read = document.files.read(&file);
+            read.map_err(|error| unreadable(format!("cannot read {}: {error}", file.display())))
+        }
+        (None, Some(view)) => {
+            let bytes = source.bytes(view.value(), &format!("images[{index}].bufferView"));
+            bytes.map(Bytes::Part).map_err(Failure::Scene)
+        }
+        (None, None) => Err(unreadable("it has neither uri nor bufferView".to_owned())),
+        (Some(_), Some(_)) => Err(unreadable("it has both uri and bufferView".to_owned())),
+    }
+}

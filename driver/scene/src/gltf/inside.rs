@@ -1,0 +1,141 @@
+//! Views from inside a closed room, for files of rooms without a camera.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use crate::{PunctualKind, Scene, Triangle};
+
+/// Number of directions in which a place is looked around from.
+const DIRECTIONS: u32 = 96;
+
+/// Maximum number of directions in which a closed room may be open: cracks between its walls.
+const MAX_OPEN: usize = 3;
+
+/// Maximum number of triangles of which rays are cast without a hierarchy.
+const MAX_TRIANGLES: usize = 4_000_000;
+
+/// Number of lamps that are looked at, from the brightest on.
+const LAMPS: usize = 4;
+
+/// Share of the way to the wall behind at which the camera stands.
+const BEFORE_WALL: f32 = 0.92;
+
+/// Distance of a lamp's rays from its surface, over the scene's diagonal.
+const CLEARANCE: f32 = 1e-4;
+
+/// Steps from the middle of the scene's bounding box to other places, in its sides.
+const STEPS: [f32; 3] = [0.0, 0.2, -0.2];
+
+/// View of a scene without cameras.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Framed {
+    FromFront,
+    FromInside,
+}
+
+/// Place and level direction of a view along the greatest free length of a closed room; `None` for a scene
+/// that is none, or that no lamp of its own lights from inside.
+pub(super) fn view(scene: &Scene) -> Option<(Vec3, Vec3)> {
+    if scene.triangles.len() > MAX_TRIANGLES || !lamps(scene).into_iter().any(|lamp| is_enclosed(scene, lamp))
+    {
+        return None;
+    }
+    let (low, high) = scene.bounds();
+    let (centre, size) = ((low + high) * 0.5, high - low);
+    let place = |x, z| centre + Vec3::new(x, 0.0, z) * size;
+    let mut places = STEPS.into_iter().flat_map(|x| STEPS.into_iter().map(move |z| place(x, z)));
+    let place = places.find(|place| is_enclosed(scene, (*place, None)))?;
+    let lengths = [Vec3::Z, Vec3::X, Vec3::NEG_Z, Vec3::NEG_X]
+        .map(|back| (back, distance(scene, place, back).unwrap_or(0.0)));
+    // Of equal lengths the first: a camera of glTF looks along -z.
+    let (back, length) = lengths.into_iter().reduce(|a, b| if b.1 > a.1 { b } else { a })?;
+    Some((place + back * (BEFORE_WALL * length), -back))
+}
+
+/// A place, and the side of the surface that it is on.
+type Lamp = (Vec3, Option<Vec3>);
+
+/// Places of the brightest lamps.
+fn lamps(scene: &Scene) -> Vec<Lamp> {
+    let mut lamps = Vec::new();
+    for light in &scene.lights {
+        match light.kind {
+            PunctualKind::Point { position } | PunctualKind::Spot { position, .. } => {
+                lamps.push((light.intensity.max_element(), (position, None)));
+            }
+            PunctualKind::Directional { .. } => {}
+        }
+    }
+    let (low, high) = scene.bounds();
+    let clearance = CLEARANCE * low.distance(high);
+    for triangle in &scene.triangles {
+        let Some(material) = scene.materials.get(triangle.material as usize) else { continue };
+        let Some(normal) = triangle.scaled_normal().try_normalize().filter(|_| material.is_emissive()) else {
+            continue;
+        };
+        let centre = triangle.vertices.into_iter().sum::<Vec3>() / 3.0;
+        let power = triangle.area() * material.emission.max_element();
+        lamps.push((power, (centre + normal * clearance, Some(normal))));
+    }
+    lamps.sort_by(|a, b| b.0.total_cmp(&a.0));
+    lamps.into_iter().take(LAMPS).map(|(_, lamp)| lamp).collect()
+}
+
+/// Returns whether surfaces are seen all around, and not mainly the backs of one-sided ones.
+fn is_enclosed(scene: &Scene, (place, side): Lamp) -> bool {
+    let directions = (0..DIRECTIONS).map(direction);
+    let directions: Vec<Vec3> =
+        directions.filter(|direction| side.is_none_or(|side| direction.dot(side) > 0.0)).collect();
+    let (mut open, mut backs) = (0, 0);
+    for direction in &directions {
+        match nearest(scene, place, *direction) {
+            None => open += 1,
+            Some((_, triangle)) => {
+                let material = scene.materials.get(triangle.material as usize);
+                let is_one_sided = material.is_some_and(|material| !material.double_sided);
+                backs += usize::from(is_one_sided && triangle.scaled_normal().dot(*direction) > 0.0);
+            }
+        }
+        if open > MAX_OPEN {
+            return false;
+        }
+    }
+    2 * backs < directions.len()
+}
+
+/// Directions of a spiral over the sphere, evenly spread.
+fn direction(index: u32) -> Vec3 {
+    let y = 1.0 - (2.0 * index as f32 + 1.0) / DIRECTIONS as f32;
+    let golden = std::f32::consts::PI * (3.0 - libm::sqrtf(5.0));
+    let (sine, cosine) = libm::sincosf(golden * index as f32);
+    let radius = libm::sqrtf(1.0 - y * y);
+    Vec3::new(radius * cosine, y, radius * sine)
+}
+
+fn distance(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<f32> {
+    nearest(scene, origin, direction).map(|(distance, _)| distance)
+}
+
+/// The nearest triangle of a ray, and its distance.
+fn nearest(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<(f32, &Triangle)> {
+    let hits = scene.triangles.par_iter().with_min_len(4096).enumerate();
+    let hits = hits.filter_map(|(index, triangle)| Some((hit(triangle, origin, direction)?, index)));
+    let (distance, index) = hits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))?;
+    Some((distance, scene.triangles.get(index)?))
+}
+
+/// Distance of a triangle along a ray (Möller and Trumbore 1997).
+fn hit(triangle: &Triangle, origin: Vec3, direction: Vec3) -> Option<f32> {
+    let [a, b, c] = triangle.vertices;
+    let (ab, ac) = (b - a, c - a);
+    let p = direction.cross(ac);
+    let determinant = ab.dot(p);
+    if determinant == 0.0 {
+        return None;
+    }
+    let from = (origin - a) / determinant;
+    let u = from.dot(p);
+    let q = from.cross(ab);
+    let (v, distance) = (direction.dot(q), ac.dot(q));
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some(distance)
+}

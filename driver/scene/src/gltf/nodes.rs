@@ -1,0 +1,228 @@
+//! Nodes of a scene: world transforms, and conversion of their meshes, lights and cameras.
+
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+use glam::DMat4;
+
+use super::accessor::Source;
+use super::animation::Poses;
+use super::camera::CameraPlacer;
+use super::document::Document;
+use super::extent::Anchor;
+use super::instances::Instances;
+use super::light::LightPlacer;
+use super::mesh::MeshPlacer;
+use super::notices::Notices;
+use super::pose::Pose;
+use super::room::Room;
+use super::skin::Skin;
+use super::transform;
+use crate::error::SceneError;
+use crate::{Camera, LightUnits, Scene};
+
+/// Maximum depth of the node hierarchy.
+const MAX_DEPTH: usize = 1024;
+
+/// Adds the meshes, lights and cameras of the scene's nodes in their poses; the lights are stated in `units`. The anchor of the scene at
+/// rest is found once.
+///
+/// All triangles are counted before the first is added.
+pub(super) fn place(
+    source: &Source<'_>,
+    poses: &Poses,
+    units: LightUnits,
+    anchor: &OnceLock<Anchor>,
+    scene: &mut Scene,
+    room: &mut Room,
+    notices: &mut Notices,
+) -> Result<(), SceneError> {
+    let document = source.document;
+    let nodes = walk(document, poses, None)?;
+    let mut placer = Placer {
+        source,
+        poses,
+        meshes: MeshPlacer::new(source),
+        cameras: CameraPlacer::new(document),
+        lights: LightPlacer::new(document, units),
+        skins: BTreeMap::new(),
+        worlds: Vec::new(),
+    };
+    nodes.iter().try_for_each(|(index, _)| placer.count(*index, scene))?;
+    placer.meshes.check_room(room)?;
+    let nodes = walk(document, poses, Some(placer.anchor(anchor, scene)?))?;
+    placer.worlds = vec![None; document.root.nodes.len()];
+    nodes.iter().for_each(|&(index, world)| placer.worlds[index] = Some(world));
+    nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))?;
+    notices.not_finite = placer.meshes.not_finite;
+    Ok(())
+}
+
+/// Cameras of the scene's nodes in their poses.
+pub(super) fn cameras(
+    document: &Document,
+    poses: &Poses,
+    anchor: Option<&Anchor>,
+) -> Result<Vec<Camera>, SceneError> {
+    let mut placer = CameraPlacer::new(document);
+    let (mut scene, mut notices) = (Scene::default(), Notices::default());
+    for (index, world) in walk(document, poses, anchor)? {
+        if let Some(camera) = document.root.nodes[index].camera {
+            placer.place(camera.value(), index, &world, &mut scene, &mut notices)?;
+        }
+    }
+    Ok(scene.cameras)
+}
+
+struct Placer<'a> {
+    source: &'a Source<'a>,
+    poses: &'a Poses,
+    meshes: MeshPlacer<'a>,
+    cameras: CameraPlacer<'a>,
+    lights: LightPlacer<'a>,
+    skins: BTreeMap<usize, Skin>,
+    /// World transforms; `None` for nodes that are not in the scene.
+    worlds: Vec<Option<DMat4>>,
+}
+
+impl<'a> Placer<'a> {
+    /// Counts the triangles of a node.
+    fn count(&mut self, index: usize, scene: &mut Scene) -> Result<(), SceneError> {
+        let node = &self.source.document.root.nodes[index];
+        let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
+        // Instances are limited by their triangles and primitives; an empty mesh would have no limit.
+        if !self.meshes.has_triangles(mesh, scene)? {
+            return Ok(());
+        }
+        let instances = match node.skin {
+            Some(_) => None,
+            None => Instances::of(self.source, index, node)?,
+        };
+        self.meshes.count(mesh, instances.map_or(1, |instances| instances.count), scene)
+    }
+
+    /// Anchor of the scene at rest.
+    fn anchor<'o>(
+        &mut self,
+        found: &'o OnceLock<Anchor>,
+        scene: &mut Scene,
+    ) -> Result<&'o Anchor, SceneError> {
+        if found.get().is_none() {
+            let nodes = walk(self.source.document, &Poses::new(), None)?;
+            let anchor = Anchor::of(self.source, &mut self.meshes, &nodes, scene)?;
+            return Ok(found.get_or_init(|| anchor));
+        }
+        Ok(found.get_or_init(Anchor::default))
+    }
+
+    fn place(
+        &mut self,
+        index: usize,
+        world: DMat4,
+        scene: &mut Scene,
+        notices: &mut Notices,
+    ) -> Result<(), SceneError> {
+        let document = self.source.document;
+        let node = &document.root.nodes[index];
+        if let Some(mesh) = node.mesh {
+            let weights = self.weights(index, mesh.value());
+            match node.skin {
+                Some(skin) => self.place_skinned((mesh.value(), weights), skin.value(), world, scene)?,
+                None => self.place_mesh((mesh.value(), weights), index, world, scene)?,
+            }
+        }
+        if let Some(camera) = node.camera {
+            self.cameras.place(camera.value(), index, &world, scene, notices)?;
+        }
+        let extensions = node.extensions.as_ref();
+        if let Some(light) = extensions.and_then(|extensions| extensions.khr_lights_punctual.as_ref()) {
+            self.lights.place(light.light.value(), index, &world, scene, notices)?;
+        }
+        Ok(())
+    }
+
+    /// Weights of the morph targets of a node's mesh.
+    fn weights(&self, node: usize, mesh: usize) -> &'a [f32] {
+        let root = &self.source.document.root;
+        let posed = self.poses.get(&node).and_then(|pose| pose.weights.as_ref());
+        let stated = [posed, root.nodes[node].weights.as_ref(), root.meshes[mesh].weights.as_ref()];
+        stated.into_iter().flatten().next().map_or(&[], Vec::as_slice)
+    }
+
+    fn place_mesh(
+        &mut self,
+        (mesh, weights): (usize, &[f32]),
+        node: usize,
+        world: DMat4,
+        scene: &mut Scene,
+    ) -> Result<(), SceneError> {
+        if !self.meshes.has_triangles(mesh, scene)? {
+            return Ok(());
+        }
+        let instances = Instances::of(self.source, node, &self.source.document.root.nodes[node])?;
+        let Some(instances) = instances else {
+            return self.meshes.place(mesh, &Pose::new(world, None, weights), scene);
+        };
+        for instance in 0..instances.count {
+            let local = instances.transform(self.source, instance)?;
+            self.meshes.place(mesh, &Pose::new(world * local, None, weights), scene)?;
+        }
+        Ok(())
+    }
+
+    fn place_skinned(
+        &mut self,
+        (mesh, weights): (usize, &[f32]),
+        skin: usize,
+        world: DMat4,
+        scene: &mut Scene,
+    ) -> Result<(), SceneError> {
+        if !self.skins.contains_key(&skin) {
+            self.skins.insert(skin, Skin::new(self.source, skin, &self.worlds)?);
+        }
+        self.meshes.place(mesh, &Pose::new(world, self.skins.get(&skin), weights), scene)
+    }
+}
+
+/// Nodes of the default scene, or of the first, with their world transforms about the anchor or, for none, the file's origin; each parent
+/// precedes its children.
+fn walk(
+    document: &Document,
+    poses: &Poses,
+    anchor: Option<&Anchor>,
+) -> Result<Vec<(usize, DMat4)>, SceneError> {
+    let root = &document.root;
+    let chosen = root.scene.map_or(0, |scene| scene.value());
+    let Some(chosen) = root.scenes.get(chosen) else {
+        return Err(SceneError::NoScene { file: document.path.clone() });
+    };
+    let mut placed = Vec::new();
+    let mut seen = vec![false; root.nodes.len()];
+    // Stack of nodes with the transform of the parent and the depth.
+    let mut open: Vec<_> = chosen.nodes.iter().rev().map(|node| (node.value(), DMat4::IDENTITY, 0)).collect();
+    while let Some((index, parent, depth)) = open.pop() {
+        let fault = |reason, remedy| Err(document.invalid(format!("nodes[{index}]"), reason, remedy));
+        if std::mem::replace(&mut seen[index], true) {
+            let reason = "the node is reached twice: it has two parents, or is its own descendant";
+            return fault(reason, "give every node one parent; a mesh may be shown by several nodes instead");
+        }
+        if depth > MAX_DEPTH {
+            let reason = format!("the node lies more than {MAX_DEPTH} levels deep");
+            let remedy = "flatten the hierarchy of nodes";
+            return Err(document.invalid(format!("nodes[{index}]"), reason, remedy));
+        }
+        let node = &root.nodes[index];
+        let Some(local) = transform::local(node, poses.get(&index)) else {
+            let reason =
+                "the transform is not finite, or does not keep parallels parallel, or has a zero rotation";
+            return fault(reason, "give the node a finite translation, rotation and scale");
+        };
+        let is_posed = poses.get(&index).is_some_and(|pose| pose.translation.is_some());
+        let placed_local = anchor.map(|anchor| anchor.placed(index, local, is_posed, depth == 0));
+        let world = parent * placed_local.unwrap_or(local);
+        placed.push((index, world));
+        let children = node.children.iter().flatten().rev();
+        open.extend(children.map(|child| (child.value(), world, depth + 1)));
+    }
+    Ok(placed)
+}

@@ -1,0 +1,36 @@
+//! Faults of image files.
+
+use photoncard_picture::allocation::{self, OutOfMemory};
+
+/// Error of an image file: reason and remedy.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Fault {
+    /// Description of the fault.
+    pub(crate) reason: String,
+    /// Remedy.
+    pub(crate) remedy: &'static str,
+    /// True for an image that is beyond a limit, or takes memory that the process cannot have; false for one that cannot be read.
+    pub(crate) is_limit: bool,
+}
+
+const COPY_AGAIN: &str = "export the image again, or copy it again: it is damaged or was cut off on the way";
+
+impl Fault {
+    /// Error of an image whose memory the process cannot have.
+    pub(crate) fn memory(error: OutOfMemory) -> Self {
+        Self {
+            reason: format!("decoding it takes much memory: {error}"),
+            remedy: allocation::REMEDY,
+            is_limit: true,
+        }
+    }
+
+    /// Error of an image that cannot be read, in whatever process.
+    pub(crate) fn unreadable(reason: impl Into<String>, remedy: &'static str) -> Self {
+        Self { reason: reason.into(), remedy, is_limit: false }
+    }
+
+    pub(super) fn damaged(reason: impl std::fmt::Display) -> Self {
+        Self::unreadable(format!("the image cannot be decoded: {reason}"), COPY_AGAIN)
+    }
+}

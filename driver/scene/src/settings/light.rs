@@ -1,0 +1,124 @@
+//! Assignments to lights without extent and to the environment.
+
+use std::ops::RangeInclusive;
+
+use glam::Vec3;
+
+use crate::limits::{BRIGHTEST, EMISSION};
+use crate::out_of_range::every;
+use crate::{Environment, PunctualKind, PunctualLight};
+
+/// Reason and remedy of a value that is not possible.
+pub(super) type Refusal = (&'static str, &'static str);
+
+/// A property of a light that can be set.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum LightProperty {
+    Colour,
+    Intensity,
+    Position,
+}
+
+/// Places, metres: those that a scene's file may state.
+const PLACES: RangeInclusive<f32> = -1e15..=1e15;
+
+impl LightProperty {
+    pub(super) const ALL: [(&str, Self); 3] =
+        [("colour", Self::Colour), ("intensity", Self::Intensity), ("position", Self::Position)];
+}
+
+impl PunctualLight {
+    /// Colour, its greatest channel 1, and intensity of that channel; white for a dark light.
+    pub fn colour(&self) -> (Vec3, f32) {
+        let greatest = self.intensity.max_element();
+        if greatest > 0.0 { (self.intensity / greatest, greatest) } else { (Vec3::ONE, 0.0) }
+    }
+
+    /// Sets a property.
+    ///
+    /// # Errors
+    /// If the light lacks the property, or the value is not possible: the reason and the remedy.
+    pub(super) fn assign(&mut self, property: LightProperty, values: &[f32]) -> Result<(), Refusal> {
+        let (colour, intensity) = self.colour();
+        match (property, values) {
+            (LightProperty::Intensity, &[value]) => {
+                if !(value == 0.0 || EMISSION.contains(&value)) {
+                    return Err(("no light has this intensity", "an intensity is 0, or 1e-20 to 1e20"));
+                }
+                self.intensity = colour * value;
+            }
+            (LightProperty::Intensity, _) => {
+                return Err((
+                    "the intensity is one number",
+                    "set the colour apart, such as bulb.colour=1,0.8,0.6",
+                ));
+            }
+            (LightProperty::Colour, _) => self.intensity = hue(values)? * intensity,
+            (LightProperty::Position, &[x, y, z]) => self.move_to(Vec3::new(x, y, z))?,
+            (LightProperty::Position, _) => {
+                return Err((
+                    "the position is three numbers",
+                    "write X,Y,Z in metres, such as bulb.position=0,2,1",
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn move_to(&mut self, place: Vec3) -> Result<(), Refusal> {
+        if !every(place, |value| PLACES.contains(&value)) {
+            return Err((
+                "the position is not in the scene",
+                "write X,Y,Z in metres, such as bulb.position=0,2,1",
+            ));
+        }
+        match &mut self.kind {
+            PunctualKind::Point { position } | PunctualKind::Spot { position, .. } => *position = place,
+            PunctualKind::Directional { .. } => {
+                return Err((
+                    "the light is a directional one, which comes from infinitely far and has no position",
+                    "set its colour or its intensity",
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A colour whose greatest channel is 1.
+fn hue(values: &[f32]) -> Result<Vec3, Refusal> {
+    let colour = match *values {
+        [red, green, blue] => Vec3::new(red, green, blue),
+        [value, ..] => Vec3::splat(value),
+        [] => Vec3::ZERO,
+    };
+    let greatest = colour.max_element();
+    if every(colour, |value| (0.0..=BRIGHTEST).contains(&value)) && EMISSION.contains(&greatest) {
+        return Ok(colour / greatest);
+    }
+    Err((
+        "no light has this colour",
+        "a colour is r,g,b of 0 or more, not all 0; the intensity 0 turns a light off",
+    ))
+}
+
+impl Environment {
+    /// Sets the factor of the texels.
+    ///
+    /// # Errors
+    /// If the environment would be brighter than any may be: the reason and the remedy.
+    pub(super) fn set_strength(&mut self, values: &[f32]) -> Result<(), Refusal> {
+        let &[strength] = values else {
+            return Err(("the strength is one number", "write environment.strength=2 for twice the map"));
+        };
+        let brightest = self.texels.as_flattened().iter().copied().fold(0.0, f32::max);
+        if !(strength >= 0.0 && (brightest * strength) <= BRIGHTEST && strength <= BRIGHTEST) {
+            return Err((
+                "no environment has this strength",
+                "a strength is a factor of 0 or more, and no radiance is above 1e20",
+            ));
+        }
+        self.strength = strength;
+        Ok(())
+    }
+}

@@ -1,0 +1,213 @@
+//! Files that glTF 2.0 allows although the types of the `gltf` crate do not, and the places of those that it
+//! does not allow.
+
+use photoncard_scene::error::SceneError;
+use photoncard_scene::{Concern, Scene};
+use serde_json::{Value, json};
+
+use crate::support::{glb, load_bytes, load_changed, load_with, push, triangle_bytes, triangle_json};
+
+type Change = fn(&mut Value);
+
+/// Channel of an animation whose target an extension states.
+fn pointer() -> Value {
+    json!({"sampler": 0, "target": {
+        "path": "pointer",
+        "extensions": {"KHR_animation_pointer": {"pointer": "/materials/0/emissiveFactor"}}
+    }})
+}
+
+fn loaded(change: impl FnOnce(&mut Value)) -> Scene {
+    load_changed(change).unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn what_the_schema_allows_is_read_as_its_plain_form() {
+    let plain = loaded(|_| ());
+    let cases: [(&str, Change); 6] = [
+        ("a scene without nodes", |json| {
+            push(json, "scenes", json!({"name": "empty"}));
+        }),
+        ("whole numbers with a fraction", |json| {
+            json["scene"] = json!(0.0);
+            json["nodes"][0]["mesh"] = json!(0.0);
+            json["accessors"][0]["count"] = json!(3.0);
+            json["accessors"][0]["componentType"] = json!(5126.0);
+        }),
+        ("null members", |json| {
+            json["nodes"][0]["children"] = json!(null);
+            json["materials"][0]["doubleSided"] = json!(null);
+            json["accessors"][0]["normalized"] = json!(null);
+        }),
+        ("another path of a node", |json| {
+            let channel = json!({"sampler": 0, "target": {"node": 0, "path": "visibility"}});
+            json["animations"] = json!([{"channels": [channel], "samplers": [{"input": 0, "output": 0}]}]);
+        }),
+        ("an attribute of an extension", |json| {
+            json["meshes"][0]["primitives"][0]["attributes"]["KHR_gaussian_splatting:SCALE"] = json!(0);
+        }),
+        ("a primitive without positions", |json| {
+            let primitives = json["meshes"][0]["primitives"].as_array_mut().unwrap();
+            primitives.push(json!({"attributes": {}}));
+        }),
+    ];
+    for (what, change) in cases {
+        assert_eq!(loaded(change).checksum(), plain.checksum(), "{what}");
+    }
+    // Chunks of all lengths, of which three in four are padded.
+    for generator in ["a", "ab", "abc", "abcd"] {
+        let mut json = triangle_json();
+        json["asset"]["generator"] = json!(generator);
+        let mut padded = glb(json, &triangle_bytes());
+        let end = padded.windows(4).position(|bytes| bytes == b"BIN\0").unwrap() - 4;
+        padded[..end].iter_mut().rev().take_while(|byte| **byte == b' ').for_each(|byte| *byte = 0);
+        assert_eq!(load_bytes("scene.glb", &padded).unwrap().checksum(), plain.checksum(), "{generator}");
+    }
+}
+
+#[test]
+fn channels_of_extensions_are_left_out_and_the_others_stay() {
+    let scene = loaded(|json| {
+        let stays = json!({"sampler": 0, "target": {"node": 1, "path": "translation"}});
+        let samplers = json!([{"input": 0, "output": 0}]);
+        json["animations"] = json!([
+            {"name": "glow", "channels": [pointer()], "samplers": samplers},
+            {"name": "both", "channels": [pointer(), stays], "samplers": samplers}
+        ]);
+        json["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_animation_pointer"));
+    });
+    let said = scene.notices.join("; ");
+    assert!(said.contains("'glow', 'both'") && said.contains("KHR_animation_pointer"), "{said}");
+    // A picture of the scene as it stands plays none.
+    assert_eq!(scene.notices_on(|concern| concern != Concern::Animations), Vec::<&str>::new());
+    let sky = loaded(|json| json["extensionsUsed"] = json!(["EXT_lights_image_based", "EXT_other"]));
+    let alone = sky.notices_on(|concern| concern != Concern::Environment);
+    assert!(sky.notices.len() == 2 && alone.len() == 1 && alone[0].contains("EXT_other"), "{alone:?}");
+    // A path that no extension of its channel defines is a mistake.
+    let mistaken = loaded(|json| {
+        let channel = json!({"sampler": 0, "target": {"node": 0, "path": "rotaton"}});
+        let samplers = json!([{"input": 0, "output": 0}]);
+        json["nodes"][0]["name"] = json!("lid");
+        json["animations"] = json!([{"channels": [pointer(), channel], "samplers": samplers}]);
+    });
+    let said = mistaken.notices.join("; ");
+    let parts = ["none of glTF 2.0", "'rotaton' of node 'lid' (animations[0].channels[1])", "'animation 0'"];
+    assert!(mistaken.notices.len() == 2 && parts.iter().all(|part| said.contains(part)), "{said}");
+    let required = load_changed(|json| json["extensionsRequired"] = json!(["KHR_animation_pointer"]));
+    assert!(matches!(required, Err(SceneError::RequiredExtension { .. })));
+}
+
+#[test]
+fn json_that_violates_the_schema_is_named_by_its_place() {
+    let cases: [(&str, &str, Change); 8] = [
+        ("scene", "invalid type", |json| json["scene"] = json!("first")),
+        ("textures", "no list", |json| json["textures"] = json!({})),
+        ("asset", "version", |json| json["asset"] = json!({})),
+        ("cameras[0]", "znear", |json| json["cameras"][0]["perspective"] = json!({"yfov": 1})),
+        ("nodes[1]", "camera", |json| json["nodes"][1]["camera"] = json!("camera")),
+        ("nodes[0]", "invalid length", |json| json["nodes"][0]["translation"] = json!([1, 2])),
+        ("bufferViews[1]", "byteLength", |json| json["bufferViews"][1] = json!({"buffer": 0})),
+        ("animations[0]", "samplers", |json| json["animations"] = json!([{"channels": [pointer()]}])),
+    ];
+    for (place, part, change) in cases {
+        match load_changed(change) {
+            Err(SceneError::Invalid { location, reason, .. }) => {
+                assert_eq!(location.item, place);
+                assert!(reason.contains(part) || part == "camera", "{place}: {reason}");
+            }
+            other => panic!("{place}: {:?}", other.err()),
+        }
+    }
+    // With and without a number that the crate does not take.
+    for (text, place) in [
+        (r#"{"asset": {"version": "2.0"}, "nodes": [], "nodes": []}"#, "nodes"),
+        (
+            r#"{"asset": {"version": "2.0"}, "scene": 0.0, "nodes": [{"mesh": 0, "mesh": 1}]}"#,
+            "nodes[0].mesh",
+        ),
+    ] {
+        match load_bytes("scene.gltf", text.as_bytes()) {
+            Err(SceneError::Invalid { location, reason, .. }) => {
+                assert!(location.item == place && reason.contains("stands twice"), "{location}: {reason}");
+            }
+            other => panic!("{text}: {:?}", other.err()),
+        }
+    }
+}
+
+#[test]
+fn files_of_other_kinds_are_recognised_with_a_command() {
+    let refused = |name: &str, bytes: &[u8], parts: &[&str]| {
+        let error = load_bytes(name, bytes).err().unwrap_or_else(|| panic!("{name} was loaded"));
+        let SceneError::OtherFormat { what, remedy, .. } = &error else { panic!("{name}: {error}") };
+        let text = format!("{what}; {remedy}");
+        assert!(parts.iter().all(|part| text.contains(part)), "{name}: {text}");
+    };
+    refused("a.blend", b"BLENDER-v405", &["Blender", "blender -b", "export_scene.gltf", "a.glb"]);
+    refused("a b.glb", b"BLENDER17-01v0500", &["Blender", "a b.glb'"]);
+    refused("a.fbx", b"Kaydara FBX Binary  \0", &["FBX", "import_scene.fbx"]);
+    refused("a.obj", b"v 0 0 0\n", &["OBJ", "wm.obj_import"]);
+    refused("a.usda", b"#usda 1.0\n", &["USD", "wm.usd_import"]);
+    refused("a.pbrt", b"Film \"rgb\"\n", &["pbrt", "export glTF"]);
+    refused("a.zip", b"PK\x03\x04..", &["ZIP", "unzip"]);
+    refused("a.card", b"\x89CARD", &["prepared", "--prepared"]);
+    refused("a.glb", b"photoncard prepared scene 9\n{}", &["prepared", "--prepared", "/a.glb"]);
+    refused("a.bin", b"photoncard part 2\n{}\n", &["part of a picture", "photoncard merge", "/a.bin"]);
+    refused("a.part", b"", &["part of a picture", "/a.exr"]);
+    refused("a.exr.partial", b"photoncard partial render 5\n{}\n", &["finished tiles", "/a.exr --resume"]);
+    refused(
+        "a.gltf",
+        br#"{"asset": {"version": "1.0"}, "nodes": {"n": {}}}"#,
+        &["glTF 1.0", "gltf-pipeline", "a.2.glb"],
+    );
+    refused("a.exr", b"\x76\x2f\x31\x01", &["picture", "--environment"]);
+    // Whatever its name, a scene is read.
+    let text = serde_json::to_vec(&triangle_json()).unwrap();
+    let unnamed = load_bytes("scene.obj", &text).unwrap_err();
+    assert!(unnamed.to_string().contains("data.bin"), "{unnamed}");
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |path: &std::path::Path| match photoncard_scene::gltf::load(path) {
+        Err(SceneError::OtherFormat { remedy, .. }) => remedy,
+        other => panic!("{:?}", other.err()),
+    };
+    assert!(refused(folder.path()).contains(".gltf or .glb"));
+    std::fs::write(folder.path().join("room.glb"), "").unwrap();
+    assert!(refused(folder.path()).contains("room.glb"));
+    let address = refused("https://example.org/a/duck.glb?v=1".as_ref());
+    assert!(address.contains("curl -L -o duck.glb 'https://example.org/a/duck.glb?v=1'"), "{address}");
+}
+
+#[test]
+fn an_orthographic_camera_is_refused_where_it_would_be_seen_by() {
+    let flat = |json: &mut Value, node: usize| {
+        let orthographic = json!({"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9});
+        let camera = json!({"name": "flat", "type": "orthographic", "orthographic": orthographic});
+        let camera = push(json, "cameras", camera);
+        json["nodes"][node]["camera"] = json!(camera);
+    };
+    let scene = loaded(|json| flat(json, 0));
+    for name in [None, Some("flat")] {
+        let Err(SceneError::OrthographicCamera { name: found, remedy }) = scene.camera(name) else {
+            panic!("{name:?} is seen by")
+        };
+        assert!(found == "flat" && remedy.contains("'eye'") && remedy.contains("--camera-at"), "{remedy}");
+    }
+    assert_eq!(scene.camera(Some("eye")).unwrap().name, "eye");
+    let behind = loaded(|json| {
+        push(json, "nodes", json!({}));
+        push(&mut json["scenes"][0], "nodes", json!(2));
+        flat(json, 2);
+    });
+    assert_eq!(behind.camera(None).unwrap().name, "eye");
+    let alone = load_with(
+        &{
+            let mut json = triangle_json();
+            flat(&mut json, 1);
+            json
+        },
+        &triangle_bytes(),
+    );
+    let alone = alone.unwrap();
+    assert!(matches!(alone.camera(None), Err(SceneError::OrthographicCamera { .. })));
+    assert!(alone.notices.iter().all(|notice| !notice.contains("framed")), "{:?}", alone.notices);
+}

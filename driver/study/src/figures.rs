@@ -1,0 +1,84 @@
+//! Figures of a run: what made them, those of its studies, and a small measurement that a reader can repeat.
+
+use std::path::Path;
+
+use photoncard_cards::scheduler::GatherOrder;
+use photoncard_picture::choice::Choice;
+use photoncard_picture::output;
+use photoncard_render::PROGRAM;
+use photoncard_shared::image::LAYOUT_VERSION;
+
+use super::error::StudyError;
+use super::laboratory::Laboratory;
+use super::report::{FIGURES, Figure, ReportError, figures_csv, slug};
+use super::scale::Scale;
+
+/// Scene of the check.
+const SCENE: &str = "cornell.gltf";
+/// Scale of the check: a second of work.
+const SCALE: Scale = Scale { side: 64, photons: 20_000, gather_rays: 25, ..Scale::QUICK };
+
+/// Figures of what all other figures depend on: versions of program and card image layout, and bytes of two small renders, to the byte. They
+/// differ from those of a file that another program made.
+///
+/// # Errors
+/// If the scene is missing, or a point cannot be measured or kept.
+pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
+    let orders = [GatherOrder::Naive, GatherOrder::Sort];
+    let points = orders.map(|order| SCALE.whole(SCENE, SCALE.settings(order)));
+    let results = laboratory.measure("check", &points)?;
+    let mut figures = vec![
+        Figure::new("program", "", PROGRAM, ""),
+        Figure::new("card-image-layout", "", LAYOUT_VERSION, ""),
+    ];
+    for (order, point) in orders.iter().zip(&points) {
+        let bytes = |of: fn(&_) -> _| results.traffic(point).tiles.iter().map(of).sum::<u64>();
+        let both = [
+            ("photon-map", bytes(|tile: &super::TileMeasurement| tile.photon_map().dram_bytes)),
+            ("scene", bytes(|tile: &super::TileMeasurement| tile.scene().dram_bytes)),
+        ];
+        let name = |part: &str| format!("check.bytes.{part}.{}", order.name());
+        figures.extend(both.map(|(part, bytes)| Figure::new(name(part), "cornell", bytes, "bytes")));
+    }
+    Ok(figures)
+}
+
+/// Writes the figures of studies into a folder, behind those of the check and the settings that all points share. Those of a trial say so.
+///
+/// # Errors
+/// If the file cannot be written.
+pub(super) fn write(
+    folder: &Path,
+    scale: &Scale,
+    check: Vec<Figure>,
+    studies: impl IntoIterator<Item = Figure>,
+) -> Result<(), StudyError> {
+    let mut figures = check;
+    figures.extend(scale.banner().map(|banner| Figure::new("trial", "", banner, "")));
+    let settings = scale.rows().into_iter();
+    figures
+        .extend(settings.map(|(name, value)| Figure::new(format!("setting.{}", slug(&name)), "", value, "")));
+    figures.extend(studies);
+    let csv = figures_csv(&figures);
+    output::write(&folder.join(FIGURES), csv.as_bytes()).map_err(ReportError::from)?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_says_what_made_it_and_if_it_is_a_trial() {
+        let folder = tempfile::tempdir().unwrap();
+        let figures_of = |scale: &Scale| {
+            let check = vec![Figure::new("program", "", PROGRAM, "")];
+            write(folder.path(), scale, check, [Figure::new("a", "atrium", 2.0, "GB")]).unwrap();
+            std::fs::read_to_string(folder.path().join(FIGURES)).unwrap()
+        };
+        let full = figures_of(&Scale::FULL);
+        assert!(full.contains(&format!("program,,{PROGRAM},,,")) && full.ends_with("a,atrium,2,GB,,\r\n"));
+        assert!(full.contains("setting.photons,,500000,,,") && !full.contains("trial"));
+        assert!(figures_of(&Scale::QUICK).contains("trial,,"));
+    }
+}

@@ -1,0 +1,204 @@
+//! Measurement of the host's work for a frame with other photons: its time, and the lines of the card image that change.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use glam::Vec3;
+use photoncard_cards::session::changed_runs;
+use photoncard_map::pack::{CardImage, PackedScene};
+use photoncard_map::photon_map::{
+    MappedImage, PhotonMapSize, PhotonSettings, PhotonTimes, TracedPhotons, map_photons, map_traced,
+};
+use photoncard_render::{RenderError, RenderSettings};
+use photoncard_scene::Scene;
+use photoncard_shared::address::LINE_BYTES;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::error::StudyError;
+use super::laboratory::{StudyObserver, load_scene};
+use super::store::PointStore;
+
+/// Displacement of lights that move, as a share of the scene's diagonal.
+pub const LIGHT_STEP: f32 = 0.01;
+
+/// Host's work for the photon map of one scene, and what changes by changes of its light.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub struct HostFrame {
+    /// Bytes of the card image.
+    pub image_bytes: u64,
+    /// The photon map in it.
+    pub map: PhotonMapSize,
+    /// Threads that have worked.
+    pub threads: usize,
+    /// Seconds of tracing photons.
+    pub tracing: f64,
+    /// Seconds of building the map and the other sections of the image.
+    pub building: f64,
+    /// Seconds of measuring distances and disc fractions.
+    pub measuring: f64,
+    /// Lines that differ after changes.
+    pub changes: Vec<Changed>,
+}
+
+impl HostFrame {
+    /// Seconds of all its work.
+    pub fn seconds(&self) -> f64 {
+        self.tracing + self.building + self.measuring
+    }
+}
+
+/// Change of a scene's light between two frames.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub enum Change {
+    /// All lights shine half as strongly.
+    Dimmed,
+    /// All lights move by [`LIGHT_STEP`].
+    Moved,
+    /// A share of the photons is traced anew.
+    Replaced(f64),
+}
+
+/// Bytes of lines that differ after a change.
+#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
+pub struct Changed {
+    /// The change.
+    pub change: Change,
+    /// Bytes of all lines that differ.
+    pub bytes: u64,
+    /// Bytes of all lines of the new image.
+    pub of: u64,
+}
+
+/// Measures the host's work, and keeps the results in a [store](super::store).
+pub struct HostBench<'a> {
+    scenes: PathBuf,
+    store: PointStore,
+    pool: ThreadPool,
+    observer: &'a dyn StudyObserver,
+}
+
+impl<'a> HostBench<'a> {
+    /// A bench that keeps results in `folder/points` and reads scenes from the folder `scenes`.
+    ///
+    /// # Errors
+    /// If the folder cannot be made, or the threads cannot be started.
+    pub fn new(
+        folder: &Path,
+        scenes: &Path,
+        threads: Option<usize>,
+        observer: &'a dyn StudyObserver,
+    ) -> Result<Self, StudyError> {
+        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build()?;
+        Ok(Self { scenes: scenes.to_owned(), store: PointStore::open(folder)?, pool, observer })
+    }
+
+    /// Measures a frame of a scene with settings, and changes of it.
+    ///
+    /// # Errors
+    /// If the scene cannot be read, its photons cannot be mapped, the result cannot be kept, or the observer stops the study.
+    pub fn measure(
+        &mut self,
+        file: &str,
+        settings: &RenderSettings,
+        changes: &[Change],
+    ) -> Result<HostFrame, StudyError> {
+        let scene = load_scene(&self.scenes, file)?;
+        let threads = self.pool.current_num_threads();
+        let key = json!({
+            "identity": settings.identity_with(&scene.checksum()), "scene": file, "threads": threads, "changes": changes,
+        });
+        let name = format!("host-{}", file.split('.').next().unwrap_or_default());
+        if let Some(known) = self.store.get(&name, &key) {
+            return Ok(known);
+        }
+        let frame = self.pool.install(|| self.frame(&scene, settings, changes));
+        let frame = frame.map_err(|error| match error {
+            RenderError::Stopped => StudyError::Stopped,
+            error => error.into(),
+        })?;
+        self.store.put(&name, &key, &frame)?;
+        Ok(frame)
+    }
+
+    fn frame(
+        &self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        changes: &[Change],
+    ) -> Result<HostFrame, RenderError> {
+        let go_on = |_| !self.observer.is_stopped();
+        let photons = settings.photon_settings(scene);
+        let start = Instant::now();
+        let packed = PackedScene::new(scene)?;
+        let packing = start.elapsed();
+        let MappedImage { image, times, .. } = map_photons(packed, &photons, &go_on)?;
+        let PhotonTimes { tracing, building, measuring, .. } = times;
+        let changed = |&change: &Change| {
+            let after = self.changed(scene, settings, change)?;
+            Ok(Changed { change, bytes: differing_bytes(&image, &after), of: after.bytes() })
+        };
+        Ok(HostFrame {
+            image_bytes: image.bytes(),
+            map: PhotonMapSize::of(&image),
+            threads: rayon::current_num_threads(),
+            tracing: tracing.as_secs_f64(),
+            building: (packing + building).as_secs_f64(),
+            measuring: measuring.as_secs_f64(),
+            changes: changes.iter().map(changed).collect::<Result<_, RenderError>>()?,
+        })
+    }
+
+    /// Card image after a change.
+    fn changed(
+        &self,
+        scene: &Scene,
+        settings: &RenderSettings,
+        change: Change,
+    ) -> Result<CardImage, RenderError> {
+        let go_on = |_| !self.observer.is_stopped();
+        let photons = settings.photon_settings(scene);
+        let mut after = scene.clone();
+        let mapped = match change {
+            Change::Dimmed => {
+                after.materials.iter_mut().for_each(|material| material.emission *= 0.5);
+                map_photons(PackedScene::new(&after)?, &photons, &go_on)?
+            }
+            Change::Moved => {
+                move_lights(&mut after);
+                map_photons(PackedScene::new(&after)?, &photons, &go_on)?
+            }
+            Change::Replaced(share) => {
+                let packed = PackedScene::new(scene)?;
+                let mut traced = TracedPhotons::new(&packed, &photons, &go_on)?;
+                let others = PhotonSettings { seed: !photons.seed, ..photons };
+                let others = TracedPhotons::new(&packed, &others, &go_on)?;
+                traced.photons = traced.photons.with_replaced(&others.photons, share);
+                map_traced(packed, traced, &photons, &go_on)?
+            }
+        };
+        Ok(mapped.image)
+    }
+}
+
+/// Moves all triangles that emit light.
+fn move_lights(scene: &mut Scene) {
+    let corners = || scene.triangles.iter().flat_map(|triangle| triangle.vertices);
+    let lower = corners().fold(Vec3::INFINITY, Vec3::min);
+    let upper = corners().fold(Vec3::NEG_INFINITY, Vec3::max);
+    let step = Vec3::X * (LIGHT_STEP * lower.distance(upper));
+    let Scene { triangles, materials, .. } = scene;
+    for triangle in triangles {
+        let material = materials.get(triangle.material as usize);
+        if material.is_some_and(|material| material.emission.max_element() > 0.0) {
+            triangle.vertices.iter_mut().for_each(|vertex| *vertex += step);
+        }
+    }
+}
+
+/// Bytes of the lines of `after` that `before` lacks or has otherwise.
+fn differing_bytes(before: &CardImage, after: &CardImage) -> u64 {
+    let differ: usize = changed_runs(before.lines(), after.lines()).iter().map(ExactSizeIterator::len).sum();
+    (differ * LINE_BYTES) as u64
+}

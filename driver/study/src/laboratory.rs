@@ -1,0 +1,328 @@
+//! Measurement of points: finished ones are read from the store, and points of one card image are measured together, so
+//! that photons are traced once for all of them.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use photoncard_map::pack::PackedScene;
+use photoncard_map::photon_map::{MappedImage, check_image, check_packed, map_photons};
+use photoncard_render::RenderError;
+use photoncard_render::emulator::THREAD_STACK;
+use photoncard_scene::Scene;
+use photoncard_scene::gltf;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::error::StudyError;
+use super::measure::{Bench, Measurement};
+use super::point::{ImageKey, Point, Task};
+use super::quality::{Quality, Reference};
+use super::store::PointStore;
+
+/// Observer of a study's progress, which can stop it.
+pub trait StudyObserver: Sync {
+    /// Reports that `done` of a study's `total` points are finished: first, with `is_new` false, those in the store; then each
+    /// that was measured.
+    fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
+
+    /// Reports, as a sentence, the reason why a stored point cannot be used; the point is measured again.
+    fn notice(&self, text: &str);
+
+    /// Returns whether the study should stop as soon as possible.
+    fn is_stopped(&self) -> bool;
+}
+
+/// Result of the measurement of a point, by its [`Task`].
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub enum Outcome {
+    /// Result of [`Task::Traffic`].
+    Traffic(Measurement),
+    /// Result of [`Task::Quality`].
+    Quality(Quality),
+}
+
+/// The outcomes of a study's points.
+#[derive(Debug)]
+pub struct Results(Vec<(Point, Outcome)>);
+
+impl Results {
+    /// The outcomes of points.
+    pub(super) fn new(outcomes: Vec<(Point, Outcome)>) -> Self {
+        Self(outcomes)
+    }
+
+    /// Work and memory traffic of a point.
+    ///
+    /// # Panics
+    /// If the point was not measured, or its task is not [`Task::Traffic`].
+    pub fn traffic(&self, point: &Point) -> &Measurement {
+        match self.find(point) {
+            Some(Outcome::Traffic(measurement)) => measurement,
+            _ => panic!("the traffic of {} was not measured", point.name()),
+        }
+    }
+
+    /// Error of a point's pixels.
+    ///
+    /// # Panics
+    /// If the point was not measured, or its task is not [`Task::Quality`].
+    pub fn quality(&self, point: &Point) -> &Quality {
+        match self.find(point) {
+            Some(Outcome::Quality(quality)) => quality,
+            _ => panic!("the quality of {} was not measured", point.name()),
+        }
+    }
+
+    fn find(&self, point: &Point) -> Option<&Outcome> {
+        self.0.iter().find(|(other, _)| other == point).map(|(_, outcome)| outcome)
+    }
+}
+
+/// Measures points, and keeps their outcomes in a [store](super::store).
+pub struct Laboratory<'a> {
+    scenes: PathBuf,
+    store: PointStore,
+    pool: ThreadPool,
+    observer: &'a dyn StudyObserver,
+    loaded: HashMap<String, LoadedScene>,
+    /// The last point's card image, which the next point may share.
+    last: Option<LastImage>,
+    /// The last reference, which points of other images of the same photons may share.
+    reference: Option<SceneReference>,
+}
+
+struct LoadedScene {
+    scene: Scene,
+    /// [`Scene::checksum`], which stands for the scene's content in keys.
+    digest: String,
+}
+
+struct LastImage {
+    key: ImageKey,
+    scene: Scene,
+    mapped: MappedImage,
+}
+
+/// A reference, and what it depends on besides settings.
+struct SceneReference {
+    scene: String,
+    assignments: Vec<String>,
+    reference: Reference,
+}
+
+impl<'a> Laboratory<'a> {
+    /// A laboratory that keeps finished points in `folder/points` and reads scenes from the folder `scenes`. Each of
+    /// `threads` emulates one chip; `None` is one thread per core.
+    ///
+    /// # Errors
+    /// If the folder cannot be made, or the threads cannot be started.
+    pub fn new(
+        folder: &Path,
+        scenes: &Path,
+        threads: Option<usize>,
+        observer: &'a dyn StudyObserver,
+    ) -> Result<Self, StudyError> {
+        let pool =
+            ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).stack_size(THREAD_STACK).build()?;
+        let store = PointStore::open(folder)?;
+        Ok(Self {
+            scenes: scenes.to_owned(),
+            store,
+            pool,
+            observer,
+            loaded: HashMap::new(),
+            last: None,
+            reference: None,
+        })
+    }
+
+    /// Measures the points that the store does not hold yet, and returns the outcomes of all.
+    ///
+    /// # Errors
+    /// If a scene is missing, a point cannot be measured or kept, or the observer stops the study.
+    pub fn measure(&mut self, study: &str, points: &[Point]) -> Result<Results, StudyError> {
+        let points = sharing_images(points);
+        let total = points.len();
+        let (mut results, mut missing) = (Vec::new(), Vec::new());
+        for point in points {
+            match self.stored(&point)? {
+                Some(outcome) => results.push((point, outcome)),
+                None => missing.push(point),
+            }
+        }
+        self.observer.progress(study, results.len(), total, false);
+        for point in missing {
+            if self.observer.is_stopped() {
+                return Err(StudyError::Stopped);
+            }
+            let outcome = self.measured(&point)?;
+            results.push((point, outcome));
+            self.observer.progress(study, results.len(), total, true);
+        }
+        Ok(Results::new(results))
+    }
+
+    /// Adds a scene of the name, in place of the file in the folder of scenes.
+    pub fn add(&mut self, name: &str, scene: Scene) {
+        let digest = scene.checksum();
+        self.loaded.insert(name.to_owned(), LoadedScene { scene, digest });
+    }
+
+    /// The scene of a file, before a point's assignments.
+    ///
+    /// # Errors
+    /// If the file is missing or cannot be read.
+    fn load(&mut self, file: &str) -> Result<&LoadedScene, StudyError> {
+        if !self.loaded.contains_key(file) {
+            let scene = load_scene(&self.scenes, file)?;
+            self.add(file, scene);
+        }
+        Ok(&self.loaded[file])
+    }
+
+    /// Outcome of a point in the store; `None` if it is to be measured.
+    fn stored(&mut self, point: &Point) -> Result<Option<Outcome>, StudyError> {
+        let key = self.key(point)?;
+        let noticed = self.store.notices().len();
+        let outcome = self.store.get(&point.name(), &key);
+        for notice in &self.store.notices()[noticed..] {
+            self.observer.notice(notice);
+        }
+        Ok(outcome)
+    }
+
+    /// Measures a point, and stores its outcome.
+    fn measured(&mut self, point: &Point) -> Result<Outcome, StudyError> {
+        let outcome = match self.measure_one(point) {
+            Err(StudyError::Render(RenderError::Stopped)) => return Err(StudyError::Stopped),
+            outcome => outcome?,
+        };
+        let key = self.key(point)?;
+        self.store.put(&point.name(), &key, &outcome)?;
+        Ok(outcome)
+    }
+
+    fn key(&mut self, point: &Point) -> Result<Value, StudyError> {
+        Ok(point.key(&self.load(&point.scene)?.digest))
+    }
+
+    fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
+        point.check()?;
+        let last = self.image(point)?;
+        check_image(&last.mapped.image, &point.chip().budget()).map_err(RenderError::from)?;
+        let is_stopped = || self.observer.is_stopped();
+        let bench =
+            Bench { scene: &last.scene, mapped: &last.mapped, pool: &self.pool, is_stopped: &is_stopped };
+        let outcome = match &point.task {
+            Task::Traffic { chip, caches, sample, least_tiles } => {
+                Outcome::Traffic(bench.traffic(&point.settings, *chip, caches, *sample, *least_tiles)?)
+            }
+            &Task::Quality { tiles, reference_rays } => {
+                let known = self.reference.take().filter(|known| known.is_of(point, tiles, reference_rays));
+                let reference = match known {
+                    Some(known) => known,
+                    None => SceneReference::new(&bench, point, tiles, reference_rays)?,
+                };
+                let quality = reference.reference.compare(&bench, &point.settings)?;
+                self.reference = Some(reference);
+                Outcome::Quality(quality)
+            }
+        };
+        self.last = Some(last);
+        Ok(outcome)
+    }
+
+    /// The card image of a point: the last one, if their keys are equal.
+    fn image(&mut self, point: &Point) -> Result<LastImage, StudyError> {
+        let key = point.image_key();
+        if let Some(last) = self.last.take_if(|last| last.key == key) {
+            return Ok(last);
+        }
+        // The previous image is dropped first: two images may not fit into memory.
+        self.last = None;
+        let mut scene = self.load(&point.scene)?.scene.clone();
+        for assignment in &point.assignments {
+            scene.apply(assignment)?;
+        }
+        scene.check_light()?;
+        let packed = PackedScene::new(&scene).map_err(RenderError::from)?;
+        let settings = point.settings.photon_settings(&scene);
+        check_packed(&packed, &settings, &point.chip().budget()).map_err(RenderError::from)?;
+        let go_on = |_| !self.observer.is_stopped();
+        let mapped = self.pool.install(|| map_photons(packed, &settings, &go_on));
+        Ok(LastImage { key, scene, mapped: mapped.map_err(RenderError::from)? })
+    }
+}
+
+impl SceneReference {
+    /// Renders the reference of a point.
+    fn new(bench: &Bench, point: &Point, tiles: usize, rays: u32) -> Result<Self, RenderError> {
+        Ok(Self {
+            scene: point.scene.clone(),
+            assignments: point.assignments.clone(),
+            reference: Reference::new(bench, &point.settings, tiles, rays)?,
+        })
+    }
+
+    fn is_of(&self, point: &Point, tiles: usize, rays: u32) -> bool {
+        self.scene == point.scene
+            && self.assignments == point.assignments
+            && self.reference.is_of(&point.settings, tiles, rays)
+    }
+}
+
+/// The points without duplicates, sorted so that points of one card image follow each other.
+fn sharing_images(points: &[Point]) -> Vec<Point> {
+    let mut images: Vec<(ImageKey, Vec<Point>)> = Vec::new();
+    for point in points {
+        let key = point.image_key();
+        match images.iter_mut().find(|(other, _)| *other == key) {
+            Some((_, sharing)) if sharing.contains(point) => {}
+            Some((_, sharing)) => sharing.push(point.clone()),
+            None => images.push((key, vec![point.clone()])),
+        }
+    }
+    images.into_iter().flat_map(|(_, sharing)| sharing).collect()
+}
+
+/// Loads a scene of the folder `scenes`.
+///
+/// # Errors
+/// If the file is missing or cannot be read.
+pub(super) fn load_scene(scenes: &Path, file: &str) -> Result<Scene, StudyError> {
+    let path = scenes.join(file);
+    if !path.is_file() {
+        return Err(StudyError::NoScene { scene: file.to_owned(), folder: scenes.to_owned() });
+    }
+    Ok(gltf::load(&path)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use photoncard_map::photon_map::PhotonLayout;
+    use photoncard_render::{PhotonMaps, RenderSettings, Schedule};
+
+    fn point(exponent: u32, layout: PhotonLayout, tile: u32) -> Point {
+        Point {
+            scene: "cornell-glossy.gltf".to_owned(),
+            assignments: vec![format!("floor.exponent={exponent}")],
+            settings: RenderSettings {
+                photons: PhotonMaps { layout, ..PhotonMaps::default() },
+                schedule: Schedule { tile: Some(tile), ..Schedule::default() },
+                ..RenderSettings::default()
+            },
+            task: Task::Quality { tiles: 1, reference_rays: 1 },
+        }
+    }
+
+    #[test]
+    fn points_of_one_image_come_together_and_once() {
+        use PhotonLayout::{Jensen, Lines};
+        let [a, b, c, d] =
+            [point(1, Jensen, 16), point(2, Jensen, 16), point(1, Lines, 16), point(1, Jensen, 8)];
+        let points = [a.clone(), b.clone(), c.clone(), d.clone(), a.clone(), b.clone()];
+        assert_eq!(sharing_images(&points), [a, d, b, c]);
+    }
+}

@@ -1,0 +1,131 @@
+//! Studies: measurements of the shipped scenes with one setting varied, reports on them, and predictions for machines
+//! that are not at hand.
+//!
+//! A study is a list of [`Point`]s and a function from their [`Results`] to a [`Report`]. [`run`] measures the points
+//! in a [`Laboratory`], which keeps their outcomes, and writes the report. [`photoncard_render::cost_model`] predicts the chips that a
+//! frame rate takes, [`load_balance`] how evenly tiles load them.
+#![forbid(unsafe_code)]
+
+mod axes;
+mod error;
+mod figures;
+mod host;
+mod index;
+mod laboratory;
+pub mod load_balance;
+mod measure;
+mod point;
+mod provenance;
+mod quality;
+pub mod report;
+mod sample;
+mod scale;
+pub mod store;
+mod studies;
+
+use std::path::{Path, PathBuf};
+
+pub use self::axes::{Axis, AxisError, MAX_POINTS};
+pub use self::error::StudyError;
+pub use self::figures::check;
+pub use self::host::{Change, Changed, HostBench, HostFrame, LIGHT_STEP};
+pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
+pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
+pub use self::point::{ImageKey, Point, Task};
+pub use self::quality::{Quality, Reference, TileError};
+use self::report::{Provenance, Report};
+pub use self::sample::{Estimate, SampleRate, choose};
+pub use self::scale::Scale;
+use self::scale::machine_row;
+pub use self::studies::{Study, Sweep};
+use photoncard_picture::choice::Choice;
+use photoncard_render::cost_model::Machine;
+use photoncard_scene::Scene;
+
+/// Options of [`run`]: the studies, their scale, and the folders they read and write.
+#[derive(Clone, Debug)]
+pub struct StudyOptions {
+    /// The studies, in order.
+    pub studies: Vec<Study>,
+    /// The scale of all studies.
+    pub scale: Scale,
+    /// The folder of the scenes.
+    pub scenes: PathBuf,
+    /// The folder of the reports.
+    pub out: PathBuf,
+    /// True if each report has a folder of its own in [`Self::out`], and an index page links them.
+    pub is_collection: bool,
+    /// Number of threads; `None` for one per core.
+    pub threads: Option<usize>,
+    /// Provenance of the numbers; each report adds its settings.
+    pub provenance: Provenance,
+}
+
+/// Measures and reports the studies, and writes their key figures into [`FIGURES`](report::FIGURES). Finished points are kept in the folder `points` of [`StudyOptions::out`], where a
+/// later run finds them.
+///
+/// # Errors
+/// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops the study.
+pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
+    let mut laboratory = Laboratory::new(&options.out, &options.scenes, options.threads, observer)?;
+    let mut bench = HostBench::new(&options.out, &options.scenes, options.threads, observer)?;
+    let mut reports: Vec<(Study, Report)> = Vec::new();
+    for &study in &options.studies {
+        let results = laboratory.measure(study.name(), &study.points(&options.scale))?;
+        let mut report =
+            study.report(&options.scale, &results, &study.host_frames(&options.scale, &mut bench)?);
+        report.provenance = options.provenance.clone();
+        report.provenance.settings = options.scale.rows();
+        report::write(&folder(options, study), &report)?;
+        reports.push((study, report));
+    }
+    if options.is_collection {
+        index::write(&options.out, options.scale.banner(), &reports, &options.provenance)?;
+    }
+    let check = check(&mut laboratory)?;
+    let figures = reports.into_iter().flat_map(|(_, report)| report.figures);
+    figures::write(&options.out, &options.scale, check, figures)
+}
+
+/// Options of [`run_sweep`].
+pub struct SweepOptions {
+    /// The sweep.
+    pub sweep: Sweep,
+    /// Name of the scene of all points.
+    pub name: String,
+    /// The scene, before a point's assignments.
+    pub scene: Scene,
+    /// The folder of the report.
+    pub out: PathBuf,
+    /// Number of threads; `None` for one per core.
+    pub threads: Option<usize>,
+    /// The machine of the report's times.
+    pub machine: Machine,
+    /// Provenance of the numbers; the report adds its settings.
+    pub provenance: Provenance,
+}
+
+/// Measures and reports a sweep. All points are checked before the first is measured; finished ones are kept as by [`run`].
+///
+/// # Errors
+/// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the sweep.
+pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
+    let SweepOptions { sweep, name, scene, out, threads, machine, mut provenance } = options;
+    for point in sweep.points() {
+        point.check()?;
+        point.settings.camera(&scene)?;
+        let mut materials = Scene { materials: scene.materials.clone(), ..Scene::default() };
+        point.assignments.iter().try_for_each(|assignment| materials.apply(assignment))?;
+    }
+    let mut laboratory = Laboratory::new(&out, Path::new(""), threads, observer)?;
+    laboratory.add(&name, scene);
+    let results = laboratory.measure("sweep", sweep.points())?;
+    provenance.settings.extend(sweep.rows());
+    provenance.settings.push(machine_row(&machine));
+    Ok(report::write(&out, &Report { provenance, ..sweep.report(&name, &results, &machine) })?)
+}
+
+fn folder(options: &StudyOptions, study: Study) -> PathBuf {
+    let out: &Path = &options.out;
+    if options.is_collection { out.join(study.name()) } else { out.to_owned() }
+}

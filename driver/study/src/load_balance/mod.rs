@@ -1,0 +1,242 @@
+//! Load balance of many chips: a simulation of the scheduler over the costs of a picture's tiles.
+//!
+//! Tiles are dealt by [`Scheduler`] itself, under the policy of [`photoncard_cards::session`]: one queue; when the host turns to a
+//! card, it sends as many tiles as the card has free credits; a chip renders its tiles in the order of arrival; a tile
+//! frees its credit when its result is at the host. A chip is done with a tile once it has rendered it: the time to
+//! send the result is the link's.
+//!
+//! Times are whole nanoseconds, and simultaneous events happen in the order of the chips, so that a simulation gives
+//! the same result on every machine.
+
+mod order;
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::time::Duration;
+
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::PIXEL_BYTES;
+
+pub use self::order::TileOrder;
+use photoncard_cards::scheduler::Scheduler;
+use photoncard_picture::sink::FinishedTile;
+use photoncard_picture::sums::SumFormat;
+
+/// Model of the chips' links, all served by one host, one message at a time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinkModel {
+    /// Time that the host takes for one tile command, seconds.
+    pub command_seconds: f64,
+    /// Time that the host takes for one tile's result, pixels and final message, seconds.
+    pub result_seconds: f64,
+    /// Latency of any message, seconds.
+    pub latency_seconds: f64,
+}
+
+/// Number of chips, their credits and their links.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setup {
+    /// Number of chips.
+    pub chips: usize,
+    /// Maximum of unanswered tile commands per chip; [`Budget::tiles`](photoncard_shared::budget::Budget::tiles).
+    pub credits: usize,
+    /// Model of the links.
+    pub link: LinkModel,
+}
+
+/// Error of [`simulate`].
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum LoadBalanceError {
+    /// Error of an empty picture.
+    #[error("there are no tiles to deal; give the cost of one at least")]
+    NoTiles,
+    /// Error of a machine without chips or credits.
+    #[error("{chips} chips of {credits} credits render nothing; give one of each at least")]
+    NoChips {
+        /// Number of chips.
+        chips: usize,
+        /// Maximum of unanswered tile commands per chip.
+        credits: usize,
+    },
+    /// Error of a time that is negative, above [`MAX_SECONDS`] or NaN.
+    #[error("{0} is no time; give seconds from 0 to {MAX_SECONDS}")]
+    Time(f64),
+}
+
+/// Maximum time of a tile or of a message, seconds: sums of nanoseconds stay exact.
+pub const MAX_SECONDS: f64 = 1e9;
+
+/// Result of a simulation. Times are seconds since the host began to deal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Balance {
+    /// Time at which the host has the last result, seconds.
+    pub makespan_seconds: f64,
+    /// Time of all tiles on one chip, without links, seconds.
+    pub work_seconds: f64,
+    /// Time at which each chip is done with its last tile, seconds; 0 for a chip without tiles.
+    pub chip_seconds: Vec<f64>,
+    /// Time that the host spent on messages, seconds.
+    pub host_seconds: f64,
+    /// Maximum number of tiles dealt and unanswered at one time, over all chips.
+    pub most_in_flight: usize,
+    /// Index of the chip that rendered each tile, in the picture's order.
+    pub chip_of_tile: Vec<usize>,
+}
+
+impl Balance {
+    /// Speed-up over one chip without links, `work / makespan`.
+    pub fn speedup(&self) -> f64 {
+        if self.makespan_seconds > 0.0 { self.work_seconds / self.makespan_seconds } else { 1.0 }
+    }
+
+    /// Parallel efficiency, `speedup / chips`: share of the chips' time until the makespan that they spend on
+    /// rendering.
+    pub fn efficiency(&self) -> f64 {
+        self.speedup() / self.chip_seconds.len() as f64
+    }
+
+    /// Idle share, `1 - efficiency`: chips wait for tiles, or for the last chip.
+    pub fn idle_share(&self) -> f64 {
+        1.0 - self.efficiency()
+    }
+
+    /// Time at which the slowest chip is done, seconds.
+    pub fn slowest_chip_seconds(&self) -> f64 {
+        self.chip_seconds.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// Mean over the chips of the time at which they are done, seconds.
+    pub fn mean_chip_seconds(&self) -> f64 {
+        self.chip_seconds.iter().sum::<f64>() / self.chip_seconds.len() as f64
+    }
+}
+
+/// Simulates the dealing of a picture's tiles to chips.
+///
+/// `costs` are the seconds that a chip takes for each tile, in the picture's order.
+///
+/// # Errors
+/// If there are no tiles, no chips or no credits, or a time is negative, above [`MAX_SECONDS`] or no number.
+pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balance, LoadBalanceError> {
+    let &Setup { chips, credits, link } = setup;
+    if costs.is_empty() {
+        return Err(LoadBalanceError::NoTiles);
+    }
+    if chips == 0 || credits == 0 {
+        return Err(LoadBalanceError::NoChips { chips, credits });
+    }
+    let costs: Vec<u128> = costs.iter().map(|&cost| nanoseconds(cost)).collect::<Result<_, _>>()?;
+    let mut simulation = Simulation {
+        scheduler: Scheduler::new(order.tiles(&costs), chips),
+        credits,
+        command: nanoseconds(link.command_seconds)?,
+        result: nanoseconds(link.result_seconds)?,
+        latency: nanoseconds(link.latency_seconds)?,
+        chips: vec![Chip::default(); chips],
+        chip_of_tile: vec![0; costs.len()],
+        costs,
+        results: BinaryHeap::new(),
+        now: 0,
+        busy: 0,
+        most_in_flight: 0,
+    };
+    simulation.run();
+    Ok(simulation.balance())
+}
+
+#[derive(Clone, Copy, Default)]
+struct Chip {
+    /// Tiles dealt and unanswered.
+    tiles: usize,
+    /// Time at which the chip is done with its tiles.
+    done: u128,
+}
+
+/// State of the simulation; times are nanoseconds.
+struct Simulation {
+    scheduler: Scheduler,
+    credits: usize,
+    command: u128,
+    result: u128,
+    latency: u128,
+    costs: Vec<u128>,
+    chips: Vec<Chip>,
+    chip_of_tile: Vec<usize>,
+    /// Queue of results in transit: time of arrival at the host, chip and tile.
+    results: BinaryHeap<Reverse<(u128, usize, u32)>>,
+    /// Time until which the host has worked or waited.
+    now: u128,
+    /// Time that the host has spent on messages.
+    busy: u128,
+    most_in_flight: usize,
+}
+
+impl Simulation {
+    fn run(&mut self) {
+        for chip in 0..self.chips.len() {
+            self.deal(chip);
+        }
+        // A result of a tile dealt later arrives later than the result that frees its credit: the first in the heap is the
+        // next.
+        while let Some(Reverse((arrival, chip, id))) = self.results.pop() {
+            self.now = self.now.max(arrival) + self.result;
+            self.busy += self.result;
+            self.chips[chip].tiles -= 1;
+            self.receive(chip, id);
+            self.deal(chip);
+        }
+    }
+
+    /// Handles the arrival of a result. The scheduler's clock matters only for lost or late cards, of which there are none
+    /// here.
+    fn receive(&mut self, chip: usize, id: u32) {
+        let finished =
+            FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);
+        if let Some(tile) = finished {
+            self.scheduler.answer(chip, tile, Duration::ZERO);
+            self.scheduler.complete(id);
+        }
+    }
+
+    /// Sends tiles to a chip until it has no free credit, as a session does.
+    fn deal(&mut self, chip: usize) {
+        while self.chips[chip].tiles < self.credits {
+            let Some(assignment) = self.scheduler.take(chip, Duration::ZERO) else { break };
+            let id = assignment.tile.id;
+            self.now += self.command;
+            self.busy += self.command;
+            let at = &mut self.chips[chip];
+            at.tiles += 1;
+            at.done = at.done.max(self.now + self.latency) + self.costs[id as usize];
+            self.results.push(Reverse((at.done + self.latency, chip, id)));
+            self.chip_of_tile[id as usize] = chip;
+        }
+        // Each tile that is dealt and unanswered has a result in transit.
+        self.most_in_flight = self.most_in_flight.max(self.results.len());
+    }
+
+    fn balance(self) -> Balance {
+        Balance {
+            makespan_seconds: seconds(self.now),
+            work_seconds: seconds(self.costs.iter().sum()),
+            chip_seconds: self.chips.iter().map(|chip| seconds(chip.done)).collect(),
+            host_seconds: seconds(self.busy),
+            most_in_flight: self.most_in_flight,
+            chip_of_tile: self.chip_of_tile,
+        }
+    }
+}
+
+fn nanoseconds(seconds: f64) -> Result<u128, LoadBalanceError> {
+    if !(0.0..=MAX_SECONDS).contains(&seconds) {
+        return Err(LoadBalanceError::Time(seconds));
+    }
+    Ok((seconds * 1e9).round() as u128)
+}
+
+fn seconds(nanoseconds: u128) -> f64 {
+    nanoseconds as f64 / 1e9
+}
+
+#[cfg(test)]
+mod tests;

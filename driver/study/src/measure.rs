@@ -1,0 +1,256 @@
+//! Measurement of a point: work and memory traffic of a sample of a picture's tiles.
+
+use photoncard_cards::scheduler::tiles;
+use photoncard_firmware::kind::{ChipKind, Large, Micro, Reference};
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::render::RenderJob;
+use photoncard_map::photon_map::{MappedImage, PhotonMapSize};
+use photoncard_render::emulator::contents::Contents;
+use photoncard_render::emulator::direct::{RenderedTile, new_chip, render_tiles, render_tiles_apart};
+use photoncard_render::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use photoncard_render::emulator::whole_frame::{CurveJob, render_along_curve};
+use photoncard_render::emulator::{EmulatedKind, Measured};
+use photoncard_render::{RenderError, RenderSettings};
+use photoncard_scene::Scene;
+use photoncard_shared::address::{STRUCTURES, Structure};
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{FrameParameters, Tile};
+use rayon::ThreadPool;
+use serde::{Deserialize, Serialize};
+
+use super::sample::{Chosen, Estimate, SampleRate, choose};
+
+/// Reads of one structure of card memory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ReadSums {
+    /// Read requests of the chip.
+    pub requests: u64,
+    /// Bytes that the chip requested.
+    pub raw_bytes: u64,
+    /// Bytes that the caches fetched from DRAM.
+    pub dram_bytes: u64,
+}
+
+/// Work and memory traffic of one tile.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TileMeasurement {
+    /// The tile's number in the picture.
+    pub tile: u32,
+    /// The tile's weight: tiles of the picture that it stands for, itself included.
+    pub stands_for: usize,
+    /// Counts of the work.
+    pub counters: Counters,
+    /// Reads of each structure, in the order of [`Structure::ALL`].
+    pub reads: [ReadSums; STRUCTURES],
+    /// Contents of the lines that were read.
+    pub contents: Contents,
+}
+
+/// Work and memory traffic of a point.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Measurement {
+    /// The measured tiles, in the picture's order; a single one for all tiles of a frame that was rendered as a whole.
+    pub tiles: Vec<TileMeasurement>,
+    /// Number of rendered tiles.
+    pub rendered: usize,
+    /// The photon map of the image.
+    pub map: PhotonMapSize,
+}
+
+impl TileMeasurement {
+    fn new(tile: u32, stands_for: usize, counters: Counters, traffic: &MemoryTraffic) -> Self {
+        let reads = Structure::ALL.map(|structure| {
+            let [requested, fetched] = traffic.of(|other| other == structure);
+            ReadSums { requests: requested.requests, raw_bytes: requested.bytes, dram_bytes: fetched.bytes }
+        });
+        Self { tile, stands_for, counters, reads, contents: traffic.contents }
+    }
+
+    /// Reads of the photon map.
+    pub fn photon_map(&self) -> ReadSums {
+        self.sum(Structure::is_photon_map)
+    }
+
+    /// Reads of everything but the photon map.
+    pub fn scene(&self) -> ReadSums {
+        self.sum(|structure| !structure.is_photon_map())
+    }
+
+    /// Reads of one structure.
+    pub fn reads_of(&self, structure: Structure) -> ReadSums {
+        self.sum(|other| other == structure)
+    }
+
+    fn sum(&self, chosen: impl Fn(Structure) -> bool) -> ReadSums {
+        let mut sum = ReadSums::default();
+        for (_, reads) in
+            Structure::ALL.into_iter().zip(&self.reads).filter(|(structure, _)| chosen(*structure))
+        {
+            sum.requests += reads.requests;
+            sum.raw_bytes += reads.raw_bytes;
+            sum.dram_bytes += reads.dram_bytes;
+        }
+        sum
+    }
+}
+
+impl Measurement {
+    /// Estimate of a count's total over the whole picture.
+    pub fn total(&self, count: impl Fn(&TileMeasurement) -> f64) -> Estimate {
+        let sample: Vec<_> = self.tiles.iter().map(|tile| (count(tile), tile.stands_for)).collect();
+        Estimate::of_total(&sample)
+    }
+
+    /// Gathers: searches of the photon map.
+    pub fn gathers(&self) -> Estimate {
+        self.total(|tile| tile.counters.gathers as f64)
+    }
+
+    /// Bytes of the photon map that chips requested.
+    pub fn raw_bytes(&self) -> Estimate {
+        self.total(|tile| tile.photon_map().raw_bytes as f64)
+    }
+
+    /// Bytes of the photon map from DRAM.
+    pub fn photon_map_bytes(&self) -> Estimate {
+        self.total(|tile| tile.photon_map().dram_bytes as f64)
+    }
+
+    /// Bytes of the scene from DRAM.
+    pub fn scene_bytes(&self) -> Estimate {
+        self.total(|tile| tile.scene().dram_bytes as f64)
+    }
+
+    /// Bytes from DRAM, of photon map and scene together.
+    pub fn dram_bytes(&self) -> Estimate {
+        self.total(|tile| (tile.photon_map().dram_bytes + tile.scene().dram_bytes) as f64)
+    }
+}
+
+/// Test bench of emulated chips: a scene, its card image, and the threads that emulate the chips.
+pub struct Bench<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// The scene's card image, with its photon map.
+    pub mapped: &'a MappedImage,
+    /// Threads, one chip each; a thread's stack must hold a chip while it is built.
+    pub pool: &'a ThreadPool,
+    /// Returns whether to stop; polled before each tile.
+    pub is_stopped: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Bench<'_> {
+    /// The parameters of a frame with these settings.
+    ///
+    /// # Errors
+    /// If the settings' camera is not possible in the scene.
+    pub fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
+        let camera = settings.camera(self.scene)?;
+        Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
+    }
+
+    /// Renders tiles, each on a chip of the kind `K` with a new memory that `model` makes, so that every tile begins with empty caches.
+    ///
+    /// # Errors
+    /// If the card image is malformed, or the bench is stopped.
+    pub fn render<'b, K: ChipKind, M: MeasuredMemory>(
+        &'b self,
+        frame: &FrameParameters,
+        tiles: &[Tile],
+        model: &(impl Fn(Lines<'b>) -> M + Sync),
+    ) -> Result<Vec<RenderedTile>, RenderError> {
+        Ok(render_tiles_apart::<K, M>(self.pool, &self.mapped.image, frame, tiles, model, self.is_stopped)?)
+    }
+
+    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or of all if there are several in flight or the order
+    /// is [of the whole frame](photoncard_cards::scheduler::GatherOrder::is_of_whole_frame).
+    ///
+    /// # Errors
+    /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is stopped.
+    pub fn traffic(
+        &self,
+        settings: &RenderSettings,
+        chip: EmulatedKind,
+        caches: &CacheSettings,
+        sample: SampleRate,
+        least_tiles: usize,
+    ) -> Result<Measurement, RenderError> {
+        let frame = self.frame(settings)?;
+        let all = tiles(settings.window(), settings.tile_side(&[chip.budget()]), settings.schedule.order);
+        if settings.schedule.order.is_of_whole_frame() {
+            return self.whole_frame(&frame, &all, caches);
+        }
+        if settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1 {
+            return match chip {
+                EmulatedKind::Reference => self.in_flight::<Reference>(&frame, &all, caches),
+                EmulatedKind::Large => self.in_flight::<Large>(&frame, &all, caches),
+                EmulatedKind::Micro => self.in_flight::<Micro>(&frame, &all, caches),
+            };
+        }
+        let chosen = choose(&all, sample.count(all.len(), least_tiles));
+        let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
+        let model = |memory| Measured::new(caches.over(memory));
+        let rendered = match chip {
+            EmulatedKind::Reference => self.render::<Reference, _>(&frame, &tiles, &model),
+            EmulatedKind::Large => self.render::<Large, _>(&frame, &tiles, &model),
+            EmulatedKind::Micro => self.render::<Micro, _>(&frame, &tiles, &model),
+        }?;
+        let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
+            TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
+        });
+        Ok(Measurement {
+            tiles: measured.collect(),
+            rendered: tiles.len(),
+            map: PhotonMapSize::of(&self.mapped.image),
+        })
+    }
+
+    /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows: what a tile reads depends
+    /// on the tiles that it is in flight with.
+    fn in_flight<K: ChipKind>(
+        &self,
+        frame: &FrameParameters,
+        tiles: &[Tile],
+        caches: &CacheSettings,
+    ) -> Result<Measurement, RenderError> {
+        let (scene, memory) = self.mapped.image.view();
+        let mut memory = Measured::new(caches.over(memory));
+        let mut counters = Counters::ZERO;
+        let mut stopped = (self.is_stopped)();
+        self.pool.install(|| {
+            let mut chip = new_chip::<K>();
+            let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
+            render_tiles(&mut chip, job, tiles, |_, tile| {
+                counters.add(&tile.counters);
+                stopped = (self.is_stopped)();
+                !stopped
+            })
+            .map_err(RenderError::Image)
+        })?;
+        if stopped {
+            return Err(RenderError::Stopped);
+        }
+        Ok(Measurement {
+            tiles: vec![TileMeasurement::new(0, 1, counters, &MeasuredMemory::traffic(&memory))],
+            rendered: tiles.len(),
+            map: PhotonMapSize::of(&self.mapped.image),
+        })
+    }
+
+    fn whole_frame(
+        &self,
+        frame: &FrameParameters,
+        tiles: &[Tile],
+        caches: &CacheSettings,
+    ) -> Result<Measurement, RenderError> {
+        let chips = self.pool.current_num_threads();
+        let job = CurveJob { image: &self.mapped.image, frame, tiles, chips };
+        let outcome = render_along_curve(job, Some(caches), &[], &|_, _| !(self.is_stopped)())?;
+        let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
+        Ok(Measurement {
+            tiles: vec![whole],
+            rendered: tiles.len(),
+            map: PhotonMapSize::of(&self.mapped.image),
+        })
+    }
+}

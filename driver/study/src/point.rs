@@ -1,0 +1,135 @@
+//! Points: single measurements, each with everything that its result depends on.
+
+use photoncard_picture::choice::Choice;
+use photoncard_render::emulator::EmulatedKind;
+use photoncard_render::emulator::memory_model::CacheSettings;
+use photoncard_render::{PhotonMaps, RenderError, RenderSettings};
+use serde_json::{Value, json};
+
+use super::sample::SampleRate;
+
+/// Maximum number of characters of a scene's name in the name of a point's file.
+const MAX_SCENE_NAME: usize = 60;
+
+/// One measurement of a scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// Name of the scene in the laboratory: its file in the folder of scenes.
+    pub scene: String,
+    /// Assignments to the scene's materials, such as `floor.exponent=8`.
+    pub assignments: Vec<String>,
+    /// Settings of the render.
+    pub settings: RenderSettings,
+    /// Quantity that is measured.
+    pub task: Task,
+}
+
+/// Quantity that is measured at a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Task {
+    /// Work and memory traffic of tiles behind caches that are empty when a tile begins.
+    Traffic {
+        /// The kind of chip.
+        chip: EmulatedKind,
+        /// The caches between chip and DRAM.
+        caches: CacheSettings,
+        /// Share of the tiles; [`Hilbert`](photoncard_cards::scheduler::GatherOrder::Hilbert), and several tiles in flight, render the whole frame
+        /// whatever it is.
+        sample: SampleRate,
+        /// Minimum number of tiles, as far as the picture has that many.
+        least_tiles: usize,
+    },
+    /// Error of indirect light against a reference with many more gather rays.
+    Quality {
+        /// Tiles of 16x16 pixels that are compared.
+        tiles: usize,
+        /// Final gather rays per pixel of the reference.
+        reference_rays: u32,
+    },
+}
+
+impl Point {
+    /// Kind of the chips that render the point.
+    pub fn chip(&self) -> EmulatedKind {
+        match self.task {
+            Task::Traffic { chip, .. } => chip,
+            Task::Quality { .. } => EmulatedKind::Reference,
+        }
+    }
+
+    /// Checks the settings against each other and against the kind of chip.
+    ///
+    /// # Errors
+    /// The first setting that is not possible.
+    pub fn check(&self) -> Result<(), RenderError> {
+        let RenderSettings { schedule, .. } = &self.settings;
+        if schedule.order.is_of_whole_frame() && self.chip() != EmulatedKind::Reference {
+            return Err(RenderError::Setting {
+                option: "--order",
+                value: schedule.order.name().to_owned(),
+                reason: format!(
+                    "{} has no room for the gathers of a frame, and only reference chips leave them to the host",
+                    self.chip().name()
+                ),
+                remedy: format!(
+                    "use --card {}, or another --order, such as sort",
+                    EmulatedKind::Reference.name()
+                ),
+            });
+        }
+        self.settings.check()?;
+        self.settings.check_budget(&self.chip().budget())
+    }
+
+    /// Name of the point's file: task, scene and order. Points that differ in other settings share it.
+    pub fn name(&self) -> String {
+        let task = match self.task {
+            Task::Traffic { .. } => "traffic",
+            Task::Quality { .. } => "quality",
+        };
+        let scene = self.scene.split('.').next().unwrap_or_default().chars().take(MAX_SCENE_NAME);
+        let portable = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
+        let scene: String = scene.map(portable).collect();
+        format!("{task}-{scene}-{}", self.settings.schedule.order.name())
+    }
+
+    /// Key of the point in the store: everything that the result depends on. `scene` is the scene's checksum.
+    pub fn key(&self, scene: &str) -> Value {
+        let mut key = json!({
+            "identity": self.settings.identity_with(scene),
+            "work": self.settings.of_work(),
+            "chip": self.chip().budget(),
+            "scene": self.scene,
+            "set": self.assignments,
+        });
+        key["task"] = match &self.task {
+            Task::Traffic { chip: _, caches, sample, least_tiles } => {
+                json!({"traffic": {"caches": caches.to_string(), "sample": sample, "least_tiles": least_tiles}})
+            }
+            Task::Quality { tiles, reference_rays } => {
+                json!({"quality of indirect light": {"tiles": tiles, "reference_rays": reference_rays}})
+            }
+        };
+        key
+    }
+
+    /// Key of the point's card image; points of equal keys share the image.
+    pub fn image_key(&self) -> ImageKey {
+        let RenderSettings { photons, integrator, .. } = &self.settings;
+        ImageKey {
+            scene: self.scene.clone(),
+            assignments: self.assignments.clone(),
+            seed: integrator.seed,
+            photons: photons.clone(),
+        }
+    }
+}
+
+/// Everything that a point's card image depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ImageKey {
+    scene: String,
+    assignments: Vec<String>,
+    seed: u32,
+    photons: PhotonMaps,
+}

@@ -1,0 +1,348 @@
+//! Error of indirect light against a reference with many more gather rays.
+//!
+//! Only the sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels; the
+//! order of the gathers, the tiles, the layout of the photon map and the caches do not. What they change is compared alone: the light that
+//! gather rays bring from the photon map,
+//!
+//! ```text
+//! L_indirect(x, w) = integral of f(x, w', w) L_map(y, -w') cos(theta') dw'
+//! ```
+//!
+//! with `y` the surface that the ray from `x` in the direction `w'` meets, and `L_map` the radiance that photons give it. Direct light has a
+//! noise of its own, that of shadow rays. Gather rays and records of the irradiance cache bring shares of it that depend on the number of
+//! rays, so all lights are put out in the card image: its layer of indirect light is then `L_indirect` by any technique.
+
+use photoncard_cards::scheduler::{GatherOrder, tiles};
+use photoncard_firmware::kind;
+use photoncard_map::photon_map::MappedImage;
+use photoncard_picture::sums::{FilmPixel, SumFormat};
+use photoncard_render::emulator::direct::RenderedTile;
+use photoncard_render::{RenderError, RenderSettings, Schedule};
+use photoncard_shared::message::{Radiance, Sampling, Tile};
+use serde::{Deserialize, Serialize};
+
+use super::measure::Bench;
+use super::sample::choose;
+
+/// Error of indirect light in the pixels of one tile, sums over pixels and channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TileError {
+    /// Number of pixels that are compared.
+    pub pixels: usize,
+    /// Sum of the squared differences from the reference.
+    pub squares: f64,
+    /// Part of [`Self::squares`] that is the reference's own noise: an unbiased estimate.
+    pub noise: f64,
+    /// Sum of the pixels.
+    pub sum: f64,
+    /// Sum of the reference.
+    pub reference: f64,
+}
+
+/// Error of a render's indirect light against a [`Reference`].
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// Errors of the tiles, which have equal weight a pixel.
+    pub tiles: Vec<TileError>,
+}
+
+impl Quality {
+    /// Root mean square error over pixels and channels, over the reference's mean, without the reference's own noise; 0 if that noise is
+    /// more than the difference.
+    pub fn rmse(&self) -> f64 {
+        let TileError { squares, noise, .. } = self.total();
+        self.relative((squares - noise).max(0.0))
+    }
+
+    /// Root mean square of the reference's own noise, over its mean.
+    pub fn reference_noise(&self) -> f64 {
+        self.relative(self.total().noise)
+    }
+
+    /// Mean of the pixels over the mean of the reference; 1 without bias.
+    pub fn mean(&self) -> f64 {
+        let TileError { sum, reference, .. } = self.total();
+        sum / reference
+    }
+
+    /// The error without one of the tiles.
+    #[must_use]
+    pub fn without(&self, tile: usize) -> Self {
+        let others = self.tiles.iter().enumerate().filter(|(index, _)| *index != tile);
+        Self { tiles: others.map(|(_, error)| *error).collect() }
+    }
+
+    fn total(&self) -> TileError {
+        self.tiles.iter().fold(TileError::default(), |sum, tile| TileError {
+            pixels: sum.pixels + tile.pixels,
+            squares: sum.squares + tile.squares,
+            noise: sum.noise + tile.noise,
+            sum: sum.sum + tile.sum,
+            reference: sum.reference + tile.reference,
+        })
+    }
+
+    fn relative(&self, squares: f64) -> f64 {
+        let TileError { pixels, reference, .. } = self.total();
+        let channels = 3.0 * pixels as f64;
+        (squares / channels).sqrt() / (reference / channels)
+    }
+}
+
+/// Side of the tiles that are compared, pixels.
+const TILE: u32 = 16;
+
+/// A pixel of a reference.
+struct ReferencePixel {
+    /// Indirect light, W/(sr m^2).
+    light: [f64; 3],
+    /// Squared noise of the light, an estimate.
+    noise: f64,
+}
+
+/// Reference picture of indirect light by many gather rays, of the pixels that show a lit surface and no emitter.
+///
+/// It is the mean of two renders by `n` and `m` rays with different strata, weighted by rays. If their errors are independent and their variances are
+/// `v / n` and `v / m`, the squared difference of the two is `v (1 / n + 1 / m)` on average, and the variance of their mean
+/// `v / (n + m)`.
+pub struct Reference {
+    /// Settings of the reference render.
+    settings: RenderSettings,
+    /// Pixels of each tile; `None` for a pixel that is left out.
+    tiles: Vec<Vec<Option<ReferencePixel>>>,
+}
+
+/// Rays of the two renders of a reference by `rays` in all. They differ so that their strata do.
+fn halves(rays: u32) -> [u32; 2] {
+    let first = 3 * rays / 8;
+    [first, rays - first].map(|rays| rays.max(1))
+}
+
+impl Reference {
+    /// Renders `tiles` tiles with `rays` gather rays per pixel by combined sampling, without the irradiance cache, and
+    /// with radiance by density estimation. Eye rays are those of `settings`.
+    ///
+    /// # Errors
+    /// If the settings' camera is not possible in the scene, the card image is malformed, or the bench is stopped.
+    pub fn new(
+        bench: &Bench,
+        settings: &RenderSettings,
+        tiles: usize,
+        rays: u32,
+    ) -> Result<Self, RenderError> {
+        let settings = Self::settings(settings, rays);
+        // Eye rays alone see emission and nothing else.
+        let emitters = settings.clone().with(|s| s.integrator.gather_rays = 0);
+        let emission = emitted(bench, &emitters, tiles)?;
+        let rays = halves(rays);
+        let [first, second] = rays
+            .map(|rays| indirect(bench, &settings.clone().with(|s| s.integrator.gather_rays = rays), tiles));
+        let rendered = first?.into_iter().zip(second?).zip(emission);
+        let tiles = rendered.map(|((first, second), emission)| {
+            let pixels = first.into_iter().zip(second).zip(emission);
+            let of_pixel = |((first, second), emission)| {
+                let pixel = ReferencePixel::new([first, second], rays);
+                let is_lit = pixel.light != [0.0; 3] && emission == [0.0; 3];
+                is_lit.then_some(pixel)
+            };
+            pixels.map(of_pixel).collect()
+        });
+        Ok(Self { tiles: tiles.collect(), settings })
+    }
+
+    /// Returns whether [`Self::new`] would make this reference from photons of the same scene.
+    pub fn is_of(&self, settings: &RenderSettings, tiles: usize, rays: u32) -> bool {
+        self.tiles.len() == tiles && self.settings == Self::settings(settings, rays)
+    }
+
+    /// Settings of the reference for a render with `settings`.
+    fn settings(settings: &RenderSettings, rays: u32) -> RenderSettings {
+        comparable(settings).with(|s| {
+            s.photons.radiance = Radiance::Density;
+            s.integrator.gather_rays = rays;
+            s.integrator.sampling = Sampling::Product;
+            s.integrator.irradiance_error = None;
+        })
+    }
+
+    /// Renders the reference's tiles with `settings`, and returns their error.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn compare(&self, bench: &Bench, settings: &RenderSettings) -> Result<Quality, RenderError> {
+        let rendered = indirect(bench, &comparable(settings), self.tiles.len())?;
+        let tiles = self.tiles.iter().zip(rendered);
+        Ok(Quality { tiles: tiles.map(|(reference, pixels)| error(reference, &pixels)).collect() })
+    }
+}
+
+impl ReferencePixel {
+    /// The mean of two renders by these numbers of rays, and its noise.
+    fn new(lights: [[f64; 3]; 2], rays: [u32; 2]) -> Self {
+        let [first, second] = lights;
+        let share = f64::from(rays[0]) / f64::from(rays[0] + rays[1]);
+        let light = [0, 1, 2].map(|i| share * first[i] + (1.0 - share) * second[i]);
+        let difference: f64 = first.iter().zip(second).map(|(first, second)| (first - second).powi(2)).sum();
+        Self { light, noise: share * (1.0 - share) * difference }
+    }
+}
+
+/// Error of a tile's pixels.
+fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileError {
+    let mut error = TileError::default();
+    for (reference, pixel) in reference.iter().zip(pixels) {
+        let Some(ReferencePixel { light, noise }) = reference else { continue };
+        error.pixels += 1;
+        error.noise += noise;
+        for (reference, value) in light.iter().zip(pixel) {
+            error.squares += (value - reference).powi(2);
+            error.sum += value;
+            error.reference += reference;
+        }
+    }
+    error
+}
+
+/// `settings` with tiles, order and queues replaced, which do not change pixels, and without shadow rays, which bring no indirect light:
+/// the fastest order.
+fn comparable(settings: &RenderSettings) -> RenderSettings {
+    let mut comparable = RenderSettings {
+        schedule: Schedule {
+            tile: Some(TILE),
+            order: GatherOrder::Sort,
+            bins: None,
+            queue: None,
+            in_flight: None,
+            focus: None,
+            part: None,
+            keep_records: false,
+        },
+        ..settings.clone()
+    };
+    comparable.integrator.shadow_rays = 0;
+    comparable
+}
+
+/// Colours of the pixels of tiles, W/(sr m^2).
+type TilePixels = Vec<Vec<[f64; 3]>>;
+
+/// Indirect light in `count` tiles: the scene's photons with its lights out.
+fn indirect(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<TilePixels, RenderError> {
+    let MappedImage { image, max_distance, caustics, paths, guiding, times } = bench.mapped;
+    let (max_distance, caustics) = (*max_distance, *caustics);
+    let image = image.without_emission();
+    let dark = MappedImage { image, max_distance, caustics, paths: *paths, guiding: *guiding, times: *times };
+    let bench = Bench { mapped: &dark, ..*bench };
+    pixels(&bench, settings, true, count, |pixel| pixel.layers.indirect)
+}
+
+/// Visible emission in `count` tiles, by settings without gather rays and shadow rays.
+fn emitted(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<TilePixels, RenderError> {
+    pixels(bench, settings, false, count, |pixel| pixel.pixel.radiance)
+}
+
+/// Pixels of `count` tiles, by a function of their values in a frame without or with layers.
+fn pixels(
+    bench: &Bench,
+    settings: &RenderSettings,
+    layers: bool,
+    count: usize,
+    light: impl Fn(&FilmPixel) -> [f32; 3],
+) -> Result<TilePixels, RenderError> {
+    let mut frame = bench.frame(settings)?;
+    frame.layers = layers;
+    let chosen = choose(&tiles(settings.window(), TILE, settings.schedule.order), count);
+    let chosen: Vec<Tile> = chosen.into_iter().map(|chosen| chosen.tile).collect();
+    let format = SumFormat::new(&bench.mapped.image.view().0.header, &frame);
+    let rendered = bench.render::<kind::Reference, _>(&frame, &chosen, &|memory| memory)?;
+    let of_tile =
+        |tile: &RenderedTile| tile.pixels(format).map(|pixel| light(&pixel).map(f64::from)).collect();
+    Ok(rendered.iter().map(of_tile).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use rayon::{ThreadPool, ThreadPoolBuilder};
+
+    use photoncard_map::pack::PackedScene;
+    use photoncard_map::photon_map::map_photons;
+    use photoncard_render::emulator::THREAD_STACK;
+    use photoncard_render::{Integrator, PhotonMaps, Picture};
+    use photoncard_scene::{Scene, gltf};
+
+    use super::*;
+
+    /// A small picture of the Cornell box.
+    struct Room {
+        scene: Scene,
+        mapped: MappedImage,
+        pool: ThreadPool,
+        settings: RenderSettings,
+    }
+
+    impl Room {
+        fn new() -> Self {
+            let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/cornell.gltf");
+            let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
+            let settings = RenderSettings {
+                picture: Picture { width: 32, height: 32, ..Picture::default() },
+                photons: PhotonMaps { count: 10_000, neighbors: 30, ..PhotonMaps::default() },
+                integrator: Integrator { gather_rays: 16, ..Integrator::default() },
+                ..RenderSettings::default()
+            };
+            let pool = ThreadPoolBuilder::new().num_threads(2).stack_size(THREAD_STACK).build();
+            let pool = pool.expect("threads start");
+            let packed = PackedScene::new(&scene).expect("packs");
+            let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("maps");
+            Self { scene, mapped, pool, settings }
+        }
+
+        fn bench(&self) -> Bench<'_> {
+            Bench { scene: &self.scene, mapped: &self.mapped, pool: &self.pool, is_stopped: &|| false }
+        }
+    }
+
+    #[test]
+    fn indirect_light_is_the_layer_of_the_lit_scene_where_no_record_mixes_in_direct_light() {
+        let room = Room::new();
+        let layer = |pixel: &FilmPixel| pixel.layers.indirect;
+        let lit = pixels(&room.bench(), &room.settings, true, 4, layer).unwrap();
+        let dark = indirect(&room.bench(), &comparable(&room.settings), 4).unwrap();
+        assert!(dark.iter().flatten().any(|pixel| pixel.iter().all(|channel| *channel > 0.0)));
+        assert!(lit == dark);
+        let cached = room.settings.clone().with(|s| s.integrator.irradiance_error = Some(0.2));
+        let [lit, dark] = [
+            pixels(&room.bench(), &cached, true, 4, layer).unwrap(),
+            indirect(&room.bench(), &comparable(&cached), 4).unwrap(),
+        ];
+        assert!(lit != dark, "records of a lit scene interpolate a share of its direct light");
+    }
+
+    #[test]
+    fn error_falls_with_rays_and_does_not_hold_the_noise_of_the_reference() {
+        let room = Room::new();
+        let error = |rays: u32, of_reference: u32| {
+            let reference = Reference::new(&room.bench(), &room.settings, 4, of_reference).unwrap();
+            let settings = room.settings.clone().with(|s| s.integrator.gather_rays = rays);
+            reference.compare(&room.bench(), &settings).unwrap()
+        };
+        let [few, more] = [error(8, 512), error(64, 512)];
+        assert!(more.rmse() < 0.5 * few.rmse(), "{} {}", few.rmse(), more.rmse());
+        assert!((more.mean() - 1.0).abs() < 0.05, "{}", more.mean());
+        // A noisier reference shows in the difference and not in the error.
+        let rough = error(8, 48);
+        assert!(rough.reference_noise() > 2.0 * few.reference_noise());
+        assert!((rough.rmse() / few.rmse() - 1.0).abs() < 0.1, "{} {}", few.rmse(), rough.rmse());
+    }
+
+    #[test]
+    fn a_tile_can_be_left_out() {
+        let tile = |squares| TileError { pixels: 1, squares, noise: 1.0, sum: 2.0, reference: 3.0 };
+        let quality = Quality { tiles: vec![tile(4.0), tile(13.0)] };
+        assert_eq!(quality.without(1), Quality { tiles: vec![tile(4.0)] });
+        assert!((quality.without(1).rmse() - 1.0).abs() < 1e-12);
+        assert!((quality.rmse() - (15.0_f64 / 6.0).sqrt()).abs() < 1e-12);
+        assert_eq!(Quality { tiles: vec![tile(0.5)] }.rmse(), 0.0);
+        assert!((quality.mean() - 2.0 / 3.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,82 @@
+//! Key figures of studies, for documents and programs: one CSV file, a line a figure.
+
+use super::table::{Cell, Column, Table};
+
+/// File of the key figures of a run.
+pub const FIGURES: &str = "figures.csv";
+
+/// Key figure of a study.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Name of the quantity, unique with [`Self::scene`]; words with hyphens, levels with dots.
+    pub name: String,
+    /// Scene; empty if the figure is of none.
+    pub scene: String,
+    /// Number or text.
+    pub value: Cell,
+    /// Unit of the number; empty if it has none.
+    pub unit: &'static str,
+    /// Ends of its 95 % confidence interval.
+    pub interval: Option<[f64; 2]>,
+}
+
+impl Figure {
+    /// A figure without an interval.
+    pub fn new(name: impl Into<String>, scene: &str, value: impl Into<Cell>, unit: &'static str) -> Self {
+        Self { name: name.into(), scene: scene.to_owned(), value: value.into(), unit, interval: None }
+    }
+
+    /// The figure with the ends of its confidence interval.
+    #[must_use]
+    pub fn within(self, lower: f64, upper: f64) -> Self {
+        Self { interval: Some([lower, upper]), ..self }
+    }
+}
+
+/// The figures as CSV.
+pub(crate) fn figures_csv(figures: &[Figure]) -> String {
+    let heads = ["name", "scene", "value", "unit", "lower", "upper"];
+    let mut table = Table::new("", heads.map(|head| Column::new(head, "")).into());
+    for Figure { name, scene, value, unit, interval } in figures {
+        let [lower, upper]: [Cell; 2] = match interval {
+            Some(ends) => ends.map(Cell::from),
+            None => [Cell::Empty, Cell::Empty],
+        };
+        table.push(vec![
+            name.as_str().into(),
+            scene.as_str().into(),
+            value.clone(),
+            (*unit).into(),
+            lower,
+            upper,
+        ]);
+    }
+    table.to_csv()
+}
+
+/// A name as a part of a figure's: lower case, with a hyphen for each run of other characters than letters, digits and dots.
+pub(crate) fn slug(name: &str) -> String {
+    let is_kept = |c: char| c.is_ascii_alphanumeric() || c == '.';
+    let words = name.split(|c: char| !is_kept(c)).filter(|word| !word.is_empty());
+    words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_lines_in_full_precision() {
+        let figures = [
+            Figure::new("program", "", "photoncard 1", ""),
+            Figure::new("bytes.all", "atrium", 1.0 / 3.0, "GB").within(0.25, 0.5),
+            Figure::new("verdict", "atrium", "pays, \"twice\"", ""),
+            Figure::new("sum", "", 12_u64, "bytes"),
+        ];
+        let expected = "name,scene,value,unit,lower,upper\r\nprogram,,photoncard 1,,,\r\n\
+                        bytes.all,atrium,0.3333333333333333,GB,0.25,0.5\r\n\
+                        verdict,atrium,\"pays, \"\"twice\"\"\",,,\r\nsum,,12,bytes,,\r\n";
+        assert_eq!(figures_csv(&figures), expected);
+        assert_eq!(slug("All techniques, lines; cache error 0.1"), "all-techniques-lines-cache-error-0.1");
+    }
+}

@@ -1,0 +1,287 @@
+//! Stratified sample of a picture's tiles, and estimates of totals from it.
+//!
+//! Tiles are sorted along the Z-order curve of their centres and cut into as many strata (*stretches*) as there are tiles
+//! to choose, of equal size except for one tile. A hash chooses one tile of each stretch, which represents it. The sample
+//! is thus spread over the picture whatever the shape of the tiles, does not alias with regular patterns of the scene, and
+//! is reproducible.
+
+use std::fmt;
+use std::str::FromStr;
+
+use photoncard_firmware::sampler::hash;
+use photoncard_shared::message::Tile;
+use serde::{Deserialize, Serialize};
+
+/// Share of a picture's tiles that is rendered: `1/17`, or `1` for all.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SampleRate {
+    numerator: u32,
+    denominator: u32,
+}
+
+impl SampleRate {
+    /// All tiles.
+    pub const ALL: Self = Self { numerator: 1, denominator: 1 };
+
+    /// The share `numerator / denominator`; `None` unless it is above 0 and at most 1.
+    pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
+        if numerator == 0 || numerator > denominator { None } else { Some(Self { numerator, denominator }) }
+    }
+
+    /// Number of tiles out of `total`: the share, rounded up, or `least` if that is more, but at most `total`.
+    pub fn count(self, total: usize, least: usize) -> usize {
+        let share = (total as u64 * u64::from(self.numerator)).div_ceil(u64::from(self.denominator));
+        (share as usize).max(least).min(total)
+    }
+}
+
+impl fmt::Display for SampleRate {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}/{}", self.numerator, self.denominator)
+    }
+}
+
+impl FromStr for SampleRate {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
+        let rate = numerator.parse().ok().zip(denominator.parse().ok());
+        rate.and_then(|(numerator, denominator)| Self::new(numerator, denominator)).ok_or_else(|| {
+            format!("{text:?} is no share of the tiles; use a fraction above 0 and up to 1, such as 1/17")
+        })
+    }
+}
+
+/// A tile of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Chosen {
+    /// The tile.
+    pub tile: Tile,
+    /// Weight: number of tiles in the stretch that the tile represents.
+    pub stands_for: usize,
+}
+
+/// Chooses `count` of the tiles, spread over the picture, in the picture's order; all if `count` is larger.
+pub fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
+    let count = count.min(tiles.len());
+    let mut sorted = tiles.to_vec();
+    let middle = |tile: &Tile| (2 * tile.x + tile.width, 2 * tile.y + tile.height);
+    sorted.sort_by_key(|tile| {
+        let (x, y) = middle(tile);
+        (spread_bits(x) | spread_bits(y) << 1, tile.id)
+    });
+    let bound = |stretch: usize| stretch * sorted.len() / count;
+    let mut chosen: Vec<Chosen> = (0..count)
+        .map(|stretch| {
+            let stretch_tiles = &sorted[bound(stretch)..bound(stretch + 1)];
+            let tile = stretch_tiles[hash(stretch as u32) as usize % stretch_tiles.len()];
+            Chosen { tile, stands_for: stretch_tiles.len() }
+        })
+        .collect();
+    chosen.sort_by_key(|chosen| chosen.tile.id);
+    chosen
+}
+
+/// The bits of a number at the even positions of a number of 64 bits, zeros at the odd ones: half of a Morton code.
+fn spread_bits(number: u32) -> u64 {
+    (0..32).map(|bit| (u64::from(number) >> bit & 1) << (2 * bit)).sum()
+}
+
+/// Estimate of a sum over all tiles, with its confidence interval.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Estimate {
+    /// The estimated sum.
+    pub value: f64,
+    /// Half the width of the 95 % confidence interval; 0 if all tiles were rendered.
+    pub half_width: f64,
+}
+
+impl Estimate {
+    /// Estimate of a population's sum from a sample of pairs: value, and weight `w`, the members that it stands for.
+    ///
+    /// The sum of value times weight, `+- t s sqrt(sum w (w - 1))`, with the standard deviation `s` of the `n` values
+    /// and Student's `t` of `n - 1` degrees of freedom. With equal weights that is the interval of a simple random
+    /// sample of a finite population. A sample that is spread over the picture errs less than a random one, so the
+    /// interval is wide rather than narrow. A single value that stands for more than itself has an infinite half-width.
+    pub fn of_total(sample: &[(f64, usize)]) -> Self {
+        let value = sample.iter().map(|&(value, stands_for)| value * stands_for as f64).sum();
+        let spread =
+            sample.iter().map(|&(_, weight)| (weight * weight.saturating_sub(1)) as f64).sum::<f64>();
+        if spread == 0.0 {
+            return Self { value, half_width: 0.0 };
+        }
+        if sample.len() < 2 {
+            return Self { value, half_width: f64::INFINITY };
+        }
+        let count = sample.len() as f64;
+        let mean = sample.iter().map(|(value, _)| value).sum::<f64>() / count;
+        let squares: f64 = sample.iter().map(|(value, _)| (value - mean).powi(2)).sum();
+        let error = (squares / (count - 1.0) * spread).sqrt();
+        Self { value, half_width: students_t(sample.len() - 1) * error }
+    }
+
+    /// The estimate times `factor`, for another unit.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { value: self.value * factor, half_width: self.half_width * factor.abs() }
+    }
+}
+
+/// Ratio of two estimates, with its 95 % confidence interval.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Ratio {
+    /// The ratio.
+    pub value: f64,
+    /// Lower end of the interval.
+    pub lower: f64,
+    /// Upper end of the interval.
+    pub upper: f64,
+}
+
+impl Ratio {
+    /// The ratio of an estimate to itself.
+    pub(super) const ONE: Self = Self { value: 1.0, lower: 1.0, upper: 1.0 };
+
+    /// Ratio of two independent estimates. Its logarithm has the relative half-widths of both and a `further` one, all independent: the
+    /// root of the sum of their squares.
+    pub(super) fn new(numerator: Estimate, denominator: Estimate, further: f64) -> Self {
+        let relative = |estimate: Estimate| estimate.half_width / estimate.value;
+        let spread = relative(numerator).hypot(relative(denominator)).hypot(further).exp();
+        let value = numerator.value / denominator.value;
+        Self { value, lower: value / spread, upper: value * spread }
+    }
+}
+
+/// Half the width of the 95 % confidence interval of a statistic by the jackknife (Tukey 1958), from its values without each one of the
+/// observations; infinite for fewer than two.
+pub(super) fn jackknife_half_width(without_one: &[f64]) -> f64 {
+    if without_one.len() < 2 {
+        return f64::INFINITY;
+    }
+    let count = without_one.len() as f64;
+    let mean = without_one.iter().sum::<f64>() / count;
+    let squares: f64 = without_one.iter().map(|value| (value - mean).powi(2)).sum();
+    students_t(without_one.len() - 1) * (squares * (count - 1.0) / count).sqrt()
+}
+
+/// 97.5 % quantiles of Student's t-distribution of one to ten degrees of freedom.
+const FEW: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
+
+/// The 97.5 % quantile of Student's t-distribution; beyond ten degrees of freedom by the Cornish-Fisher expansion.
+fn students_t(degrees: usize) -> f64 {
+    const Z: f64 = 1.959_964;
+    FEW.get(degrees.wrapping_sub(1)).copied().unwrap_or_else(|| {
+        let degrees = degrees as f64;
+        let first = (Z.powi(3) + Z) / (4.0 * degrees);
+        let second = (5.0 * Z.powi(5) + 16.0 * Z.powi(3) + 3.0 * Z) / (96.0 * degrees * degrees);
+        let third =
+            (3.0 * Z.powi(7) + 19.0 * Z.powi(5) + 17.0 * Z.powi(3) - 15.0 * Z) / (384.0 * degrees.powi(3));
+        Z + first + second + third
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use photoncard_cards::scheduler::{GatherOrder, tiles};
+    use photoncard_picture::film::Window;
+
+    #[test]
+    fn a_share_is_a_fraction_of_some_tiles() {
+        for (text, written) in [("1/17", "1/17"), ("1", "1/1"), ("3/4", "3/4"), ("5/5", "5/5")] {
+            assert_eq!(text.parse::<SampleRate>().unwrap().to_string(), written);
+        }
+        for text in ["0/5", "3/2", "1/0", "0", "2", "", "/", "1/", "a/b", "-1/2", "0.5", "1/2/3"] {
+            let error = text.parse::<SampleRate>().unwrap_err();
+            assert!(error.contains("1/17") && error.contains(&format!("{text:?}")), "{error}");
+        }
+        let rate = SampleRate::new(1, 17).unwrap();
+        assert_eq!([rate.count(1024, 15), rate.count(64, 15), rate.count(4, 15)], [61, 15, 4]);
+    }
+
+    #[test]
+    fn a_sample_is_spread_over_the_picture_whatever_the_shape_of_the_tiles() {
+        let window = Window::full(512, 512);
+        for order in [GatherOrder::Naive, GatherOrder::Sort] {
+            let tiles = tiles(window, 16, order);
+            let chosen = choose(&tiles, 64);
+            assert_eq!(chosen.len(), 64);
+            assert!(chosen.windows(2).all(|pair| pair[0].tile.id < pair[1].tile.id));
+            for quarter in 0..4 {
+                let is_inside = |Chosen { tile, .. }: &&Chosen| tile.x / 256 + tile.y / 256 * 2 == quarter;
+                assert_eq!(chosen.iter().filter(is_inside).count(), 16, "{order:?}");
+            }
+            let all = tiles.iter().map(|&tile| Chosen { tile, stands_for: 1 });
+            assert_eq!(choose(&tiles, tiles.len() + 1), all.collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn the_tiles_of_a_sample_stand_for_all_and_none_counts_for_more_than_its_stretch() {
+        let tiles = tiles(Window::full(100, 70), 16, GatherOrder::Sort);
+        for count in 1..=tiles.len() {
+            let stands_for: Vec<usize> = choose(&tiles, count).iter().map(|tile| tile.stands_for).collect();
+            assert_eq!(stands_for.len(), count);
+            assert_eq!(stands_for.iter().sum::<usize>(), tiles.len());
+            assert!(stands_for.iter().all(|&stands_for| stands_for.abs_diff(tiles.len() / count) <= 1));
+        }
+        let estimate = Estimate::of_total(&[(1.0, 2), (3.0, 1)]);
+        assert_eq!(estimate.value, 5.0);
+    }
+
+    /// Uniform, skewed and two-valued populations, sampled repeatedly in stretches of a shuffled order.
+    #[test]
+    fn the_interval_covers_the_total_of_a_population_as_often_as_it_says() {
+        let uniform = |index: u32| (f64::from(hash(index)) + 0.5) / 4_294_967_296.0;
+        let shapes: [fn(f64) -> f64; 3] = [|u| 5.0 + u, |u| -u.ln(), |u| if u < 0.3 { 0.0 } else { 1.0 }];
+        for (shape, (total, count)) in
+            shapes.into_iter().flat_map(|shape| [(200, 40), (60, 40)].map(|sizes| (shape, sizes)))
+        {
+            let population: Vec<f64> = (0..total as u32).map(|index| shape(uniform(index + 7000))).collect();
+            let sum: f64 = population.iter().sum();
+            let covered = (0..1000_u32).filter(|draw| {
+                let mut order: Vec<usize> = (0..total).collect();
+                order.sort_by_key(|&index| hash(hash(*draw + 1) ^ index as u32));
+                let bound = |stretch: usize| stretch * total / count;
+                let one_of =
+                    |stretch: usize| (population[order[bound(stretch)]], bound(stretch + 1) - bound(stretch));
+                let estimate = Estimate::of_total(&(0..count).map(one_of).collect::<Vec<_>>());
+                (estimate.value - sum).abs() <= estimate.half_width
+            });
+            let share = covered.count() as f64 / 1000.0;
+            assert!((0.91..0.985).contains(&share), "{count} of {total}: {share}");
+        }
+    }
+
+    #[test]
+    fn the_jackknife_of_a_mean_is_its_students_interval() {
+        let values: [f64; 5] = [1.0, 4.0, 2.0, 8.0, 5.0];
+        let sum: f64 = values.iter().sum();
+        let without: Vec<f64> = values.iter().map(|value| (sum - value) / 4.0).collect();
+        let squares: f64 = values.iter().map(|value| (value - sum / 5.0).powi(2)).sum();
+        let expected = 2.776 * (squares / 4.0 / 5.0).sqrt();
+        assert!((jackknife_half_width(&without) - expected).abs() < 1e-12);
+        assert_eq!(jackknife_half_width(&without[..1]), f64::INFINITY);
+    }
+
+    #[test]
+    fn a_ratio_is_as_uncertain_as_all_that_it_is_made_of() {
+        let estimate = |value, relative: f64| Estimate { value, half_width: relative * value };
+        let ratio = Ratio::new(estimate(6.0, 0.3), estimate(2.0, 0.4), 1.2);
+        assert_eq!(ratio.value, 3.0);
+        assert!(((ratio.upper / 3.0).ln() - 1.3).abs() < 1e-12);
+        assert!(((ratio.lower / 3.0).ln() + 1.3).abs() < 1e-12);
+        let exact = Ratio::new(estimate(6.0, 0.0), estimate(2.0, 0.0), 0.0);
+        assert_eq!([exact.lower, exact.upper], [3.0, 3.0]);
+    }
+
+    #[test]
+    fn all_tiles_leave_no_doubt_and_one_tile_all() {
+        assert_eq!(
+            Estimate::of_total(&[(1.0, 1), (2.0, 1), (4.0, 1)]),
+            Estimate { value: 7.0, half_width: 0.0 }
+        );
+        assert_eq!(Estimate::of_total(&[(2.0, 3)]), Estimate { value: 6.0, half_width: f64::INFINITY });
+        assert!((students_t(30) - 2.0423).abs() < 1e-3 && (students_t(11) - 2.201).abs() < 1e-3);
+    }
+}

@@ -1,0 +1,229 @@
+//! Scale of a study: the settings that its renders have in common, and the number of values that it varies them over.
+
+use photoncard_cards::scheduler::GatherOrder;
+use photoncard_firmware::kind::REFERENCE;
+use photoncard_map::photon_map::PhotonLayout;
+use photoncard_picture::choice::Choice;
+use photoncard_render::cost_model::Machine;
+use photoncard_render::emulator::EmulatedKind;
+use photoncard_render::emulator::memory_model::CacheSettings;
+use photoncard_render::{Integrator, PhotonMaps, Picture, RenderSettings, Sampling, Schedule};
+
+use super::point::{Point, Task};
+use super::sample::SampleRate;
+
+/// Side of the dissertation's tiles, pixels.
+pub(super) const TILE: u32 = 16;
+/// Side of the largest tile that the reference chip has room for, pixels.
+pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
+
+/// Settings that all points of a study have in common, and the number of points.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scale {
+    /// Width and height of the picture, pixels.
+    pub side: u32,
+    /// Photons in the map.
+    pub photons: usize,
+    /// Photons that a gather searches for, `k`.
+    pub neighbors: u32,
+    /// Final gather rays per pixel, where the study does not vary them.
+    pub gather_rays: u32,
+    /// Shadow rays per pixel.
+    pub shadow_rays: u32,
+    /// Share of the tiles that is rendered.
+    pub sample: SampleRate,
+    /// Minimum number of tiles that are rendered, as far as the picture has that many.
+    pub least_tiles: usize,
+    /// Tiles of 16x16 pixels that are compared with a reference.
+    pub quality_tiles: usize,
+    /// Final gather rays per pixel of the reference.
+    pub reference_rays: u32,
+    /// True if studies vary their settings over fewer values: [`Self::pick`].
+    pub is_quick: bool,
+    /// The machine of times and numbers of chips.
+    pub machine: Machine,
+}
+
+impl Scale {
+    /// The dissertation's nominal frame.
+    pub const FULL: Self = Self {
+        side: 512,
+        photons: 500_000,
+        neighbors: 100,
+        gather_rays: 100,
+        shadow_rays: 8,
+        sample: SampleRate::ALL,
+        least_tiles: 15,
+        quality_tiles: 48,
+        reference_rays: 1600,
+        is_quick: false,
+        machine: Machine::NOMINAL,
+    };
+    /// A small picture and fewer values, as a trial of the whole.
+    pub const QUICK: Self = Self {
+        side: 128,
+        photons: 60_000,
+        neighbors: 50,
+        gather_rays: 50,
+        shadow_rays: 8,
+        sample: SampleRate::ALL,
+        least_tiles: 15,
+        quality_tiles: 8,
+        reference_rays: 400,
+        is_quick: true,
+        machine: Machine::NOMINAL,
+    };
+
+    /// True if all points share the settings of the dissertation's nominal frame. Only figures of such a scale may stand beside
+    /// published ones.
+    pub fn is_nominal(&self) -> bool {
+        let frame =
+            |scale: &Self| (scale.side, scale.photons, scale.neighbors, scale.gather_rays, scale.shadow_rays);
+        frame(self) == frame(&Self::FULL)
+    }
+
+    /// Mark of figures that are not of the nominal frame; `None` for the others.
+    pub fn banner(&self) -> Option<String> {
+        let Self { side, photons, neighbors, gather_rays, .. } = self;
+        let Self { side: nominal_side, photons: nominal_photons, .. } = Self::FULL;
+        (!self.is_nominal()).then(|| {
+            format!(
+                "Trial, no result: {side}x{side} pixels, {photons} photons, {neighbors} neighbours and {gather_rays} gather rays instead \
+                 of the nominal {nominal_side}x{nominal_side} pixels and {nominal_photons} photons. Published figures are left out, and \
+                 nothing here says anything about them."
+            )
+        })
+    }
+
+    /// This scale with another share of the tiles.
+    pub fn with_sample(self, sample: SampleRate) -> Self {
+        Self { sample, ..self }
+    }
+
+    /// This scale with times and numbers of chips by another machine. No point depends on it.
+    pub fn on(self, machine: Machine) -> Self {
+        Self { machine, ..self }
+    }
+
+    /// The values that a study varies a setting over: `quick` if [`Self::is_quick`], else `full`.
+    pub fn pick<T: Copy>(&self, full: &[T], quick: &[T]) -> Vec<T> {
+        if self.is_quick { quick.to_vec() } else { full.to_vec() }
+    }
+
+    /// Settings without any technique but an order: 16x16 tiles, one in flight, rays by the reflection, Jensen's kd-tree.
+    pub fn settings(&self, order: GatherOrder) -> RenderSettings {
+        RenderSettings {
+            picture: Picture { width: self.side, height: self.side, ..Picture::default() },
+            photons: PhotonMaps {
+                count: self.photons,
+                neighbors: self.neighbors,
+                layout: PhotonLayout::Jensen,
+                ..PhotonMaps::default()
+            },
+            integrator: Integrator {
+                gather_rays: self.gather_rays,
+                shadow_rays: self.shadow_rays,
+                sampling: Sampling::Reflection,
+                ..Integrator::default()
+            },
+            schedule: Schedule { tile: Some(TILE), order, in_flight: Some(1), ..Schedule::default() },
+            ..RenderSettings::default()
+        }
+    }
+
+    /// Settings with everything on: gathers sorted over the largest tiles, combined sampling, the irradiance cache,
+    /// photons in line leaves.
+    pub fn all_on(&self) -> RenderSettings {
+        self.settings(GatherOrder::Sort).with(|s| {
+            s.photons.layout = PhotonLayout::Lines;
+            s.integrator.sampling = Sampling::Product;
+            s.integrator.irradiance_error = Some(IRRADIANCE_ERROR);
+            s.schedule.tile = Some(WIDEST_TILE);
+        })
+    }
+
+    /// [`Self::all_on`] in the dissertation's tiles of 16x16 pixels, of which a frame has enough for many chips.
+    pub fn all_on_in_small_tiles(&self) -> RenderSettings {
+        self.all_on().with(|s| s.schedule.tile = Some(TILE))
+    }
+
+    /// A point that measures the traffic of sampled tiles behind the nominal caches.
+    pub fn traffic(&self, scene: &str, settings: RenderSettings) -> Point {
+        self.traffic_behind(scene, settings, CacheSettings::default())
+    }
+
+    /// A point that measures the traffic of sampled tiles behind `caches`.
+    pub fn traffic_behind(&self, scene: &str, settings: RenderSettings, caches: CacheSettings) -> Point {
+        let chip = EmulatedKind::Reference;
+        let task = Task::Traffic { chip, caches, sample: self.sample, least_tiles: self.least_tiles };
+        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
+    }
+
+    /// A point that measures the traffic of all tiles in flight on one chip of a kind, behind `caches`.
+    pub(super) fn on_one_chip(
+        &self,
+        scene: &str,
+        settings: RenderSettings,
+        chip: EmulatedKind,
+        caches: CacheSettings,
+    ) -> Point {
+        let task = Task::Traffic { chip, caches, sample: SampleRate::ALL, least_tiles: self.least_tiles };
+        Point { task, ..self.traffic_behind(scene, settings, caches) }
+    }
+
+    /// A point that measures the traffic of all tiles behind the nominal caches.
+    pub fn whole(&self, scene: &str, settings: RenderSettings) -> Point {
+        Self { sample: SampleRate::ALL, ..self.clone() }.traffic(scene, settings)
+    }
+
+    /// A point that measures the error of [`Self::quality_tiles`] tiles.
+    pub fn quality(&self, scene: &str, settings: RenderSettings) -> Point {
+        let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
+        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
+    }
+
+    /// Settings that all points share, as names and values for a report's provenance.
+    pub fn rows(&self) -> Vec<(String, String)> {
+        let settings = self.settings(GatherOrder::Sort);
+        let rows = [
+            (
+                "picture",
+                format!("{0}x{0} pixels, 1 sample each, seed {1}", self.side, settings.integrator.seed),
+            ),
+            ("photons", self.photons.to_string()),
+            ("photons a gather looks for", self.neighbors.to_string()),
+            ("gather rays a pixel", self.gather_rays.to_string()),
+            ("shadow rays a pixel", self.shadow_rays.to_string()),
+            ("tiles", format!("{TILE}x{TILE} pixels; in the naive order rows of as many pixels")),
+            ("sampling of gather rays", "brdf, unless said otherwise".to_owned()),
+            ("photon map", format!("{}, unless said otherwise", settings.photons.layout.name())),
+            ("error of the irradiance cache, where it is on", IRRADIANCE_ERROR.to_string()),
+            ("caches, unless said otherwise", CacheSettings::default().to_string()),
+            ("share of the tiles rendered", format!("{}, at least {}", self.sample, self.least_tiles)),
+            ("caches at a tile's begin", "empty".to_owned()),
+            ("tiles in flight, unless said otherwise", "1".to_owned()),
+        ]
+        .map(|(name, value)| (name.to_owned(), value));
+        rows.into_iter().chain([machine_row(&self.machine)]).collect()
+    }
+
+    /// Gathers of a frame in which every gather ray of every pixel ends in one, `side^2 N_FG`: 26.2 million at the
+    /// nominal values.
+    pub fn nominal_gathers(&self) -> f64 {
+        f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
+    }
+}
+
+/// Machine of a report's times and numbers of chips, as a name and a value for its provenance.
+pub(super) fn machine_row(machine: &Machine) -> (String, String) {
+    let Machine { link, tasks, .. } = machine;
+    let value = format!(
+        "{machine}, reads of {} ns, {tasks} tasks in flight of each unit; host link of {} GB/s each way",
+        machine.latency_ns(),
+        link / 1e9
+    );
+    ("chip that times are of".to_owned(), value)
+}
+
+/// The dissertation's error bound of the irradiance cache, as figure 6.17 seems to state it.
+pub(super) const IRRADIANCE_ERROR: f32 = 0.025;

@@ -1,0 +1,118 @@
+//! Strip of the picture that shows the floor alone.
+//!
+//! The rest of the picture hardly changes with the floor's exponent, and flattens every line.
+
+use photoncard_picture::film::Window;
+
+use super::super::super::laboratory::Results;
+use super::super::super::point::{Point, Task};
+use super::super::super::report::{Block, Figure, Table, slug};
+use super::super::super::sample::{Estimate, SampleRate};
+use super::super::super::scale::Scale;
+use super::super::present::{columns, gigabytes, key, say, table, text};
+use super::super::scenes::GLOSSY;
+use super::line::{self, LINES, Line, change, exponents, line_name, spread};
+
+/// Height of the strip at the picture's lower edge, as a divisor of the picture's.
+const DIVISOR: u32 = 32;
+/// Maximum of greatest over least of a curve that is called nearly flat here.
+const NEARLY_FLAT: f64 = 1.1;
+
+/// All tiles of the strip, without the irradiance cache.
+fn point(scale: &Scale, line: Line, exponent: u32) -> Point {
+    let Point { scene, assignments, mut settings, mut task } = line::point(scale, line, false, exponent);
+    let full = Window::full(scale.side, scale.side);
+    settings.picture.crop = Some(Window { y0: scale.side - scale.side / DIVISOR, ..full });
+    if let Task::Traffic { sample, .. } = &mut task {
+        *sample = SampleRate::ALL;
+    }
+    Point { scene, assignments, settings, task }
+}
+
+pub(super) fn points(scale: &Scale) -> Vec<Point> {
+    let at = |exponent| LINES.map(|line| point(scale, line, exponent));
+    exponents(scale).into_iter().flat_map(at).collect()
+}
+
+/// Bytes of the photon map from DRAM at each exponent.
+fn curve(scale: &Scale, results: &Results, line: Line) -> Vec<Estimate> {
+    let of = |exponent| results.traffic(&point(scale, line, exponent)).photon_map_bytes();
+    exponents(scale).into_iter().map(of).collect()
+}
+
+pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
+    let (first, last) = ends(scale);
+    let first = format!("n = {first}");
+    let last = format!("n = {last}");
+    let heads = [
+        ("line", ""),
+        (first.as_str(), "GB"),
+        (last.as_str(), "GB"),
+        ("last over first", ""),
+        ("greatest over least", ""),
+    ];
+    let rows = scale.side / DIVISOR;
+    let title = format!("Photon map from DRAM of the lowest {rows} rows, which show the floor alone");
+    let mut flatness = Table::new(title, columns(&heads));
+    for line in LINES {
+        let curve = curve(scale, results, line);
+        let [first, last] = [curve.first(), curve.last()].map(|value| value.copied().unwrap_or_default());
+        flatness.push(vec![
+            line_name(line).into(),
+            gigabytes(first),
+            gigabytes(last),
+            change(&curve).into(),
+            spread(&curve).into(),
+        ]);
+    }
+    vec![text(verdict(scale, results)), table("floor-alone", flatness)]
+}
+
+/// First and last exponent.
+fn ends(scale: &Scale) -> (u32, u32) {
+    let exponents = exponents(scale);
+    let [first, last] = [exponents.first(), exponents.last()].map(|end| end.copied().unwrap_or_default());
+    (first, last)
+}
+
+/// Sentence on which reordered lines are nearly flat over the floor alone.
+fn verdict(scale: &Scale, results: &Results) -> String {
+    let named = |line| (line_name(line), curve(scale, results, line));
+    let naive = named(LINES[0]).1;
+    // `tiled` is an order of pixels alone: each gather is done when its ray ends.
+    let reordered = LINES.into_iter().filter(|(order, _)| order.has_bins());
+    let (flat, other): (Vec<_>, Vec<_>) =
+        reordered.map(named).partition(|(_, curve)| spread(curve) <= NEARLY_FLAT);
+    let list = |curves: &[(String, Vec<Estimate>)]| {
+        let named = curves.iter().map(|(name, curve)| format!("{name} ({})", say(change(curve))));
+        if curves.is_empty() { "none".to_owned() } else { named.collect::<Vec<_>>().join(", ") }
+    };
+    let (first, last) = ends(scale);
+    let published =
+        if scale.is_nominal() { " The dissertation calls the reordered lines nearly flat." } else { "" };
+    format!(
+        "Bytes of the photon map at n = {last} over those at n = {first}, over the floor alone and without the irradiance cache: \
+         naive {}.{published} Reordered lines within {} % from least to greatest: {}; not: {}.",
+        say(change(&naive)),
+        say(100.0 * (NEARLY_FLAT - 1.0)),
+        list(&flat),
+        list(&other)
+    )
+}
+
+pub(super) fn figures(scale: &Scale, results: &Results) -> Vec<Figure> {
+    let mut figures: Vec<_> = LINES
+        .iter()
+        .flat_map(|&line| {
+            let curve = curve(scale, results, line);
+            let name =
+                |quantity: &str| format!("figure-6.17.{quantity}.floor-alone.{}", slug(&line_name(line)));
+            [
+                Figure::new(name("last-over-first"), key(GLOSSY), change(&curve), ""),
+                Figure::new(name("greatest-over-least"), key(GLOSSY), spread(&curve), ""),
+            ]
+        })
+        .collect();
+    figures.push(Figure::new("figure-6.17.verdict", key(GLOSSY), verdict(scale, results), ""));
+    figures
+}

@@ -1,0 +1,156 @@
+//! Headline figures over the nominal range of photons: naive, exact reordering, and all techniques.
+
+use photoncard_cards::scheduler::GatherOrder;
+use photoncard_map::photon_map::PhotonLayout;
+
+use super::super::laboratory::Results;
+use super::super::point::Point;
+use super::super::report::{Block, Figure, Table, slug};
+use super::super::sample::{Estimate, Ratio};
+use super::super::scale::{Scale, WIDEST_TILE};
+use super::flights::LARGE_IN_FLIGHT;
+use super::present::{GIGA, columns, gigabytes, key, say, table, text};
+use super::scenes::{ATRIUM, CORNELL};
+
+/// A simple and a large scene: file and name in the report.
+const SCENES: [(&str, &str); 2] = [(CORNELL, "Cornell box"), (ATRIUM, "atrium")];
+
+/// Bytes of a gather in the dissertation's naive order.
+const PUBLISHED_GATHER_BYTES: f64 = 14_000.0;
+
+/// A render of a scene by a number of photons.
+type Line = (&'static str, fn(&Scale, &str, usize) -> Point);
+
+const NAIVE: Line = ("naive", |scale, scene, photons| {
+    scale.traffic(scene, scale.settings(GatherOrder::Naive).with(|s| s.photons.count = photons))
+});
+const LINES: [Line; 4] = [
+    NAIVE,
+    ("sort, lines, largest tiles", |scale, scene, photons| {
+        let settings = scale.settings(GatherOrder::Sort).with(|s| {
+            s.photons.count = photons;
+            s.photons.layout = PhotonLayout::Lines;
+            s.schedule.tile = Some(WIDEST_TILE);
+        });
+        scale.traffic(scene, settings)
+    }),
+    ("all techniques", |scale, scene, photons| {
+        scale.traffic(scene, scale.all_on().with(|s| s.photons.count = photons))
+    }),
+    ("all techniques, tiles in flight, large chip", |scale, scene, photons| {
+        LARGE_IN_FLIGHT.point(scale, scene, scale.all_on().with(|s| s.photons.count = photons))
+    }),
+];
+
+/// Photons of the map: in the dissertation's range of 0.5 to 6 million at the nominal scale.
+fn photons(scale: &Scale) -> Vec<usize> {
+    scale.pick(&[1, 4, 12], &[1, 4]).iter().map(|times| times * scale.photons).collect()
+}
+
+/// A line's point at a number of photons, with what names it.
+struct Headline {
+    scene: &'static str,
+    scene_name: &'static str,
+    photons: usize,
+    line: Line,
+}
+
+impl Headline {
+    fn all(scale: &Scale) -> Vec<Self> {
+        let mut all = Vec::new();
+        for (scene, scene_name) in SCENES {
+            for photons in photons(scale) {
+                all.extend(LINES.map(|line| Self { scene, scene_name, photons, line }));
+            }
+        }
+        all
+    }
+
+    fn point(&self, scale: &Scale) -> Point {
+        let (_, point) = self.line;
+        point(scale, self.scene, self.photons)
+    }
+
+    fn bytes(&self, scale: &Scale, results: &Results) -> Estimate {
+        results.traffic(&self.point(scale)).dram_bytes()
+    }
+
+    /// Bytes of the photon map of a gather.
+    fn gather_bytes(&self, scale: &Scale, results: &Results) -> f64 {
+        let measured = results.traffic(&self.point(scale));
+        measured.photon_map_bytes().value / measured.gathers().value
+    }
+
+    /// Ratio of the naive bytes to this line's, by as many photons.
+    fn factor(&self, scale: &Scale, results: &Results) -> Ratio {
+        let naive = Self { line: NAIVE, ..*self };
+        if self.line.0 == NAIVE.0 {
+            return Ratio::ONE;
+        }
+        Ratio::new(naive.bytes(scale, results), self.bytes(scale, results), 0.0)
+    }
+}
+
+pub(super) fn points(scale: &Scale) -> Vec<Point> {
+    Headline::all(scale).iter().map(|headline| headline.point(scale)).collect()
+}
+
+pub(super) fn blocks(scale: &Scale, results: &Results) -> Vec<Block> {
+    let heads = [
+        ("scene", ""),
+        ("photons", ""),
+        ("render", ""),
+        ("from DRAM", "GB"),
+        ("photon map, of a gather", "KB"),
+        ("less than naive", "times"),
+        ("from", "times"),
+        ("to", "times"),
+    ];
+    let title = format!("Photon map and scene from DRAM at {} gather rays", scale.gather_rays);
+    let mut rows = Table::new(title, columns(&heads));
+    for headline in Headline::all(scale) {
+        let factor = headline.factor(scale, results);
+        let mut row = vec![
+            headline.scene_name.into(),
+            headline.photons.into(),
+            headline.line.0.into(),
+            gigabytes(headline.bytes(scale, results)),
+            (headline.gather_bytes(scale, results) / 1e3).into(),
+        ];
+        row.extend([factor.value, factor.lower, factor.upper].map(Into::into));
+        rows.push(row);
+    }
+    let published = if scale.is_nominal() {
+        format!(
+            " The dissertation's 11 TB/s at 30 frames/s are {} KB a gather, of maps in that range.",
+            say(PUBLISHED_GATHER_BYTES / 1e3)
+        )
+    } else {
+        String::new()
+    };
+    vec![
+        text(format!(
+            "All techniques: sort, combined sampling, irradiance cache, photons in leaves that fill a line. Renders with tiles in \
+             flight are whole frames on one large chip, with a scene cache of 128 KB.{published}"
+        )),
+        table("headlines", rows),
+    ]
+}
+
+pub(super) fn figures(scale: &Scale, results: &Results) -> Vec<Figure> {
+    let of = |headline: &Headline| {
+        let bytes = headline.bytes(scale, results).scaled(1.0 / GIGA);
+        let factor = headline.factor(scale, results);
+        let figure = |quantity: &str, value: f64, unit| {
+            let name = format!("scaling.{quantity}.{}.{}", slug(headline.line.0), headline.photons);
+            Figure::new(name, key(headline.scene), value, unit)
+        };
+        [
+            figure("gigabytes", bytes.value, "GB")
+                .within(bytes.value - bytes.half_width, bytes.value + bytes.half_width),
+            figure("factor", factor.value, "times").within(factor.lower, factor.upper),
+            figure("kilobytes-a-gather", headline.gather_bytes(scale, results) / 1e3, "KB"),
+        ]
+    };
+    Headline::all(scale).iter().flat_map(of).collect()
+}

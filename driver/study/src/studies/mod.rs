@@ -1,0 +1,180 @@
+//! The studies: each a list of points, and a report on their outcomes.
+
+mod arithmetic;
+mod balance;
+mod flights;
+mod glossy_floor;
+mod headlines;
+mod interactive;
+mod machine;
+mod overlap;
+mod present;
+mod reordering;
+mod scaling;
+mod scenes;
+mod sweep;
+mod techniques;
+mod times;
+mod workload;
+
+pub use self::sweep::Sweep;
+use super::error::StudyError;
+use super::host::{HostBench, HostFrame};
+use super::laboratory::Results;
+use super::point::Point;
+use super::report::Report;
+use super::scale::Scale;
+use photoncard_picture::choice::choices;
+
+/// A study that the program offers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Study {
+    /// Memory traffic by order, cache and layout.
+    Reordering,
+    /// Memory traffic over the exponent of a glossy floor: figure 6.17 of the dissertation.
+    Figure617,
+    /// The cost model of table 7.1, with nominal and measured counts.
+    Table71,
+    /// Each technique alone and all together, at equal numbers of rays and at equal quality.
+    Techniques,
+    /// Memory traffic over photons, tile sides and queue sizes; time over chips.
+    Scaling,
+    /// Parts of a frame while camera and lights move.
+    Interactive,
+}
+
+choices!(Study {
+    Reordering = "reordering": "Memory traffic by order, cache and layout",
+    Figure617 = "figure-6.17": "Memory traffic over the exponent of a glossy floor",
+    Table71 = "table-7.1": "Chips for a frame rate, by nominal and by measured counts",
+    Techniques = "techniques": "Each technique alone and together, at as many rays and at equal quality",
+    Scaling = "scaling": "Photons, tile sides, queues and chips",
+    Interactive = "interactive": "Parts of a frame while camera and lights move",
+});
+
+impl Study {
+    /// The points that the study measures.
+    pub fn points(self, scale: &Scale) -> Vec<Point> {
+        match self {
+            Self::Reordering => reordering::points(scale),
+            Self::Figure617 => glossy_floor::points(scale),
+            Self::Table71 => machine::points(scale),
+            Self::Techniques => techniques::points(scale),
+            Self::Scaling => scaling::points(scale),
+            Self::Interactive => interactive::points(scale),
+        }
+    }
+
+    /// Measures the host's work that the report needs besides the points.
+    ///
+    /// # Errors
+    /// As [`HostBench::measure`].
+    pub fn host_frames(self, scale: &Scale, bench: &mut HostBench) -> Result<Vec<HostFrame>, StudyError> {
+        match self {
+            Self::Interactive => interactive::host_frames(scale, bench),
+            _ => Ok(Vec::new()),
+        }
+    }
+
+    /// The report on the results, without provenance. It has published figures only beside those of a
+    /// [nominal](Scale::is_nominal) scale.
+    ///
+    /// # Panics
+    /// If `results` lack one of the [points](Self::points) of this scale.
+    pub fn report(self, scale: &Scale, results: &Results, host: &[HostFrame]) -> Report {
+        let report = match self {
+            Self::Reordering => reordering::report(scale, results),
+            Self::Figure617 => glossy_floor::report(scale, results),
+            Self::Table71 => machine::report(scale, results),
+            Self::Techniques => techniques::report(scale, results),
+            Self::Scaling => scaling::report(scale, results),
+            Self::Interactive => interactive::report(scale, results, host),
+        };
+        match scale.banner() {
+            Some(banner) => report.marked(banner),
+            None => report,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_shared::address::STRUCTURES;
+    use photoncard_shared::counters::Counters;
+
+    use photoncard_map::photon_map::PhotonMapSize;
+    use photoncard_picture::choice::Choice;
+    use photoncard_render::emulator::contents::Contents;
+
+    use super::super::host::{Change, Changed};
+    use super::super::laboratory::Outcome;
+    use super::super::measure::{Measurement, ReadSums, TileMeasurement};
+    use super::super::point::Task;
+    use super::super::quality::{Quality, TileError};
+    use super::*;
+
+    /// Host's work, made up.
+    fn host_frame() -> HostFrame {
+        let change = |change| Changed { change, bytes: 6_000_000, of: 8_000_000 };
+        HostFrame {
+            image_bytes: 8_000_000,
+            map: PhotonMapSize { photons: 500_000, bytes: 7_000_000 },
+            threads: 2,
+            tracing: 0.5,
+            building: 0.25,
+            measuring: 0.25,
+            changes: vec![
+                change(Change::Dimmed),
+                change(Change::Replaced(0.1)),
+                change(Change::Replaced(1.0)),
+            ],
+        }
+    }
+
+    #[test]
+    fn interactive_frames_take_the_threads_and_links_of_their_measurements() {
+        let page = page(Study::Interactive, &Scale::FULL);
+        // 30 frames of a second each on two threads.
+        assert!(page.contains(">60<"), "threads");
+        assert!(
+            page.contains("all lights dimmed to a half") && page.contains("10 % of the photons traced anew")
+        );
+    }
+
+    /// Page of a study on made-up outcomes.
+    fn page(study: Study, scale: &Scale) -> String {
+        let counters =
+            Counters { gathers: 10, gather_rays: 20, eye_rays: 1, photons_found: 500, ..Counters::ZERO };
+        let reads = [ReadSums { requests: 9, raw_bytes: 180, dram_bytes: 128 }; STRUCTURES];
+        let tile = TileMeasurement { tile: 0, stands_for: 1, counters, reads, contents: Contents::ZERO };
+        let error = TileError { pixels: 256, squares: 7.0, noise: 0.5, sum: 760.0, reference: 768.0 };
+        let outcome = |point: &Point| match point.task {
+            Task::Traffic { .. } => Outcome::Traffic(Measurement {
+                tiles: vec![tile.clone()],
+                rendered: 1,
+                map: PhotonMapSize { photons: 500_000, bytes: 7_000_000 },
+            }),
+            Task::Quality { .. } => Outcome::Quality(Quality { tiles: vec![error; 3] }),
+        };
+        let points = study.points(scale).into_iter();
+        let results = Results::new(points.map(|point| (point.clone(), outcome(&point))).collect());
+        study.report(scale, &results, &[(); 9].map(|()| host_frame())).to_html()
+    }
+
+    #[test]
+    fn published_figures_are_beside_those_of_the_nominal_frame_alone() {
+        let larger = Scale { side: 1024, ..Scale::FULL };
+        for (study, words) in [
+            (Study::Reordering, "Published figures are of frames"),
+            (Study::Figure617, "is cited for three claims"),
+            (Study::Table71, "The dissertation gives"),
+            (Study::Techniques, "The dissertation says"),
+        ] {
+            for (scale, is_nominal) in [(Scale::FULL, true), (Scale::QUICK, false), (larger.clone(), false)] {
+                let page = page(study, &scale);
+                assert_eq!(page.contains(words), is_nominal, "{}", study.name());
+                assert_eq!(!page.contains("class=\"banner\""), is_nominal, "{}", study.name());
+            }
+        }
+    }
+}

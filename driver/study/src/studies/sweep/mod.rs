@@ -1,0 +1,85 @@
+//! Sweep: a study of a scene of the user's own, over any settings of the render and of the chip.
+
+mod report;
+
+use std::collections::BTreeSet;
+
+use photoncard_picture::choice::Choice;
+use photoncard_render::cost_model::Machine;
+use serde_json::Value;
+
+use super::super::axes::{Axes, Axis, AxisError};
+use super::super::laboratory::Results;
+use super::super::point::{Point, Task};
+use super::super::report::Report;
+
+/// Points that differ in the settings of some axes.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sweep {
+    axes: Axes,
+    /// Points in the order of [`Axes::combinations`]; their task is [`Task::Traffic`].
+    points: Vec<Point>,
+}
+
+impl Sweep {
+    /// The sweep over `axes`. `point` makes the point of names and values, one of each axis; its task must be [`Task::Traffic`].
+    ///
+    /// # Errors
+    /// If the axes make no sweep, or `point` fails.
+    pub fn new<E: From<AxisError>>(
+        axes: Vec<Axis>,
+        point: impl FnMut(Vec<(&str, &str)>) -> Result<Point, E>,
+    ) -> Result<Self, E> {
+        let axes = Axes::new(axes)?;
+        let points: Result<_, E> =
+            axes.combinations().map(|indices| axes.values(&indices)).map(point).collect();
+        Ok(Self { points: points?, axes })
+    }
+
+    /// The points.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// Report on the results, without provenance. Times are of one chip of `machine`.
+    ///
+    /// # Panics
+    /// If `results` lack one of the points.
+    pub(crate) fn report(&self, scene: &str, results: &Results, machine: &Machine) -> Report {
+        report::report(scene, &self.axes, &self.points, results, machine)
+    }
+
+    /// Settings of the points by name, for a report's provenance; those in which points differ are marked.
+    pub(crate) fn rows(&self) -> Vec<(String, String)> {
+        let all: Vec<_> = self.points.iter().map(settings).collect();
+        let names: BTreeSet<_> = all.iter().flatten().map(|(name, _)| name).collect();
+        let value = |name: &String| {
+            let values: BTreeSet<_> =
+                all.iter().flatten().filter(|row| row.0 == *name).map(|row| &row.1).collect();
+            match values.first() {
+                Some(value) if values.len() == 1 => (*value).clone(),
+                _ => "varied".to_owned(),
+            }
+        };
+        names.into_iter().map(|name| (name.clone(), value(name))).collect()
+    }
+}
+
+/// Settings of a point by name.
+fn settings(point: &Point) -> Vec<(String, String)> {
+    let text = |value: Value| match value {
+        Value::String(text) => text,
+        Value::Null => "default".to_owned(),
+        other => other.to_string(),
+    };
+    let named = point.settings.of_pixels().into_iter().chain(point.settings.of_work());
+    let mut rows: Vec<_> = named.map(|(name, value)| (name, text(value))).collect();
+    let mut add = |name: &str, value: String| rows.push((name.to_owned(), value));
+    add("set", point.assignments.join("; "));
+    if let Task::Traffic { chip, caches, sample, least_tiles } = &point.task {
+        add("card", chip.name().to_owned());
+        add("cache", caches.to_string());
+        add("sample", format!("{sample}, at least {least_tiles} tiles"));
+    }
+    rows
+}

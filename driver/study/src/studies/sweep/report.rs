@@ -1,0 +1,265 @@
+//! Report of a sweep: traffic by structure and time of a chip at every point, and plots over each axis.
+
+use photoncard_picture::choice::Choice;
+use photoncard_render::cost_model::{Cost, Machine};
+use photoncard_shared::address::Structure;
+
+use super::super::super::axes::{Axes, Axis};
+use super::super::super::laboratory::Results;
+use super::super::super::measure::Measurement;
+use super::super::super::point::Point;
+use super::super::super::report::{self, Block, Cell, Column, Report, Series, Table, XScale, YScale};
+use super::super::super::sample::Estimate;
+use super::super::arithmetic;
+use super::super::present::{
+    cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table,
+};
+use super::super::workload::{of_frame, symbols};
+
+/// Maximum number of lines in a plot.
+const MAX_LINES: usize = 8;
+
+/// A sweep with its results.
+struct Swept<'a> {
+    axes: &'a Axes,
+    points: &'a [Point],
+    results: &'a Results,
+    machine: &'a Machine,
+}
+
+pub(super) fn report(
+    scene: &str,
+    axes: &Axes,
+    points: &[Point],
+    results: &Results,
+    machine: &Machine,
+) -> Report {
+    let swept = Swept { axes, points, results, machine };
+    let introduction = vec![
+        format!("Work and memory traffic of {scene} in frames that differ in the settings below."),
+        how_it_counts(),
+        format!(
+            "The time of a chip is that of {machine}, at its counted arithmetic. Memory and arithmetic work at once, so that a frame \
+             takes the longer of both."
+        ),
+    ];
+    let mut sections = vec![section("Points", vec![table("points", swept.totals())])];
+    for (index, axis) in axes.list().iter().enumerate().filter(|(_, axis)| axis.values.len() > 1) {
+        sections.push(section(
+            &format!("By {}", axis.name),
+            vec![swept.plot(index), swept.plot_of_structures(index)],
+        ));
+    }
+    sections.push(section("Structures", vec![table("structures", swept.structures())]));
+    page(&format!("Sweep of {scene}"), introduction, sections)
+}
+
+impl Swept<'_> {
+    fn measured(&self, indices: &[usize]) -> &Measurement {
+        self.results.traffic(&self.points[self.axes.point(indices)])
+    }
+
+    /// Columns of the axes, and others.
+    fn heads(&self, others: &[(&str, &str)]) -> Vec<Column> {
+        let axes = self.axes.list().iter().map(|axis| Column::new(axis.name.as_str(), ""));
+        axes.chain(columns(others)).collect()
+    }
+
+    /// Cells of the values of a combination.
+    fn values(&self, indices: &[usize]) -> Vec<Cell> {
+        self.axes.values(indices).into_iter().map(|(_, value)| value.into()).collect()
+    }
+
+    /// Table with a row for each point.
+    fn totals(&self) -> Table {
+        let heads = self.heads(&[
+            ("tiles rendered", ""),
+            ("gather rays", "million"),
+            ("gathers", "million"),
+            ("photon map, raw", "GB"),
+            ("photon map", "GB"),
+            ("scene", "GB"),
+            ("photon map and scene", "GB"),
+            ("photon map", "bytes a gather"),
+            ("chip's memory", "s"),
+            ("chip's arithmetic", "s"),
+        ]);
+        let mut table = Table::new("Work, bytes from DRAM and time of a chip, of a frame", heads);
+        for (indices, point) in self.axes.combinations().zip(self.points) {
+            let measured = self.results.traffic(point);
+            let gathers = measured.gathers();
+            let [memory, arithmetic] = chip_seconds(point, measured, self.machine);
+            let mut row = self.values(&indices);
+            row.extend([
+                measured.rendered.into(),
+                cell(measured.total(|tile| tile.counters.gather_rays as f64), 1e6),
+                cell(gathers, 1e6),
+                gigabytes(measured.raw_bytes()),
+                gigabytes(measured.photon_map_bytes()),
+                gigabytes(measured.scene_bytes()),
+                gigabytes(measured.dram_bytes()),
+                (gathers.value > 0.0).then(|| measured.photon_map_bytes().value / gathers.value).into(),
+                memory.into(),
+                arithmetic.into(),
+            ]);
+            table.push(row);
+        }
+        table
+    }
+
+    /// Structures that are read at any point.
+    fn read_structures(&self) -> Vec<Structure> {
+        let is_read = |structure: &Structure| {
+            let mut measured = self.points.iter().map(|point| self.results.traffic(point));
+            measured.any(|measured| measured.tiles.iter().any(|tile| tile.reads_of(*structure).requests > 0))
+        };
+        Structure::ALL.into_iter().filter(is_read).collect()
+    }
+
+    /// Table with a row for each point and structure.
+    fn structures(&self) -> Table {
+        let heads = self.heads(&[
+            ("structure", ""),
+            ("requests", "million"),
+            ("raw", "GB"),
+            ("from DRAM", "GB"),
+            ("from DRAM", "% of the point"),
+        ]);
+        let mut table = Table::new("Reads of a frame by structure", heads);
+        let structures = self.read_structures();
+        for (indices, point) in self.axes.combinations().zip(self.points) {
+            let measured = self.results.traffic(point);
+            let all = measured.dram_bytes().value;
+            for &structure in &structures {
+                let bytes = measured.total(|tile| tile.reads_of(structure).dram_bytes as f64);
+                let mut row = self.values(&indices);
+                row.extend([
+                    structure.name().into(),
+                    cell(measured.total(|tile| tile.reads_of(structure).requests as f64), 1e6),
+                    gigabytes(measured.total(|tile| tile.reads_of(structure).raw_bytes as f64)),
+                    gigabytes(bytes),
+                    (all > 0.0).then(|| 100.0 * bytes.value / all).into(),
+                ]);
+                table.push(row);
+            }
+        }
+        table
+    }
+
+    /// Plot over an axis, of photon map and scene, with a line for each combination of the other axes: as many of them as make at
+    /// most [`MAX_LINES`] lines; the others keep their first value.
+    fn plot(&self, axis: usize) -> Block {
+        let (varied, kept) = self.other_axes(axis);
+        let lines: Vec<Vec<usize>> = (self.axes.combinations())
+            .filter(|indices| (0..indices.len()).all(|at| varied.contains(&at) || indices[at] == 0))
+            .collect();
+        let of = |title: &str, bytes: fn(&Measurement) -> Estimate| {
+            let lines = lines.iter().map(|indices| {
+                let name: Vec<_> = (self.axes.values(indices).into_iter().enumerate())
+                    .filter(|(at, _)| varied.contains(at))
+                    .map(|(_, (name, value))| format!("{name} {value}"))
+                    .collect();
+                self.line(name.join(", "), axis, indices, bytes)
+            });
+            let label = (self.axes.list()[axis].name.as_str(), "", scale(&self.axes.list()[axis]));
+            panel(title, label, ("from DRAM", "GB a frame", YScale::Log10), lines.collect())
+        };
+        let panels =
+            vec![of("photon map", Measurement::photon_map_bytes), of("scene", Measurement::scene_bytes)];
+        let name = &self.axes.list()[axis].name;
+        plot(&format!("by-{name}"), &format!("Bytes from DRAM by {name}"), &self.caption(&kept), panels)
+    }
+
+    /// Plot over an axis with a line for each structure; the other axes have their first value.
+    fn plot_of_structures(&self, axis: usize) -> Block {
+        let first = vec![0; self.axes.list().len()];
+        let lines = self.read_structures().into_iter().map(|structure| {
+            self.line(structure.name().to_owned(), axis, &first, |measured| {
+                measured.total(|tile| tile.reads_of(structure).dram_bytes as f64)
+            })
+        });
+        let Axis { name, .. } = &self.axes.list()[axis];
+        let label = (name.as_str(), "", scale(&self.axes.list()[axis]));
+        let axes = panel("", label, ("from DRAM", "GB a frame", YScale::Log10), lines.collect());
+        let others: Vec<_> = (0..first.len()).filter(|&other| other != axis).collect();
+        let title = format!("Bytes from DRAM of each structure by {name}");
+        plot(&format!("structures-by-{name}"), &title, &self.caption(&others), vec![axes])
+    }
+
+    /// Line over an axis from the combination `indices`.
+    fn line(
+        &self,
+        name: String,
+        axis: usize,
+        indices: &[usize],
+        bytes: impl Fn(&Measurement) -> Estimate,
+    ) -> Series {
+        let mut indices = indices.to_vec();
+        let mut points: Vec<report::Point> = places(&self.axes.list()[axis])
+            .into_iter()
+            .enumerate()
+            .map(|(value, x)| {
+                indices[axis] = value;
+                gigabyte_point(x, bytes(self.measured(&indices)))
+            })
+            .collect();
+        points.sort_by(|a, b| a.x.total_cmp(&b.x));
+        series(name, points)
+    }
+
+    /// The other axes with several values: those that lines differ in, and those that keep their first value.
+    fn other_axes(&self, axis: usize) -> (Vec<usize>, Vec<usize>) {
+        let (mut varied, mut kept, mut lines) = (Vec::new(), Vec::new(), 1);
+        for (other, Axis { values, .. }) in
+            self.axes.list().iter().enumerate().filter(|(other, _)| *other != axis)
+        {
+            if lines * values.len() <= MAX_LINES {
+                lines *= values.len();
+                varied.push(other);
+            } else {
+                kept.push(other);
+            }
+        }
+        (varied, kept)
+    }
+
+    /// Values of the axes that keep their first one.
+    fn caption(&self, kept: &[usize]) -> String {
+        let axes = kept.iter().map(|&axis| &self.axes.list()[axis]);
+        let values: Vec<_> = axes.map(|axis| format!("{} {}", axis.name, axis.values[0])).collect();
+        if values.is_empty() { String::new() } else { format!("With {}.", values.join(", ")) }
+    }
+}
+
+/// Horizontal places of the values: numbers and sizes are at their value, other texts at their index.
+fn places(axis: &Axis) -> Vec<f64> {
+    numbers(axis).unwrap_or_else(|| (0..axis.values.len()).map(|index| index as f64).collect())
+}
+
+fn scale(axis: &Axis) -> XScale {
+    match numbers(axis) {
+        Some(_) => XScale::Log2,
+        None => XScale::Categories(axis.values.clone()),
+    }
+}
+
+/// The values as positive numbers, if all of them are; K and M stand for 2^10 and 2^20, as in sizes of caches.
+fn numbers(axis: &Axis) -> Option<Vec<f64>> {
+    let number = |text: &String| {
+        let (digits, unit) = match text.strip_suffix('K') {
+            Some(digits) => (digits, 1024.0),
+            None => text.strip_suffix('M').map_or((text.as_str(), 1.0), |digits| (digits, 1_048_576.0)),
+        };
+        let value = digits.parse::<f64>().ok()? * unit;
+        (value > 0.0 && value.is_finite()).then_some(value)
+    };
+    axis.values.iter().map(number).collect()
+}
+
+/// Seconds that the memory and the arithmetic of one chip take for a frame.
+fn chip_seconds(point: &Point, measured: &Measurement, machine: &Machine) -> [f64; 2] {
+    let symbols = symbols(&point.settings);
+    let workload = of_frame(measured, symbols.pixels(), &symbols);
+    let total = Cost::counted(&workload, &arithmetic::of_frame(measured, &symbols)).total();
+    [total.dram_bytes / machine.bandwidth, total.flops / machine.flops]
+}

@@ -1,0 +1,159 @@
+//! Combinations of techniques, their settings and the points that measure them.
+
+use photoncard_cards::scheduler::GatherOrder;
+use photoncard_map::photon_map::PhotonLayout;
+use photoncard_render::{Radiance, RenderSettings, Sampling};
+
+use super::super::super::point::Point;
+use super::super::super::scale::{IRRADIANCE_ERROR, Scale, TILE, WIDEST_TILE};
+use super::super::flights::{LARGE_IN_FLIGHT, Setup};
+
+/// A combination of techniques.
+pub(super) struct Technique {
+    pub(super) name: &'static str,
+    pub(super) order: GatherOrder,
+    pub(super) sampling: Sampling,
+    /// Error bound of the irradiance cache; `None` without the cache.
+    pub(super) irradiance_error: Option<f32>,
+    pub(super) radiance: Radiance,
+    pub(super) layout: PhotonLayout,
+    pub(super) tile: u32,
+    /// Chip that renders whole frames with several tiles in flight; `None` for sampled tiles, one at a time on reference chips.
+    pub(super) in_flight: Option<Setup>,
+}
+
+/// Maximum number of gather rays with which bytes are measured.
+pub(super) const MAX_TRAFFIC_RAYS: u32 = 200;
+pub(super) const NAIVE: Technique = Technique {
+    name: "naive",
+    order: GatherOrder::Naive,
+    sampling: Sampling::Reflection,
+    irradiance_error: None,
+    radiance: Radiance::Density,
+    layout: PhotonLayout::Jensen,
+    tile: TILE,
+    in_flight: None,
+};
+pub(super) const TILED: Technique = Technique { name: "tiled", order: GatherOrder::Tiled, ..NAIVE };
+pub(super) const CACHE: Technique =
+    Technique { name: "irradiance cache, tiled", irradiance_error: Some(IRRADIANCE_ERROR), ..TILED };
+pub(super) const COMBINED: Technique =
+    Technique { name: "combined sampling", sampling: Sampling::Product, ..NAIVE };
+pub(super) const EXACT: Technique = Technique {
+    name: "sort, lines, largest tiles",
+    order: GatherOrder::Sort,
+    layout: PhotonLayout::Lines,
+    tile: WIDEST_TILE,
+    ..NAIVE
+};
+pub(super) const ALL: Technique = Technique {
+    name: "all techniques, jensen",
+    order: GatherOrder::Sort,
+    sampling: Sampling::Product,
+    irradiance_error: Some(IRRADIANCE_ERROR),
+    radiance: Radiance::Density,
+    layout: PhotonLayout::Jensen,
+    tile: WIDEST_TILE,
+    in_flight: None,
+};
+pub(super) const ALL_IN_LINES: Technique =
+    Technique { name: "all techniques, lines", layout: PhotonLayout::Lines, ..ALL };
+pub(super) const ALL_ON_LARGE: Technique = Technique {
+    name: "all techniques, lines, tiles in flight, large chip",
+    in_flight: Some(LARGE_IN_FLIGHT),
+    ..ALL_IN_LINES
+};
+/// The combinations that are measured. The irradiance cache has square tiles: rows of pixels share few records.
+pub(super) const TECHNIQUES: [Technique; 13] = [
+    NAIVE,
+    Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
+    TILED,
+    CACHE,
+    COMBINED,
+    Technique { name: "lines", layout: PhotonLayout::Lines, ..NAIVE },
+    EXACT,
+    Technique {
+        name: "sort, lines, largest tiles, precomputed irradiance",
+        radiance: Radiance::Precomputed,
+        ..EXACT
+    },
+    ALL,
+    ALL_IN_LINES,
+    Technique { name: "all techniques, lines, cache error 0.1", irradiance_error: Some(0.1), ..ALL_IN_LINES },
+    Technique {
+        name: "all techniques, lines, precomputed irradiance",
+        radiance: Radiance::Precomputed,
+        ..ALL_IN_LINES
+    },
+    ALL_ON_LARGE,
+];
+
+impl Technique {
+    pub(super) fn settings(&self, scale: &Scale, gather_rays: u32) -> RenderSettings {
+        scale.settings(self.order).with(|s| {
+            s.photons.radiance = self.radiance;
+            s.photons.layout = self.layout;
+            s.integrator.gather_rays = gather_rays;
+            s.integrator.sampling = self.sampling;
+            s.integrator.irradiance_error = self.irradiance_error;
+            s.schedule.tile = Some(self.tile);
+        })
+    }
+
+    pub(super) fn traffic(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
+        let settings = self.settings(scale, rays);
+        match self.in_flight {
+            Some(setup) => setup.point(scale, scene, settings),
+            None => scale.traffic(scene, settings),
+        }
+    }
+
+    /// The point of the technique's error. Order, layout and tiles do not change pixels: techniques that differ in them
+    /// alone share the point.
+    pub(super) fn quality(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
+        let settings = self.settings(scale, rays);
+        let shared = scale.settings(GatherOrder::Sort);
+        let settings = settings.with(|s| {
+            s.photons.layout = shared.photons.layout;
+            s.schedule.order = shared.schedule.order;
+            s.schedule.tile = shared.schedule.tile;
+        });
+        scale.quality(scene, settings)
+    }
+
+    /// Returns whether the technique's pixels differ from those of the naive render.
+    pub(super) fn changes_pixels(&self) -> bool {
+        self.irradiance_error.is_some() || self.sampling != NAIVE.sampling || self.radiance != NAIVE.radiance
+    }
+
+    /// Numbers of gather rays that the technique's error is measured with, ascending. Combined sampling alone takes about as many rays as
+    /// the naive render; interpolated light may take fewer or more.
+    pub(super) fn sweep(&self, scale: &Scale) -> Vec<u32> {
+        if !self.changes_pixels() {
+            return vec![scale.gather_rays];
+        }
+        if self.irradiance_error.is_none() && self.radiance == NAIVE.radiance {
+            return with_equal_rays(scale, scale.pick(&[25, 50, 100, 200], &[12, 25, 50, 100]));
+        }
+        with_equal_rays(scale, scale.pick(&[6, 12, 25, 50, 100, 200, 400], &[6, 12, 25, 50, 100]))
+    }
+
+    /// Numbers of gather rays that the technique's bytes are measured with, ascending: up to 200, as bytes hardly bend beyond, and fewer for
+    /// whole frames.
+    pub(super) fn traffic_sweep(&self, scale: &Scale) -> Vec<u32> {
+        let mut rays = match self.in_flight {
+            Some(_) => with_equal_rays(scale, scale.pick(&[25, 50, 100, 200], &[12, 50])),
+            None => self.sweep(scale),
+        };
+        rays.retain(|rays| *rays <= MAX_TRAFFIC_RAYS);
+        rays
+    }
+}
+
+/// Numbers of rays with the scale's own among them, ascending.
+fn with_equal_rays(scale: &Scale, mut rays: Vec<u32>) -> Vec<u32> {
+    rays.push(scale.gather_rays);
+    rays.sort_unstable();
+    rays.dedup();
+    rays
+}
