@@ -1,4 +1,5 @@
-//! Hands the linker the memory map of the board whose image is built; without a board's feature it does nothing.
+//! Hands the linker the memory map of the board whose image is built; without a board's feature it does
+//! nothing.
 
 use std::env;
 use std::path::{Path, PathBuf};

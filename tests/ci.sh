@@ -104,6 +104,10 @@ fi
 step "format"
 cargo fmt --all --check
 cargo fmt --check --manifest-path tests/operations/Cargo.toml
+# Comments end at column 110, as code does; tables and formats of bytes do not.
+long=$(find shared firmware driver host-cli scenes tests -name '*.rs' -not -path '*/target/*' -print0 |
+    xargs -0 grep -nE '^.{111,}$' | grep -E ':[0-9]+: *//' | grep -vE '//[/!]? .*(\||  )' || true)
+[ -z "$long" ] || fail "comments are longer than 110 columns: $long"
 
 step "lints"
 cargo clippy --workspace --all-targets --features photoncard/study --locked -- -D warnings

@@ -1,10 +1,11 @@
-//! The host half of photoncard: a library that renders glTF scenes with global illumination, on emulated chips in this process
-//! or on cards at the other end of a link.
+//! The host half of photoncard: a library that renders glTF scenes with global illumination, on emulated
+//! chips in this process or on cards at the other end of a link.
 //!
-//! photoncard is photon mapping (Jensen 2001) on *rendering chips*: small processors with a fixed amount of on-chip memory, a
-//! private DRAM and one link to a host. A chip runs `photoncard_firmware`. This crate is what runs on the host: it loads a
-//! scene, traces photons, packs scene and photon map into a *card image*, sends the image to each card, deals tiles to the cards
-//! and assembles the picture. The picture is equal, bit for bit, for any number and kind of cards.
+//! photoncard is photon mapping (Jensen 2001) on *rendering chips*: small processors with a fixed amount of
+//! on-chip memory, a private DRAM and one link to a host. A chip runs `photoncard_firmware`. This crate is
+//! what runs on the host: it loads a scene, traces photons, packs scene and photon map into a *card image*,
+//! sends the image to each card, deals tiles to the cards and assembles the picture. The picture is equal,
+//! bit for bit, for any number and kind of cards.
 //!
 //! # First steps
 //!
@@ -39,16 +40,19 @@
 //! ```
 //!
 //! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups.
-//! [`Quality::settings`](quality::Quality::settings) has cache and filter of a `--quality`, with the fewest samples and middle numbers of rays and photons, which
-//! [`Quality::fit`](quality::Quality::fit) chooses for a scene, within [`render_chosen`](render::render_chosen). `RenderSettings::default()` is
-//! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All are for one emulated reference chip. [`Rendering`](render::Rendering) holds the
-//! [`Film`](film::Film) and the [`Statistics`](render::Statistics). A [`Renderer`](render::Renderer) renders further pictures on cards that stay
-//! open. A tone-mapped PNG is written by
-//! [`tone_mapping::write_png`], and two pictures are compared by [`difference`].
+//! [`Quality::settings`](quality::Quality::settings) has cache and filter of a `--quality`, with the fewest
+//! samples and middle numbers of rays and photons, which [`Quality::fit`](quality::Quality::fit) chooses for
+//! a scene, within [`render_chosen`](render::render_chosen). `RenderSettings::default()` is
+//! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All are for one emulated
+//! reference chip. [`Rendering`](render::Rendering) holds the [`Film`](film::Film) and the
+//! [`Statistics`](render::Statistics). A [`Renderer`](render::Renderer) renders further pictures on cards
+//! that stay open. A tone-mapped PNG is written by [`tone_mapping::write_png`], and two pictures are compared
+//! by [`difference`].
 //!
 //! # Cards
 //!
-//! [`CardAddress`](render::CardAddress) names cards as `--card` does. Emulated and remote cards may be mixed in one render:
+//! [`CardAddress`](render::CardAddress) names cards as `--card` does. Emulated and remote cards may be mixed
+//! in one render:
 //!
 //! ```
 //! use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
@@ -65,7 +69,8 @@
 //!
 //! # Progress and cancellation
 //!
-//! [`Observer`](render::Observer) is called from the threads of a render, and ends it by [`is_stopped`](render::Observer::is_stopped):
+//! [`Observer`](render::Observer) is called from the threads of a render, and ends it by
+//! [`is_stopped`](render::Observer::is_stopped):
 //!
 //! ```
 //! use std::sync::atomic::{AtomicBool, Ordering};
@@ -94,8 +99,8 @@
 //!
 //! # Rooms
 //!
-//! Six crates, whose modules this one re-exports. Each imports those of rows above it, but `photoncard_cards`, which takes
-//! `photoncard_picture` alone.
+//! Six crates, whose modules this one re-exports. Each imports those of rows above it, but
+//! `photoncard_cards`, which takes `photoncard_picture` alone.
 //!
 //! | crate | modules | contents |
 //! |---|---|---|
@@ -106,8 +111,8 @@
 //! | [`photoncard_render`] | [`render`], [`emulator`], [`quality`], [`partial`], [`parts`], [`display`], [`cost_model`] | one render from a scene to a complete film; chips on threads of this process; settings by pilot renders; the file of finished tiles; parts and their merge; the client of a display server; FLOPs and DRAM bytes by Table 7.1 |
 //! | [`photoncard_study`] | [`study`] | measurements of shipped scenes, and reports |
 //!
-//! Below all of them are `photoncard_shared` (formats of memory and wire) and `photoncard_firmware`, with which the map traces
-//! photons: photons, chords and irradiance points are computed by the chip's own code.
+//! Below all of them are `photoncard_shared` (formats of memory and wire) and `photoncard_firmware`, with
+//! which the map traces photons: photons, chords and irradiance points are computed by the chip's own code.
 //!
 //! # Way of the data
 //!
@@ -117,7 +122,8 @@
 //! Film -> exr, tone_mapping
 //! ```
 //!
-//! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in `docs/architecture.md`.
+//! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in
+//! `docs/architecture.md`.
 #![forbid(unsafe_code)]
 
 pub use photoncard_cards::{dispatcher, link, scheduler, session};

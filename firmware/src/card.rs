@@ -1,8 +1,9 @@
 //! A card: commands in, replies out. A state machine without I/O, fed with bytes and giving bytes.
 //!
 //! Its runner ([`crate::serve`], or a simulator) calls [`Card::feed`] with received bytes, sends the bytes of
-//! [`Card::outgoing`], calls [`Card::work`] while [`Card::is_busy`] (and may at any time), and [`Card::acknowledge`] when the line is quiet. A call
-//! takes at most the time of some rays or gathers, or of the checksum of a few lines; none blocks, and no input makes one panic.
+//! [`Card::outgoing`], calls [`Card::work`] while [`Card::is_busy`] (and may at any time), and
+//! [`Card::acknowledge`] when the line is quiet. A call takes at most the time of some rays or gathers, or of
+//! the checksum of a few lines; none blocks, and no input makes one panic.
 
 mod engine;
 mod frame;

@@ -1,7 +1,7 @@
 //! Sums in fixed point, whose bits do not depend on the order of the terms.
 //!
-//! A term is rounded once to 2^-40 of a unit, a power of two near the largest term that the host chooses for each
-//! scene, and added as an integer: unlike floating-point addition, integer addition is associative.
+//! A term is rounded once to 2^-40 of a unit, a power of two near the largest term that the host chooses for
+//! each scene, and added as an integer: unlike floating-point addition, integer addition is associative.
 
 use fixed::types::I24F40;
 use glam::Vec3;
@@ -20,15 +20,15 @@ impl Sum {
     /// The empty sum.
     pub const ZERO: Self = Self(I24F40::ZERO);
 
-    /// Adds a term, in units, rounded towards zero to a multiple of 2^-40; NaN counts as 0, and terms out of range are
-    /// clamped.
+    /// Adds a term, in units, rounded towards zero to a multiple of 2^-40; NaN counts as 0, and terms out of
+    /// range are clamped.
     #[inline(always)]
     pub fn add(&mut self, term: f32) {
         self.add_bits((term * SCALE) as i64);
     }
 
-    /// Adds a non-negative term, in units, with saturation. The order does not matter here either: a sum that only
-    /// grows saturates in every order or in none.
+    /// Adds a non-negative term, in units, with saturation. The order does not matter here either: a sum that
+    /// only grows saturates in every order or in none.
     #[inline(always)]
     fn add_up_to_greatest(&mut self, term: f32) {
         let bits = ((term * SCALE) as i64).max(0);
@@ -49,8 +49,8 @@ impl Sum {
 
 /// Fixed-point sum of colours, exact but for the rounding of each term.
 ///
-/// Each component is a [`Sum`]: k photons of one power unit each, times a reflectance of at most a few thousand, stay
-/// far below its limit.
+/// Each component is a [`Sum`]: k photons of one power unit each, times a reflectance of at most a few
+/// thousand, stay far below its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ColourSum([Sum; 3]);
 
@@ -131,7 +131,8 @@ fn bits_of_power(photon: u64) -> [u64; 3] {
     // The exponent byte of a mantissa in units of 2^-40.
     const UNIT: u32 = Rgbe::EXPONENT_BIAS as u32 - I24F40::FRAC_NBITS;
     let exponent = (photon >> 24) as u32 & 0xff;
-    // One of the two shifts is 0; a byte shifted by 63 is out of range on the right, and 0 or 2^63 on the left.
+    // One of the two shifts is 0; a byte shifted by 63 is out of range on the right, and 0 or 2^63 on the
+    // left.
     let [up, down] = [exponent.saturating_sub(UNIT).min(63), UNIT.saturating_sub(exponent).min(63)];
     [photon, photon >> 8, photon >> 16].map(|mantissa| (mantissa & 0xff) << up >> down)
 }

@@ -1,11 +1,12 @@
 //! The photon mapping renderer of one rendering chip.
 //!
-//! No allocator, no I/O, every buffer sized at compile time by a [`kind`] of chip. An emulated card, a machine of QEMU and a
-//! board run the same code. Terms are defined in `docs/glossary.md`.
+//! No allocator, no I/O, every buffer sized at compile time by a [`kind`] of chip. An emulated card, a
+//! machine of QEMU and a board run the same code. Terms are defined in `docs/glossary.md`.
 //!
 //! # Example
 //!
-//! A card is its firmware and its DRAM. Here it answers a host's first message; on a port [`serve::serve`] moves the bytes:
+//! A card is its firmware and its DRAM. Here it answers a host's first message; on a port [`serve::serve`]
+//! moves the bytes:
 //!
 //! ```
 //! use photoncard_firmware::card::MicroCard;
@@ -33,7 +34,8 @@
 //!
 //! # Layers
 //!
-//! Modules from bottom to top. A module imports modules of its own row and of rows above it in this table, never of rows below it.
+//! Modules from bottom to top. A module imports modules of its own row and of rows above it in this table,
+//! never of rows below it.
 //!
 //! | module | contents |
 //! |---|---|
@@ -52,27 +54,28 @@
 //! | [`card`] | protocol of a card: commands in, replies out |
 //! | [`serve`] | main loop of a card on a port |
 //!
-//! [`card::Card`] is the whole firmware: it is fed with bytes, works in small steps, and returns bytes. `boards/` has the images for
-//! boards, which add registers and a memory map.
+//! [`card::Card`] is the whole firmware: it is fed with bytes, works in small steps, and returns bytes.
+//! `boards/` has the images for boards, which add registers and a memory map.
 //!
 //! # Light paths
 //!
-//! Every path is counted once. In Heckbert's notation, with L a light, E the eye, D a reflection by the Lambertian part
-//! or a wide lobe of a surface, and S a perfectly specular reflection, a refraction, or a reflection by a narrow lobe
-//! ([`scene::Reflection::has_narrow_lobe`]) that the eye does not see itself:
+//! Every path is counted once. In Heckbert's notation, with L a light, E the eye, D a reflection by the
+//! Lambertian part or a wide lobe of a surface, and S a perfectly specular reflection, a refraction, or a
+//! reflection by a narrow lobe ([`scene::Reflection::has_narrow_lobe`]) that the eye does not see itself:
 //!
 //! - `L S* E`, visible emission: the eye path, followed through S ([`render::eye`]).
-//! - `L D S* E`, direct light: shadow rays, and final gather rays that meet a light, combined by multiple importance
-//!   sampling ([`render::direct`]).
+//! - `L D S* E`, direct light: shadow rays, and final gather rays that meet a light, combined by multiple
+//!   importance sampling ([`render::direct`]).
 //! - `L S+ D S* E`, caustics: the caustic map ([`render::caustic`]).
-//! - `L (S|D)* D S* D S* E`, indirect light: final gather rays alone, followed through S ([`render::final_gather`]). At
-//!   their ends the photon map gives all reflected light, direct light included, as no shadow rays start there.
+//! - `L (S|D)* D S* D S* E`, indirect light: final gather rays alone, followed through S
+//!   ([`render::final_gather`]). At their ends the photon map gives all reflected light, direct light
+//!   included, as no shadow rays start there.
 //!
 //! # Exactness
 //!
-//! Random numbers are functions of (seed, pixel, sample, dimension). Sums over photons and over gather rays are in
-//! fixed point ([`fixed_point`]), so that their order does not matter. All processors give equal bits: `f32` add,
-//! multiply, divide and square root, `libm`, integer arithmetic, and never a fused multiply-add.
+//! Random numbers are functions of (seed, pixel, sample, dimension). Sums over photons and over gather rays
+//! are in fixed point ([`fixed_point`]), so that their order does not matter. All processors give equal bits:
+//! `f32` add, multiply, divide and square root, `libm`, integer arithmetic, and never a fused multiply-add.
 // `simd` alone is exempt, for its vector instructions.
 #![deny(unsafe_code)]
 #![no_std]

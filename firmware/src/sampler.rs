@@ -1,14 +1,16 @@
-//! Random numbers as functions of (seed, pixel, sample, dimension), independent of chip, thread and order of execution.
+//! Random numbers as functions of (seed, pixel, sample, dimension), independent of chip, thread and order of
+//! execution.
 //!
-//! Points in a pixel, on emitters and of choices are the first points of a sequence, not a set of a stated size: samples can be added to
-//! a picture, and any number of them is stratified. The sequence is the first two dimensions of Sobol' (1967) with Owen's (1995) nested
-//! uniform scrambling, and in an order that is scrambled likewise, so that patterns of different dimensions are independent
-//! (Burley 2020, *Practical hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has one in every
-//! box of area 2^-m with sides of powers of two.
+//! Points in a pixel, on emitters and of choices are the first points of a sequence, not a set of a stated
+//! size: samples can be added to a picture, and any number of them is stratified. The sequence is the first
+//! two dimensions of Sobol' (1967) with Owen's (1995) nested uniform scrambling, and in an order that is
+//! scrambled likewise, so that patterns of different dimensions are independent (Burley 2020, *Practical
+//! hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has one in every box
+//! of area 2^-m with sides of powers of two.
 //!
-//! The two coordinates of a final gather ray are a jittered one ([`Pattern::jitter`]), which selects a cell of the
-//! direction table ([`crate::importance::DirectionTable`]), and a radical inverse: any run of consecutive rays, such as
-//! those of one cell of the table, is stratified in both.
+//! The two coordinates of a final gather ray are a jittered one ([`Pattern::jitter`]), which selects a cell
+//! of the direction table ([`crate::importance::DirectionTable`]), and a radical inverse: any run of
+//! consecutive rays, such as those of one cell of the table, is stratified in both.
 
 pub use photoncard_shared::hash::hash;
 
@@ -60,8 +62,8 @@ impl Pattern {
         self.bits(index, 0x967a_889b)
     }
 
-    /// Base-2 radical inverse of `index`, in [0, 1), with randomly flipped digits (XOR scrambling). Each aligned run of
-    /// 2^m indices has one point in every stratum of width 2^-m.
+    /// Base-2 radical inverse of `index`, in [0, 1), with randomly flipped digits (XOR scrambling). Each
+    /// aligned run of 2^m indices has one point in every stratum of width 2^-m.
     #[inline(always)]
     pub fn radical_inverse(self, index: u32) -> f32 {
         unit_interval(index.reverse_bits() ^ hash(self.0.wrapping_add(0x368c_c8b7)))
@@ -83,16 +85,17 @@ impl Pattern {
     }
 }
 
-/// Digits of the second dimension of Sobol' at `index`, least significant bit first: bit `i` is the sum of bits `j` of the index with an odd
-/// binomial coefficient (j, i), where `i` is a subset of `j` bit by bit (Lucas).
+/// Digits of the second dimension of Sobol' at `index`, least significant bit first: bit `i` is the sum of
+/// bits `j` of the index with an odd binomial coefficient (j, i), where `i` is a subset of `j` bit by bit
+/// (Lucas).
 #[inline(always)]
 fn second_dimension(index: u32) -> u32 {
     let steps = [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)];
     steps.into_iter().fold(index, |digits, (distance, mask)| digits ^ (digits >> distance & mask))
 }
 
-/// Nested uniform scrambling of digits, least significant bit first: a bijection in which each bit depends on itself and those below alone
-/// (Laine, Karras 2011, with Vegdahl's constants of 2021).
+/// Nested uniform scrambling of digits, least significant bit first: a bijection in which each bit depends on
+/// itself and those below alone (Laine, Karras 2011, with Vegdahl's constants of 2021).
 #[inline(always)]
 fn scramble(mut digits: u32, seed: u32) -> u32 {
     digits ^= digits.wrapping_mul(0x3d20_adea);
@@ -163,7 +166,8 @@ mod tests {
         }
     }
 
-    /// Of points of equal index in two dimensions, strata are paired at random: each pair of halves has a fourth of the pixels' points.
+    /// Of points of equal index in two dimensions, strata are paired at random: each pair of halves has a
+    /// fourth of the pixels' points.
     #[test]
     fn patterns_of_two_dimensions_are_independent() {
         let half = |x, index, dimension| {

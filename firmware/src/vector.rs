@@ -20,8 +20,8 @@ pub(crate) fn mirror(direction: Vec3, normal: Vec3) -> Vec3 {
     normal * (2.0 * normal.dot(direction)) - direction
 }
 
-/// Two unit vectors that form a right-handed frame with a unit normal (Duff et al. 2017, *Building an orthonormal
-/// basis, revisited*).
+/// Two unit vectors that form a right-handed frame with a unit normal (Duff et al. 2017, *Building an
+/// orthonormal basis, revisited*).
 #[inline(always)]
 pub(crate) fn tangents(normal: Vec3) -> (Vec3, Vec3) {
     let sign = if normal.z < 0.0 { -1.0 } else { 1.0 };
@@ -39,7 +39,8 @@ pub(crate) fn from_frame(normal: Vec3, x: f32, y: f32, z: f32) -> Vec3 {
     tangent * x + bitangent * y + normal * z
 }
 
-/// The vector `radius` away from an axis, at an azimuth in radians, and `height` along it, in the frame of [`tangents`].
+/// The vector `radius` away from an axis, at an azimuth in radians, and `height` along it, in the frame of
+/// [`tangents`].
 #[inline(always)]
 pub(crate) fn about(axis: Vec3, azimuth: f32, radius: f32, height: f32) -> Vec3 {
     let (y, x) = libm::sincosf(azimuth);
@@ -59,8 +60,8 @@ pub(crate) fn max_component(v: Vec3) -> f32 {
     max(max(v.x, v.y), v.z)
 }
 
-/// bfloat16 of an `f32`, rounded to nearest, ties away from zero. Finite numbers above the largest bfloat16 become
-/// infinite; a NaN may become any number.
+/// bfloat16 of an `f32`, rounded to nearest, ties away from zero. Finite numbers above the largest bfloat16
+/// become infinite; a NaN may become any number.
 #[inline(always)]
 pub(crate) fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16

@@ -1,7 +1,7 @@
 //! Traversal of a tree of wide nodes: the bounding volume hierarchy, or a photon map in leaves.
 //!
-//! A visit of a node computes the distances to the boxes of all its children at once. Children within the limit are
-//! pushed onto a stack, the nearest on top.
+//! A visit of a node computes the distances to the boxes of all its children at once. Children within the
+//! limit are pushed onto a stack, the nearest on top.
 
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
@@ -18,8 +18,8 @@ const _: () = assert!(NODE_CHILDREN == LANES);
 /// Distance bits of a child to be skipped.
 pub(crate) const BEYOND: u32 = u32::MAX;
 
-/// A subtree on the stack: the bits of a lower bound of its distance in the upper half, its leaf or node in the lower
-/// half.
+/// A subtree on the stack: the bits of a lower bound of its distance in the upper half, its leaf or node in
+/// the lower half.
 #[derive(Clone, Copy)]
 struct Deferred(u64);
 
@@ -39,8 +39,8 @@ impl Deferred {
     }
 }
 
-/// Stack of [`Deferred`] subtrees, the next on top. `ENTRIES` is the tree's maximum plus [`LANES`], as all lanes of a
-/// node are written at once.
+/// Stack of [`Deferred`] subtrees, the next on top. `ENTRIES` is the tree's maximum plus [`LANES`], as all
+/// lanes of a node are written at once.
 pub(crate) type Stack<const ENTRIES: usize> = Vec<u64, ENTRIES>;
 
 /// Order of the visits to a node's children.
@@ -127,12 +127,12 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         self.scene.line(memory, self.leaves, index, 0..LINE_BYTES as u32)
     }
 
-    /// Visits a node: pushes its children and prefetches their lines. `distances` maps the node's line to the bits of a
-    /// lower bound of each child's distance, or [`BEYOND`] for a child to be skipped.
+    /// Visits a node: pushes its children and prefetches their lines. `distances` maps the node's line to the
+    /// bits of a lower bound of each child's distance, or [`BEYOND`] for a child to be skipped.
     ///
     /// # Errors
-    /// [`FaultCode::Depth`] if the stack overflows; [`FaultCode::Record`] or [`FaultCode::LineRange`] if there is no
-    /// such node.
+    /// [`FaultCode::Depth`] if the stack overflows; [`FaultCode::Record`] or [`FaultCode::LineRange`] if
+    /// there is no such node.
     #[inline(always)]
     pub(crate) fn enter(
         &mut self,

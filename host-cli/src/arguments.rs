@@ -166,7 +166,8 @@ pub(crate) enum Command {
     /// Measure how memory traffic and time depend on orders, caches, techniques and chips
     #[cfg(feature = "study")]
     Study(StudyArguments),
-    /// Measure how memory traffic and time depend on orders, caches, techniques and chips: this program was built without it
+    /// Measure how memory traffic and time depend on orders, caches, techniques and chips: this program was
+    /// built without it
     #[cfg(not(feature = "study"))]
     Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
@@ -217,7 +218,8 @@ pub(crate) enum CardCommand {
 
 #[derive(Args)]
 pub(crate) struct EmulateOptions {
-    /// Address to listen on: pty, tcp:PORT on this machine alone, tcp:ADDRESS:PORT or unix:PATH; port 0 for any
+    /// Address to listen on: pty, tcp:PORT on this machine alone, tcp:ADDRESS:PORT or unix:PATH; port 0 for
+    /// any
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) listen: ListenAddress,
     /// The kind of card

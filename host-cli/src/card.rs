@@ -8,8 +8,8 @@ use photoncard_driver::render::{CardAddress, MAX_BINS, MemoryUse, card_info, car
 use crate::console::print;
 use crate::failure::Failure;
 
-/// Prints the budget that a card reports, the memory use that a board has measured and, for an emulated card, the
-/// firmware's buffers.
+/// Prints the budget that a card reports, the memory use that a board has measured and, for an emulated card,
+/// the firmware's buffers.
 pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     let info = card_info(address)?;
     let budget = info.budget;

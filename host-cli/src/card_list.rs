@@ -9,7 +9,8 @@ use crate::failure::Failure;
 
 const COLUMNS: [&str; 4] = ["path", "USB name", "serial number", "--card"];
 
-/// Prints the serial ports of this machine, one per line, below the names of the columns; nothing if there are none.
+/// Prints the serial ports of this machine, one per line, below the names of the columns; nothing if there
+/// are none.
 pub(crate) fn run() -> Result<(), Failure> {
     let ports = list_serial_ports().map_err(Failure::work)?;
     if ports.is_empty() {

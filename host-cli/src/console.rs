@@ -1,5 +1,5 @@
-//! Standard streams: a closed or full one never makes the program panic. All output passes through this module, and foreign
-//! text is escaped.
+//! Standard streams: a closed or full one never makes the program panic. All output passes through this
+//! module, and foreign text is escaped.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stderr, stdout};
@@ -28,7 +28,8 @@ pub(crate) fn print_json(text: &str) -> Result<(), Failure> {
     write_out(&(printable_json(text) + "\n"))
 }
 
-/// Escapes all characters of JSON that do not print as themselves. Except for line ends, they occur in strings alone.
+/// Escapes all characters of JSON that do not print as themselves. Except for line ends, they occur in
+/// strings alone.
 pub(crate) fn printable_json(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {

@@ -1,7 +1,7 @@
 //! The `photoncard` command: arguments and printing, no rendering.
 //!
-//! Standard output is for data, standard error for messages. Exit status: 0 done; 1 the work failed; 2 invalid arguments or
-//! unreadable input; 130 stopped by an interrupt.
+//! Standard output is for data, standard error for messages. Exit status: 0 done; 1 the work failed; 2
+//! invalid arguments or unreadable input; 130 stopped by an interrupt.
 //!
 //! | module | contents |
 //! |---|---|
@@ -15,8 +15,8 @@
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
 //! | `render` (and `prepare`), `merge`, `farm`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
 //!
-//! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render from Rust, use
-//! `photoncard_driver` directly.
+//! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render
+//! from Rust, use `photoncard_driver` directly.
 #![forbid(unsafe_code)]
 
 mod arguments;

@@ -115,7 +115,8 @@ mod tests {
         assert_eq!(refused("", &Scene { notices: Vec::new(), ..scene }), None);
     }
 
-    /// A notice on each concern, in place of which the command line may state another view, play no animation, or have another sky.
+    /// A notice on each concern, in place of which the command line may state another view, play no
+    /// animation, or have another sky.
     #[test]
     fn what_the_command_line_states_itself_is_no_error_of_a_strict_render() {
         for (concern, replaced, used) in [

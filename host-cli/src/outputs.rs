@@ -8,8 +8,8 @@ use photoncard_driver::tone_mapping::is_of_photoncard;
 
 use crate::failure::Failure;
 
-/// Checks that the files `written` can be written, and that none of them or of `reserved` is one of the inputs, each with its
-/// description, or another output.
+/// Checks that the files `written` can be written, and that none of them or of `reserved` is one of the
+/// inputs, each with its description, or another output.
 pub(crate) fn check(inputs: &[(&Path, &str)], written: &[&Path], reserved: &[&Path]) -> Result<(), Failure> {
     for path in written {
         output::check_writable(path).map_err(|error| Failure::input_error(&error))?;

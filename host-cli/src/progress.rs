@@ -1,4 +1,5 @@
-//! Progress of a render or of a card's self-test: a bar on a terminal, otherwise a line for each tenth of a phase.
+//! Progress of a render or of a card's self-test: a bar on a terminal, otherwise a line for each tenth of a
+//! phase.
 
 pub(crate) mod openjd;
 pub(crate) mod remaining;
@@ -49,7 +50,8 @@ struct Display {
 }
 
 impl Progress {
-    /// Starts the display of work on `cards` cards, which is empty if `quiet`. The first signal stops the work, a second one ends the process.
+    /// Starts the display of work on `cards` cards, which is empty if `quiet`. The first signal stops the
+    /// work, a second one ends the process.
     pub(crate) fn start(quiet: bool, cards: usize) -> std::io::Result<Self> {
         let display = Display {
             phase: None,
@@ -73,7 +75,8 @@ impl Progress {
         }
     }
 
-    /// [`Self::start`] for frames, one after another. Without a terminal a frame tells nothing before its end.
+    /// [`Self::start`] for frames, one after another. Without a terminal a frame tells nothing before its
+    /// end.
     pub(crate) fn of_frames(quiet: bool, cards: usize) -> std::io::Result<Self> {
         Self::start(quiet || !std::io::stderr().is_terminal(), cards)
     }

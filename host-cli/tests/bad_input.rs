@@ -323,7 +323,8 @@ fn outputs_of_no_known_format() {
     assert!(room.names().is_empty());
 }
 
-/// No output is written to a name that is no regular file: a pipe would block, a device or a link would be replaced.
+/// No output is written to a name that is no regular file: a pipe would block, a device or a link would be
+/// replaced.
 #[cfg(unix)]
 #[test]
 fn outputs_that_are_no_files() {

@@ -1,5 +1,5 @@
-//! Small files with costly contents: each is rejected with a remedy, or takes little, within 4 GB of address space and some
-//! seconds (docs/architecture.md, "What a file may cost").
+//! Small files with costly contents: each is rejected with a remedy, or takes little, within 4 GB of address
+//! space and some seconds (docs/architecture.md, "What a file may cost").
 #![cfg(unix)]
 
 mod support;

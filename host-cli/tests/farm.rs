@@ -192,7 +192,8 @@ fn the_template_of_open_job_description_renders_the_picture() {
     check_pictures(&room);
 }
 
-/// Compiles the job type with a stand-in for Flamenco's manager, and runs the commands of the tasks in an order of their dependencies.
+/// Compiles the job type with a stand-in for Flamenco's manager, and runs the commands of the tasks in an
+/// order of their dependencies.
 #[test]
 fn the_job_type_of_flamenco_renders_the_picture() {
     let (room, _) = room();

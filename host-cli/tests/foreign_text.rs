@@ -23,7 +23,8 @@ const SHOWN: &str = "x\\u{1b}[2J\\0\\u{9b}31m\\r\\nforged\\u{202e}\\u{2066}\\u{7
 const HOSTILE_PATH: &str = "x\u{1b}[2J\u{9b}31m\r\nforged\u{202e}";
 const SHOWN_PATH: &str = "x\\u{1b}[2J\\u{9b}31m\\r\\nforged\\u{202e}";
 
-/// Checks the status of a command, that it printed a text at least `times` times, and no unprintable character.
+/// Checks the status of a command, that it printed a text at least `times` times, and no unprintable
+/// character.
 fn check_shown(outcome: &Outcome, status: i32, shown: &str, times: usize) {
     let Outcome { status: found, stdout, stderr } = outcome;
     assert_eq!(*found, Some(status), "{stderr}");

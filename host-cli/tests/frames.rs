@@ -1,4 +1,5 @@
-//! Frames: each is the picture of a command of its own, and a camera that moves alone takes nothing but tiles.
+//! Frames: each is the picture of a command of its own, and a camera that moves alone takes nothing but
+//! tiles.
 
 mod support;
 
@@ -70,12 +71,14 @@ fn no_card_is_loaded_twice_for_cameras_that_move() {
     let image = frames[0]["image_bytes"].as_u64().expect("a number");
     for card in 0..3 {
         let loaded: u64 = frames.iter().map(|frame| sent(frame)[card]).sum();
-        // A load that the end of a frame interrupts goes on in the next one, with the last chunk of lines again.
+        // A load that the end of a frame interrupts goes on in the next one, with the last chunk of lines
+        // again.
         assert!(loaded < 2 * image, "card {card}: {loaded} bytes of an image of {image}");
     }
 }
 
-/// Settings of a quality are chosen once, by the scene as it stands, so that frames of one machine fit those of another.
+/// Settings of a quality are chosen once, by the scene as it stands, so that frames of one machine fit those
+/// of another.
 #[test]
 fn a_frame_is_the_same_after_others_and_alone_on_other_cards() {
     let room = Room::new();
@@ -168,7 +171,8 @@ fn statistics_and_provenance_name_the_frame() {
     );
 }
 
-/// Frames that are finished stay as they are, down to their time; those of other settings, forms or damaged files are rendered again.
+/// Frames that are finished stay as they are, down to their time; those of other settings, forms or damaged
+/// files are rendered again.
 #[test]
 fn a_sequence_that_is_resumed_renders_what_is_not_finished() {
     let scene = shipped("cornell-moving.glb");
@@ -231,7 +235,8 @@ fn a_sequence_that_is_resumed_renders_what_is_not_finished() {
     }
 }
 
-/// Kept samples of frames are gone on from with the settings that a pilot has chosen for them, whatever frames are finished.
+/// Kept samples of frames are gone on from with the settings that a pilot has chosen for them, whatever
+/// frames are finished.
 #[test]
 fn samples_of_frames_are_added_with_the_settings_of_the_kept_ones() {
     let room = Room::new();

@@ -25,7 +25,8 @@ fn prepare(room: &Room) {
 #[test]
 fn a_picture_of_a_prepared_scene_is_that_of_the_scene() {
     let cornell = shipped("cornell-spheres.glb");
-    // The pilot of a quality looks at the picture. Options of the scene, of photons and of rays are prepared, those of the picture are stated again.
+    // The pilot of a quality looks at the picture. Options of the scene, of photons and of rays are prepared,
+    // those of the picture are stated again.
     for (prepared, picture) in [
         (
             &["--quality", "draft", "--photons", "900", "--environment", "0.1,0.2,0.3"][..],

@@ -1,4 +1,5 @@
-//! Provenance: everything that pixels depend on in pictures, and everything that the work depends on in statistics.
+//! Provenance: everything that pixels depend on in pictures, and everything that the work depends on in
+//! statistics.
 
 mod support;
 
@@ -7,7 +8,8 @@ use std::collections::BTreeSet;
 use serde_json::{Value, json};
 use support::{Room, scene, shipped};
 
-/// Options that pixels depend on: a value of each that is not the default, its key in the provenance, and the value there.
+/// Options that pixels depend on: a value of each that is not the default, its key in the provenance, and the
+/// value there.
 fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
     vec![
         (&["--size", "9x7"], "size", json!([9, 7])),

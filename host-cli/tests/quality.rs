@@ -53,7 +53,8 @@ fn a_stated_option_is_not_changed() {
         let (_, stated) = drafted(&room, "b.exr", &[option]);
         let of = |statistics: &Value, name: &str| statistics["provenance"]["pixels"][name].as_f64();
         assert_eq!(of(&stated, name), Some(value), "{option}");
-        // Samples of a stated number share the shadow rays of a pixel, and the error decides how many records share the gather rays.
+        // Samples of a stated number share the shadow rays of a pixel, and the error decides how many records
+        // share the gather rays.
         let pairs = [("spp", "shadow-rays"), ("ic-error", "gather-rays")];
         let follows = |other: &str| other == name || pairs.contains(&(name, other));
         for other in FOUND.into_iter().filter(|other| !follows(other)) {

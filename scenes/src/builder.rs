@@ -166,8 +166,8 @@ impl SceneBuilder {
         Geometry { attributes, indices: None, mode: Some(joined.mode()) }
     }
 
-    /// Adds the attributes of a mesh's vertices. Normals that equal the positions, as on a unit sphere, share their
-    /// accessor.
+    /// Adds the attributes of a mesh's vertices. Normals that equal the positions, as on a unit sphere, share
+    /// their accessor.
     fn attributes(&mut self, mesh: &Mesh) -> PrimitiveAttributes {
         let (min, max) = mesh.bounds();
         let position = self.vectors(mesh.positions.iter().map(Vec3::to_array), "VEC3");

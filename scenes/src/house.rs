@@ -1,4 +1,5 @@
-//! A house of one room on open ground, with a window, for an environment: most of the sky's light falls beside the window.
+//! A house of one room on open ground, with a window, for an environment: most of the sky's light falls
+//! beside the window.
 
 use glam::Vec3;
 

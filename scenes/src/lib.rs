@@ -1,7 +1,7 @@
 //! Generators of the scenes that ship with photoncard.
 //!
-//! [`scenes`] returns all files, equal on every machine; a test compares them with the files beside this crate. `README.md` beside them
-//! describes each scene.
+//! [`scenes`] returns all files, equal on every machine; a test compares them with the files beside this
+//! crate. `README.md` beside them describes each scene.
 //!
 //! | module | contents |
 //! |---|---|

@@ -1,7 +1,7 @@
 //! Triangle meshes, and the operations that make the scenes' shapes.
 //!
-//! Front faces are counterclockwise. Shapes share vertices along their inner edges, so they have no cracks; sines and
-//! cosines come from `libm`, so that every machine computes equal bits.
+//! Front faces are counterclockwise. Shapes share vertices along their inner edges, so they have no cracks;
+//! sines and cosines come from `libm`, so that every machine computes equal bits.
 
 use glam::{Vec2, Vec3};
 

@@ -14,7 +14,8 @@ const ZENITH: Vec3 = Vec3::new(0.30, 0.62, 1.40);
 const HORIZON: Vec3 = Vec3::new(1.35, 1.50, 1.70);
 const GROUND: Vec3 = Vec3::new(0.22, 0.19, 0.15);
 
-/// Direction of the sun; its radiance at the centre, W/(sr m^2); and the angle at which `1/e` of that is left, radians.
+/// Direction of the sun; its radiance at the centre, W/(sr m^2); and the angle at which `1/e` of that is
+/// left, radians.
 const SUN: Vec3 = Vec3::new(-0.55, 0.75, -0.6);
 const SUN_RADIANCE: Vec3 = Vec3::new(1100.0, 900.0, 620.0);
 const SUN_WIDTH: f32 = 0.06;

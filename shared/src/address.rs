@@ -12,7 +12,8 @@ impl Line {
     /// A line of zero bytes.
     pub const ZERO: Self = Self([0; LINE_BYTES]);
 
-    /// The `slot`-th record of `N` bytes, records packed from the start of the line; `None` past the last whole one.
+    /// The `slot`-th record of `N` bytes, records packed from the start of the line; `None` past the last
+    /// whole one.
     #[inline(always)]
     pub fn record<const N: usize>(&self, slot: usize) -> Option<&[u8; N]> {
         self.0.as_chunks::<N>().0.get(slot)
@@ -40,8 +41,8 @@ pub enum Structure {
     Triangles = 2,
     /// Materials.
     Materials = 3,
-    /// Lights and the distributions that sample them: emitters, the light tree, distant lights, the environment's
-    /// cells.
+    /// Lights and the distributions that sample them: emitters, the light tree, distant lights, the
+    /// environment's cells.
     Emitters = 4,
     /// Inner nodes of a photon map in leaves.
     PhotonNodes = 5,
@@ -85,7 +86,8 @@ impl Structure {
         Self::IrradianceRecords,
     ];
 
-    /// True if the structure belongs to a photon map or to the irradiance points, false if it belongs to the scene.
+    /// True if the structure belongs to a photon map or to the irradiance points, false if it belongs to the
+    /// scene.
     #[inline(always)]
     pub const fn is_photon_map(self) -> bool {
         matches!(

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::layout::LEAF_LANES;
 
-/// Fixed capacities of one kind of chip. A host reads them in [`crate::message::Reply::Hello`] and keeps within them.
+/// Fixed capacities of one kind of chip. A host reads them in [`crate::message::Reply::Hello`] and keeps
+/// within them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Budget {
     /// On-chip memory, bytes.
@@ -37,8 +38,8 @@ pub struct Budget {
     pub in_flight: u32,
 }
 
-/// Sums that a chip keeps for each pixel of a picture with layers: direct, indirect and caustic light, and a count of
-/// gathers.
+/// Sums that a chip keeps for each pixel of a picture with layers: direct, indirect and caustic light, and a
+/// count of gathers.
 pub const SUMS_WITH_LAYERS: u32 = 4;
 
 /// Sums that a chip keeps for each pixel of a picture: [`SUMS_WITH_LAYERS`] or 1.
@@ -68,8 +69,8 @@ pub const MAX_GATHER_RAYS: u32 = 1 << 14;
 /// Specular bounces that a path takes without Russian roulette.
 pub const FREE_BOUNCES: u32 = 16;
 
-/// Maximum number of specular bounces of a path; a path that would take more is black. Between mirrors of reflectance 0.98 less than
-/// 4e-5 of the light is left by then.
+/// Maximum number of specular bounces of a path; a path that would take more is black. Between mirrors of
+/// reflectance 0.98 less than 4e-5 of the light is left by then.
 pub const SPECULAR_BOUNCES: u32 = 512;
 
 /// Maximum number of direction bins of generative reordering.
@@ -84,16 +85,16 @@ pub const KD_TREE_LEVELS: usize = 27;
 /// Stack entries of a search in a photon map in leaves; a host builds no tree that needs more.
 pub const PHOTON_STACK: usize = 160;
 
-/// Number of candidates at which a search for the `neighbors` nearest photons selects them: a trade-off, as a lower
-/// number shrinks the search radius sooner but selects more often.
+/// Number of candidates at which a search for the `neighbors` nearest photons selects them: a trade-off, as a
+/// lower number shrinks the search radius sooner but selects more often.
 pub const fn selected_candidates(neighbors: u32) -> usize {
     const MIN_BEYOND: usize = 32;
     let beyond = neighbors as usize * 3 / 5;
     neighbors as usize + if beyond < MIN_BEYOND { MIN_BEYOND } else { beyond }
 }
 
-/// Candidates that a search for `neighbors` photons needs room for: [`selected_candidates`], and the photons of one
-/// leaf, which are tested at once.
+/// Candidates that a search for `neighbors` photons needs room for: [`selected_candidates`], and the photons
+/// of one leaf, which are tested at once.
 pub const fn gather_candidates(neighbors: u32) -> usize {
     selected_candidates(neighbors) + LEAF_LANES
 }

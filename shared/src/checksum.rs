@@ -1,8 +1,9 @@
-//! The checksums of frames and of images: two polynomials, so that an error that one misses is caught by the other.
+//! The checksums of frames and of images: two polynomials, so that an error that one misses is caught by the
+//! other.
 //!
-//! [`Checksum`], of frames, is CRC-32C (Castagnoli) by slicing-by-16 (Kounavis, Berry 2005): sixteen bytes at a time,
-//! with a table for each of the sixteen byte positions. [`ImageChecksum`], of chunks and of the whole image, is
-//! CRC-64/XZ (ECMA-182) by slicing-by-8.
+//! [`Checksum`], of frames, is CRC-32C (Castagnoli) by slicing-by-16 (Kounavis, Berry 2005): sixteen bytes at
+//! a time, with a table for each of the sixteen byte positions. [`ImageChecksum`], of chunks and of the whole
+//! image, is CRC-64/XZ (ECMA-182) by slicing-by-8.
 
 use crate::address::Line;
 
@@ -16,7 +17,8 @@ static TABLES: [[u32; 256]; 16] = narrowed(tables(POLYNOMIAL as u64));
 /// `IMAGE_TABLES[n][b]`: the CRC-64/XZ remainder of byte `b` followed by `n` zero bytes.
 static IMAGE_TABLES: [[u64; 256]; 8] = tables(IMAGE_POLYNOMIAL);
 
-/// Remainders by a bit-reversed polynomial of up to 64 bits: `[n][b]` is that of byte `b` followed by `n` zero bytes.
+/// Remainders by a bit-reversed polynomial of up to 64 bits: `[n][b]` is that of byte `b` followed by `n`
+/// zero bytes.
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
 const fn tables<const PLACES: usize>(polynomial: u64) -> [[u64; 256]; PLACES] {
     let mut tables = [[0; 256]; PLACES];
@@ -89,7 +91,8 @@ impl Checksum {
             let mut tables = TABLES.iter().rev();
             let head = (u32::from_le_bytes([*a, *b, *c, *d]) ^ self.0).to_le_bytes();
             let head = head.into_iter().zip(&mut tables).fold(0, add);
-            // Only the first four bytes depend on the sum so far; the other twelve lookups need not wait for it.
+            // Only the first four bytes depend on the sum so far; the other twelve lookups need not wait for
+            // it.
             self.0 = behind.iter().copied().zip(tables).fold(0, add) ^ head;
         }
         for &byte in rest {

@@ -2,13 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Work done on a tile. Sums over all tiles do not depend on which chip rendered which tile, unless chips keep irradiance records
+/// Work done on a tile. Sums over all tiles do not depend on which chip rendered which tile, unless chips
+/// keep irradiance records
 /// ([`FrameParameters::keep_records`](crate::message::FrameParameters::keep_records)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
-    /// Eye rays: 2 a sample, for its light and for its other channels; another for each later piece of work on a sample
-    /// that sees its surface by way of specular ones; and 1 for each lookup of a point of the irradiance
-    /// cache's lattice.
+    /// Eye rays: 2 a sample, for its light and for its other channels; another for each later piece of work
+    /// on a sample that sees its surface by way of specular ones; and 1 for each lookup of a point of the
+    /// irradiance cache's lattice.
     pub eye_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,
@@ -45,7 +46,8 @@ pub struct Counters {
     pub distances_compared: u64,
     /// Photons returned by searches.
     pub photons_found: u64,
-    /// Photons whose power was reflected by a lobe as well, each by its direction; those of the caustic map included.
+    /// Photons whose power was reflected by a lobe as well, each by its direction; those of the caustic map
+    /// included.
     pub photons_reflected: u64,
     /// Photons of [`Self::photons_reflected`] whose lobe is a microfacet model.
     pub photons_on_microfacets: u64,
@@ -91,8 +93,8 @@ impl Counters {
         most_waiting: 0,
     };
 
-    /// Counts a search for the k nearest photons: photons tested, photons that became candidates, candidates read by
-    /// selections and their comparisons, photons found.
+    /// Counts a search for the k nearest photons: photons tested, photons that became candidates, candidates
+    /// read by selections and their comparisons, photons found.
     #[inline(always)]
     pub fn count_gather(&mut self, tested: u32, taken: u32, [selected, compared]: [u32; 2], found: u32) {
         self.gathers += 1;

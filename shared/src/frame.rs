@@ -4,8 +4,9 @@
 //! COBS( kind: u8 | session: u32 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
 //! ```
 //!
-//! Numbers are little-endian. Stuffing ([`crate::stuffing`]) leaves no zero byte inside a frame, so that a receiver
-//! finds the next frame after any damage. [`crate::transport`] gives the header's numbers their meaning.
+//! Numbers are little-endian. Stuffing ([`crate::stuffing`]) leaves no zero byte inside a frame, so that a
+//! receiver finds the next frame after any damage. [`crate::transport`] gives the header's numbers their
+//! meaning.
 
 use heapless::Vec;
 use memchr::memchr;
@@ -47,7 +48,8 @@ pub enum FrameKind {
     Open = 1,
     /// An acknowledgement alone.
     Acknowledge = 2,
-    /// A request for an [`Self::Answer`]; frames below its sequence number that are not acknowledged are lost.
+    /// A request for an [`Self::Answer`]; frames below its sequence number that are not acknowledged are
+    /// lost.
     Probe = 3,
     /// Reply to a probe: an acknowledgement, and the number of the sender's next frame.
     Answer = 4,
@@ -135,8 +137,8 @@ impl FrameReader {
         Self { wire: Vec::new(), overrun: false, complete: false }
     }
 
-    /// Consumes bytes up to the end of the next frame. Returns the number of bytes consumed and, if a frame ended, the
-    /// frame or its defect. Two zero bytes in a row are no frame and no error.
+    /// Consumes bytes up to the end of the next frame. Returns the number of bytes consumed and, if a frame
+    /// ended, the frame or its defect. Two zero bytes in a row are no frame and no error.
     pub fn read(&mut self, bytes: &[u8]) -> (usize, Option<Result<Frame<'_>, FrameError>>) {
         if core::mem::take(&mut self.complete) {
             self.wire.clear();

@@ -1,12 +1,12 @@
 //! The card image: the lines that hold everything a chip needs of a scene.
 //!
-//! The first lines are the header: magic, layout version, number of lines, units, lights, and a table of sections. A
-//! section is a run of lines that holds records of one kind ([`crate::layout`]), as many whole ones as fit in each
-//! line; unused bytes are zero.
+//! The first lines are the header: magic, layout version, number of lines, units, lights, and a table of
+//! sections. A section is a run of lines that holds records of one kind ([`crate::layout`]), as many whole
+//! ones as fit in each line; unused bytes are zero.
 //!
-//! The photon map has one of two layouts, and the sections of the other are empty: [`SectionKind::Photons`], or
-//! [`SectionKind::PhotonNodes`] and [`SectionKind::PhotonLeaves`]. Sections of irradiance points, the caustic map,
-//! textures and vertex attributes are empty in an image without them.
+//! The photon map has one of two layouts, and the sections of the other are empty: [`SectionKind::Photons`],
+//! or [`SectionKind::PhotonNodes`] and [`SectionKind::PhotonLeaves`]. Sections of irradiance points, the
+//! caustic map, textures and vertex attributes are empty in an image without them.
 
 use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
 use crate::layout::{
@@ -33,7 +33,8 @@ pub enum SectionKind {
     Nodes = 0,
     /// [`crate::layout::BvhLeaf`]s, of triangles.
     Triangles = 1,
-    /// [`crate::layout::LeafAttributes`], one `u32` for each leaf of triangles. Empty if no triangle has attributes.
+    /// [`crate::layout::LeafAttributes`], one `u32` for each leaf of triangles. Empty if no triangle has
+    /// attributes.
     LeafAttributes = 2,
     /// [`Attributes`] of triangles, those of a leaf after its [`crate::layout::Tangents`] if it has any.
     Attributes = 3,
@@ -51,10 +52,11 @@ pub enum SectionKind {
     LightNodes = 9,
     /// [`DistantLight`]s.
     DistantLights = 10,
-    /// Distribution of the environment's cells: `u32` thresholds of the cumulative distribution function, in units of
-    /// 2^-32. First the marginal one of the rows, then for each row the conditional one of its cells; each ends with
-    /// 2^32 - 1. If cells are divided there follow their count, the number n of rows and of columns of their parts, the numbers
-    /// of the divided cells (row by row), increasing, and for each of them the like distributions of n rows and n x n parts.
+    /// Distribution of the environment's cells: `u32` thresholds of the cumulative distribution function, in
+    /// units of 2^-32. First the marginal one of the rows, then for each row the conditional one of its
+    /// cells; each ends with 2^32 - 1. If cells are divided there follow their count, the number n of rows
+    /// and of columns of their parts, the numbers of the divided cells (row by row), increasing, and for each
+    /// of them the like distributions of n rows and n x n parts.
     EnvironmentCells = 11,
     /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
     Photons = 12,
@@ -200,7 +202,8 @@ pub struct Lights {
     pub radiance: [f32; 3],
     /// Index of the environment's texture; `None` without an environment.
     pub texture: Option<u32>,
-    /// Columns and rows of the cells in which the environment is sampled, equal steps of the two angles: 1 to 65535.
+    /// Columns and rows of the cells in which the environment is sampled, equal steps of the two angles: 1 to
+    /// 65535.
     pub cells: [u16; 2],
 }
 
@@ -229,8 +232,8 @@ pub enum HeaderError {
     Magic,
     /// The image has this layout version instead of [`LAYOUT_VERSION`].
     Version(u16),
-    /// A unit or the grid's cell is not a positive normal number, a probability is not in [0, 1], or the environment's
-    /// radiance is negative or not finite.
+    /// A unit or the grid's cell is not a positive normal number, a probability is not in [0, 1], or the
+    /// environment's radiance is negative or not finite.
     Unit,
     /// The section of this index reaches past the image's last line.
     Section(u8),

@@ -1,7 +1,8 @@
 //! Wire and memory formats of photoncard: bytes, no rendering.
 //!
-//! Firmware and host are built on this crate. It defines the contents of a card's memory ([`address`], [`layout`],
-//! [`image`]), the capacities of a chip ([`budget`]), and the protocol of a link ([`message`], [`transport`], [`frame`]).
+//! Firmware and host are built on this crate. It defines the contents of a card's memory ([`address`],
+//! [`layout`], [`image`]), the capacities of a chip ([`budget`]), and the protocol of a link ([`message`],
+//! [`transport`], [`frame`]).
 //!
 //! # Example
 //!
@@ -50,8 +51,8 @@
 //!
 //! [`hash`] is that of all random numbers.
 //!
-//! No function allocates, and no input makes one panic. `docs/protocol.md` describes the protocol for other implementations,
-//! `docs/glossary.md` defines the terms.
+//! No function allocates, and no input makes one panic. `docs/protocol.md` describes the protocol for other
+//! implementations, `docs/glossary.md` defines the terms.
 #![forbid(unsafe_code)]
 #![no_std]
 // A chip never panics: these lints catch what could, and each exception gives its reason.

@@ -13,14 +13,15 @@ pub enum PortError {
 
 /// One end of a byte link. Every call returns within `wait`, whether or not a byte has moved.
 pub trait Port {
-    /// Reads 1 to `buffer.len()` bytes as soon as any are there and returns their number; 0 if none came within `wait`.
+    /// Reads 1 to `buffer.len()` bytes as soon as any are there and returns their number; 0 if none came
+    /// within `wait`.
     ///
     /// # Errors
     /// If no more bytes can come.
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError>;
 
-    /// Writes as many of the first `bytes` as there is room for and returns their number; 0 if no room came within
-    /// `wait`.
+    /// Writes as many of the first `bytes` as there is room for and returns their number; 0 if no room came
+    /// within `wait`.
     ///
     /// # Errors
     /// If no more bytes can be sent.

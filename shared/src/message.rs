@@ -13,9 +13,11 @@
 //! Flush           -> (nothing)                   no tile follows for now: gathers that wait are done
 //! ```
 //!
-//! A self-test takes the place of the image: `Compute -> Computed`, any number, then `TestMemory -> MemoryTested ...`.
+//! A self-test takes the place of the image: `Compute -> Computed`, any number, then `TestMemory ->
+//! MemoryTested ...`.
 //!
-//! A command that the card cannot execute is answered with [`Reply::Fault`]; the card stays ready for the next one.
+//! A command that the card cannot execute is answered with [`Reply::Fault`]; the card stays ready for the
+//! next one.
 
 mod fault;
 mod pixel;
@@ -59,8 +61,8 @@ pub struct MemoryUse {
 /// Maximum number of checksums of one [`Reply::Checksums`].
 pub const CHECKSUMS_PER_REPLY: u32 = 64;
 
-/// A pinhole camera. The ray through the picture's point `(u, v)`, both from 0 to 1, v downwards, has the direction
-/// `forward + (2 u - 1) right + (1 - 2 v) up`.
+/// A pinhole camera. The ray through the picture's point `(u, v)`, both from 0 to 1, v downwards, has the
+/// direction `forward + (2 u - 1) right + (1 - 2 v) up`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
     /// The pinhole, metres.
@@ -84,11 +86,13 @@ pub struct FrameParameters {
     pub camera: Camera,
     /// Seed of all random numbers.
     pub seed: u32,
-    /// Number of the first sample of a pixel: 0, or the number of those that other frames of the picture have.
+    /// Number of the first sample of a pixel: 0, or the number of those that other frames of the picture
+    /// have.
     pub first_sample: u32,
     /// Samples a pixel, from the first on.
     pub samples: u32,
-    /// Samples a pixel of the whole picture as planned: with the irradiance cache, rays are divided among so many.
+    /// Samples a pixel of the whole picture as planned: with the irradiance cache, rays are divided among so
+    /// many.
     pub planned_samples: u32,
     /// Final gather rays a sample.
     pub gather_rays: u32,
@@ -100,10 +104,12 @@ pub struct FrameParameters {
     pub max_distance: f32,
     /// Importance sampling of gather rays.
     pub sampling: Sampling,
-    /// Relative error bound of interpolated irradiance, above 0 and at most 1; `None` turns the irradiance cache off.
+    /// Relative error bound of interpolated irradiance, above 0 and at most 1; `None` turns the irradiance
+    /// cache off.
     pub irradiance_error: Option<f32>,
-    /// Number of direction bins of gather rays, at least 1: the rays of one bin are cast for all pixels of a tile before
-    /// those of the next bin. With one bin, all rays of a pixel are cast before those of the next pixel.
+    /// Number of direction bins of gather rays, at least 1: the rays of one bin are cast for all pixels of a
+    /// tile before those of the next bin. With one bin, all rays of a pixel are cast before those of the next
+    /// pixel.
     pub bins: u32,
     /// Time and order of gathers.
     pub drain: Drain,
@@ -111,7 +117,8 @@ pub struct FrameParameters {
     pub queue: u32,
     /// Source of the radiance at the end of a gather ray.
     pub radiance: Radiance,
-    /// Gathers in the caustic map; with `None`, emission that gather rays meet through specular surfaces counts.
+    /// Gathers in the caustic map; with `None`, emission that gather rays meet through specular surfaces
+    /// counts.
     pub caustics: Option<CausticGather>,
     /// `true` for pixels with [`LayerSums`]. Their light does not change; tiles have fewer pixels
     /// ([`Budget::pixels_of_tile`]).
@@ -120,11 +127,12 @@ pub struct FrameParameters {
     pub filter: Filter,
     /// Maximum number of tiles in flight, at least 1; a chip limits it to [`Budget::in_flight`].
     pub in_flight: u32,
-    /// `true` for one of several frames of a picture: irradiance records of a tile are kept in card memory, where there is room
-    /// beyond the image, for a frame of other samples.
+    /// `true` for one of several frames of a picture: irradiance records of a tile are kept in card memory,
+    /// where there is room beyond the image, for a frame of other samples.
     pub keep_records: bool,
-    /// Adaptive sampling: threshold of the deviation of a pixel's samples over the root of their mean, W^(1/2)/(sr^(1/2) m), finite and above 0, above
-    /// which samples after the first [`PROBES`] are means of several paths. `None` for one path a sample.
+    /// Adaptive sampling: threshold of the deviation of a pixel's samples over the root of their mean,
+    /// W^(1/2)/(sr^(1/2) m), finite and above 0, above which samples after the first [`PROBES`] are means of
+    /// several paths. `None` for one path a sample.
     pub adaptive_threshold: Option<f32>,
 }
 
@@ -140,8 +148,9 @@ impl FrameParameters {
     }
 }
 
-/// Pixel filter: the density of a pixel's samples around its centre, in both directions alike. Samples are drawn from the filter and
-/// count equally (Ernst, Stamminger, Greiner 2006, *Filter importance sampling*), so that no pixel needs those of its neighbours.
+/// Pixel filter: the density of a pixel's samples around its centre, in both directions alike. Samples are
+/// drawn from the filter and count equally (Ernst, Stamminger, Greiner 2006, *Filter importance sampling*),
+/// so that no pixel needs those of its neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Filter {
     /// The pixel's square.
@@ -162,7 +171,8 @@ pub struct CausticGather {
     pub max_distance: f32,
 }
 
-/// Importance sampling of final gather rays. The expectation of the picture does not depend on it. Points of fewer than eight rays have that of the reflection.
+/// Importance sampling of final gather rays. The expectation of the picture does not depend on it. Points of
+/// fewer than eight rays have that of the reflection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sampling {
     /// By the reflection function and the cosine.
@@ -182,8 +192,8 @@ pub enum Radiance {
     /// Density of the nearest photons.
     #[default]
     Density,
-    /// Nearest irradiance point, which the image must have (Christensen 1999, *Faster photon map global illumination*), for
-    /// Lambertian surfaces; density of photons for surfaces with a lobe.
+    /// Nearest irradiance point, which the image must have (Christensen 1999, *Faster photon map global
+    /// illumination*), for Lambertian surfaces; density of photons for surfaces with a lobe.
     Precomputed,
 }
 
@@ -224,8 +234,8 @@ impl Tile {
 /// Message from the host to a card.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
-    /// Begins a session, at any time. The card forgets frame, tiles, and whether it has an image; written lines stay. Its
-    /// encoding is equal in all versions of the protocol.
+    /// Begins a session, at any time. The card forgets frame, tiles, and whether it has an image; written
+    /// lines stay. Its encoding is equal in all versions of the protocol.
     Hello {
         /// The host's [`PROTOCOL_VERSION`].
         protocol: u16,
@@ -239,8 +249,8 @@ pub enum Command<'a> {
         /// Number of chunks.
         count: u32,
     },
-    /// Announces an image: number of lines, and checksum of all its bytes. Written lines stay, so that only those need be written in
-    /// which the image differs from the one before.
+    /// Announces an image: number of lines, and checksum of all its bytes. Written lines stay, so that only
+    /// those need be written in which the image differs from the one before.
     BeginImage {
         /// Lines.
         lines: u32,
@@ -257,8 +267,8 @@ pub enum Command<'a> {
     },
     /// Ends the image, which is then checked.
     EndImage,
-    /// Sets the parameters of the tiles that follow. Tiles of an earlier frame are dropped; messages about them may still come before the
-    /// answer.
+    /// Sets the parameters of the tiles that follow. Tiles of an earlier frame are dropped; messages about
+    /// them may still come before the answer.
     BeginFrame(FrameParameters),
     /// Renders a tile.
     RenderTile(Tile),
@@ -278,7 +288,8 @@ pub enum Command<'a> {
 /// Message from a card to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply<'a> {
-    /// Answer to [`Command::Hello`]. The versions are first in all versions of the protocol: [`hello_versions`].
+    /// Answer to [`Command::Hello`]. The versions are first in all versions of the protocol:
+    /// [`hello_versions`].
     Hello {
         /// The card's [`PROTOCOL_VERSION`].
         protocol: u16,
@@ -288,7 +299,8 @@ pub enum Reply<'a> {
         budget: Budget,
         /// Number of lines of card memory, from the first, that were written since the card was switched on.
         written_lines: u32,
-        /// On-chip memory that the firmware uses; `None` on cards that do not measure it, such as emulated ones.
+        /// On-chip memory that the firmware uses; `None` on cards that do not measure it, such as emulated
+        /// ones.
         memory_use: Option<MemoryUse>,
         /// Name and version of the firmware.
         #[serde(borrow)]
@@ -306,8 +318,8 @@ pub enum Reply<'a> {
     ImageAccepted,
     /// Answer to [`Command::BeginFrame`]: the card can render it.
     FrameAccepted,
-    /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each. Every pixel of a tile is sent once; parts of a tile may
-    /// come in any order.
+    /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each. Every pixel of a tile is sent
+    /// once; parts of a tile may come in any order.
     Pixels {
         /// The tile's number.
         tile: u32,
@@ -355,8 +367,8 @@ pub struct Versions {
     pub layout: u16,
 }
 
-/// Reads the versions of a [`Reply::Hello`] of any version of the protocol, in which they are first; `None` for other
-/// replies.
+/// Reads the versions of a [`Reply::Hello`] of any version of the protocol, in which they are first; `None`
+/// for other replies.
 pub fn hello_versions(bytes: &[u8]) -> Option<Versions> {
     let (opcode, rest) = postcard::take_from_bytes::<u32>(bytes).ok()?;
     let (versions, _) = postcard::take_from_bytes(rest).ok()?;

@@ -1,8 +1,8 @@
 //! Consistent overhead byte stuffing (COBS; Cheshire, Baker 1999): an encoding without zero bytes.
 //!
-//! The plain bytes are cut at every zero byte, which is left out, and after 254 non-zero bytes in a row. Each piece
-//! follows a code byte, its length plus one. A code below 255 stands for a zero byte after its piece, but for the last
-//! piece.
+//! The plain bytes are cut at every zero byte, which is left out, and after 254 non-zero bytes in a row. Each
+//! piece follows a code byte, its length plus one. A code below 255 stands for a zero byte after its piece,
+//! but for the last piece.
 
 use heapless::Vec;
 
@@ -14,7 +14,8 @@ pub const fn max_stuffed_bytes(plain: usize) -> usize {
     plain + plain.div_ceil(FULL as usize - 1) + (plain == 0) as usize
 }
 
-/// Appends the stuffed bytes of `parts`, one after the other, to `wire`, or nothing if there is no room. Returns whether there was.
+/// Appends the stuffed bytes of `parts`, one after the other, to `wire`, or nothing if there is no room.
+/// Returns whether there was.
 pub fn stuff<const N: usize>(parts: &[&[u8]], wire: &mut Vec<u8, N>) -> bool {
     let begin = wire.len();
     let plain = parts.iter().map(|part| part.len()).sum();
@@ -46,10 +47,11 @@ fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
     Some(place)
 }
 
-/// Decodes stuffed bytes, without the terminating zero, in place; `None` if they are not a COBS encoding. They must hold no zero byte.
+/// Decodes stuffed bytes, without the terminating zero, in place; `None` if they are not a COBS encoding.
+/// They must hold no zero byte.
 pub fn unstuff(wire: &mut [u8]) -> Option<&mut [u8]> {
-    // Plain bytes are where they were stuffed, and a zero byte is in the place of its code. Only the code behind a full piece, for
-    // which no zero byte stands, is taken out: those before it move up.
+    // Plain bytes are where they were stuffed, and a zero byte is in the place of its code. Only the code
+    // behind a full piece, for which no zero byte stands, is taken out: those before it move up.
     let mut begin = 1;
     let mut place = 0;
     let mut is_zero = false;

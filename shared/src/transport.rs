@@ -1,18 +1,21 @@
-//! The transport: delivers messages once, whole and in order, over a link that damages, loses or repeats bytes.
+//! The transport: delivers messages once, whole and in order, over a link that damages, loses or repeats
+//! bytes.
 //!
-//! Each end of a link has a [`Transport`], which does no I/O and has no clock: it takes bytes and returns bytes.
+//! Each end of a link has a [`Transport`], which does no I/O and has no clock: it takes bytes and returns
+//! bytes.
 //!
-//! - The host begins a session with an [`FrameKind::Open`] frame of number 0 and a random session number of 32 bits; the
-//!   card then forgets any other session. A card answers a frame of an unknown session with [`FrameKind::Unknown`], from which
-//!   the host concludes that the card was reset.
-//! - Messages are numbered from 0 in each direction. At most [`WINDOW`] are in flight: sent and not acknowledged.
-//! - Every frame carries the number of messages of the other direction that were taken (`acknowledged`), and which of the
-//!   next ones have arrived (`held`). A link keeps the order of its bytes: a message is lost if one that was sent after it
-//!   has arrived. Only lost messages are repeated.
-//! - A loss of the last messages needs a clock to be noticed, which the host has: after some silence it sends a
-//!   [`FrameKind::Probe`] with the number of its transmission. The card's [`FrameKind::Answer`] returns that number: host
-//!   messages sent before the probe that have not arrived are lost. The answer also carries the number of messages that the
-//!   card has sent; missing ones are lost, as the host's next probe states.
+//! - The host begins a session with an [`FrameKind::Open`] frame of number 0 and a random session number of
+//!   32 bits; the card then forgets any other session. A card answers a frame of an unknown session with
+//!   [`FrameKind::Unknown`], from which the host concludes that the card was reset.
+//! - Messages are numbered from 0 in each direction. At most [`WINDOW`] are in flight: sent and not
+//!   acknowledged.
+//! - Every frame carries the number of messages of the other direction that were taken (`acknowledged`), and
+//!   which of the next ones have arrived (`held`). A link keeps the order of its bytes: a message is lost if
+//!   one that was sent after it has arrived. Only lost messages are repeated.
+//! - A loss of the last messages needs a clock to be noticed, which the host has: after some silence it sends
+//!   a [`FrameKind::Probe`] with the number of its transmission. The card's [`FrameKind::Answer`] returns
+//!   that number: host messages sent before the probe that have not arrived are lost. The answer also carries
+//!   the number of messages that the card has sent; missing ones are lost, as the host's next probe states.
 
 mod session;
 
@@ -48,7 +51,8 @@ impl Transport {
         Self::new(End::Card)
     }
 
-    /// Begins a session, with the next message that is sent. Messages in flight of an earlier session are dropped.
+    /// Begins a session, with the next message that is sent. Messages in flight of an earlier session are
+    /// dropped.
     pub fn open(&mut self, number: u32) {
         self.session.begin(number);
     }
@@ -63,13 +67,15 @@ impl Transport {
         self.session.on_their_way() == 0
     }
 
-    /// Counter of progress, modulo 2^16: messages that were taken here, plus messages that the other end acknowledged.
+    /// Counter of progress, modulo 2^16: messages that were taken here, plus messages that the other end
+    /// acknowledged.
     pub fn passed(&self) -> u16 {
         self.session.passed()
     }
 
-    /// Sends the message that `fill` writes into a slice of [`MAX_PAYLOAD`] bytes, of the length that it returns. Returns `false`,
-    /// and sends nothing, if the window is full or `fill` returns `None` or more than the slice's length.
+    /// Sends the message that `fill` writes into a slice of [`MAX_PAYLOAD`] bytes, of the length that it
+    /// returns. Returns `false`, and sends nothing, if the window is full or `fill` returns `None` or more
+    /// than the slice's length.
     pub fn send(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
         self.can_send() && self.session.send(fill)
     }
@@ -89,7 +95,8 @@ impl Transport {
         self.sent = self.sent.saturating_add(bytes);
     }
 
-    /// Takes bytes from the link, up to the end of the next frame. Returns their number, and the frame's event.
+    /// Takes bytes from the link, up to the end of the next frame. Returns their number, and the frame's
+    /// event.
     pub fn receive(&mut self, bytes: &[u8]) -> (usize, Option<Event>) {
         let (taken, frame) = self.reader.read(bytes);
         let event = match frame {

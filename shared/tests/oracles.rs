@@ -92,7 +92,8 @@ proptest! {
 /// An error that a frame's checksum does not show: the polynomial itself, laid over the bytes.
 #[test]
 fn what_a_frames_checksum_misses_an_images_shows() {
-    // The polynomial of CRC-32C has 33 bits. The first on the wire, a byte's lowest, is the highest coefficient.
+    // The polynomial of CRC-32C has 33 bits. The first on the wire, a byte's lowest, is the highest
+    // coefficient.
     let multiple = 1 | u64::from(0x82f6_3b78_u32) << 1;
     let (sound, mut damaged) = (Line([0x5a; LINE_BYTES]), Line([0x5a; LINE_BYTES]));
     for (byte, error) in damaged.0[50..].iter_mut().zip(multiple.to_le_bytes()) {

@@ -238,7 +238,8 @@ fn the_page_is_of_this_version() {
     assert!(page.contains(&format!("The version is {PROTOCOL_VERSION}\n")));
 }
 
-/// Structures whose every field has a number of its own: bytes that change are another version of the protocol.
+/// Structures whose every field has a number of its own: bytes that change are another version of the
+/// protocol.
 #[test]
 fn golden_structures() {
     assert_eq!(PROTOCOL_VERSION, 17);

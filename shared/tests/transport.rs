@@ -215,7 +215,8 @@ proptest! {
     }
 }
 
-/// A card in the middle of a session with another host takes a new host's first message, unless the 32 bits of both numbers are equal.
+/// A card in the middle of a session with another host takes a new host's first message, unless the 32 bits
+/// of both numbers are equal.
 #[test]
 fn sessions_are_told_apart_by_all_bits_of_their_numbers() {
     for (bit, is_new) in (0..32).map(|bit| (1 << bit, true)).chain([(0, false)]) {

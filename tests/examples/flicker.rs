@@ -1,14 +1,16 @@
-//! Flicker of frames: the difference of each from the one before, at the same places of surfaces that stand still.
+//! Flicker of frames: the difference of each from the one before, at the same places of surfaces that stand
+//! still.
 //!
 //! ```text
 //! flicker [--within X0,Y0,Z0,X1,Y1,Z1] FRAME.exr[=OTHER.exr] ...
 //! ```
 //!
-//! A pixel of a frame is a place in the scene, by the frame's camera and its layer `Z`. The place is projected into the frame before, whose
-//! radiance there is interpolated between four pixels, all of which see the same surface by their depths. Printed is the root mean
-//! square of the relative difference `(b - a) / ((a + b) / 2)` of luminance: noise that stays on the surfaces, and does not crawl, is none.
-//! `--within` takes the places in a box alone, such as a strip of a wall. With `OTHER.exr` the radiance is that of another
-//! renderer's picture of the same view.
+//! A pixel of a frame is a place in the scene, by the frame's camera and its layer `Z`. The place is
+//! projected into the frame before, whose radiance there is interpolated between four pixels, all of which
+//! see the same surface by their depths. Printed is the root mean square of the relative difference `(b - a)
+//! / ((a + b) / 2)` of luminance: noise that stays on the surfaces, and does not crawl, is none. `--within`
+//! takes the places in a box alone, such as a strip of a wall. With `OTHER.exr` the radiance is that of
+//! another renderer's picture of the same view.
 
 use std::error::Error;
 

@@ -1,13 +1,14 @@
 //! Fuzzes readers of foreign bytes.
 //!
-//! `cargo run --profile PROFILE -p photoncard-tests --example fuzz -- TARGET|all [--inputs N] [--seed N] [--first N]
-//! [--seconds N] [--folder PATH]`
+//! `cargo run --profile PROFILE -p photoncard-tests --example fuzz -- TARGET|all [--inputs N] [--seed N]
+//! [--first N] [--seconds N] [--folder PATH]`
 //!
-//! The targets are `frames`, `messages`, `session`, `image`, `gltf`, `meshopt`, `draco`, `textures`, `environments` and `exr`. The
-//! profile `dev` keeps every check of overflows; `release` is what users run. An input is a function of target, seed and
-//! number: `--first N --inputs 1` replays the one that failed. Its bytes are written into the folder, by default
-//! `photoncard-fuzz` among the temporary files. Several runs at once, each with a `--first` of its own, share the work.
-//! A run that is ended by the system leaves the number of its input in a file `*.at`.
+//! The targets are `frames`, `messages`, `session`, `image`, `gltf`, `meshopt`, `draco`, `textures`,
+//! `environments` and `exr`. The profile `dev` keeps every check of overflows; `release` is what users run.
+//! An input is a function of target, seed and number: `--first N --inputs 1` replays the one that failed. Its
+//! bytes are written into the folder, by default `photoncard-fuzz` among the temporary files. Several runs at
+//! once, each with a `--first` of its own, share the work. A run that is ended by the system leaves the
+//! number of its input in a file `*.at`.
 
 use std::error::Error;
 use std::process::ExitCode;

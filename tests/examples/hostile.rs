@@ -1,13 +1,15 @@
 //! Damages real files and reads them in processes of limited memory.
 //!
-//! `cargo run --release -p photoncard-tests --example hostile -- images|scenes|cards|parts|partials|frames [--inputs N] [--seed N] [--first N] [--batch N]
-//! [--command PHOTONCARD] [--every N] [--kilobytes N] [--folder PATH]`
+//! `cargo run --release -p photoncard-tests --example hostile -- images|scenes|cards|parts|partials|frames
+//! [--inputs N] [--seed N] [--first N] [--batch N] [--command PHOTONCARD] [--every N] [--kilobytes N]
+//! [--folder PATH]`
 //!
-//! An input that ends a process by a panic, an abort or a signal, or takes more than 20 s, is a finding: it is written into the
-//! folder, and `--first N --inputs 1` replays it. The command that `--command` names reads every 50th input, or as
-//! `--every` says. It alone reads the last four kinds, files that it keeps, in half of the inputs damaged while it works: a replay of these
-//! may need some repetitions. Another picture than that of undamaged files is a finding there too.
-//! `tests/hostile_files.sh` builds all and runs 100,000 images, 20,000 scenes and 50,000 kept files.
+//! An input that ends a process by a panic, an abort or a signal, or takes more than 20 s, is a finding: it
+//! is written into the folder, and `--first N --inputs 1` replays it. The command that `--command` names
+//! reads every 50th input, or as `--every` says. It alone reads the last four kinds, files that it keeps, in
+//! half of the inputs damaged while it works: a replay of these may need some repetitions. Another picture
+//! than that of undamaged files is a finding there too. `tests/hostile_files.sh` builds all and runs 100,000
+//! images, 20,000 scenes and 50,000 kept files.
 
 use std::error::Error;
 use std::path::PathBuf;

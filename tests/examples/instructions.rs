@@ -1,8 +1,9 @@
 //! The host's part of `tests/instructions.sh`, which counts the instructions of a gather.
 //!
-//! `instructions write FILE` writes what a board's memory is to hold: the image of the Cornell box with its photons, and the
-//! frame's parameters in the line behind it. `instructions render FILE WORK` does the work `Eye`, `Rays` or `Gathers` of one
-//! tile as a board does, in the function `measured`, and prints what it counted.
+//! `instructions write FILE` writes what a board's memory is to hold: the image of the Cornell box with its
+//! photons, and the frame's parameters in the line behind it. `instructions render FILE WORK` does the work
+//! `Eye`, `Rays` or `Gathers` of one tile as a board does, in the function `measured`, and prints what it
+//! counted.
 
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;

@@ -2,9 +2,9 @@
 //!
 //! `cargo run --release -p photoncard-tests --example nearest -- [--write FOLDER] [--repeat N]`
 //!
-//! Prints searches per second of one thread, for queries in random order and along a Hilbert curve, and the sum of the
-//! squared distances found. `--write` stores points and queries as little-endian `f32`, so that other libraries can run the
-//! same searches: `tests/peers/nearest.sh`.
+//! Prints searches per second of one thread, for queries in random order and along a Hilbert curve, and the
+//! sum of the squared distances found. `--write` stores points and queries as little-endian `f32`, so that
+//! other libraries can run the same searches: `tests/peers/nearest.sh`.
 
 use std::error::Error;
 use std::path::PathBuf;

@@ -1,7 +1,8 @@
 //! The floating-point operations of the firmware: `tests/operations.sh`.
 //!
-//! `operations table` prints `driver/render/src/cost_model/arithmetic/table.rs`: the operations of each step, counted in tiles of several scenes.
-//! `operations report` prints the operations of each unit for a ray and for a gather, counted and by the table.
+//! `operations table` prints `driver/render/src/cost_model/arithmetic/table.rs`: the operations of each step,
+//! counted in tiles of several scenes. `operations report` prints the operations of each unit for a ray and
+//! for a gather, counted and by the table.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::arithmetic::{Operations, Step, Unit};
@@ -21,7 +22,8 @@ const SCENES: [(&str, usize); 6] = [
     ("roughness.glb", 2),
 ];
 
-/// Settings of the dissertation's frame, without techniques or with all; in a smaller picture and with fewer photons, on which no step depends.
+/// Settings of the dissertation's frame, without techniques or with all; in a smaller picture and with fewer
+/// photons, on which no step depends.
 fn settings(has_all: bool) -> RenderSettings {
     let plain = RenderSettings {
         picture: Picture { width: 256, height: 256, ..Picture::default() },

@@ -4,9 +4,10 @@
 //! cargo run --release -p photoncard-tests --example pixels -- PHOTONCARD [--card ADDRESS] [ONLY]
 //! ```
 //!
-//! A line for each shipped scene and technique: the CRC-64 of the picture's samples, all layers included, the CRC-64 of the
-//! counters of `--stats --counters`, and the options. Attributes of the EXR file, times and the bytes of links are left out, so
-//! that builds of different versions can be compared. With `--card` the pictures are rendered there, and no work is counted.
+//! A line for each shipped scene and technique: the CRC-64 of the picture's samples, all layers included, the
+//! CRC-64 of the counters of `--stats --counters`, and the options. Attributes of the EXR file, times and the
+//! bytes of links are left out, so that builds of different versions can be compared. With `--card` the
+//! pictures are rendered there, and no work is counted.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};

@@ -1,11 +1,13 @@
 //! Measures the ray caster in isolation: rays from surfaces that a camera sees, cosine-weighted.
 //!
-//! `cargo run --release -p photoncard-tests --example rays -- SCENE [--bundle 16] [--write FOLDER] [--rays N] [--repeat N]`
+//! `cargo run --release -p photoncard-tests --example rays -- SCENE [--bundle 16] [--write FOLDER] [--rays N]
+//! [--repeat N]`
 //!
-//! Prints rays per second of one thread, to the first triangle and to any, the number of rays that meet one, the sum of the
-//! distances, and the lines that a ray reads. By default each ray has a place of its own. With `--bundle 16` sixteen rays have a place and one
-//! of 32 cells of the hemisphere in common, and are cast alone and in bundles. `--write` stores triangles and rays as little-endian `f32`, so that other
-//! libraries can cast the same rays: `tests/peers/rays.sh`.
+//! Prints rays per second of one thread, to the first triangle and to any, the number of rays that meet one,
+//! the sum of the distances, and the lines that a ray reads. By default each ray has a place of its own. With
+//! `--bundle 16` sixteen rays have a place and one of 32 cells of the hemisphere in common, and are cast
+//! alone and in bundles. `--write` stores triangles and rays as little-endian `f32`, so that other libraries
+//! can cast the same rays: `tests/peers/rays.sh`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -36,7 +38,8 @@ fn random(index: u32, dimension: u32) -> f32 {
 /// Numbers of cells along the axes of the unit square; the directions of a place are in one cell.
 const CELLS: [f32; 2] = [8.0, 4.0];
 
-/// Rays from the surfaces that the camera sees, in sampled directions of reflection: `bundle` from each place, in one cell.
+/// Rays from the surfaces that the camera sees, in sampled directions of reflection: `bundle` from each
+/// place, in one cell.
 fn bounces(scene: &Scene, packed: &PackedScene, count: u32, bundle: u32) -> Vec<Ray> {
     let (image, mut memory) = packed.view();
     let camera = scene.camera(None).expect("a scene has a camera");

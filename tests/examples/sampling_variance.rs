@@ -1,10 +1,11 @@
 //! Variance of each sampling of gather rays, on a fixed photon map.
 //!
-//! `cargo run --release -p photoncard-tests --example sampling_variance [SCENE [camera=NAME] [ASSIGNMENT...]]`
+//! `cargo run --release -p photoncard-tests --example sampling_variance [SCENE [camera=NAME]
+//! [ASSIGNMENT...]]`
 //!
-//! Prints, for every sampling and several ray counts, the RMSE of a point's indirect radiance over its mean, the
-//! variance of `brdf` over that of the sampling, and how far the mean of the seeds is from a gather of 10,000 rays, in
-//! standard errors; then how many rays the sampling needs for the RMSE of 200 `brdf` rays.
+//! Prints, for every sampling and several ray counts, the RMSE of a point's indirect radiance over its mean,
+//! the variance of `brdf` over that of the sampling, and how far the mean of the seeds is from a gather of
+//! 10,000 rays, in standard errors; then how many rays the sampling needs for the RMSE of 200 `brdf` rays.
 
 use glam::DVec3;
 use photoncard_driver::render::{PhotonMaps, RenderSettings, Sampling};

@@ -1,6 +1,7 @@
 //! Set-associative LRU cache in its simplest form: the oracle for the firmware's caches.
 
-/// A set-associative cache with least-recently-used replacement: for every set its blocks, the last used at the end.
+/// A set-associative cache with least-recently-used replacement: for every set its blocks, the last used at
+/// the end.
 pub struct LruOracle {
     sets: Vec<Vec<u32>>,
     ways: usize,
@@ -10,7 +11,8 @@ pub struct LruOracle {
 }
 
 impl LruOracle {
-    /// An empty cache of `ways` blocks per set, each of `lines` lines of card memory, in the set that `set` gives.
+    /// An empty cache of `ways` blocks per set, each of `lines` lines of card memory, in the set that `set`
+    /// gives.
     pub fn new(sets: u32, ways: u32, lines: u32, set: impl Fn(u32) -> u32 + 'static) -> Self {
         Self { sets: vec![Vec::new(); sets as usize], ways: ways as usize, lines, set: Box::new(set) }
     }

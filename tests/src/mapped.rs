@@ -52,7 +52,8 @@ impl MappedScene {
     /// Renders the window of a frame on reference chips in this process, one per thread.
     ///
     /// # Panics
-    /// If the scene has no camera of the settings' name, the card image is malformed, or threads cannot be started.
+    /// If the scene has no camera of the settings' name, the card image is malformed, or threads cannot be
+    /// started.
     pub fn frame(&self, settings: &RenderSettings) -> Frame {
         let window = settings.window();
         let camera = settings.camera(&self.scene).expect("a camera");
@@ -110,8 +111,8 @@ impl<'a> IndirectLight<'a> {
         Self { mapped, frame, points }
     }
 
-    /// Radiance of indirect light that each point reflects towards the eye, W/(sr m^2), by `rays` gather rays of a
-    /// sampling.
+    /// Radiance of indirect light that each point reflects towards the eye, W/(sr m^2), by `rays` gather rays
+    /// of a sampling.
     ///
     /// # Panics
     /// If the card image is malformed.

@@ -48,8 +48,8 @@ pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, materi
     }
 }
 
-/// Adds a quadrilateral with texture coordinates of the first set to a scene; corners counter-clockwise seen from the
-/// front.
+/// Adds a quadrilateral with texture coordinates of the first set to a scene; corners counter-clockwise seen
+/// from the front.
 pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f32; 2]; 4], material: u32) {
     let [a, b, c, d] = coordinates.map(Vec2::from);
     for (triangle, coordinates) in quad(corners, material).into_iter().zip([[a, b, c], [a, c, d]]) {

@@ -66,7 +66,8 @@ impl<'a, K: ChipKind> Wire<'a, K> {
         self.say_all(std::slice::from_ref(command))
     }
 
-    /// Sends commands without waiting for answers in between, and lets the card work until it is idle. Returns its answers.
+    /// Sends commands without waiting for answers in between, and lets the card work until it is idle.
+    /// Returns its answers.
     ///
     /// # Panics
     /// If there are more than the link's window holds, or the card sends anything but replies.
@@ -80,7 +81,8 @@ impl<'a, K: ChipKind> Wire<'a, K> {
         self.work()
     }
 
-    /// Sends a raw message, which need not be a command, and lets the card work until it is idle. Returns its answers.
+    /// Sends a raw message, which need not be a command, and lets the card work until it is idle. Returns its
+    /// answers.
     ///
     /// # Panics
     /// If the message does not fit a frame of the link, or the card sends anything but replies.
@@ -136,7 +138,8 @@ impl<'a, K: ChipKind> Wire<'a, K> {
         }
     }
 
-    /// Loads an image in reverse order of its writes, from the last lines to the first. Returns the card's answers.
+    /// Loads an image in reverse order of its writes, from the last lines to the first. Returns the card's
+    /// answers.
     pub fn load(&mut self, lines: &[Line]) -> Vec<Answer> {
         let begin = Command::BeginImage { lines: lines.len() as u32, checksum: image_checksum(lines) };
         let mut answers = self.say(&begin);

@@ -65,8 +65,8 @@ fn check_means([even, even_error, _]: [f64; 3], [adaptive, error, _]: [f64; 3]) 
     assert!(allowed < 0.08 * even, "the comparison tells little apart: {allowed} of {even}");
 }
 
-/// Most pixels see an edge of the lamp, of a box or of a shadow. A mean over all paths, of which the probes choose the number, would
-/// be too dark: bright probes bring more paths, and count less.
+/// Most pixels see an edge of the lamp, of a box or of a shadow. A mean over all paths, of which the probes
+/// choose the number, would be too dark: bright probes bring more paths, and count less.
 #[test]
 fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
     let [even, adaptive] = [None, Some(0.02)].map(|threshold| moments(threshold, 0));
@@ -75,13 +75,15 @@ fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
     assert!(variance < 0.75 * even_variance, "{variance} of {even_variance}");
 }
 
-/// Paths of a Lambertian surface share the gather rays of their sample: with sixteen each has one, with one all sixteen.
+/// Paths of a Lambertian surface share the gather rays of their sample: with sixteen each has one, with one
+/// all sixteen.
 #[test]
 fn paths_that_share_gather_rays_have_the_mean_of_samples_with_rays_of_their_own() {
     check_means(moments(None, 16), moments(Some(0.005), 16));
 }
 
-/// Gather rays of a picture of Lambertian surfaces are as many with several paths a sample as with one, but for one of each path at least.
+/// Gather rays of a picture of Lambertian surfaces are as many with several paths a sample as with one, but
+/// for one of each path at least.
 #[test]
 fn paths_divide_the_gather_rays_of_their_sample() {
     let scene = room();

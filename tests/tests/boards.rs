@@ -1,4 +1,5 @@
-//! Processor-independent parts of boards: the ring between a UART's interrupt and the port; and the page that states their sizes.
+//! Processor-independent parts of boards: the ring between a UART's interrupt and the port; and the page that
+//! states their sizes.
 
 #[path = "../../firmware/boards/common/ring.rs"]
 mod ring;

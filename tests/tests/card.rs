@@ -126,7 +126,8 @@ fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
     });
 }
 
-/// With layers a pixel takes four sums of the buffer: the micro chip has room for 64 pixels, and 8 fit a reply.
+/// With layers a pixel takes four sums of the buffer: the micro chip has room for 64 pixels, and 8 fit a
+/// reply.
 #[test]
 fn a_tile_with_layers_has_a_fourth_of_the_pixels() {
     with_room_for_a_card(|| {

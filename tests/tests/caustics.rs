@@ -18,8 +18,8 @@ fn smooth(name: &str, metallic: f32, transmission: Option<Transmission>) -> Mate
     Material::new(name, reflection)
 }
 
-/// Room with a light above two balls: one of glass, which focuses it on the floor, and one of metal, which scatters it over the walls.
-/// The camera sees a part of the ceiling.
+/// Room with a light above two balls: one of glass, which focuses it on the floor, and one of metal, which
+/// scatters it over the walls. The camera sees a part of the ceiling.
 fn two_balls() -> Scene {
     let glass = Transmission { factor: 1.0, ior: 1.5, is_volume: true, absorption: Vec3::ZERO };
     let materials =

@@ -48,7 +48,8 @@ impl Map {
         Self { image, max_distance, radius }
     }
 
-    /// Radiance that a Lambertian surface reflects at a point, W/(sr m^2); it must be equal for all instruction sets.
+    /// Radiance that a Lambertian surface reflects at a point, W/(sr m^2); it must be equal for all
+    /// instruction sets.
     fn radiance(&self, position: Vec3, normal: Vec3) -> f64 {
         self.radiance_after(f32::INFINITY, position, normal)
     }
@@ -87,7 +88,8 @@ impl Map {
         f64::from(radiance.x)
     }
 
-    /// Mean radiance of a horizontal surface along the four sides of a square: their distance from its middle, and half their length.
+    /// Mean radiance of a horizontal surface along the four sides of a square: their distance from its
+    /// middle, and half their length.
     fn mean_around(&self, y: f32, distance: f32, half: f32) -> f64 {
         let sides = [-distance, distance].map(|side| {
             let along_z = [-half, half].map(|z| Vec3::new(side, y, z));
@@ -136,7 +138,8 @@ fn the_radiance_of_a_wall_is_the_same_up_to_its_edges() {
     for distance in [0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 2.0] {
         let x = 1.0 - distance * map.radius;
         let mean = map.mean_along(Vec3::new(x, -1.0, -0.8), Vec3::new(x, -1.0, 0.8), Vec3::Y);
-        // At the edge itself the nearest photon is always a little inside, where the fraction of the disc is larger.
+        // At the edge itself the nearest photon is always a little inside, where the fraction of the disc is
+        // larger.
         let tolerance = if distance == 0.0 { 0.08 } else { 0.05 };
         assert!((mean - 1.0).abs() < tolerance, "at {distance} radii from the edge it is {mean}");
     }
@@ -159,7 +162,8 @@ fn the_mean_radiance_around_a_corner_is_that_of_the_wall() {
     assert!((mean - 1.0).abs() < 0.05, "around the corners it is {mean}");
 }
 
-/// Shelves closer than a gather's radius: a search finds photons of several. Boards reflect on one side, sheets on both.
+/// Shelves closer than a gather's radius: a search finds photons of several. Boards reflect on one side,
+/// sheets on both.
 #[test]
 fn the_radiance_of_shelves_above_one_another_is_that_of_the_wall() {
     let top = |shelf: u32| -0.5 + 0.02 * shelf as f32;
@@ -209,8 +213,8 @@ fn the_radiance_of_a_lattice_is_that_of_the_wall() {
     assert!((mean - 1.0).abs() < 0.04, "{mean}");
 }
 
-/// Bars narrower than a gather's radius, close above a floor, with gaps of their width: a search on the floor finds their
-/// tops, and vice versa. Their end faces may be double-sided: inside them it is dark.
+/// Bars narrower than a gather's radius, close above a floor, with gaps of their width: a search on the floor
+/// finds their tops, and vice versa. Their end faces may be double-sided: inside them it is dark.
 #[test]
 fn the_radiance_of_bars_and_of_the_floor_between_them_is_that_of_the_wall() {
     let bars = (0..40).flat_map(|bar| {
@@ -279,7 +283,8 @@ fn light_on_a_wall_does_not_show_on_the_back_of_furniture_behind_it() {
     }
 }
 
-/// Five boxes around the cube from -1 to 1, without a ceiling. They touch along its edges, or the floor goes on below the walls.
+/// Five boxes around the cube from -1 to 1, without a ceiling. They touch along its edges, or the floor goes
+/// on below the walls.
 fn walls_of_boxes(thickness: f32, overlap: bool) -> Vec<Triangle> {
     let wall = |side: usize| {
         let axis = side / 2;

@@ -1,5 +1,5 @@
-//! Licences and sources of dependencies are allowed by `deny.toml`. `cargo deny` checks advisories as well; this test needs
-//! only cargo.
+//! Licences and sources of dependencies are allowed by `deny.toml`. `cargo deny` checks advisories as well;
+//! this test needs only cargo.
 
 use std::process::Command;
 
@@ -26,8 +26,8 @@ fn allowed<'a>(licences: &'a toml::Table, package: &str) -> Vec<&'a str> {
     of_package.flat_map(|exception| names(&exception["allow"])).chain(names(&licences["allow"])).collect()
 }
 
-/// Returns whether allowed licences satisfy an SPDX expression; `None` if it is invalid. A slash between alternatives
-/// predates SPDX.
+/// Returns whether allowed licences satisfy an SPDX expression; `None` if it is invalid. A slash between
+/// alternatives predates SPDX.
 fn is_satisfied(expression: &str, allowed: &[&str]) -> Option<bool> {
     let expression = Expression::parse_mode(expression, ParseMode::LAX).ok()?;
     Some(expression.evaluate(|requirement| allowed.contains(&requirement.to_string().as_str())))

@@ -109,7 +109,8 @@ fn an_environment_brings_its_radiance_to_all_sides() {
     check(&cube, received(&cube), "map");
 }
 
-/// Power that the cube receives from its environment: the integral over directions of radiance times projected area.
+/// Power that the cube receives from its environment: the integral over directions of radiance times
+/// projected area.
 fn received(cube: &Scene) -> [f64; 3] {
     let packed = PackedScene::new(cube).unwrap();
     let (image, mut memory) = packed.view();
@@ -177,8 +178,8 @@ fn far_cubes() -> Scene {
     cubes
 }
 
-/// Integral over the surfaces of both cubes of the irradiance by a light at a point: `toward(way)` is its radiant intensity along
-/// the vector to the surface, W/sr.
+/// Integral over the surfaces of both cubes of the irradiance by a light at a point: `toward(way)` is its
+/// radiant intensity along the vector to the surface, W/sr.
 fn received_from(from: Vec3, toward: impl Fn(Vec3) -> f32) -> f64 {
     const STEPS: i32 = 8;
     let middle = |i: i32| ((i as f32 + 0.5) / STEPS as f32 * 2.0 - 1.0) * HALF;
@@ -248,8 +249,9 @@ fn photons_of_panels_are_aimed() {
     }
 }
 
-/// A mirror of 10 m on the ground, under a slanting sun, and above it a black plate of 1 m: one path in hundreds that meet the mirror meets
-/// the plate. A spot lights the plate with `lamp` times the sun's intensity.
+/// A mirror of 10 m on the ground, under a slanting sun, and above it a black plate of 1 m: one path in
+/// hundreds that meet the mirror meets the plate. A spot lights the plate with `lamp` times the sun's
+/// intensity.
 fn sun_over_a_mirror(lamp: f32) -> Scene {
     let smooth = Reflection::MetallicRoughness {
         base_colour: Vec3::ONE,
@@ -278,7 +280,8 @@ fn sun_over_a_mirror(lamp: f32) -> Scene {
     Scene { lights: vec![sun, spot], ..scene(triangles, materials, camera(Vec3::Y, Vec3::Y)) }
 }
 
-/// Where caustics bring next to none of the light, few paths are traced for them, and the photons have the power all the same.
+/// Where caustics bring next to none of the light, few paths are traced for them, and the photons have the
+/// power all the same.
 #[test]
 fn rare_caustics_take_paths_by_their_share_of_the_light_and_keep_their_power() {
     const SEEDS: u32 = 16;

@@ -64,8 +64,8 @@ fn a_room_of_black_walls_but_one_stores_that_walls_share() {
     assert!(error.abs() < 0.005, "off by {error}");
 }
 
-/// Form factor from a square of half side `a` to a parallel, centred square of half side `b` at `distance`, by the
-/// double area integral.
+/// Form factor from a square of half side `a` to a parallel, centred square of half side `b` at `distance`,
+/// by the double area integral.
 fn form_factor(a: f64, b: f64, distance: f64) -> f64 {
     let steps = 40;
     let at = |i: usize, half: f64| ((i as f64 + 0.5) / steps as f64 * 2.0 - 1.0) * half;

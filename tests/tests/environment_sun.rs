@@ -38,7 +38,8 @@ fn floor_under(column: u32, row: u32, sun: f32) -> Scene {
     scene
 }
 
-/// Radiance of the floor: the sun's texel is interpolated to its neighbours, and has the light of its own solid angle.
+/// Radiance of the floor: the sun's texel is interpolated to its neighbours, and has the light of its own
+/// solid angle.
 fn expected(row: u32, sun: f32) -> f64 {
     let angle = PI * (f64::from(row) + 0.5) / f64::from(WIDTH / 2);
     let solid_angle = (2.0 * PI / f64::from(WIDTH)).powi(2) * angle.sin();

@@ -166,7 +166,8 @@ fn tiles_with_more_pixels_than_gather_points_are_the_same() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
 
-    /// Any number of tiles in flight, on chips of any kind, in any order, with a queue of any size: gathers wait across tiles.
+    /// Any number of tiles in flight, on chips of any kind, in any order, with a queue of any size: gathers
+    /// wait across tiles.
     #[test]
     fn tiles_in_flight_do_not_change_a_bit(
         tile in 2_u32..9,
@@ -267,7 +268,8 @@ fn adaptive_sampling_is_exact() {
 
 #[test]
 fn more_records_than_a_chip_has_room_for_are_exact() {
-    // So small an error bound divides every cell, down to one record at every other pixel: these blocks are halved.
+    // So small an error bound divides every cell, down to one record at every other pixel: these blocks are
+    // halved.
     let records = |width: u32, height: u32| (width.div_ceil(2) + 1) * (height.div_ceil(2) + 1);
     assert!(records(61, 61) > REFERENCE.irradiance_records && records(140, 1) > MICRO.irradiance_records);
     let scene = glossy();
@@ -294,7 +296,8 @@ fn more_records_than_a_chip_has_room_for_are_exact() {
     }
 }
 
-/// Far to the right a position in the picture has few bits below the pixel: it may be rounded to the next pixel's border.
+/// Far to the right a position in the picture has few bits below the pixel: it may be rounded to the next
+/// pixel's border.
 #[test]
 fn samples_rounded_to_the_next_pixel_are_exact() {
     let scene = glossy();

@@ -1,4 +1,5 @@
-//! Scenes and settings at the limits of their ranges: large, tilted, bright, saturated, with rays of one kind alone.
+//! Scenes and settings at the limits of their ranges: large, tilted, bright, saturated, with rays of one kind
+//! alone.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;

@@ -64,8 +64,8 @@ fn a_diffuse_furnace_glows_evenly_by_precomputed_irradiance() {
     }
 }
 
-/// A Phong lobe reflects less at grazing angles. A small wall with one, in a room of uniform radiance, shows its
-/// directional albedo.
+/// A Phong lobe reflects less at grazing angles. A small wall with one, in a room of uniform radiance, shows
+/// its directional albedo.
 #[test]
 fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
     let (diffuse, specular, exponent) = (0.3, 0.4, 16.0);
@@ -116,8 +116,8 @@ fn lobe_albedo(specular: f64, exponent: f64, angle: f64) -> f64 {
     specular * (exponent + 2.0) / std::f64::consts::TAU * sum * std::f64::consts::TAU / (steps * steps) as f64
 }
 
-/// A room whose walls all have a lobe is no uniform furnace. The expected radiance comes from an oracle: a plain path
-/// tracer of this room, in double precision.
+/// A room whose walls all have a lobe is no uniform furnace. The expected radiance comes from an oracle: a
+/// plain path tracer of this room, in double precision.
 #[test]
 fn a_phong_furnace_shows_what_a_path_tracer_finds() {
     let (diffuse, specular, exponent) = (0.25, 0.35, 12.0);
@@ -132,8 +132,8 @@ fn a_phong_furnace_shows_what_a_path_tracer_finds() {
 }
 
 mod oracle {
-    //! A path tracer of the cube from -1 to 1 with walls of one reflection and radiance 1: no light sampling, no
-    //! photons, uniform directions over the hemisphere.
+    //! A path tracer of the cube from -1 to 1 with walls of one reflection and radiance 1: no light sampling,
+    //! no photons, uniform directions over the hemisphere.
 
     use glam::DVec3;
     use photoncard_driver::scene::Camera;

@@ -34,7 +34,8 @@ fn check(name: &str, inputs: u64) {
     assert!(report.sound * 20 > inputs && report.sound < inputs, "{report:?}");
 }
 
-/// A test for each target, of so many inputs: some seconds each, so that a busy machine has time for any of them.
+/// A test for each target, of so many inputs: some seconds each, so that a busy machine has time for any of
+/// them.
 macro_rules! tests_of_targets {
     ($($name:ident: $inputs:literal,)*) => {
         $(#[test]

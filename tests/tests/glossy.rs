@@ -1,4 +1,5 @@
-//! glTF's metallic-roughness model of known radiance: plates, balls and grooves under a sky of uniform radiance.
+//! glTF's metallic-roughness model of known radiance: plates, balls and grooves under a sky of uniform
+//! radiance.
 
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
@@ -46,7 +47,8 @@ fn plate(material: Material, cosine: f32) -> Scene {
     under_a_white_sky(scene(quad.to_vec(), vec![material], far_camera(Vec3::new(sine, cosine, 0.01))))
 }
 
-/// Directional albedos by quadrature over half vectors: roughness, cosine, a metal of base 0.8, a black dielectric.
+/// Directional albedos by quadrature over half vectors: roughness, cosine, a metal of base 0.8, a black
+/// dielectric.
 const ALBEDOS: [(f32, f32, f64, f64); 10] = [
     (0.1, 0.15, 0.8854, 0.4608),
     (0.1, 0.98, 0.8, 0.04),
@@ -87,8 +89,8 @@ fn groove(roughness: f32, far: f32) -> Scene {
     scene(triangles, vec![surface(0.9, 1.0, roughness)], far_camera(Vec3::new(0.01, 1.0, 0.02)))
 }
 
-/// Two plates at a right angle reflect most light twice: F0^2 at low roughness. The values are means of paths that are traced by the
-/// Monte Carlo method, with standard errors below 0.0002.
+/// Two plates at a right angle reflect most light twice: F0^2 at low roughness. The values are means of paths
+/// that are traced by the Monte Carlo method, with standard errors below 0.0002.
 #[test]
 fn a_groove_of_glossy_metal_is_not_black() {
     for (roughness, expected) in [(0.05, 0.8104), (0.1, 0.8102), (0.3, 0.7849)] {
@@ -101,8 +103,8 @@ fn a_groove_of_glossy_metal_is_not_black() {
     }
 }
 
-/// A light without extent is seen by way of two plates: no ray meets it, the caustic map brings it, and blurs it at the edge between
-/// them. The values are means of traced paths, with standard errors below 0.2 %.
+/// A light without extent is seen by way of two plates: no ray meets it, the caustic map brings it, and blurs
+/// it at the edge between them. The values are means of traced paths, with standard errors below 0.2 %.
 #[test]
 fn a_groove_of_glossy_metal_reflects_a_distant_light() {
     for (roughness, expected) in [(0.3, 1.4976), (0.45, 0.6705)] {

@@ -88,8 +88,8 @@ fn furnace(albedo: f32) -> Scene {
     scene(room([0; 6]), vec![wall], camera(Vec3::new(0.2, -0.1, 0.6), Vec3::new(0.1, 0.2, -1.0)))
 }
 
-/// Every wall of a furnace emits 1 and reflects `albedo`: every pixel is `1 / (1 - albedo)`. Direct light of walls so near
-/// and large is divided between shadow rays and records.
+/// Every wall of a furnace emits 1 and reflects `albedo`: every pixel is `1 / (1 - albedo)`. Direct light of
+/// walls so near and large is divided between shadow rays and records.
 #[test]
 fn a_furnace_is_even_with_records_of_any_sampling() {
     for (albedo, sampling) in [
@@ -133,8 +133,8 @@ fn no_seam_shows_at_the_borders_of_tiles() {
     };
     let [mut at_borders, mut elsewhere] = [(0.0_f64, 0_u32); 2];
     for seed in 0..4 {
-        // The difference from a render with equal eye and shadow rays, but without interpolation, is the error of
-        // interpolation.
+        // The difference from a render with equal eye and shadow rays, but without interpolation, is the
+        // error of interpolation.
         let [on, off] = [with(seed, Some(0.025)), with(seed, None)];
         let errors: Vec<f32> = on.iter().zip(&off).map(|(on, off)| (*on - *off).element_sum()).collect();
         for row in errors.chunks(192) {

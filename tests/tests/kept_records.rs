@@ -1,5 +1,5 @@
-//! Irradiance records that a chip keeps from one frame of a picture to the next: they are gathered once, as far as there is room, and no
-//! pixel depends on that.
+//! Irradiance records that a chip keeps from one frame of a picture to the next: they are gathered once, as
+//! far as there is room, and no pixel depends on that.
 
 use photoncard_driver::emulator::direct::{RenderedTile, render_tiles};
 use photoncard_driver::pack::PackedScene;
@@ -146,7 +146,8 @@ fn all_passes_together_do_the_work_of_one_frame() {
         }
         let (_, whole) = world.alone(&world.samples(0, 4));
         assert_eq!(sum.kept_records, 2 * whole.records);
-        // Drains depend on what waits. Pixels with gather rays are found by looking at samples, which a pass has more or fewer of.
+        // Drains depend on what waits. Pixels with gather rays are found by looking at samples, which a pass
+        // has more or fewer of.
         let Counters { drains, most_waiting, eye_rays, shadow_rays, .. } = whole;
         let Counters { specular_rays, caustic_gathers, normals_decoded, .. } = whole;
         let by_pass = Counters {

@@ -1,4 +1,5 @@
-//! Layers of materials of known radiance: coat, sheen, diffuse transmission, rough glass, textures of the reflectance.
+//! Layers of materials of known radiance: coat, sheen, diffuse transmission, rough glass, textures of the
+//! reflectance.
 
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
@@ -132,7 +133,8 @@ fn a_leaf_shows_what_both_of_its_sides_receive() {
     assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}");
 }
 
-/// A plate of a black dielectric of roughness 0.1 seen from above shows its F0. The code 188 is 0.5029 of white, 128 is half an alpha.
+/// A plate of a black dielectric of roughness 0.1 seen from above shows its F0. The code 188 is 0.5029 of
+/// white, 128 is half an alpha.
 #[test]
 fn textures_of_the_reflectance_multiply_it_before_its_limit() {
     for (specular, texel, expected) in [
@@ -218,7 +220,8 @@ fn glass(roughness: f32, is_volume: bool) -> Material {
     Material::new("glass", reflection)
 }
 
-/// Sun through a pane is a caustic on the floor below it. A coat takes its share of the light, and photons are stored once.
+/// Sun through a pane is a caustic on the floor below it. A coat takes its share of the light, and photons
+/// are stored once.
 #[test]
 fn a_caustic_below_a_coat_is_dimmed_by_the_coat() {
     let look = |floor: Material| {

@@ -122,7 +122,8 @@ fn the_probabilities_of_all_emitters_sum_to_that_of_finding_one() {
                 .is_some()
         };
         let found = (0..samples).filter(finds).count() as f64 / f64::from(samples);
-        // No light is found if all children of a node are behind the receiver, though the node as a whole is not.
+        // No light is found if all children of a node are behind the receiver, though the node as a whole is
+        // not.
         assert!((found - sum).abs() < 0.02 && sum < 1.0 + 1e-5, "{found} are found of {sum}");
         assert!(sum > 0.3, "{sum}");
     }

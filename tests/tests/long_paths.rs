@@ -46,7 +46,8 @@ fn rendered(scene: &Scene, settings: &RenderSettings) -> (f64, Rendering) {
     (mean(&radiances(&rendering.film)), rendering)
 }
 
-/// Light of a lamp at the end of a corridor between two mirrors arrives after a number of reflections that the angle determines.
+/// Light of a lamp at the end of a corridor between two mirrors arrives after a number of reflections that
+/// the angle determines.
 #[test]
 fn a_lamp_is_seen_by_way_of_any_number_of_reflections_between_mirrors() {
     for (bounces, reflectance) in [(10_u16, 0.95_f32), (40, 0.95), (40, 0.99), (150, 0.99)] {
@@ -72,8 +73,8 @@ fn a_lamp_is_seen_by_way_of_any_number_of_reflections_between_mirrors() {
     }
 }
 
-/// A closed room of lossless mirrors with a small lamp and a small Lambertian plate. No walls are parallel: between parallel ones some
-/// paths miss lamp and plate forever.
+/// A closed room of lossless mirrors with a small lamp and a small Lambertian plate. No walls are parallel:
+/// between parallel ones some paths miss lamp and plate forever.
 fn mirror_room(forward: Vec3) -> Scene {
     let plate = |centre: Vec3, material: u32| -> [Triangle; 2] {
         let corner = |x: f32, z: f32| centre + Vec3::new(0.4 * x, 0.0, -0.3 * z);
@@ -89,7 +90,8 @@ fn mirror_room(forward: Vec3) -> Scene {
     scene(triangles, materials, camera(Vec3::new(0.31, 0.17, 0.67), forward))
 }
 
-/// Everything shows the radiance of the lamp, however many mirrors a path meets on its way: eye paths, gather rays, and photons.
+/// Everything shows the radiance of the lamp, however many mirrors a path meets on its way: eye paths, gather
+/// rays, and photons.
 #[test]
 fn a_room_of_mirrors_shows_the_radiance_of_its_lamp_everywhere() {
     let gathering = |caustic_photons| {

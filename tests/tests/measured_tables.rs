@@ -1,5 +1,5 @@
-//! Tables of measurements in documents: their rows follow from the CSV files beside them. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test
-//! measured_tables` writes them.
+//! Tables of measurements in documents: their rows follow from the CSV files beside them. `UPDATE_DOCS=1
+//! cargo test -p photoncard-tests --test measured_tables` writes them.
 
 use std::fs;
 use std::path::{Path, PathBuf};

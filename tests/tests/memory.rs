@@ -314,7 +314,8 @@ fn counts_are_of_whole_records_and_whole_lines() {
         ] {
             assert_eq!(reads.raw_bytes, reads.requests * record as u64, "{record}");
         }
-        // A leaf is read as a whole by a ray that visits it, without its last byte for the surface where a ray ends.
+        // A leaf is read as a whole by a ray that visits it, without its last byte for the surface where a
+        // ray ends.
         let triangles = structures.triangles;
         let surfaces = triangles.requests * LINE_BYTES as u64 - triangles.raw_bytes;
         assert!((1..triangles.requests).contains(&surfaces), "{surfaces} of {}", triangles.requests);

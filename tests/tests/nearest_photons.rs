@@ -11,8 +11,8 @@ use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};
 use photoncard_tests::{camera, lambertian, room, scene};
 use proptest::prelude::*;
 
-/// Images of an empty room with a photon at each position, in both layouts. Photons at one position differ in their
-/// contents.
+/// Images of an empty room with a photon at each position, in both layouts. Photons at one position differ in
+/// their contents.
 fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
     let photons = (0_u16..).zip(places).map(|(index, &position)| Photon {
@@ -96,7 +96,8 @@ fn place(range: f32) -> impl Strategy<Value = [f32; 3]> {
     [-range..range, -range..range, -range..range]
 }
 
-/// Positions of one kind: random, clustered, on a coarse grid (many coincide or are equidistant), or in a plane.
+/// Positions of one kind: random, clustered, on a coarse grid (many coincide or are equidistant), or in a
+/// plane.
 fn places() -> impl Strategy<Value = Vec<[f32; 3]>> {
     let random = proptest::collection::vec(place(1.0), 1..400);
     let clustered =

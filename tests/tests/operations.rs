@@ -56,7 +56,8 @@ fn check(name: &str, run: &Run) {
     let of_all = modelled.sum(|_| true).flops();
     println!("{name}: all: {}", difference(of_all, total.flops()));
     assert!(difference(of_all, total.flops()) < 0.05, "{name}: {of_all} instead of {}", total.flops());
-    // A quarter of the unit, as directions depend on the few surfaces of the tiles, and a fiftieth of all: the model of shading and of pixels is by their mean.
+    // A quarter of the unit, as directions depend on the few surfaces of the tiles, and a fiftieth of all:
+    // the model of shading and of pixels is by their mean.
     for &unit in Unit::ALL {
         let (counted, modelled) = (run.counted(unit).flops(), modelled.unit(unit).flops());
         let allowed = 0.25 * counted + 0.02 * total.flops();

@@ -1,5 +1,5 @@
-//! Passes: the samples of a picture rendered in any division, each pass on other cards and in another order, are to the bit those of one
-//! render.
+//! Passes: the samples of a picture rendered in any division, each pass on other cards and in another order,
+//! are to the bit those of one render.
 
 use std::sync::Arc;
 use std::time::Duration;

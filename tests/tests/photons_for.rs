@@ -70,7 +70,8 @@ impl Pictures {
     }
 }
 
-/// At the dark end photons are few, and a gather that reached for fifty of them would find those in the light around the corner.
+/// At the dark end photons are few, and a gather that reached for fifty of them would find those in the light
+/// around the corner.
 #[test]
 fn a_corridor_seen_from_its_dark_end_has_one_mean_by_photons_for_any_camera_and_for_its_own() {
     let scene = corridor(0.8);

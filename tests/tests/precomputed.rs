@@ -1,5 +1,5 @@
-//! Precomputed irradiance: it equals the chip's own density estimate at a photon, searches find the same points as brute
-//! force, and the mean over positions is right.
+//! Precomputed irradiance: it equals the chip's own density estimate at a photon, searches find the same
+//! points as brute force, and the mean over positions is right.
 
 use core::f32::consts::PI;
 
@@ -102,7 +102,8 @@ fn place(range: f32) -> impl Strategy<Value = [f32; 3]> {
     [-range..range, -range..range, -range..range]
 }
 
-/// Photons of one kind: random, on a coarse grid (many coincide or are equidistant), or in a plane; on a few surfaces.
+/// Photons of one kind: random, on a coarse grid (many coincide or are equidistant), or in a plane; on a few
+/// surfaces.
 fn photons() -> impl Strategy<Value = Vec<Placed>> {
     let random = proptest::collection::vec(place(1.0), 1..400);
     let coincident = proptest::collection::vec([-2_i8..3, -2_i8..3, -2_i8..3], 1..400)
@@ -161,8 +162,8 @@ fn floor(count: u32, seed: u32, half_side: f32) -> Vec<[f32; 3]> {
     (0..count).map(|i| [half_side * coordinate(2 * i), -1.0, half_side * coordinate(2 * i + 1)]).collect()
 }
 
-/// At a photon a density estimate of k - 1 photons is too high by about 1 / (k - 2); at the photon nearest to a position it
-/// is not.
+/// At a photon a density estimate of k - 1 photons is too high by about 1 / (k - 2); at the photon nearest to
+/// a position it is not.
 #[test]
 fn the_mean_over_places_is_right_though_that_over_photons_is_not() {
     let neighbors = 12;
@@ -211,8 +212,8 @@ fn little_light_is_lost_or_won_where_photons_are_few() {
     }
 }
 
-/// An irradiance point equals the gather's estimate at its position from all photons that count, except for its 16-bit
-/// mantissa.
+/// An irradiance point equals the gather's estimate at its position from all photons that count, except for
+/// its 16-bit mantissa.
 #[test]
 fn a_point_is_the_density_of_the_photons_around_it() {
     let neighbors = 30;

@@ -169,7 +169,8 @@ fn renders_as_the_emulated_card(name: &str) {
     drop(machine);
 }
 
-/// The machine computes as the host does, and has all of its memory. The scene after the test is loaded as a whole.
+/// The machine computes as the host does, and has all of its memory. The scene after the test is loaded as a
+/// whole.
 fn passes_the_self_test(name: &str, address: &CardAddress) {
     let test = card_self_test(address, &Unobserved).expect("the card answers");
     for PatternTest { pattern, write, check, .. } in &test.patterns {
@@ -235,8 +236,8 @@ fn stays_within_the_budget(name: &str, address: &CardAddress) {
     assert!(static_bytes + stack_bytes + caches <= MICRO.sram_bytes);
 }
 
-/// Checks a figure of `docs/bring-up.md` that the test measures, in a row of the table of machines: other compilers give others,
-/// within a tenth.
+/// Checks a figure of `docs/bring-up.md` that the test measures, in a row of the table of machines: other
+/// compilers give others, within a tenth.
 fn check_page(row: &str, name: &str, measured: u32) {
     let page = include_str!("../../docs/bring-up.md");
     let cells = |start: &str| {

@@ -56,7 +56,8 @@ fn they_depend_neither_on_threads_nor_on_the_crop_window() {
     }
 }
 
-/// Light of a point is one value, and the parts of a lamp are at different distances, angles and behind different things.
+/// Light of a point is one value, and the parts of a lamp are at different distances, angles and behind
+/// different things.
 #[test]
 fn a_point_takes_one_shadow_ray_and_a_lamp_more() {
     assert_eq!(fit(&room_with_a_point(), &small()).shadow_rays, 1);
@@ -115,7 +116,8 @@ fn nothing_is_interpolated_where_hardly_any_surface_is_lambertian() {
     assert!(fit(&lit_room(), &small()).interpolates);
 }
 
-/// Light that comes over many surfaces from one spot takes more gather rays and photons than light from a lamp in view.
+/// Light that comes over many surfaces from one spot takes more gather rays and photons than light from a
+/// lamp in view.
 #[test]
 fn indirect_light_from_a_spot_takes_more_rays_and_photons() {
     let [lamp, spot] = ["cornell.gltf", "cornell-uplight.gltf"].map(|name| fit(&shipped(name), &small()));

@@ -1,4 +1,5 @@
-//! The ray caster agrees with brute force, has equal bits on every processor and in bundles, and loses no ray at an edge.
+//! The ray caster agrees with brute force, has equal bits on every processor and in bundles, and loses no ray
+//! at an edge.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -176,7 +177,8 @@ fn no_ray_leaves_a_closed_surface() {
     }
 }
 
-/// Rays as a chip casts them together: those of neighbouring pixels, from one point to a light or all around, or without order.
+/// Rays as a chip casts them together: those of neighbouring pixels, from one point to a light or all around,
+/// or without order.
 fn bundle(scene: &Scene, triangles: &[Triangle], index: u32) -> Vec<Ray> {
     let count = 1 + index % BUNDLE_RAYS as u32;
     let of = |ray: u32| index * BUNDLE_RAYS as u32 + ray;

@@ -1,7 +1,7 @@
 //! Pictures against path-traced references, by block means.
 //!
-//! A render has a fourth of its reference's pixels along each axis: a block of 16x16 pixels of the reference is one of 4x4
-//! pixels of the render, as both have a box filter.
+//! A render has a fourth of its reference's pixels along each axis: a block of 16x16 pixels of the reference
+//! is one of 4x4 pixels of the render, as both have a box filter.
 
 use std::path::PathBuf;
 
@@ -58,7 +58,8 @@ fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     assert!(high < most_high, "the 95th percentile of the blocks is off by {high}");
 }
 
-/// Checks a scene with default settings, with all techniques that save gathers, and with precomputed irradiance.
+/// Checks a scene with default settings, with all techniques that save gathers, and with precomputed
+/// irradiance.
 fn check(scene: &str, reference: &str) {
     check_with(scene, reference, Sampling::Reflection, None, Radiance::Density);
     check_with(scene, reference, Sampling::Product, Some(0.025), Radiance::Density);

@@ -87,7 +87,8 @@ impl Port for HostPort<'_> {
     }
 }
 
-/// Maximum number of lines that a card reads between two polls of its link, while it renders a tile of a lit room.
+/// Maximum number of lines that a card reads between two polls of its link, while it renders a tile of a lit
+/// room.
 fn most_reads(frame: &FrameParameters) -> u64 {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;

@@ -83,7 +83,8 @@ fn a_memory_that_is_smaller_than_the_budgets_does_not_pass() {
 /// Arithmetic of a chip.
 type Arithmetic = fn([f32; 3]) -> [u32; RESULTS];
 
-/// Card on a port without a thread, with some arithmetic, and with replies to the test of its memory in place of a memory.
+/// Card on a port without a thread, with some arithmetic, and with replies to the test of its memory in place
+/// of a memory.
 struct Chip {
     transport: Transport,
     arithmetic: Arithmetic,
@@ -351,8 +352,9 @@ fn an_observer_stops_the_test() {
 }
 
 proptest! {
-    /// The expected results are IEEE 754's: a double holds sums, products, quotients and roots of floats with so many digits that the
-    /// second rounding, to a float, gives the correctly rounded result (Figueroa 1995).
+    /// The expected results are IEEE 754's: a double holds sums, products, quotients and roots of floats with
+    /// so many digits that the second rounding, to a float, gives the correctly rounded result (Figueroa
+    /// 1995).
     #[test]
     fn the_hosts_results_are_correctly_rounded(bits in any::<[u32; 3]>()) {
         let operands = bits.map(f32::from_bits);

@@ -1,4 +1,5 @@
-//! The test of card memory finds faults of data lines, address lines, byte lanes and cells, names the first wrong word and counts all.
+//! The test of card memory finds faults of data lines, address lines, byte lanes and cells, names the first
+//! wrong word and counts all.
 
 use std::ops::Range;
 
@@ -46,7 +47,8 @@ enum Defect {
         bit: u32,
         value: bool,
     },
-    /// A store of a byte is one of the whole word, whose bytes are all that byte, as the processor drives all lanes.
+    /// A store of a byte is one of the whole word, whose bytes are all that byte, as the processor drives all
+    /// lanes.
     NoByteLanes,
 }
 
@@ -61,7 +63,8 @@ fn with_conjunction(word: u32, [a, b]: [u32; 2]) -> u32 {
     with_bit(with_bit(word, a, both), b, both)
 }
 
-/// Memory with a defect. Its words are stored where the defect puts them, and shown at all addresses at which it has them.
+/// Memory with a defect. Its words are stored where the defect puts them, and shown at all addresses at which
+/// it has them.
 struct DefectiveMemory {
     lines: Vec<Line>,
     shown: Vec<Line>,

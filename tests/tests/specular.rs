@@ -1,4 +1,5 @@
-//! Mirrors and glass of known radiance, on every path of light: seen by eye rays, by gather rays, and as caustics.
+//! Mirrors and glass of known radiance, on every path of light: seen by eye rays, by gather rays, and as
+//! caustics.
 
 use glam::Vec3;
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
@@ -79,8 +80,8 @@ fn shows(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64
     }
 }
 
-/// An object without loss is invisible in a room of uniform radiance, and the walls, which receive light through it, are
-/// neither darker nor brighter.
+/// An object without loss is invisible in a room of uniform radiance, and the walls, which receive light
+/// through it, are neither darker nor brighter.
 #[test]
 fn nothing_that_loses_no_light_shows_in_a_furnace() {
     let ball = |scene: &mut Scene| add_ball(scene, Vec3::new(-0.2, -0.1, 0.0), 0.4, 24, 1);
@@ -166,7 +167,8 @@ fn what_is_inside_of_glass_shows_its_radiance_over_the_square_of_the_index() {
     assert!((seen / expected - 1.0).abs() < 0.01, "{seen} instead of {expected}");
 }
 
-/// A coat or a mirror alone casts no caustic on any surface: it shows the sky, and its base's reflection of the sky.
+/// A coat or a mirror alone casts no caustic on any surface: it shows the sky, and its base's reflection of
+/// the sky.
 #[test]
 fn specular_things_alone_under_a_sky_show_it() {
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);

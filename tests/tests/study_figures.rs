@@ -1,5 +1,6 @@
-//! Figures of studies in `docs/studies.md`: those of `docs/studies.csv`, the `figures.csv` of a run of `photoncard study all`, which is of this
-//! program. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test study_figures` writes them into the document.
+//! Figures of studies in `docs/studies.md`: those of `docs/studies.csv`, the `figures.csv` of a run of
+//! `photoncard study all`, which is of this program. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test
+//! study_figures` writes them into the document.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -34,7 +35,8 @@ fn figures(csv: &str) -> Figures {
     figures
 }
 
-/// Text of a figure for a kind of marker: `=` for its value, `~` for its confidence interval; numbers with three significant digits.
+/// Text of a figure for a kind of marker: `=` for its value, `~` for its confidence interval; numbers with
+/// three significant digits.
 fn text(figure: &Line, kind: char) -> String {
     let number = |value: f64| human(value, 3);
     match (kind, figure.lower, figure.upper) {
@@ -55,7 +57,8 @@ fn has_study(figures: &Figures, name: &str) -> bool {
     figures.keys().any(|(other, _)| study(other) == study(name))
 }
 
-/// The document with the text between each marker `<!--=NAME@SCENE-->` or `<!--~NAME@SCENE-->` and the next `<!--/-->` replaced by the figure.
+/// The document with the text between each marker `<!--=NAME@SCENE-->` or `<!--~NAME@SCENE-->` and the next
+/// `<!--/-->` replaced by the figure.
 fn filled(document: &str, figures: &Figures) -> Result<String, String> {
     let mut filled = String::new();
     let mut rest = document;
@@ -107,7 +110,8 @@ impl StudyObserver for Silent {
     }
 }
 
-/// Program, card image layout and the bytes of two small renders: a change of any of them makes all other figures old.
+/// Program, card image layout and the bytes of two small renders: a change of any of them makes all other
+/// figures old.
 #[test]
 fn the_csv_is_of_this_program_and_no_trial() {
     let committed = figures(&read("studies.csv"));

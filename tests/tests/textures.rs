@@ -31,8 +31,8 @@ fn with_texture(mut scene: Scene, image: Image, texture: Texture) -> Scene {
     scene
 }
 
-/// Square of side 2 in the plane z = 0 that faces the camera and fills the picture, with texture coordinates of 0 to 1 from
-/// the upper left corner.
+/// Square of side 2 in the plane z = 0 that faces the camera and fills the picture, with texture coordinates
+/// of 0 to 1 from the upper left corner.
 fn canvas(material: Material) -> Scene {
     let mut view = camera(Vec3::Z, Vec3::NEG_Z);
     view.vertical_fov = std::f32::consts::FRAC_PI_2;
@@ -126,8 +126,8 @@ fn a_textured_furnace_glows_evenly() {
     }
 }
 
-/// A texture's green and blue are roughness and metalness: metal of roughness 0.3 in one half, a rough dielectric in the
-/// other.
+/// A texture's green and blue are roughness and metalness: metal of roughness 0.3 in one half, a rough
+/// dielectric in the other.
 #[test]
 fn roughness_and_metalness_follow_their_texture() {
     let reflection = Reflection::MetallicRoughness {
@@ -155,8 +155,8 @@ fn roughness_and_metalness_follow_their_texture() {
     assert!((albedo(37) - dull).abs().max_element() < 0.005, "{}", albedo(37));
 }
 
-/// A mirror by its factors whose texture makes it a dielectric is Lambertian: photons are stored on it, and their disc
-/// fractions measured. One whose texture leaves it a metal is a mirror.
+/// A mirror by its factors whose texture makes it a dielectric is Lambertian: photons are stored on it, and
+/// their disc fractions measured. One whose texture leaves it a metal is a mirror.
 #[test]
 fn a_texture_decides_what_a_mirror_is() {
     let film = |metallic, texture: Option<u8>| {
@@ -219,7 +219,8 @@ fn where_alpha_cuts_out_there_is_nothing() {
     assert!(half > 0.15 * open && half < 0.5 * open, "{half} of {open}");
 }
 
-/// A sheet of partial coverage before a lamp: eye rays, shadow rays, gather rays and photons pass it in the share that is not there.
+/// A sheet of partial coverage before a lamp: eye rays, shadow rays, gather rays and photons pass it in the
+/// share that is not there.
 #[test]
 fn where_alpha_is_a_half_half_of_the_light_passes() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
@@ -281,7 +282,8 @@ fn the_back_of_a_one_sided_sheet_of_partial_coverage_is_not_there() {
     }
 }
 
-/// A sheet that returns as much light as it takes does not show in a furnace: photons are stored on it as often as gathers ask.
+/// A sheet that returns as much light as it takes does not show in a furnace: photons are stored on it as
+/// often as gathers ask.
 #[test]
 fn a_sheet_of_partial_coverage_does_not_show_in_a_furnace() {
     let wall = Material { emission: Vec3::splat(0.5), ..lambertian("wall", 0.5) };

@@ -102,7 +102,8 @@ impl<'a> Dispatcher<'a> {
             order
         } else {
             drop(order);
-            // The tile is not complete yet, so the render cannot end before the wrong card's tiles are revoked.
+            // The tile is not complete yet, so the render cannot end before the wrong card's tiles are
+            // revoked.
             liars.into_iter().for_each(|liar| self.distrust(liar, Some(rectangle)));
             self.order.read().unwrap_or_else(PoisonError::into_inner)
         };

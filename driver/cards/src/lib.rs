@@ -1,7 +1,8 @@
 //! Cards: links of bytes, the host's end of the protocol, and which card renders which tile.
 //!
 //! A [`Session`](session::Session) has no I/O: it takes bytes of a [`link`], and says what to send. The
-//! [`Scheduler`](scheduler::Scheduler) deals tiles, and a [`Dispatcher`](dispatcher::Dispatcher) hands finished ones to their sinks.
+//! [`Scheduler`](scheduler::Scheduler) deals tiles, and a [`Dispatcher`](dispatcher::Dispatcher) hands
+//! finished ones to their sinks.
 //!
 //! | modules | contents |
 //! |---|---|

@@ -1,9 +1,9 @@
 //! The host's end of a card's link: a state machine without I/O, whose inputs are bytes, tiles and a clock.
 //!
-//! A session greets the card, sends the parts of the image that the card lacks, sets the frame, requests tiles and checks
-//! their pixels. Its results are [`Event`]s. A card that was reset is greeted and loaded again, and its tiles are returned.
-//! Threads, ports, time, scheduler and sinks are outside: `photoncard_render` runs one session per thread, a simulator many
-//! in one.
+//! A session greets the card, sends the parts of the image that the card lacks, sets the frame, requests
+//! tiles and checks their pixels. Its results are [`Event`]s. A card that was reset is greeted and loaded
+//! again, and its tiles are returned. Threads, ports, time, scheduler and sinks are outside:
+//! `photoncard_render` runs one session per thread, a simulator many in one.
 
 mod channel;
 mod clock;
@@ -75,8 +75,8 @@ pub struct Session {
 }
 
 impl Session {
-    /// Session that starts with a greeting. `number` distinguishes it from frames of other sessions on the line; any value
-    /// is valid.
+    /// Session that starts with a greeting. `number` distinguishes it from frames of other sessions on the
+    /// line; any value is valid.
     pub fn new(number: u32, now: Duration) -> Self {
         let mut session = Self {
             state: State::Greeting,
@@ -117,14 +117,14 @@ impl Session {
         self.memory_use
     }
 
-    /// States that the card's memory holds the image of a checksum: the next load sends no line of it, and the card checks it as it checks
-    /// what it has received.
+    /// States that the card's memory holds the image of a checksum: the next load sends no line of it, and
+    /// the card checks it as it checks what it has received.
     pub fn assume(&mut self, checksum: u64) {
         self.assumed = Some(checksum);
     }
 
-    /// Sets the job of the card, which starts as soon as the card has answered the greeting. A card that has rendered another job
-    /// receives only what it lacks; what is left of that job is dropped.
+    /// Sets the job of the card, which starts as soon as the card has answered the greeting. A card that has
+    /// rendered another job receives only what it lacks; what is left of that job is dropped.
     pub fn start(&mut self, job: Job, now: Duration) {
         self.clock.rest(now);
         self.events.clear();
@@ -137,7 +137,8 @@ impl Session {
         }
     }
 
-    /// Continues with the job on a card that holds the image `held`, and may be at work on tiles of an earlier frame.
+    /// Continues with the job on a card that holds the image `held`, and may be at work on tiles of an
+    /// earlier frame.
     fn go_on_from(&mut self, held: &Upload, now: Duration) {
         let Some(job) = &self.job else { return };
         let Some(runs) = job.upload.missing_from(held.checksum()) else { return self.greet_anew(now) };
@@ -152,8 +153,8 @@ impl Session {
         }
     }
 
-    /// Requests the results of operand triples, at most [`message::CASES_PER_COMMAND`], from a card that has said hello and has no job:
-    /// [`Event::Computed`].
+    /// Requests the results of operand triples, at most [`message::CASES_PER_COMMAND`], from a card that has
+    /// said hello and has no job: [`Event::Computed`].
     pub fn compute(&mut self, operands: &[[u8; OPERAND_BYTES]], now: Duration) {
         self.ask(
             Request::Compute(operands.len()),
@@ -162,8 +163,8 @@ impl Session {
         );
     }
 
-    /// Requests the test of its memory from a card that has said hello and has no job: [`Event::MemoryTested`], until the test
-    /// is over.
+    /// Requests the test of its memory from a card that has said hello and has no job:
+    /// [`Event::MemoryTested`], until the test is over.
     pub fn test_memory(&mut self, now: Duration) {
         self.ask(Request::Memory(None), &Command::TestMemory, now);
     }
@@ -193,8 +194,8 @@ impl Session {
         self.send(&Command::RenderTile(assignment.tile));
     }
 
-    /// Sends [`Command::Flush`] to a card for which [`Self::wants_tile`] is true and there is no tile: it does the gathers of its
-    /// tiles in flight instead of waiting for another.
+    /// Sends [`Command::Flush`] to a card for which [`Self::wants_tile`] is true and there is no tile: it
+    /// does the gathers of its tiles in flight instead of waiting for another.
     pub fn flush(&mut self) {
         if !self.tiles.is_empty() && !std::mem::replace(&mut self.is_flushed, true) {
             self.send(&Command::Flush);
@@ -250,7 +251,8 @@ impl Session {
         while self.channel.is_free() && self.load_more() {}
     }
 
-    /// Sends the next lines of the image, or the command that ends it. Returns false if the session is not loading.
+    /// Sends the next lines of the image, or the command that ends it. Returns false if the session is not
+    /// loading.
     fn load_more(&mut self) -> bool {
         let (State::Loading, Some(job)) = (self.state, &self.job) else { return false };
         let sent = self.load.next_lines(&job.upload, &mut self.channel.transport);
@@ -327,8 +329,9 @@ impl Session {
         self.channel.transport.acknowledge();
     }
 
-    /// Advances the clock; to be called often. Probes a card that has been quiet for too long. `slowest` is the maximum
-    /// time of a ray or its gather, seconds, if known ([`Scheduler::slowest`](crate::scheduler::Scheduler::slowest)).
+    /// Advances the clock; to be called often. Probes a card that has been quiet for too long. `slowest` is
+    /// the maximum time of a ray or its gather, seconds, if known
+    /// ([`Scheduler::slowest`](crate::scheduler::Scheduler::slowest)).
     ///
     /// # Errors
     /// If the card has been silent or without progress for too long, or has failed too often.
@@ -369,8 +372,8 @@ impl Session {
         self.tiles.give_back(at_work, &mut self.events);
     }
 
-    /// Greets the card again, with a new session number, after its link was closed or it was silent. Its tiles are
-    /// returned.
+    /// Greets the card again, with a new session number, after its link was closed or it was silent. Its
+    /// tiles are returned.
     pub fn greet_again(&mut self, now: Duration) {
         self.left_suspect = self.tiles.is_at_suspect();
         self.give_back();

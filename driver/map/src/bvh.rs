@@ -1,5 +1,5 @@
-//! Bounding volume hierarchy: built by obvhs as a binary tree, folded into wide nodes for the chip by the surface area
-//! heuristic.
+//! Bounding volume hierarchy: built by obvhs as a binary tree, folded into wide nodes for the chip by the
+//! surface area heuristic.
 
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
@@ -92,11 +92,12 @@ const REINSERTED: [f32; 2] = [0.2, 0.4];
 /// Depth of the binary tree above which its builder searches for partners next to each part alone.
 const SEARCH_DEPTH: usize = 2;
 
-/// Builds the hierarchy of `triangles`, at least one. The result does not depend on the machine or on threads.
+/// Builds the hierarchy of `triangles`, at least one. The result does not depend on the machine or on
+/// threads.
 ///
 /// # Errors
-/// If the triangles or materials are too many, a corner is not finite or too far away, or a descent could overflow the
-/// chip's stack.
+/// If the triangles or materials are too many, a corner is not finite or too far away, or a descent could
+/// overflow the chip's stack.
 pub fn build(triangles: &[Triangle], finishes: Finishes) -> Result<Hierarchy, HierarchyError> {
     if triangles.len() > MAX_TRIANGLES {
         return Err(HierarchyError::TooMany { triangles: triangles.len() });
@@ -143,10 +144,11 @@ fn binary(boxes: &[Aabb]) -> Bvh2 {
     tree
 }
 
-/// Input of the builder: one box for many triangles whose boxes have a common centre, one for each other triangle.
+/// Input of the builder: one box for many triangles whose boxes have a common centre, one for each other
+/// triangle.
 ///
-/// Concentric boxes, each in the next, are all at one distance from the smallest: hardly two of them are each other's
-/// nearest, and the builder would search all of them for each pair that it joins.
+/// Concentric boxes, each in the next, are all at one distance from the smallest: hardly two of them are each
+/// other's nearest, and the builder would search all of them for each pair that it joins.
 struct Parts {
     crowds: Vec<Vec<u32>>,
     singles: Vec<u32>,

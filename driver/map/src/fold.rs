@@ -1,5 +1,6 @@
-//! Binary trees, folded into wide nodes of minimum expected cost and numbered as in a card image (Ylitie, Karras, Laine
-//! 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, section 3.1).
+//! Binary trees, folded into wide nodes of minimum expected cost and numbered as in a card image (Ylitie,
+//! Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, section
+//! 3.1).
 
 use std::collections::VecDeque;
 
@@ -12,14 +13,14 @@ pub(crate) struct Tree<L, B> {
     costs: [f32; NODE_CHILDREN],
 }
 
-/// A node of a binary tree: the leaf that it may become, and its two children, if any. Its costs are in [`Tree`], as only
-/// its parent needs them.
+/// A node of a binary tree: the leaf that it may become, and its two children, if any. Its costs are in
+/// [`Tree`], as only its parent needs them.
 struct Part<L, B> {
     bounds: B,
     leaf: Option<L>,
     parts: Option<Box<[Self; 2]>>,
-    /// `first[i]`: of at most `i + 1` children of a wide node, the number that the first part contributes; 0 if the whole
-    /// part is one child.
+    /// `first[i]`: of at most `i + 1` children of a wide node, the number that the first part contributes; 0
+    /// if the whole part is one child.
     first: [u8; NODE_CHILDREN],
 }
 
@@ -30,8 +31,8 @@ impl<L, B: Copy> Tree<L, B> {
         Self { part, costs: [cost; NODE_CHILDREN] }
     }
 
-    /// A node of two parts. `node`: cost of a visit as a wide node. `leaf`: the leaf that it may become, with the cost
-    /// of a visit.
+    /// A node of two parts. `node`: cost of a visit as a wide node. `leaf`: the leaf that it may become, with
+    /// the cost of a visit.
     pub(crate) fn node(parts: [Self; 2], bounds: B, node: f32, leaf: Option<(L, f32)>) -> Self {
         let mut costs = [f32::INFINITY; NODE_CHILDREN];
         let mut first = [0; NODE_CHILDREN];

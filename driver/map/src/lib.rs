@@ -1,8 +1,8 @@
 //! Card images: what a host computes of a scene once, before any tile is rendered.
 //!
-//! A [`PackedScene`](pack::PackedScene) has the scene's sections, [`map_photons`](photon_map::map_photons) traces photons in it and
-//! adds theirs; the result is a [`CardImage`](pack::CardImage). Photons are traced by the chip's own ray caster, in the packed lines, and lie
-//! on exactly the surfaces that gather rays meet.
+//! A [`PackedScene`](pack::PackedScene) has the scene's sections, [`map_photons`](photon_map::map_photons)
+//! traces photons in it and adds theirs; the result is a [`CardImage`](pack::CardImage). Photons are traced
+//! by the chip's own ray caster, in the packed lines, and lie on exactly the surfaces that gather rays meet.
 //!
 //! | modules | contents |
 //! |---|---|

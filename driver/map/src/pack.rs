@@ -1,8 +1,8 @@
 //! Packing: conversion of a scene to the sections of a card image, in lines.
 //!
-//! A [`PackedScene`] holds hierarchy, triangles, materials and lights. The photon pass ([`crate::photon`]) traces in it
-//! with the chip's own ray caster, so that photons lie on exactly the surfaces that gather rays meet. [`crate::photon_map`]
-//! adds the sections of the photon map.
+//! A [`PackedScene`] holds hierarchy, triangles, materials and lights. The photon pass ([`crate::photon`])
+//! traces in it with the chip's own ray caster, so that photons lie on exactly the surfaces that gather rays
+//! meet. [`crate::photon_map`] adds the sections of the photon map.
 
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
@@ -49,7 +49,8 @@ impl PackedScene {
     /// Packs geometry, materials, textures and lights.
     ///
     /// # Errors
-    /// If the geometry exceeds a chip or this process's memory, or there are more textures or lights than a chip can index.
+    /// If the geometry exceeds a chip or this process's memory, or there are more textures or lights than a
+    /// chip can index.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
         allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
             .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
@@ -114,7 +115,8 @@ impl PackedScene {
         self.keeps_photons
     }
 
-    /// Returns whether there are narrow lobes and lights without extent: the caustic map brings the one's light to the other.
+    /// Returns whether there are narrow lobes and lights without extent: the caustic map brings the one's
+    /// light to the other.
     pub(crate) fn has_lobes_under_punctual_lights(&self) -> bool {
         self.has_lobes_under_punctual_lights
     }
@@ -172,10 +174,11 @@ fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
 
 /// Unit of the chips' fixed-point sums of radiance, which hold 23 bits above the unit and 40 below.
 ///
-/// The unit is 2^4 times a typical radiance: that of all surfaces if the emitted power were spread over them and reflected once by
-/// white. A much brighter emitter or texel of the environment raises it, so that its own radiance is within 2^7 units. The sums of
-/// 2^12 samples, the maximum of a pixel, then hold 2^15 times the typical radiance and 2^4 times the brightest one on average: shadow
-/// rays next to an emitter may contribute a thousand times as much.
+/// The unit is 2^4 times a typical radiance: that of all surfaces if the emitted power were spread over them
+/// and reflected once by white. A much brighter emitter or texel of the environment raises it, so that its
+/// own radiance is within 2^7 units. The sums of 2^12 samples, the maximum of a pixel, then hold 2^15 times
+/// the typical radiance and 2^4 times the brightest one on average: shadow rays next to an emitter may
+/// contribute a thousand times as much.
 fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
     let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
     let typical = lights.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));

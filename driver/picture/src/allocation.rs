@@ -1,5 +1,5 @@
-//! Check of available memory before work of a known size: memory that the process cannot have is an error, whereas an
-//! allocation that fails in the middle of the work would abort the process.
+//! Check of available memory before work of a known size: memory that the process cannot have is an error,
+//! whereas an allocation that fails in the middle of the work would abort the process.
 
 use std::hint::black_box;
 
@@ -42,7 +42,8 @@ pub fn check(bytes: u64) -> Result<(), OutOfMemory> {
     Ok(())
 }
 
-/// Zeros. The system gives their memory when it is first written, so that a film of which a part is rendered takes that part's.
+/// Zeros. The system gives their memory when it is first written, so that a film of which a part is rendered
+/// takes that part's.
 ///
 /// # Errors
 /// If the allocation fails.

@@ -27,8 +27,8 @@ pub trait Choice: Copy + Send + Sync + 'static {
     }
 }
 
-/// Implements [`Choice`] by a table of variants, names and explanations. A variant that the table lacks is an error of
-/// the compiler.
+/// Implements [`Choice`] by a table of variants, names and explanations. A variant that the table lacks is an
+/// error of the compiler.
 #[macro_export]
 macro_rules! choices {
     ($choice:ty { $($variant:ident = $name:literal $(: $about:literal)?),+ $(,)? }) => {

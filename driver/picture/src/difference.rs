@@ -1,7 +1,8 @@
 //! Difference of a picture from a reference: errors of pixels, and of the means of blocks of pixels.
 //!
-//! Block means average the noise of both pictures away and show bias. Everything is computed in double precision
-//! over all three channels; the *mean* of a pixel or a block is the mean of its channels R, G and B.
+//! Block means average the noise of both pictures away and show bias. Everything is computed in double
+//! precision over all three channels; the *mean* of a pixel or a block is the mean of its channels R, G and
+//! B.
 
 use serde::Serialize;
 use thiserror::Error;
@@ -113,9 +114,9 @@ pub enum DifferenceError {
 
 /// Compares `image` with `reference` in blocks of `block` x `block` pixels.
 ///
-/// With `exclude`, blocks in which any channel of any pixel of the reference exceeds that radiance are left out of
-/// everything: they see an emitter, whose radiance would outweigh all else. The positions of the data windows do not
-/// matter, only their sizes.
+/// With `exclude`, blocks in which any channel of any pixel of the reference exceeds that radiance are left
+/// out of everything: they see an emitter, whose radiance would outweigh all else. The positions of the data
+/// windows do not matter, only their sizes.
 ///
 /// # Errors
 /// If the sizes differ, a pixel is not finite, `block` is 0, or nothing is left to compare.

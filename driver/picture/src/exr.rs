@@ -154,8 +154,8 @@ pub fn write(
 
 /// The film as `OpenEXR`: equal films give equal bytes. `path` is the file's name in errors.
 ///
-/// Pixels that were never written are zero, and so are layers that the film does not have. `provenance_json` is stored
-/// in the attribute [`PROVENANCE`]; characters beyond ASCII are stored as JSON's `\u` escapes.
+/// Pixels that were never written are zero, and so are layers that the film does not have. `provenance_json`
+/// is stored in the attribute [`PROVENANCE`]; characters beyond ASCII are stored as JSON's `\u` escapes.
 ///
 /// # Errors
 /// If the provenance is empty, or no text.
@@ -225,8 +225,8 @@ fn to_half(value: f32) -> f16 {
     if half.is_infinite() && value.is_finite() { f16::MAX.copysign(half) } else { half }
 }
 
-/// JSON with every character beyond ASCII escaped: the attribute is ASCII, and only strings of JSON hold other
-/// characters.
+/// JSON with every character beyond ASCII escaped: the attribute is ASCII, and only strings of JSON hold
+/// other characters.
 pub(crate) fn ascii(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {
@@ -252,11 +252,12 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
     read_with_provenance(path).map(|(picture, _)| picture)
 }
 
-/// Reads a picture as [`read_rgb`], and the JSON of its attribute [`PROVENANCE`]; `None` if the file has none, or it is not JSON.
+/// Reads a picture as [`read_rgb`], and the JSON of its attribute [`PROVENANCE`]; `None` if the file has
+/// none, or it is not JSON.
 ///
 /// # Errors
-/// If the file cannot be read, is malformed, has no such channels, or has more than [`MAX_READ_PIXELS`]. A file
-/// that states a size its length cannot hold is refused before anything is allocated.
+/// If the file cannot be read, is malformed, has no such channels, or has more than [`MAX_READ_PIXELS`]. A
+/// file that states a size its length cannot hold is refused before anything is allocated.
 pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), ExrError> {
     let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
     let found = std::fs::metadata(path).map_err(unreadable)?;
@@ -267,7 +268,8 @@ pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), E
     decode_walled(path, &bytes, MAX_READ_PIXELS)
 }
 
-/// Reads the provenance of a picture of this program and the type of its samples, without its pixels; `None` if the file is none.
+/// Reads the provenance of a picture of this program and the type of its samples, without its pixels; `None`
+/// if the file is none.
 pub fn read_form(path: &Path) -> Option<(String, SampleFormat)> {
     let meta = || MetaData::read_from_file(path, false).map_err(drop);
     let meta = foreign::decode(meta, || ()).ok()?;

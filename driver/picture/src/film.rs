@@ -153,7 +153,8 @@ impl Film {
         Ok(Self { width, height, window, format, records, written, missing: count })
     }
 
-    /// Checks that a film can be made, as far as that is known before its memory is asked for. Returns its pixels.
+    /// Checks that a film can be made, as far as that is known before its memory is asked for. Returns its
+    /// pixels.
     pub fn check(width: u32, height: u32, window: Window) -> Result<usize, FilmError> {
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
             return Err(FilmError::Size { width, height });
@@ -239,7 +240,8 @@ impl Film {
         self.all_at(x, y).map(|all| all.pixel)
     }
 
-    /// Values of the pixel at `(x, y)` of the full picture with its layers, or `None` outside the crop window.
+    /// Values of the pixel at `(x, y)` of the full picture with its layers, or `None` outside the crop
+    /// window.
     pub fn all_at(&self, x: u32, y: u32) -> Option<FilmPixel> {
         self.sums_at(x, y).map(|sums| self.format.values(&sums))
     }
@@ -251,8 +253,8 @@ impl Film {
         PixelSums::read(&self.records[index * bytes..(index + 1) * bytes])
     }
 
-    /// Writes the sums of the pixel at `(x, y)` of the full picture; writing them again replaces them. Layers that the film lacks are
-    /// left out, and those that the sums lack are zero.
+    /// Writes the sums of the pixel at `(x, y)` of the full picture; writing them again replaces them. Layers
+    /// that the film lacks are left out, and those that the sums lack are zero.
     ///
     /// # Errors
     /// [`FilmError::Outside`] if the pixel is not in the crop window; the film stays as it was.
@@ -270,7 +272,8 @@ impl Film {
         Ok(())
     }
 
-    /// Adds the sums of the samples of a film of equal window, layers and units. Pixels that either lacks are missing.
+    /// Adds the sums of the samples of a film of equal window, layers and units. Pixels that either lacks are
+    /// missing.
     ///
     /// # Errors
     /// [`FilmError::Other`] if the films differ in these; the film stays as it was.
@@ -289,8 +292,8 @@ impl Film {
         Ok(())
     }
 
-    /// Returns `tile` with this film's samples added, and with its own counters; `None` if the film lacks one of its pixels, or its units or
-    /// layers differ.
+    /// Returns `tile` with this film's samples added, and with its own counters; `None` if the film lacks one
+    /// of its pixels, or its units or layers differ.
     pub fn added_to(&self, tile: &FinishedTile) -> Option<FinishedTile> {
         let format = self.format.plus(tile.format())?;
         if !self.has(tile.tile()) {

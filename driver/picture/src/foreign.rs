@@ -1,7 +1,8 @@
-//! Isolation of decoders of untrusted bytes: a decoder that panics returns an error, without a message and without ending
-//! the process.
+//! Isolation of decoders of untrusted bytes: a decoder that panics returns an error, without a message and
+//! without ending the process.
 //!
-//! Decoders are written not to panic, but some do on malformed input. A build with `panic = "abort"` has no isolation.
+//! Decoders are written not to panic, but some do on malformed input. A build with `panic = "abort"` has no
+//! isolation.
 
 use std::cell::Cell;
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
@@ -12,8 +13,8 @@ thread_local! {
     static WALLS: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Runs a decoder; `panicked` makes the error if it panics. State outside of the decoder that it changes must not be used
-/// after an error.
+/// Runs a decoder; `panicked` makes the error if it panics. State outside of the decoder that it changes must
+/// not be used after an error.
 pub fn decode<T, E>(decoder: impl FnOnce() -> Result<T, E>, panicked: impl FnOnce() -> E) -> Result<T, E> {
     silence_walled_panics();
     WALLS.set(WALLS.get() + 1);

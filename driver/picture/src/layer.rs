@@ -1,4 +1,5 @@
-//! Layers of a picture (arbitrary output variables) and their channels, in the EXR file and on the display server.
+//! Layers of a picture (arbitrary output variables) and their channels, in the EXR file and on the display
+//! server.
 
 use std::fmt;
 use std::str::FromStr;
@@ -55,8 +56,8 @@ pub enum Layer {
     Direct,
     /// Indirect light, W/(sr m^2).
     Indirect,
-    /// Light from the caustic map, through specular surfaces, W/(sr m^2). Direct, indirect and caustic light add up to
-    /// radiance.
+    /// Light from the caustic map, through specular surfaces, W/(sr m^2). Direct, indirect and caustic light
+    /// add up to radiance.
     Caustic,
     /// Mean albedo of the surfaces seen, 0 to 1.
     Albedo,
@@ -104,8 +105,8 @@ impl Layer {
         matches!(self, Self::Direct | Self::Indirect | Self::Caustic | Self::Gathers)
     }
 
-    /// Returns whether the layer is always stored in single precision: distances and counts exceed the precision of
-    /// halves.
+    /// Returns whether the layer is always stored in single precision: distances and counts exceed the
+    /// precision of halves.
     pub fn is_always_single(self) -> bool {
         matches!(self, Self::Depth | Self::Gathers)
     }

@@ -90,8 +90,8 @@ impl PendingFile {
         let failed = |source| OutputError::Write { path: path.clone(), source };
         file.as_file().sync_all().map_err(failed)?;
         file.persist(&target).map_err(|error| failed(error.error))?;
-        // The rename itself survives a power cut only once the folder is on disk too. Not every file system can sync a
-        // folder, and the file is complete either way.
+        // The rename itself survives a power cut only once the folder is on disk too. Not every file system
+        // can sync a folder, and the file is complete either way.
         if let Ok(folder) = fs::File::open(folder_of(&target)) {
             let _ = folder.sync_all();
         }
@@ -109,8 +109,8 @@ impl Write for PendingFile {
     }
 }
 
-/// Returns whether two paths name one file, or would after writing it. Of files that do not exist yet, names that the file
-/// system would identify, such as names that differ in case alone, count as different.
+/// Returns whether two paths name one file, or would after writing it. Of files that do not exist yet, names
+/// that the file system would identify, such as names that differ in case alone, count as different.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let absolute = |path: &Path| {
         let folder = || Some(fs::canonicalize(folder_of(path)).ok()?.join(path.file_name()?));

@@ -3,9 +3,9 @@
 
 use std::borrow::Cow;
 
-/// Escapes all characters that do not print as themselves: control characters, line ends included, invisible and
-/// bidirectional formatting characters, and unassigned code points. Quotes and backslashes are kept, so that escaped text
-/// stays as it is.
+/// Escapes all characters that do not print as themselves: control characters, line ends included, invisible
+/// and bidirectional formatting characters, and unassigned code points. Quotes and backslashes are kept, so
+/// that escaped text stays as it is.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
         return Cow::Borrowed(text);

@@ -28,7 +28,8 @@ impl FinishedTile {
         (records.len() as u64 == bytes).then_some(Self { tile, records, format, counters })
     }
 
-    /// Tile from the sums of its pixels, row by row, with zero counters; `None` unless there are those of each pixel.
+    /// Tile from the sums of its pixels, row by row, with zero counters; `None` unless there are those of
+    /// each pixel.
     pub fn of_pixels(
         tile: Tile,
         pixels: impl IntoIterator<Item = PixelSums>,
@@ -80,12 +81,13 @@ pub fn pixel_positions(tile: &Tile) -> impl Iterator<Item = (u32, u32)> + use<> 
     (y..y + height).flat_map(move |row| (x..x + width).map(move |column| (column, row)))
 }
 
-/// Destination of finished tiles, called from any thread. A sink reports errors to its owner, not to the card's thread.
+/// Destination of finished tiles, called from any thread. A sink reports errors to its owner, not to the
+/// card's thread.
 pub trait TileSink: Sync {
     /// Stores a finished tile.
     fn put(&self, tile: &FinishedTile);
 
-    /// Revokes a stored tile, whose card sent wrong pixels. The tile is stored again once another card has rendered it,
-    /// unless the render ends before.
+    /// Revokes a stored tile, whose card sent wrong pixels. The tile is stored again once another card has
+    /// rendered it, unless the render ends before.
     fn revoke(&self, tile: &Tile);
 }

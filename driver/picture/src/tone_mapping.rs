@@ -1,9 +1,9 @@
 //! Tone mapping of radiance to a PNG picture in sRGB, 8 bits per channel.
 //!
-//! Radiance is scaled by `2^exposure`, or without an exposure so that the log-average luminance of the lit pixels
-//! becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone reproduction for digital
-//! images*, equations 1 and 2). A [`ToneCurve`] then compresses it, and it is clipped to 1 and encoded with the sRGB
-//! transfer curve. Negative radiance is shown black, infinite radiance white.
+//! Radiance is scaled by `2^exposure`, or without an exposure so that the log-average luminance of the lit
+//! pixels becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone reproduction
+//! for digital images*, equations 1 and 2). A [`ToneCurve`] then compresses it, and it is clipped to 1 and
+//! encoded with the sRGB transfer curve. Negative radiance is shown black, infinite radiance white.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -23,13 +23,14 @@ use crate::output::{self, OutputError};
 pub enum ToneCurve {
     /// No compression: values above 1 are clipped.
     None,
-    /// Reinhard's extended curve (2002, equation 4) of luminance, `L (1 + L / w^2) / (1 + L)` with the white point `w =
-    /// 4`. The colour is scaled with its luminance.
+    /// Reinhard's extended curve (2002, equation 4) of luminance, `L (1 + L / w^2) / (1 + L)` with the white
+    /// point `w = 4`. The colour is scaled with its luminance.
     #[default]
     Reinhard,
-    /// Narkowicz' fit of the Academy Color Encoding System's filmic curve, for each channel: `x (2.51 x + 0.03) / (x
-    /// (2.43 x + 0.59) + 0.14)` (2016, <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>).
-    /// It maps 1 to 0.80; the Academy's own curve is this one at 0.6 times the radiance.
+    /// Narkowicz' fit of the Academy Color Encoding System's filmic curve, for each channel: `x (2.51 x +
+    /// 0.03) / (x (2.43 x + 0.59) + 0.14)` (2016,
+    /// <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>). It maps 1 to 0.80; the
+    /// Academy's own curve is this one at 0.6 times the radiance.
     Aces,
 }
 
@@ -59,8 +60,8 @@ impl ToneCurve {
 /// Mapping of radiance to a screen: exposure and tone curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
-    /// Exposure in stops: radiance is scaled by `2^exposure`. `None` derives the scale from the picture's log-average
-    /// luminance.
+    /// Exposure in stops: radiance is scaled by `2^exposure`. `None` derives the scale from the picture's
+    /// log-average luminance.
     pub exposure: Option<f32>,
     /// Tone curve.
     pub curve: ToneCurve,
@@ -123,11 +124,12 @@ pub enum PngError {
 
 /// Writes a picture of `width` x `height` pixels of linear radiance to `path` as PNG, whole or not at all.
 ///
-/// The JSON of the picture's provenance is stored in the text chunk [`PROVENANCE`], with characters beyond ASCII as `\u` escapes,
-/// and that of the mapping in the text chunk [`TONE_MAPPING`].
+/// The JSON of the picture's provenance is stored in the text chunk [`PROVENANCE`], with characters beyond
+/// ASCII as `\u` escapes, and that of the mapping in the text chunk [`TONE_MAPPING`].
 ///
 /// # Errors
-/// If the file cannot be written, the exposure is not finite, a pixel is NaN, or there are not `width` x `height` pixels.
+/// If the file cannot be written, the exposure is not finite, a pixel is NaN, or there are not `width` x
+/// `height` pixels.
 #[cfg(not(target_family = "wasm"))]
 pub fn write_png(
     path: &Path,

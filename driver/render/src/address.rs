@@ -52,8 +52,9 @@ pub enum RemoteAddress {
 const MAX_CHIPS: usize = 1024;
 /// Default speed of a serial port, bits/s.
 const DEFAULT_BAUD: u32 = 115_200;
-/// Minimum speed of a serial port, bits/s. A card is silent while it receives two whole frames and acknowledges them. Even
-/// if one acknowledgement is lost, the next has to arrive within the 10 s after which a card counts as lost.
+/// Minimum speed of a serial port, bits/s. A card is silent while it receives two whole frames and
+/// acknowledges them. Even if one acknowledgement is lost, the next has to arrive within the 10 s after which
+/// a card counts as lost.
 const MIN_BAUD: u32 = 4800;
 
 impl Default for CardAddress {

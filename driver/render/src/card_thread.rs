@@ -21,9 +21,9 @@ struct CardAtWork<'a> {
     crew: &'a Crew<'a>,
 }
 
-/// Loads the image into a card and renders tiles on it until none is left. A lost card is retried as long as there are
-/// others; a card that answers wrongly, or fails repeatedly, is given up. Returns the time when the card was loaded, since the
-/// start of the crew; zero if it was not.
+/// Loads the image into a card and renders tiles on it until none is left. A lost card is retried as long as
+/// there are others; a card that answers wrongly, or fails repeatedly, is given up. Returns the time when the
+/// card was loaded, since the start of the crew; zero if it was not.
 pub(super) fn render_on(
     number: CardNumber,
     greeted: &mut GreetedCard,
@@ -86,7 +86,8 @@ impl CardAtWork<'_> {
         if is_closed { self.reopen() } else { Ok(true) }
     }
 
-    /// Reconnects to a card whose link was closed. Returns false for an emulated card, which cannot be reached again.
+    /// Reconnects to a card whose link was closed. Returns false for an emulated card, which cannot be
+    /// reached again.
     fn reopen(&mut self) -> Result<bool, RenderError> {
         let Some(address) = self.greeted.card.close() else { return Ok(false) };
         if let Some(port) = reopen(&address, &|longest| self.crew.wait_for_end(longest))? {

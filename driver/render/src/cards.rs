@@ -1,5 +1,5 @@
-//! Executor of tiles on cards: connects to all cards, greets them, and renders on them in parallel. Cards stay open for the next
-//! picture.
+//! Executor of tiles on cards: connects to all cards, greets them, and renders on them in parallel. Cards
+//! stay open for the next picture.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::AtomicBool;
@@ -26,7 +26,8 @@ use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{MemoryModel, SharedImage, TileLines};
 
-/// Maximum time without a render after which a card elsewhere is used without a new greeting: it may close a link that is silent.
+/// Maximum time without a render after which a card elsewhere is used without a new greeting: it may close a
+/// link that is silent.
 const MAX_REST: Duration = Duration::from_secs(5);
 
 /// Cards that have answered the greeting.
@@ -49,8 +50,8 @@ pub(super) struct Cards {
 }
 
 impl Cards {
-    /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it, the first card's with
-    /// the trace. A card that does not answer counts as lost.
+    /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it, the
+    /// first card's with the trace. A card that does not answer counts as lost.
     ///
     /// # Errors
     /// If the trace cannot be written, or fewer cards are left than needed.
@@ -90,7 +91,8 @@ impl Cards {
         Ok(this)
     }
 
-    /// Returns whether the cards are those of the settings, as many as needed, and can be used without a new greeting.
+    /// Returns whether the cards are those of the settings, as many as needed, and can be used without a new
+    /// greeting.
     pub(super) fn serve(&self, settings: &RenderSettings) -> bool {
         let is_remote = |address: &CardAddress| matches!(address, CardAddress::Remote(_));
         let is_fresh = !self.set.addresses.iter().any(is_remote) || self.used.elapsed() <= MAX_REST;
@@ -121,8 +123,8 @@ impl Cards {
         last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
     }
 
-    /// Has emulated cards to which nothing was loaded hold the image by reference: all of them, or all but the first, whose load is the one
-    /// that is counted. Cards on faulty links are loaded.
+    /// Has emulated cards to which nothing was loaded hold the image by reference: all of them, or all but
+    /// the first, whose load is the one that is counted. Cards on faulty links are loaded.
     fn share(&mut self, image: &Arc<CardImage>, checksum: u64, is_image_kept: bool) {
         let is_faulty = self.set.faults.is_some();
         for (index, (_, GreetedCard { card, session, .. })) in self.cards.iter_mut().enumerate() {
@@ -294,8 +296,8 @@ impl Executor for Cards {
     }
 }
 
-/// Does each piece of work on a thread of its own. Returns the results in the order of the work. A panic of one is the
-/// caller's.
+/// Does each piece of work on a thread of its own. Returns the results in the order of the work. A panic of
+/// one is the caller's.
 fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) -> Vec<T> {
     std::thread::scope(|scope| {
         let threads: Vec<_> = works.map(|work| scope.spawn(work)).collect();

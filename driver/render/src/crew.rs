@@ -69,8 +69,8 @@ impl Crew<'_> {
         error
     }
 
-    /// Handles a card that is lost or given up; the others render its tiles. `was_lost` is true if its loss was reported
-    /// before.
+    /// Handles a card that is lost or given up; the others render its tiles. `was_lost` is true if its loss
+    /// was reported before.
     ///
     /// # Errors
     /// If no other card is left.

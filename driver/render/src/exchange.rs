@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 use photoncard_cards::session::{Session, SessionError};
 use photoncard_shared::link::Port;
 
-/// Maximum wait of a port for a byte, and so the time until a card's thread notices that the render is stopped.
+/// Maximum wait of a port for a byte, and so the time until a card's thread notices that the render is
+/// stopped.
 pub(super) const WAIT: Duration = Duration::from_millis(4);
 
 /// Moves bytes once in each direction; waits at most [`WAIT`] if there are none. `slowest` is an argument of

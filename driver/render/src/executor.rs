@@ -38,7 +38,8 @@ pub(super) trait Executor {
         observer: &dyn Observer,
     ) -> Result<(), RenderError>;
 
-    /// Returns whether tiles are finished one after another, so that a render that ends early has finished tiles.
+    /// Returns whether tiles are finished one after another, so that a render that ends early has finished
+    /// tiles.
     fn finishes_tiles_early(&self) -> bool;
 
     /// Renders the tiles into the sinks.
@@ -84,7 +85,8 @@ pub(super) struct Outcome {
     pub(super) cards_given_up: usize,
     /// Numbers of tiles that were rendered more than once or taken over.
     pub(super) tiles: TileCounts,
-    /// Names of cards that alone have rendered dazzling tiles, which no other has verified, with their number.
+    /// Names of cards that alone have rendered dazzling tiles, which no other has verified, with their
+    /// number.
     pub(super) dazzling: Vec<(String, usize)>,
     /// Error that has ended the work; the rest is what was done until then.
     pub(super) failure: Option<RenderError>,

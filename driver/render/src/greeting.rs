@@ -133,8 +133,8 @@ pub(super) fn greet_port(
     }
 }
 
-/// Random number of a session, to distinguish it from frames of earlier sessions on the line; two coincide with probability
-/// 2^-32.
+/// Random number of a session, to distinguish it from frames of earlier sessions on the line; two coincide
+/// with probability 2^-32.
 fn session_number() -> u32 {
     // The standard library's hashers have random keys.
     RandomState::new().hash_one(std::process::id()) as u32

@@ -1,8 +1,8 @@
 //! A render, from a loaded scene to a complete film.
 //!
-//! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, executor, statistics. The executor
-//! fills the film: cards over their links, or for the order `hilbert` emulated chips with the host. [`render`] is a renderer's first
-//! picture.
+//! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, executor, statistics.
+//! The executor fills the film: cards over their links, or for the order `hilbert` emulated chips with the
+//! host. [`render`] is a renderer's first picture.
 #![forbid(unsafe_code)]
 
 mod address;
@@ -64,7 +64,8 @@ use photoncard_scene::Scene;
 
 /// Renders a scene. For further pictures on the same cards use a [`Renderer`].
 ///
-/// A serial port may be held open for about a second after the end: an attempt to reopen it runs on a detached thread.
+/// A serial port may be held open for about a second after the end: an attempt to reopen it runs on a
+/// detached thread.
 ///
 /// # Errors
 /// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
@@ -76,8 +77,8 @@ pub fn render(
     Renderer::default().render(scene, settings, observer)
 }
 
-/// Renders a scene with photons and an integrator that are chosen when the cards have answered and the scene is packed. `choose` takes
-/// the packed scene; everything else is by `settings`.
+/// Renders a scene with photons and an integrator that are chosen when the cards have answered and the scene
+/// is packed. `choose` takes the packed scene; everything else is by `settings`.
 ///
 /// # Errors
 /// As [`render`], and those of `choose`.

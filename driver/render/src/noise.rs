@@ -1,10 +1,12 @@
 //! Estimate of the noise of a picture from the differences of its passes.
 //!
-//! Let `A` and `B` be the means of the pixels over the first and the next `n` samples, `M` their mean, `e_n` and `e_2n` the errors of `A`
-//! and `M` (root mean squares), and `D_n = E[(A - B)^2]`. `B` has the error of `A`, so that `e_2n^2 = e_n^2 - D_n / 4`. With
-//! `e_2n^2 = r e_n^2` this is `e_2n^2 = D_n / 4 * r / (1 - r)`. Independent samples have `r = 1/2`. A stratified sequence does better, down to
-//! `1/4` for edges and smooth light (Owen 1997), with few samples more than with many, and unevenly: the ratios of successive `D_n` are 0.24 to
-//! 0.69, and some numbers of samples are luckier than others. One ratio for all pictures is nearer to the truth than ratios that follow them.
+//! Let `A` and `B` be the means of the pixels over the first and the next `n` samples, `M` their mean, `e_n`
+//! and `e_2n` the errors of `A` and `M` (root mean squares), and `D_n = E[(A - B)^2]`. `B` has the error of
+//! `A`, so that `e_2n^2 = e_n^2 - D_n / 4`. With `e_2n^2 = r e_n^2` this is `e_2n^2 = D_n / 4 * r / (1 - r)`.
+//! Independent samples have `r = 1/2`. A stratified sequence does better, down to `1/4` for edges and smooth
+//! light (Owen 1997), with few samples more than with many, and unevenly: the ratios of successive `D_n` are
+//! 0.24 to 0.69, and some numbers of samples are luckier than others. One ratio for all pictures is nearer to
+//! the truth than ratios that follow them.
 
 use photoncard_picture::film::Film;
 
@@ -25,7 +27,8 @@ pub(super) struct NoiseEstimate {
 }
 
 impl NoiseEstimate {
-    /// Adds the picture before a pass and the one after it. A pass that does not double the samples has no part in the estimate.
+    /// Adds the picture before a pass and the one after it. A pass that does not double the samples has no
+    /// part in the estimate.
     pub(super) fn add(&mut self, before: &Film, after: &Film) {
         let [few, all] = [before, after].map(|film| f64::from(film.format().samples));
         self.all = all;
@@ -44,7 +47,8 @@ impl NoiseEstimate {
         if self.is_of_black {
             return;
         }
-        // `A - M` is the share of the pass in `M` times `A - B`: half of it, or more with probes in `A`, which count by half.
+        // `A - M` is the share of the pass in `M` times `A - B`: half of it, or more with probes in `A`,
+        // which count by half.
         let [few, all] = [before, after].map(|film| film.format().count().weight_of_light());
         let halves = 0.5 * all / (all - few);
         let quarter = squares / count / (sum / count).powi(2) * halves * halves;
@@ -57,15 +61,17 @@ impl NoiseEstimate {
         self.is_of_black
     }
 
-    /// Noise of the last picture, relative to its mean; `None` before there is a pass that has doubled the samples.
+    /// Noise of the last picture, relative to its mean; `None` before there is a pass that has doubled the
+    /// samples.
     pub(super) fn noise(&self) -> Option<f64> {
-        // Linear from one doubling to the next: the last samples of the sequence are not stratified against the first.
+        // Linear from one doubling to the next: the last samples of the sequence are not stratified against
+        // the first.
         let doubled = (self.all / self.samples - 1.0).min(1.0);
         Some((self.squared? * (1.0 - doubled * (1.0 - RATIO))).sqrt())
     }
 
-    /// Number of samples to be added so that the noise is at most `aim`; `None` before there is an estimate, and where twice the samples of the
-    /// last doubling do not suffice.
+    /// Number of samples to be added so that the noise is at most `aim`; `None` before there is an estimate,
+    /// and where twice the samples of the last doubling do not suffice.
     pub(super) fn samples_to(&self, aim: f64) -> Option<u32> {
         if self.noise()? <= aim {
             return Some(0);

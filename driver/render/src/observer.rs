@@ -25,7 +25,8 @@ pub enum Phase {
     SelfTest,
 }
 
-/// Observer of a render or of a card's self-test, which can stop it. Its methods are called from the threads of the work.
+/// Observer of a render or of a card's self-test, which can stop it. Its methods are called from the threads
+/// of the work.
 pub trait Observer: Sync {
     /// Reports the progress of a phase: `done` of `total`.
     fn progress(&self, phase: Phase, done: u64, total: u64);
@@ -42,8 +43,8 @@ pub trait Observer: Sync {
     /// Reports that a card was lost or given up; the others render its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
 
-    /// Reports that a card has rendered a tile, before the sinks have it; with the lines that it has read from DRAM, if its memory is
-    /// [modelled](super::RenderSettings::modelled_caches).
+    /// Reports that a card has rendered a tile, before the sinks have it; with the lines that it has read
+    /// from DRAM, if its memory is [modelled](super::RenderSettings::modelled_caches).
     fn rendered(&self, _card: &str, _tile: &Tile, _dram_lines: Option<u64>) {}
 
     /// Sink of the observer's own for finished tiles.

@@ -29,8 +29,9 @@ enum Connection {
 }
 
 impl OpenCard {
-    /// Starts or connects to the card at an address, the first if there are several. An emulated card may have a model of
-    /// its memory, and shares the host's image. `index` is the card's number, on which injected faults depend.
+    /// Starts or connects to the card at an address, the first if there are several. An emulated card may
+    /// have a model of its memory, and shares the host's image. `index` is the card's number, on which
+    /// injected faults depend.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,

@@ -22,8 +22,9 @@ pub(super) struct Outputs<'a> {
 }
 
 impl<'a> Outputs<'a> {
-    /// Opens the outputs. Tiles of the render that is resumed are written into the film, and shown. Samples that are complete in
-    /// the render that is resumed take the place of `base`, and the film is of the others.
+    /// Opens the outputs. Tiles of the render that is resumed are written into the film, and shown. Samples
+    /// that are complete in the render that is resumed take the place of `base`, and the film is of the
+    /// others.
     ///
     /// # Errors
     /// If the file of finished tiles cannot be read or is not the file of this picture.
@@ -56,7 +57,8 @@ impl<'a> Outputs<'a> {
         Ok(outputs)
     }
 
-    /// Sinks of finished tiles: the film, the outputs that show them, and the file if tiles are finished early.
+    /// Sinks of finished tiles: the film, the outputs that show them, and the file if tiles are finished
+    /// early.
     pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>, finished_early: bool) -> Vec<&'s dyn TileSink> {
         let mut sinks: Vec<&dyn TileSink> = vec![film, self];
         let partial = self.partial.as_ref().filter(|_| finished_early);

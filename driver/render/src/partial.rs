@@ -1,4 +1,5 @@
-//! Partial renders: finished tiles are appended to a file beside the picture, so that `--resume` can continue from them.
+//! Partial renders: finished tiles are appended to a file beside the picture, so that `--resume` can continue
+//! from them.
 //!
 //! ```text
 //! photoncard partial render 4\n
@@ -8,12 +9,13 @@
 //! ...
 //! ```
 //!
-//! Numbers are little-endian. The first checksum covers the two lines; that of a record covers the first checksum
-//! and all preceding bytes of the record. An incomplete last record, left when
-//! the process ended during a write, is cut off. A damaged record is skipped: the reader searches for the magic number that
-//! begins the next one. If two records contain a pixel, the later one holds. The settings are those that pixels depend on:
-//! a resumed render may use other tiles, another order and other cards. They do not hold the number of samples: a picture of more
-//! samples takes over complete ranges of samples from the first on, and renders the others.
+//! Numbers are little-endian. The first checksum covers the two lines; that of a record covers the first
+//! checksum and all preceding bytes of the record. An incomplete last record, left when the process ended
+//! during a write, is cut off. A damaged record is skipped: the reader searches for the magic number that
+//! begins the next one. If two records contain a pixel, the later one holds. The settings are those that
+//! pixels depend on: a resumed render may use other tiles, another order and other cards. They do not hold
+//! the number of samples: a picture of more samples takes over complete ranges of samples from the first on,
+//! and renders the others.
 //!
 //! The render that writes the file locks it. A file of this name that is no partial render is refused and
 //! left unchanged, and so is one with tiles that the render is not to go on from.
@@ -69,9 +71,10 @@ struct KeptTiles {
 }
 
 impl PartialRender {
-    /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on but the number of samples,
-    /// which `film` states. With [`PartialSettings::resume`] the file's tiles are written into the film. If it has all tiles of fewer
-    /// samples, these are the second result, and the film is of the others.
+    /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on
+    /// but the number of samples, which `film` states. With [`PartialSettings::resume`] the file's tiles are
+    /// written into the film. If it has all tiles of fewer samples, these are the second result, and the film
+    /// is of the others.
     ///
     /// # Errors
     /// If the file is no partial render, in use by another render or unreadable, or its settings are damaged;
@@ -103,8 +106,8 @@ impl PartialRender {
         PartialError::File { path: self.path.clone(), source }
     }
 
-    /// Writes the valid tiles of the file into the film, and truncates the file after the last one. Returns the film of the first
-    /// samples if the file has all of their tiles.
+    /// Writes the valid tiles of the file into the film, and truncates the file after the last one. Returns
+    /// the film of the first samples if the file has all of their tiles.
     fn resume(&self, mut file: &File, film: &mut Film) -> Result<Option<Film>, PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let mut reader = BufReader::new(file);
@@ -227,7 +230,8 @@ impl PartialRender {
         kept.failed.take().map_or(Ok(()), Err)
     }
 
-    /// Removes the file after the picture is written. A file that this render has not opened is another's, and stays.
+    /// Removes the file after the picture is written. A file that this render has not opened is another's,
+    /// and stays.
     ///
     /// # Errors
     /// If it cannot be removed.

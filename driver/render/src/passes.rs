@@ -1,7 +1,7 @@
 //! Pictures by passes: samples are added until the time is over or the noise is low enough.
 //!
-//! The numbers of samples double. A pass and the picture before it are then estimates of equally many samples, whose difference shows the
-//! noise of their mean ([`NoiseEstimate`]).
+//! The numbers of samples double. A pass and the picture before it are then estimates of equally many
+//! samples, whose difference shows the noise of their mean ([`NoiseEstimate`]).
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -26,7 +26,8 @@ const PLANNED_SHARE: f64 = 0.95;
 /// Aim of a picture by passes: the first of the two, and 4096 samples a pixel in any case.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
-    /// Time of the render; the first pass may take longer, and without room for irradiance records on a card the second.
+    /// Time of the render; the first pass may take longer, and without room for irradiance records on a card
+    /// the second.
     pub time: Option<Duration>,
     /// Noise: estimated standard error of the pixels (root mean square), relative to the mean of the picture.
     pub noise: Option<f64>,
@@ -58,8 +59,9 @@ pub enum Ending {
 }
 
 impl Renderer {
-    /// Renders a picture by passes until an aim is reached. Photons and integrator are chosen as by [`Self::render_chosen`]; the number of
-    /// samples chosen is the planned one. The picture is, to the bit, that of one render of as many samples with as many planned.
+    /// Renders a picture by passes until an aim is reached. Photons and integrator are chosen as by
+    /// [`Self::render_chosen`]; the number of samples chosen is the planned one. The picture is, to the bit,
+    /// that of one render of as many samples with as many planned.
     ///
     /// # Errors
     /// As [`Self::render_chosen`], in the first pass.
@@ -153,7 +155,8 @@ fn next_pass(
 /// Time of passes: a part that each has, and one in proportion to its samples.
 #[derive(Default)]
 struct Pace {
-    /// Samples and seconds of the last two passes, without a first one that gathers irradiance records for all.
+    /// Samples and seconds of the last two passes, without a first one that gathers irradiance records for
+    /// all.
     last: [Option<(f64, f64)>; 2],
 }
 
@@ -167,7 +170,8 @@ impl Pace {
         let Some((samples, time)) = self.last[1] else { return u32::from(seconds > 0.0) };
         let slope = self.last[0].filter(|(before, _)| *before != samples);
         let slope = slope.map(|(before, other)| (time - other) / (samples - before));
-        // The time of a sample is at most what it would be without a part that each pass has, and not much less.
+        // The time of a sample is at most what it would be without a part that each pass has, and not much
+        // less.
         let most = time / samples;
         let each = slope.unwrap_or(most).clamp(0.25 * most, most).max(f64::MIN_POSITIVE);
         let fixed = time - each * samples;

@@ -12,10 +12,12 @@ use serde_json::{Value, json};
 use super::{NamedSettings, RenderSettings};
 use crate::emulator::EmulatedKind;
 
-/// Provenance of a render. The caller of a render adds the names of its inputs, which the library does not know.
+/// Provenance of a render. The caller of a render adds the names of its inputs, which the library does not
+/// know.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Provenance {
-    /// Everything that pixels depend on: the provenance that pictures store. It is equal for all orders, caches and cards.
+    /// Everything that pixels depend on: the provenance that pictures store. It is equal for all orders,
+    /// caches and cards.
     pub pixels: NamedSettings,
     /// Everything else that the work depends on: order, photon map layout, cards, caches.
     pub work: NamedSettings,
@@ -44,7 +46,8 @@ impl Provenance {
     }
 }
 
-/// The camera with all changes of it applied: name, place in metres, unit vectors, vertical field of view in degrees.
+/// The camera with all changes of it applied: name, place in metres, unit vectors, vertical field of view in
+/// degrees.
 fn view(camera: &Camera) -> Value {
     let Camera { name, origin, right: _, up, forward, vertical_fov, aspect: _ } = camera;
     let [origin, up, forward] = [origin, up, forward].map(Vec3::to_array);

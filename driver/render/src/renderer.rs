@@ -36,13 +36,14 @@ type Choice<'a> = &'a dyn Fn(&PackedScene) -> Chosen;
 
 /// Renders pictures one after another on the same cards, which stay open between them.
 ///
-/// A picture of another camera, of the same scene and photons, takes the host no photons and the cards no image: nothing but tiles is
-/// sent. After a change of the scene or its photons the host makes the image anew, and a card receives the lines that have changed; it
-/// checks the checksum of the whole image, and receives the image as a whole if that differs, or if it was reset or lost. A picture never
-/// depends on those before it.
+/// A picture of another camera, of the same scene and photons, takes the host no photons and the cards no
+/// image: nothing but tiles is sent. After a change of the scene or its photons the host makes the image
+/// anew, and a card receives the lines that have changed; it checks the checksum of the whole image, and
+/// receives the image as a whole if that differs, or if it was reset or lost. A picture never depends on
+/// those before it.
 ///
-/// Cards are connected again for settings with other cards, for each picture with modelled memory, after a render that has failed, and,
-/// if any are remote, after some seconds without a picture.
+/// Cards are connected again for settings with other cards, for each picture with modelled memory, after a
+/// render that has failed, and, if any are remote, after some seconds without a picture.
 #[derive(Default)]
 pub struct Renderer {
     cards: Option<Cards>,
@@ -68,7 +69,8 @@ impl Renderer {
         self.render_fixed(&scene.into(), settings, observer)
     }
 
-    /// Renders a picture of a scene that stays as it is between pictures: for another camera neither triangles nor texels are read.
+    /// Renders a picture of a scene that stays as it is between pictures: for another camera neither
+    /// triangles nor texels are read.
     ///
     /// # Errors
     /// As [`Self::render`].
@@ -81,12 +83,13 @@ impl Renderer {
         self.render_by(scene, settings, None, None, observer)
     }
 
-    /// Adds samples to a picture: renders those from the `base`'s on, and returns the picture of all samples of the settings. It is, to
-    /// the bit, the picture of one render of as many. [`Integrator::planned_samples`] and all else that pixels depend on must be those of
-    /// the base.
+    /// Adds samples to a picture: renders those from the `base`'s on, and returns the picture of all samples
+    /// of the settings. It is, to the bit, the picture of one render of as many.
+    /// [`Integrator::planned_samples`] and all else that pixels depend on must be those of the base.
     ///
     /// # Errors
-    /// As [`Self::render`]; if the base does not have fewer samples, or is of another size, crop window or other layers.
+    /// As [`Self::render`]; if the base does not have fewer samples, or is of another size, crop window or
+    /// other layers.
     pub fn refine(
         &mut self,
         scene: &FixedScene,
@@ -102,7 +105,8 @@ impl Renderer {
         self.cards = None;
     }
 
-    /// Renders a picture of a scene with photons and an integrator that are chosen when the cards have answered and the scene is packed.
+    /// Renders a picture of a scene with photons and an integrator that are chosen when the cards have
+    /// answered and the scene is packed.
     ///
     /// # Errors
     /// As [`Self::render`], and those of `choose`.

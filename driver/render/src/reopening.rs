@@ -11,13 +11,14 @@ use super::open_card::{BoxedPort, reach};
 /// Pause before each attempt to reconnect.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// Tries to reconnect to a card until it succeeds, or all tiles are done. `wait_for_end` waits at most for the time given,
-/// and returns whether they are.
+/// Tries to reconnect to a card until it succeeds, or all tiles are done. `wait_for_end` waits at most for
+/// the time given, and returns whether they are.
 pub(super) fn reopen(
     address: &RemoteAddress,
     wait_for_end: &dyn Fn(Duration) -> Result<bool, RenderError>,
 ) -> Result<Option<BoxedPort>, RenderError> {
-    // The first attempt waits as well: a peer that closes every link at once must not be contacted in a tight loop.
+    // The first attempt waits as well: a peer that closes every link at once must not be contacted in a tight
+    // loop.
     while !wait_for_end(RETRY)? {
         let attempt = try_to_reach(address.clone());
         loop {
@@ -32,8 +33,8 @@ pub(super) fn reopen(
     Ok(None)
 }
 
-/// Tries once, on a thread of its own: looking up or connecting to an address may take seconds, and a render that ends does
-/// not wait for it. A port that is not received is closed.
+/// Tries once, on a thread of its own: looking up or connecting to an address may take seconds, and a render
+/// that ends does not wait for it. A port that is not received is closed.
 fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
     let (sender, receiver) = channel();
     let work = move || {

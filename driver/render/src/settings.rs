@@ -40,11 +40,12 @@ pub struct RenderSettings {
 /// Default number of direction bins: three per entry of the table that samples directions.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
-/// Minimum number of tiles for each of several cards by default. A card waits for the last tile of another half a tile's time on average.
+/// Minimum number of tiles for each of several cards by default. A card waits for the last tile of another
+/// half a tile's time on average.
 const TILES_OF_CARD: u64 = 4;
 
-/// Side of tiles that are not divided for more cards by default, pixels: that of the coarsest cells of irradiance records, which
-/// narrower tiles would compute several times.
+/// Side of tiles that are not divided for more cards by default, pixels: that of the coarsest cells of
+/// irradiance records, which narrower tiles would compute several times.
 const NARROWEST_TILE: u32 = 16;
 
 /// Default number of caustic photons for a scene with a specular surface.
@@ -63,8 +64,9 @@ impl RenderSettings {
         self.picture.crop.unwrap_or(Window::full(self.picture.width, self.picture.height))
     }
 
-    /// Side of the tiles on cards of `budgets`, pixels: [`Schedule::tile`]; without one the widest that each card has room for, as
-    /// it reads the least memory; for several cards halved while the window has fewer than four tiles for each, down to 16 pixels.
+    /// Side of the tiles on cards of `budgets`, pixels: [`Schedule::tile`]; without one the widest that each
+    /// card has room for, as it reads the least memory; for several cards halved while the window has fewer
+    /// than four tiles for each, down to 16 pixels.
     pub fn tile_side(&self, budgets: &[Budget]) -> u32 {
         if let Some(side) = self.schedule.tile {
             return side;
@@ -114,8 +116,9 @@ impl RenderSettings {
         if is_specular { asked } else { 0 }
     }
 
-    /// Canonical settings, equal for all settings that give the scene equal pixels: the number of caustic photons is the
-    /// scene's, photons that no pilot has chosen are for any camera, and without a caustic map the neighbours of its gathers are the default's.
+    /// Canonical settings, equal for all settings that give the scene equal pixels: the number of caustic
+    /// photons is the scene's, photons that no pilot has chosen are for any camera, and without a caustic map
+    /// the neighbours of its gathers are the default's.
     #[must_use]
     pub fn resolved(&self, scene: &Scene) -> Self {
         self.resolved_if(scene.is_specular())
@@ -138,7 +141,8 @@ impl RenderSettings {
         self.photon_settings_of(&scene.into())
     }
 
-    /// [`Self::photon_settings`] of a scene that stays as it is. A camera that the scene does not have is any.
+    /// [`Self::photon_settings`] of a scene that stays as it is. A camera that the scene does not have is
+    /// any.
     pub(super) fn photon_settings_of(&self, scene: &FixedScene) -> PhotonSettings {
         let camera = match self.photons.photons_for {
             PhotonsFor::Scene | PhotonsFor::Auto => None,
@@ -203,8 +207,8 @@ impl RenderSettings {
         }
     }
 
-    /// Pinhole camera of the frame. The vertical field of view is the camera's; the horizontal one follows from the
-    /// picture's size.
+    /// Pinhole camera of the frame. The vertical field of view is the camera's; the horizontal one follows
+    /// from the picture's size.
     pub(crate) fn pinhole(&self, camera: &Camera) -> message::Camera {
         let half_height = libm::tanf(0.5 * camera.vertical_fov);
         let half_width = half_height * self.picture.width as f32 / self.picture.height as f32;

@@ -39,11 +39,11 @@ pub struct Statistics {
     pub cards_given_up: usize,
     /// Number of tiles that two cards have rendered equally.
     pub verified_tiles: usize,
-    /// Number of tiles rendered once more, for verification or because another card took too long. Not included in the
-    /// other counts.
+    /// Number of tiles rendered once more, for verification or because another card took too long. Not
+    /// included in the other counts.
     pub repeated_tiles: usize,
-    /// Number of tiles with light far beyond that of the scene's surfaces for which there was no second card to verify
-    /// them.
+    /// Number of tiles with light far beyond that of the scene's surfaces for which there was no second card
+    /// to verify them.
     pub dazzling_tiles: usize,
     /// Names of the cards that have rendered these.
     #[serde(skip)]
@@ -54,8 +54,8 @@ pub struct Statistics {
     pub time_s: Times,
     /// Number of rays cast on the chips.
     pub rays: Rays,
-    /// Number of paths that exceeded the limit of specular bounces, or met a surface that absorbs all light; they
-    /// contribute nothing.
+    /// Number of paths that exceeded the limit of specular bounces, or met a surface that absorbs all light;
+    /// they contribute nothing.
     pub lost_paths: u64,
     /// Number of searches of the caustic map.
     pub caustic_gathers: u64,
@@ -85,7 +85,8 @@ pub struct Statistics {
     pub drains: u64,
     /// Maximum number of gathers that waited at once on any chip.
     pub most_waiting: u64,
-    /// Floating-point operations of the counted work by the constants of Table 7.1 (`docs/scaling.md`), without lookups of irradiance.
+    /// Floating-point operations of the counted work by the constants of Table 7.1 (`docs/scaling.md`),
+    /// without lookups of irradiance.
     pub flops: Flops,
     /// Bytes of the card image.
     pub image_bytes: u64,
@@ -175,7 +176,8 @@ fn photons(count: u64, prepared: &Prepared) -> u64 {
 /// Rays by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Rays {
-    /// Eye rays: one per sample, cast twice, with the irradiance cache three times; and rays to points of its lattice.
+    /// Eye rays: one per sample, cast twice, with the irradiance cache three times; and rays to points of its
+    /// lattice.
     pub eye: u64,
     /// Shadow rays.
     pub shadow: u64,

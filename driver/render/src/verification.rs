@@ -9,7 +9,8 @@ impl RenderSettings {
     /// Checks that tiles can be verified, if requested.
     ///
     /// # Errors
-    /// If there are not two cards, the share is none, or reads are counted, which would be those of both cards.
+    /// If there are not two cards, the share is none, or reads are counted, which would be those of both
+    /// cards.
     pub(super) fn check_verification(&self) -> Result<(), RenderError> {
         let Some(share) = self.cards.verify else { return Ok(()) };
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
@@ -32,7 +33,8 @@ impl RenderSettings {
         if self.cards.verify.is_some() { 2 } else { 1 }
     }
 
-    /// Scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice: all reads count.
+    /// Scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice: all reads
+    /// count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
         // Modelled caches are read in the order of the picture.
         if self.modelled_caches().is_some() {

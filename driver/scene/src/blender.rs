@@ -1,4 +1,5 @@
-//! Blender's own exporter: its name and version in `asset.generator`, what it leaves out by default, and its lights.
+//! Blender's own exporter: its name and version in `asset.generator`, what it leaves out by default, and its
+//! lights.
 
 use super::light_units::LightUnits;
 
@@ -37,11 +38,12 @@ fn version(text: &str) -> Option<(u32, u32)> {
     Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
 }
 
-/// Cosine of the inner cone with which glTF's falloff has the flux of Blender's spot light, by the cosine of its outer cone and the
-/// exporter's angles of both.
+/// Cosine of the inner cone with which glTF's falloff has the flux of Blender's spot light, by the cosine of
+/// its outer cone and the exporter's angles of both.
 ///
-/// The exporter writes `inner = outer (1 - blend)`. Blender's falloff is a smooth step of the cosine, from 0 at `cos outer` to 1 over a
-/// width of `blend (1 - cos outer)`, and its integral over the width is 1/2; that of glTF's square is 1/3. Equal flux takes 3/4 of the width.
+/// The exporter writes `inner = outer (1 - blend)`. Blender's falloff is a smooth step of the cosine, from 0
+/// at `cos outer` to 1 over a width of `blend (1 - cos outer)`, and its integral over the width is 1/2; that
+/// of glTF's square is 1/3. Equal flux takes 3/4 of the width.
 pub(super) fn inner_cosine(inner: f32, outer: f32, outer_cosine: f32) -> f32 {
     let blend = 1.0 - inner / outer;
     outer_cosine + 0.75 * blend * (1.0 - outer_cosine)

@@ -49,7 +49,8 @@ impl Scene {
         format!("{:08x}", sum.value())
     }
 
-    /// Text of all contents except triangles, attributes and texels, with floating-point numbers that parse back exactly.
+    /// Text of all contents except triangles, attributes and texels, with floating-point numbers that parse
+    /// back exactly.
     fn description(&self, cameras: &[Camera]) -> String {
         let mut text = String::new();
         let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, cameras, self.textures, self.lights);

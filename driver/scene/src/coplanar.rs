@@ -1,7 +1,8 @@
 //! Lamps in the plane of another surface, such as a panel that is modelled in the plane of the ceiling.
 //!
-//! Of two surfaces in one plane a ray would meet either, by rounding. An emissive triangle is lifted off such a surface by a distance
-//! above the rounding error, so that it is seen whole, shadow rays reach it, and its photons start in front.
+//! Of two surfaces in one plane a ray would meet either, by rounding. An emissive triangle is lifted off such
+//! a surface by a distance above the rounding error, so that it is seen whole, shadow rays reach it, and its
+//! photons start in front.
 
 use glam::{DVec2, DVec3};
 use photoncard_picture::allocation::{self, OutOfMemory};
@@ -11,14 +12,15 @@ use super::{Scene, Triangle};
 
 /// Distance within which surfaces share a plane, in units in the last place of their greatest coordinate.
 const SHARED: f64 = 16.0;
-/// Distance that a lamp is lifted by, in units in the last place of its greatest coordinate and of the distance from which it is seen.
+/// Distance that a lamp is lifted by, in units in the last place of its greatest coordinate and of the
+/// distance from which it is seen.
 const LIFT: f64 = 64.0;
 /// Greatest distance from which a lamp is seen whole, in lengths of its longest edge.
 const SEEN_FROM: f64 = 32.0;
 
 impl Scene {
-    /// Lifts emissive triangles off surfaces that are not, and overlap them in one plane: along their own normal, or on both sides
-    /// emissive ones towards the front of a one-sided surface.
+    /// Lifts emissive triangles off surfaces that are not, and overlap them in one plane: along their own
+    /// normal, or on both sides emissive ones towards the front of a one-sided surface.
     ///
     /// # Errors
     /// If the process cannot have the memory.
@@ -129,7 +131,8 @@ impl Lamp {
     }
 }
 
-/// Returns whether two triangles overlap by more than a distance along each normal of their edges (the separating axis theorem).
+/// Returns whether two triangles overlap by more than a distance along each normal of their edges (the
+/// separating axis theorem).
 fn overlap(one: &[DVec2; 3], other: &[DVec2; 3], distance: f64) -> bool {
     let is_apart = |along: DVec2| {
         let range = |corners: &[DVec2; 3]| {

@@ -18,11 +18,12 @@ use crate::error::SceneError;
 
 const EXR_MAGIC: &[u8] = &[0x76, 0x2f, 0x31, 0x01];
 
-/// Radiance from infinitely far, W/(sr m^2) per linear RGB channel: an equirectangular map, constant if it is 1 x 1.
+/// Radiance from infinitely far, W/(sr m^2) per linear RGB channel: an equirectangular map, constant if it is
+/// 1 x 1.
 ///
 /// Column u, 0 to 1 from the left, and row v, 0 to 1 from the top, show the direction `(sin(theta) sin(phi),
-/// cos(theta), -sin(theta) cos(phi))` with `phi = 2 pi (u - 0.5)` and `theta = pi v`: y is up, and the middle of the
-/// map is -z, where a camera of glTF looks.
+/// cos(theta), -sin(theta) cos(phi))` with `phi = 2 pi (u - 0.5)` and `theta = pi v`: y is up, and the middle
+/// of the map is -z, where a camera of glTF looks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     /// Width, texels.
@@ -41,8 +42,8 @@ impl Environment {
         Self { width: 1, height: 1, texels: vec![radiance.to_array()], strength: 1.0 }
     }
 
-    /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that has the
-    /// channels R, G and B. The first bytes of the file determine its format.
+    /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that
+    /// has the channels R, G and B. The first bytes of the file determine its format.
     ///
     /// Channels that are no radiance are clamped: negative ones and those that are not a number to 0, others
     /// to [`BRIGHTEST`], and infinite ones to the brightest channel of the map.

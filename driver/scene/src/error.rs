@@ -45,7 +45,8 @@ impl SourceCode for Excerpt {
 pub struct Location {
     /// The scene file.
     pub file: PathBuf,
-    /// The JSON path in the file, such as `meshes[2].primitives[0].attributes.POSITION`; empty for the whole file.
+    /// The JSON path in the file, such as `meshes[2].primitives[0].attributes.POSITION`; empty for the whole
+    /// file.
     pub item: String,
 }
 

@@ -9,7 +9,8 @@ use photoncard_shared::checksum::Checksum;
 
 use super::{Camera, Scene};
 
-/// A scene that stays as it is between pictures. What a render derives from all triangles and texels is computed once.
+/// A scene that stays as it is between pictures. What a render derives from all triangles and texels is
+/// computed once.
 #[derive(Debug)]
 pub struct FixedScene<'a> {
     scene: Cow<'a, Scene>,
@@ -40,7 +41,8 @@ impl FixedScene<'_> {
         self.bulk.get_or_init(|| self.scene.bulk_checksum()).clone()
     }
 
-    /// Moves the cameras, or takes others: nothing that a render derives from triangles and texels is computed again.
+    /// Moves the cameras, or takes others: nothing that a render derives from triangles and texels is
+    /// computed again.
     pub fn set_cameras(&mut self, cameras: Vec<Camera>) {
         self.scene.to_mut().cameras = cameras;
         self.checksum = OnceLock::new();
@@ -61,7 +63,8 @@ impl Deref for FixedScene<'_> {
 }
 
 impl FixedScene<'static> {
-    /// The cameras of a scene of these checksums, with cameras and without. Of the rest nothing is there but whether it is specular.
+    /// The cameras of a scene of these checksums, with cameras and without. Of the rest nothing is there but
+    /// whether it is specular.
     pub fn of_cameras(
         cameras: Vec<Camera>,
         offset: DVec3,

@@ -1,17 +1,18 @@
-//! Layers of a material beyond its base: normal map, textures of the reflectance, clearcoat, sheen, textures of transmission.
+//! Layers of a material beyond its base: normal map, textures of the reflectance, clearcoat, sheen, textures
+//! of transmission.
 
 use glam::Vec3;
 
 use super::out_of_range::{OutOfRange, Property, every, fault, is_share};
 
-/// Layers of a material. Every texture is an index into [`Scene::textures`](super::Scene::textures), and multiplies the value
-/// that it varies.
+/// Layers of a material. Every texture is an index into [`Scene::textures`](super::Scene::textures), and
+/// multiplies the value that it varies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layers {
     /// Normal map of the base.
     pub normal: Option<NormalMap>,
-    /// F0 of the dielectric before its limit of 1, without the factor: F0 of the index of refraction times the colour of
-    /// `KHR_materials_specular`.
+    /// F0 of the dielectric before its limit of 1, without the factor: F0 of the index of refraction times
+    /// the colour of `KHR_materials_specular`.
     pub specular: Vec3,
     /// Texture of the factor of `KHR_materials_specular`, in alpha.
     pub specular_texture: Option<u32>,
@@ -113,7 +114,8 @@ impl Layers {
             .flatten()
     }
 
-    /// Replaces every texture by `renumbered` of it, or takes it off. No field is left out here: a new one may be a texture.
+    /// Replaces every texture by `renumbered` of it, or takes it off. No field is left out here: a new one
+    /// may be a texture.
     pub(super) fn renumber(&mut self, renumbered: impl Fn(u32) -> Option<u32>) {
         let Self {
             normal,

@@ -1,7 +1,8 @@
 //! Loaded scenes: triangles, materials, textures, lights and cameras in world space.
 //!
-//! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel. They are about the scene's own
-//! origin, which lies at [`Scene::offset`] in the file: single precision resolves little far from an origin.
+//! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel. They are
+//! about the scene's own origin, which lies at [`Scene::offset`] in the file: single precision resolves
+//! little far from an origin.
 #![forbid(unsafe_code)]
 
 mod blender;
@@ -55,7 +56,8 @@ const NO_LIGHT: &str = "give a material of at least one triangle an emissiveFact
 /// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Place of the scene's origin in the coordinates of its file, metres: 0 unless the scene lies far from the file's origin.
+    /// Place of the scene's origin in the coordinates of its file, metres: 0 unless the scene lies far from
+    /// the file's origin.
     pub offset: DVec3,
     /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
     pub triangles: Vec<Triangle>,
@@ -115,9 +117,11 @@ impl Scene {
         notices.filter(|(index, _)| !is_idle(*index)).map(|(_, notice)| &**notice).collect()
     }
 
-    /// Coordinates in the file of a place in the scene. Where the scene has no offset they read as the place's own do.
+    /// Coordinates in the file of a place in the scene. Where the scene has no offset they read as the
+    /// place's own do.
     pub fn in_file(&self, place: Vec3) -> DVec3 {
-        // Of all double-precision numbers that round to a coordinate the one with its shortest decimal form is meant.
+        // Of all double-precision numbers that round to a coordinate the one with its shortest decimal form
+        // is meant.
         let decimal = |value: f32| value.to_string().parse().unwrap_or(f64::from(value));
         DVec3::from_array(place.to_array().map(decimal)) + self.offset
     }
@@ -221,7 +225,8 @@ impl Scene {
         self.triangles.iter().any(|triangle| is_specular.get(triangle.material as usize) == Some(&true))
     }
 
-    /// For each material, whether it focuses light: it reflects or transmits perfectly specularly, or by a lobe that rays follow.
+    /// For each material, whether it focuses light: it reflects or transmits perfectly specularly, or by a
+    /// lobe that rays follow.
     pub fn specular_materials(&self) -> Vec<bool> {
         self.materials.iter().map(|material| material.is_specular(self.minimum_roughness(material))).collect()
     }
@@ -231,7 +236,8 @@ impl Scene {
         material.has_narrow_lobe(self.minimum_roughness(material))
     }
 
-    /// For each material, whether parts of its surfaces may not be there: it has cut-outs, or an alpha below 1 that counts.
+    /// For each material, whether parts of its surfaces may not be there: it has cut-outs, or an alpha below
+    /// 1 that counts.
     pub fn uncovered_materials(&self) -> Vec<bool> {
         let mut uncovered: Vec<bool> =
             self.materials.iter().map(|material| self.is_uncovered(material)).collect();
@@ -263,7 +269,8 @@ impl Scene {
         image.map_or(1.0, Image::minimum_green)
     }
 
-    /// Adds the light that rough microsurfaces reflect several times to the reflection of all metallic-roughness materials.
+    /// Adds the light that rough microsurfaces reflect several times to the reflection of all
+    /// metallic-roughness materials.
     pub fn compensate_energy(&mut self) {
         self.materials.iter_mut().for_each(|material| material.energy_compensation = true);
     }

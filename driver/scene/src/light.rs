@@ -2,14 +2,16 @@
 
 use glam::Vec3;
 
-/// A light without extent, in radiometric units: a file's are converted by its [`LightUnits`](super::LightUnits).
+/// A light without extent, in radiometric units: a file's are converted by its
+/// [`LightUnits`](super::LightUnits).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PunctualLight {
     /// Name in the file, or `light N`.
     pub name: String,
     /// Kind of the light, with its position and direction.
     pub kind: PunctualKind,
-    /// Colour times intensity per linear RGB channel: W/sr of point and spot lights, W/m^2 of directional lights.
+    /// Colour times intensity per linear RGB channel: W/sr of point and spot lights, W/m^2 of directional
+    /// lights.
     pub intensity: Vec3,
 }
 

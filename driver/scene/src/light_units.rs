@@ -7,20 +7,21 @@ const EFFICACY: f32 = 683.0;
 
 /// Units in which a file states lights without extent (`KHR_lights_punctual`).
 ///
-/// Emission of surfaces is always radiance in W/(sr m^2), and the constant radiance of an environment too. A file is consistent
-/// if its lights are in W/sr and W/m^2, or in cd and lx beside emission in cd/m^2, which is the same but for a factor of all light: both
-/// are [`Radiometric`](Self::Radiometric).
+/// Emission of surfaces is always radiance in W/(sr m^2), and the constant radiance of an environment too. A
+/// file is consistent if its lights are in W/sr and W/m^2, or in cd and lx beside emission in cd/m^2, which
+/// is the same but for a factor of all light: both are [`Radiometric`](Self::Radiometric).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightUnits {
-    /// Units of the exporter that the file names: [`Photometric`](Self::Photometric) for Blender's own, [`Watts`](Self::Watts) for
-    /// Blender's before 3.4, [`Radiometric`](Self::Radiometric) for others.
+    /// Units of the exporter that the file names: [`Photometric`](Self::Photometric) for Blender's own,
+    /// [`Watts`](Self::Watts) for Blender's before 3.4, [`Radiometric`](Self::Radiometric) for others.
     #[default]
     Auto,
     /// Points and spots in W/sr, directional lights in W/m^2: numbers of candela and lux as they stand.
     Radiometric,
     /// Points and spots in cd, directional lights in lx, both of 683 lm/W.
     Photometric,
-    /// Points and spots by the flux of a point that radiates in all directions, W; directional lights in W/m^2.
+    /// Points and spots by the flux of a point that radiates in all directions, W; directional lights in
+    /// W/m^2.
     Watts,
 }
 

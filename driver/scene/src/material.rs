@@ -22,22 +22,22 @@ pub struct Material {
     pub emission: Vec3,
     /// True if the back reflects and emits as the front does. A one-sided back is black.
     pub double_sided: bool,
-    /// Alpha below which the surface is cut out (`alphaMode` `MASK`), of `alpha` times the alphas of the base texture
-    /// and of the corners' colours.
-    pub alpha_cutoff: Option<f32>,
-    /// True for partial coverage (`alphaMode` `BLEND`): the share of the surface that is there is `alpha` times the alphas of the base
+    /// Alpha below which the surface is cut out (`alphaMode` `MASK`), of `alpha` times the alphas of the base
     /// texture and of the corners' colours.
+    pub alpha_cutoff: Option<f32>,
+    /// True for partial coverage (`alphaMode` `BLEND`): the share of the surface that is there is `alpha`
+    /// times the alphas of the base texture and of the corners' colours.
     pub blends: bool,
     /// Alpha of the base colour factor, 0 to 1.
     pub alpha: f32,
-    /// Base colour texture, an index into [`Scene::textures`](super::Scene::textures): its colour (sRGB) multiplies the
-    /// base colour or the diffuse albedo, its alpha multiplies `alpha`.
+    /// Base colour texture, an index into [`Scene::textures`](super::Scene::textures): its colour (sRGB)
+    /// multiplies the base colour or the diffuse albedo, its alpha multiplies `alpha`.
     pub base_texture: Option<u32>,
-    /// Metallic-roughness texture, an index into [`Scene::textures`](super::Scene::textures): its green (linear)
-    /// multiplies the roughness, its blue (linear) the metalness.
+    /// Metallic-roughness texture, an index into [`Scene::textures`](super::Scene::textures): its green
+    /// (linear) multiplies the roughness, its blue (linear) the metalness.
     pub metallic_roughness_texture: Option<u32>,
-    /// Emissive texture (sRGB), an index into [`Scene::textures`](super::Scene::textures), which multiplies the
-    /// emission.
+    /// Emissive texture (sRGB), an index into [`Scene::textures`](super::Scene::textures), which multiplies
+    /// the emission.
     pub emissive_texture: Option<u32>,
     /// True to add the light that a rough microsurface reflects several times, which glTF's model leaves out.
     pub energy_compensation: bool,
@@ -48,9 +48,10 @@ pub struct Material {
 /// Reflection and transmission model of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflection {
-    /// A Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi) max(0,
-    /// cos alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`; without the lobe also by
-    /// `KHR_materials_specular` with the factor 0 on a material that is neither metallic nor transmissive.
+    /// A Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2
+    /// pi) max(0, cos alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`; without
+    /// the lobe also by `KHR_materials_specular` with the factor 0 on a material that is neither metallic nor
+    /// transmissive.
     Phong {
         /// Lambertian albedo, 0 to 1.
         diffuse: Vec3,
@@ -61,14 +62,15 @@ pub enum Reflection {
     },
     /// The metallic-roughness reflection of glTF 2.0 (appendix B).
     MetallicRoughness {
-        /// Base colour, 0 to 1: the albedo of the dielectric part, and the reflectance at normal incidence of metal.
+        /// Base colour, 0 to 1: the albedo of the dielectric part, and the reflectance at normal incidence of
+        /// metal.
         base_colour: Vec3,
         /// Metalness, 0 to 1.
         metallic: f32,
         /// Perceptual roughness, 0 to 1: `sqrt(alpha)` of the microfacet distribution.
         roughness: f32,
-        /// F0 of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the product at most 1) and the
-        /// factor of `KHR_materials_specular`.
+        /// F0 of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the product at most 1)
+        /// and the factor of `KHR_materials_specular`.
         dielectric: Vec3,
         /// F90 of the dielectric part, 0 to 1: the factor of `KHR_materials_specular`.
         grazing: f32,
@@ -85,11 +87,11 @@ pub struct Transmission {
     pub factor: f32,
     /// Index of refraction, at least 1 (`KHR_materials_ior`; 1.5 without).
     pub ior: f32,
-    /// True if the surface bounds a volume (`KHR_materials_volume` with a thickness above 0), at which light is
-    /// refracted. Otherwise the surface is thin-walled: light passes straight on.
+    /// True if the surface bounds a volume (`KHR_materials_volume` with a thickness above 0), at which light
+    /// is refracted. Otherwise the surface is thin-walled: light passes straight on.
     pub is_volume: bool,
-    /// Absorption coefficient, 1/m: `-ln(attenuationColor) / attenuationDistance`; zero without a volume. The scale of
-    /// nodes does not change it.
+    /// Absorption coefficient, 1/m: `-ln(attenuationColor) / attenuationDistance`; zero without a volume. The
+    /// scale of nodes does not change it.
     pub absorption: Vec3,
 }
 
@@ -127,8 +129,9 @@ impl Material {
         self.emission.max_element() > 0.0
     }
 
-    /// Returns whether the material focuses light: it reflects or transmits perfectly specularly (mirrors, smooth coats, glass), or
-    /// by a lobe that rays follow: a narrow one, a coat, a sheen. `texel` is the minimum roughness of its texture, 1 without one.
+    /// Returns whether the material focuses light: it reflects or transmits perfectly specularly (mirrors,
+    /// smooth coats, glass), or by a lobe that rays follow: a narrow one, a coat, a sheen. `texel` is the
+    /// minimum roughness of its texture, 1 without one.
     pub(super) fn is_specular(&self, texel: f32) -> bool {
         if self.layers.as_ref().is_some_and(|layers| layers.coat.is_some() || layers.sheen.is_some()) {
             return true;
@@ -152,8 +155,8 @@ impl Material {
         }
     }
 
-    /// Returns whether the material has a lobe that is narrow somewhere. `texel` is the minimum roughness of its texture, 1 without
-    /// one.
+    /// Returns whether the material has a lobe that is narrow somewhere. `texel` is the minimum roughness of
+    /// its texture, 1 without one.
     pub(super) fn has_narrow_lobe(&self, texel: f32) -> bool {
         matches!(self.reflection, Reflection::MetallicRoughness { roughness, .. } if is_narrow(roughness * texel))
     }
@@ -169,13 +172,14 @@ impl Material {
         own.into_iter().flatten().chain(self.layers.iter().flat_map(|layers| layers.textures()))
     }
 
-    /// The normal texture whose coordinates define tangents, an index into [`Scene::textures`](super::Scene::textures); `None`
-    /// without a normal map.
+    /// The normal texture whose coordinates define tangents, an index into
+    /// [`Scene::textures`](super::Scene::textures); `None` without a normal map.
     pub fn tangent_texture(&self) -> Option<u32> {
         self.layers.as_ref().and_then(|layers| layers.tangent_texture())
     }
 
-    /// Checks that every value is finite and within its range, and that no more light is reflected than arrives.
+    /// Checks that every value is finite and within its range, and that no more light is reflected than
+    /// arrives.
     pub(super) fn check(&self) -> Result<(), OutOfRange> {
         self.reflection.check()?;
         self.layers.as_ref().map_or(Ok(()), |layers| layers.check())?;

@@ -1,5 +1,5 @@
-//! Pictures of the Radiance system: `.hdr`, `.pic` (Ward, "Real Pixels", Graphics Gems II, 1991; "Radiance Picture File
-//! Format", <https://radsite.lbl.gov/radiance/refer/filefmts.pdf>).
+//! Pictures of the Radiance system: `.hdr`, `.pic` (Ward, "Real Pixels", Graphics Gems II, 1991; "Radiance
+//! Picture File Format", <https://radsite.lbl.gov/radiance/refer/filefmts.pdf>).
 
 use photoncard_picture::allocation;
 
@@ -63,8 +63,8 @@ pub(super) fn read(bytes: &[u8]) -> Result<([u32; 2], Vec<[f32; 3]>), Fault> {
     Ok((header.size, texels))
 }
 
-/// Decodes `m 2^(e - 136) / exposure` for three mantissas with a common exponent `e`; `e = 0` is black. A mantissa of 0
-/// gives 0, unlike in readers that add a half.
+/// Decodes `m 2^(e - 136) / exposure` for three mantissas with a common exponent `e`; `e = 0` is black. A
+/// mantissa of 0 gives 0, unlike in readers that add a half.
 fn radiance([red, green, blue, exponent]: [u8; 4], exposure: f32) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];

@@ -75,27 +75,29 @@ fn fault(assignment: &str, reason: String, remedy: &'static str) -> SceneError {
 }
 
 impl Scene {
-    /// Applies `MATERIAL.PROPERTY=VALUE` to every material of the name, `LIGHT.PROPERTY=VALUE` to every light without extent of the
-    /// name, or `environment.strength=VALUE`.
+    /// Applies `MATERIAL.PROPERTY=VALUE` to every material of the name, `LIGHT.PROPERTY=VALUE` to every light
+    /// without extent of the name, or `environment.strength=VALUE`.
     ///
-    /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material), `alpha` (the coverage of
-    /// a material without cut-outs) or `emission` of any material, `specular` or `exponent` of one that states a Phong lobe or is
-    /// Lambertian, or `metallic`, `roughness`, `ior` (index of refraction, in place of the colour of the reflectance too),
-    /// `transmission` or `thickness` (above 0: the surface bounds a solid) of a metallic-roughness one. Colours are `r,g,b` or one number for all three, the
-    /// others one number. Textures keep multiplying the values; the emissive texture of a material that did
-    /// not emit was not loaded, as a notice says.
+    /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material),
+    /// `alpha` (the coverage of a material without cut-outs) or `emission` of any material, `specular` or
+    /// `exponent` of one that states a Phong lobe or is Lambertian, or `metallic`, `roughness`, `ior` (index
+    /// of refraction, in place of the colour of the reflectance too), `transmission` or `thickness` (above 0:
+    /// the surface bounds a solid) of a metallic-roughness one. Colours are `r,g,b` or one number for all
+    /// three, the others one number. Textures keep multiplying the values; the emissive texture of a material
+    /// that did not emit was not loaded, as a notice says.
     ///
-    /// Of a light it is `colour` (of which the proportions of the channels count alone), `intensity` (of the greatest channel, W/sr, or W/m^2 of a
-    /// directional light; the colour stays, and is white for a light that was dark) or `position` (`x,y,z` in the file's
-    /// coordinates, metres, of a point or spot
-    /// light that shares its name with no other). The strength of the environment is a factor of its map.
+    /// Of a light it is `colour` (of which the proportions of the channels count alone), `intensity` (of the
+    /// greatest channel, W/sr, or W/m^2 of a directional light; the colour stays, and is white for a light
+    /// that was dark) or `position` (`x,y,z` in the file's coordinates, metres, of a point or spot light that
+    /// shares its name with no other). The strength of the environment is a factor of its map.
     ///
-    /// No property is one of both materials and lights, so that a name may be that of both. A name may itself contain dots.
-    /// [`Scene::check_light`] checks that the scene still has a light once all assignments are applied.
+    /// No property is one of both materials and lights, so that a name may be that of both. A name may itself
+    /// contain dots. [`Scene::check_light`] checks that the scene still has a light once all assignments are
+    /// applied.
     ///
     /// # Errors
-    /// If the text is not of this form, nothing with the property has the name, a material or light lacks the property, or a value would
-    /// be out of range; the scene stays as it was.
+    /// If the text is not of this form, nothing with the property has the name, a material or light lacks the
+    /// property, or a value would be out of range; the scene stays as it was.
     pub fn apply(&mut self, assignment: &str) -> Result<(), SceneError> {
         let assignment = Assignment::parse(assignment)?;
         match assignment.property {

@@ -19,7 +19,8 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// True for the nearest texel (`magFilter` `NEAREST`), false for bilinear interpolation.
     pub nearest: bool,
-    /// Rows of the matrix M of `KHR_texture_transform`: coordinates are M (u, v) + offset. The identity without it.
+    /// Rows of the matrix M of `KHR_texture_transform`: coordinates are M (u, v) + offset. The identity
+    /// without it.
     pub matrix: [[f32; 2]; 2],
     /// Offset of `KHR_texture_transform`, in widths and heights of the image.
     pub offset: [f32; 2],
@@ -94,10 +95,11 @@ pub enum Encoding {
     /// Linear, of nine bits a channel with a shared exponent (OpenGL's `RGB9_E5`), without alpha: for
     /// emission of more than 8 bits.
     SharedExponent,
-    /// Two linear channels of 16 bits, little-endian: the first is red and blue, the second green. Without alpha.
-    LinearPair,
-    /// Red and green of a normal map, linear, 16 bits each, little-endian; blue is that of a unit normal. Without
+    /// Two linear channels of 16 bits, little-endian: the first is red and blue, the second green. Without
     /// alpha.
+    LinearPair,
+    /// Red and green of a normal map, linear, 16 bits each, little-endian; blue is that of a unit normal.
+    /// Without alpha.
     NormalPair,
 }
 

@@ -25,7 +25,8 @@ impl Triangle {
         Self { vertices, material, attributes: NO_ATTRIBUTES }
     }
 
-    /// Cross product of two edges: the direction of the geometric normal, with twice the area in m^2 for its length.
+    /// Cross product of two edges: the direction of the geometric normal, with twice the area in m^2 for its
+    /// length.
     pub fn scaled_normal(&self) -> Vec3 {
         let [a, b, c] = self.vertices;
         (b - a).cross(c - a)
@@ -40,21 +41,22 @@ impl Triangle {
 /// Vertex attributes of a triangle's corners beyond their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexAttributes {
-    /// Unit shading normals of the corners in world space, on the front's side. `None` for a flat triangle, also
-    /// where all three normals equal the geometric normal.
+    /// Unit shading normals of the corners in world space, on the front's side. `None` for a flat triangle,
+    /// also where all three normals equal the geometric normal.
     pub normals: Option<[Vec3; 3]>,
-    /// Texture coordinates of the corners, sets 0 and 1 (`TEXCOORD_0` and `TEXCOORD_1`), untransformed; v counts from
-    /// the image's top.
+    /// Texture coordinates of the corners, sets 0 and 1 (`TEXCOORD_0` and `TEXCOORD_1`), untransformed; v
+    /// counts from the image's top.
     pub coordinates: [[Vec2; 3]; 2],
-    /// Linear RGBA of the corners, white without `COLOR_0`. It multiplies the base colour (or the diffuse albedo) and
-    /// alpha.
+    /// Linear RGBA of the corners, white without `COLOR_0`. It multiplies the base colour (or the diffuse
+    /// albedo) and alpha.
     pub colours: [[f32; 4]; 3],
     /// Index into [`Scene::tangents`](super::Scene::tangents), or [`NO_TANGENTS`].
     pub tangents: u32,
 }
 
-/// Tangents of a triangle's corners: x, y and z of the unit vector in world space along which u increases, perpendicular to the
-/// corner's normal, or zero at a corner without one; w is 1 or -1, and the bitangent `w (normal x tangent)`.
+/// Tangents of a triangle's corners: x, y and z of the unit vector in world space along which u increases,
+/// perpendicular to the corner's normal, or zero at a corner without one; w is 1 or -1, and the bitangent `w
+/// (normal x tangent)`.
 pub type CornerTangents = [Vec4; 3];
 
 impl VertexAttributes {

@@ -58,7 +58,8 @@ impl Axes {
     /// Checks axes.
     ///
     /// # Errors
-    /// If an axis has no value, a name or a value is repeated, or there are more than [`MAX_POINTS`] combinations.
+    /// If an axis has no value, a name or a value is repeated, or there are more than [`MAX_POINTS`]
+    /// combinations.
     pub(super) fn new(axes: Vec<Axis>) -> Result<Self, AxisError> {
         for (index, Axis { name, values }) in axes.iter().enumerate() {
             let name = || name.clone();

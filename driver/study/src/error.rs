@@ -53,8 +53,8 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    /// Returns whether the arguments or the scenes are at fault, rather than the work: the command's exit status 2, not
-    /// 1.
+    /// Returns whether the arguments or the scenes are at fault, rather than the work: the command's exit
+    /// status 2, not 1.
     pub fn is_input(&self) -> bool {
         match self {
             Self::NoScene { .. }

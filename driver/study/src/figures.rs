@@ -18,8 +18,8 @@ const SCENE: &str = "cornell.gltf";
 /// Scale of the check: a second of work.
 const SCALE: Scale = Scale { side: 64, photons: 20_000, gather_rays: 25, ..Scale::QUICK };
 
-/// Figures of what all other figures depend on: versions of program and card image layout, and bytes of two small renders, to the byte. They
-/// differ from those of a file that another program made.
+/// Figures of what all other figures depend on: versions of program and card image layout, and bytes of two
+/// small renders, to the byte. They differ from those of a file that another program made.
 ///
 /// # Errors
 /// If the scene is missing, or a point cannot be measured or kept.
@@ -43,7 +43,8 @@ pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
     Ok(figures)
 }
 
-/// Writes the figures of studies into a folder, behind those of the check and the settings that all points share. Those of a trial say so.
+/// Writes the figures of studies into a folder, behind those of the check and the settings that all points
+/// share. Those of a trial say so.
 ///
 /// # Errors
 /// If the file cannot be written.

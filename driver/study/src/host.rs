@@ -1,4 +1,5 @@
-//! Measurement of the host's work for a frame with other photons: its time, and the lines of the card image that change.
+//! Measurement of the host's work for a frame with other photons: its time, and the lines of the card image
+//! that change.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -97,7 +98,8 @@ impl<'a> HostBench<'a> {
     /// Measures a frame of a scene with settings, and changes of it.
     ///
     /// # Errors
-    /// If the scene cannot be read, its photons cannot be mapped, the result cannot be kept, or the observer stops the study.
+    /// If the scene cannot be read, its photons cannot be mapped, the result cannot be kept, or the observer
+    /// stops the study.
     pub fn measure(
         &mut self,
         file: &str,

@@ -1,5 +1,5 @@
-//! Measurement of points: finished ones are read from the store, and points of one card image are measured together, so
-//! that photons are traced once for all of them.
+//! Measurement of points: finished ones are read from the store, and points of one card image are measured
+//! together, so that photons are traced once for all of them.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -22,8 +22,8 @@ use super::store::PointStore;
 
 /// Observer of a study's progress, which can stop it.
 pub trait StudyObserver: Sync {
-    /// Reports that `done` of a study's `total` points are finished: first, with `is_new` false, those in the store; then each
-    /// that was measured.
+    /// Reports that `done` of a study's `total` points are finished: first, with `is_new` false, those in the
+    /// store; then each that was measured.
     fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
 
     /// Reports, as a sentence, the reason why a stored point cannot be used; the point is measured again.
@@ -112,8 +112,8 @@ struct SceneReference {
 }
 
 impl<'a> Laboratory<'a> {
-    /// A laboratory that keeps finished points in `folder/points` and reads scenes from the folder `scenes`. Each of
-    /// `threads` emulates one chip; `None` is one thread per core.
+    /// A laboratory that keeps finished points in `folder/points` and reads scenes from the folder `scenes`.
+    /// Each of `threads` emulates one chip; `None` is one thread per core.
     ///
     /// # Errors
     /// If the folder cannot be made, or the threads cannot be started.

@@ -1,9 +1,10 @@
-//! Studies: measurements of the shipped scenes with one setting varied, reports on them, and predictions for machines
-//! that are not at hand.
+//! Studies: measurements of the shipped scenes with one setting varied, reports on them, and predictions for
+//! machines that are not at hand.
 //!
-//! A study is a list of [`Point`]s and a function from their [`Results`] to a [`Report`]. [`run`] measures the points
-//! in a [`Laboratory`], which keeps their outcomes, and writes the report. [`photoncard_render::cost_model`] predicts the chips that a
-//! frame rate takes, [`load_balance`] how evenly tiles load them.
+//! A study is a list of [`Point`]s and a function from their [`Results`] to a [`Report`]. [`run`] measures
+//! the points in a [`Laboratory`], which keeps their outcomes, and writes the report.
+//! [`photoncard_render::cost_model`] predicts the chips that a frame rate takes, [`load_balance`] how evenly
+//! tiles load them.
 #![forbid(unsafe_code)]
 
 mod axes;
@@ -61,11 +62,12 @@ pub struct StudyOptions {
     pub provenance: Provenance,
 }
 
-/// Measures and reports the studies, and writes their key figures into [`FIGURES`](report::FIGURES). Finished points are kept in the folder `points` of [`StudyOptions::out`], where a
-/// later run finds them.
+/// Measures and reports the studies, and writes their key figures into [`FIGURES`](report::FIGURES). Finished
+/// points are kept in the folder `points` of [`StudyOptions::out`], where a later run finds them.
 ///
 /// # Errors
-/// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops the study.
+/// If a scene is missing, a point cannot be measured, a file cannot be written, or the observer stops the
+/// study.
 pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
     let mut laboratory = Laboratory::new(&options.out, &options.scenes, options.threads, observer)?;
     let mut bench = HostBench::new(&options.out, &options.scenes, options.threads, observer)?;
@@ -105,10 +107,12 @@ pub struct SweepOptions {
     pub provenance: Provenance,
 }
 
-/// Measures and reports a sweep. All points are checked before the first is measured; finished ones are kept as by [`run`].
+/// Measures and reports a sweep. All points are checked before the first is measured; finished ones are kept
+/// as by [`run`].
 ///
 /// # Errors
-/// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the sweep.
+/// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the
+/// sweep.
 pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<(), StudyError> {
     let SweepOptions { sweep, name, scene, out, threads, machine, mut provenance } = options;
     for point in sweep.points() {

@@ -49,7 +49,8 @@ pub struct TileMeasurement {
 /// Work and memory traffic of a point.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// The measured tiles, in the picture's order; a single one for all tiles of a frame that was rendered as a whole.
+    /// The measured tiles, in the picture's order; a single one for all tiles of a frame that was rendered as
+    /// a whole.
     pub tiles: Vec<TileMeasurement>,
     /// Number of rendered tiles.
     pub rendered: usize,
@@ -149,7 +150,8 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders tiles, each on a chip of the kind `K` with a new memory that `model` makes, so that every tile begins with empty caches.
+    /// Renders tiles, each on a chip of the kind `K` with a new memory that `model` makes, so that every tile
+    /// begins with empty caches.
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.
@@ -162,11 +164,13 @@ impl Bench<'_> {
         Ok(render_tiles_apart::<K, M>(self.pool, &self.mapped.image, frame, tiles, model, self.is_stopped)?)
     }
 
-    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or of all if there are several in flight or the order
-    /// is [of the whole frame](photoncard_cards::scheduler::GatherOrder::is_of_whole_frame).
+    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or of all if there are
+    /// several in flight or the order is [of the whole
+    /// frame](photoncard_cards::scheduler::GatherOrder::is_of_whole_frame).
     ///
     /// # Errors
-    /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is stopped.
+    /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is
+    /// stopped.
     pub fn traffic(
         &self,
         settings: &RenderSettings,
@@ -205,8 +209,8 @@ impl Bench<'_> {
         })
     }
 
-    /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows: what a tile reads depends
-    /// on the tiles that it is in flight with.
+    /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows:
+    /// what a tile reads depends on the tiles that it is in flight with.
     fn in_flight<K: ChipKind>(
         &self,
         frame: &FrameParameters,

@@ -33,8 +33,8 @@ pub enum Task {
         chip: EmulatedKind,
         /// The caches between chip and DRAM.
         caches: CacheSettings,
-        /// Share of the tiles; [`Hilbert`](photoncard_cards::scheduler::GatherOrder::Hilbert), and several tiles in flight, render the whole frame
-        /// whatever it is.
+        /// Share of the tiles; [`Hilbert`](photoncard_cards::scheduler::GatherOrder::Hilbert), and several
+        /// tiles in flight, render the whole frame whatever it is.
         sample: SampleRate,
         /// Minimum number of tiles, as far as the picture has that many.
         least_tiles: usize,

@@ -33,8 +33,8 @@ fn host() -> String {
 
 /// The Gregorian date, as `2007-05-01`, of a number of days after 1970-01-01.
 fn date(days: u64) -> String {
-    // Years are counted from March, so that a leap day is the last of its year; 1970-01-01 is day 719,468 from
-    // 0000-03-01.
+    // Years are counted from March, so that a leap day is the last of its year; 1970-01-01 is day 719,468
+    // from 0000-03-01.
     let days = days + 719_468;
     let (era, day) = (days / 146_097, days % 146_097);
     let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;

@@ -1,16 +1,17 @@
 //! Error of indirect light against a reference with many more gather rays.
 //!
-//! Only the sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels; the
-//! order of the gathers, the tiles, the layout of the photon map and the caches do not. What they change is compared alone: the light that
-//! gather rays bring from the photon map,
+//! Only the sampling, the number of gather rays, the irradiance cache and precomputed irradiance change
+//! pixels; the order of the gathers, the tiles, the layout of the photon map and the caches do not. What they
+//! change is compared alone: the light that gather rays bring from the photon map,
 //!
 //! ```text
 //! L_indirect(x, w) = integral of f(x, w', w) L_map(y, -w') cos(theta') dw'
 //! ```
 //!
-//! with `y` the surface that the ray from `x` in the direction `w'` meets, and `L_map` the radiance that photons give it. Direct light has a
-//! noise of its own, that of shadow rays. Gather rays and records of the irradiance cache bring shares of it that depend on the number of
-//! rays, so all lights are put out in the card image: its layer of indirect light is then `L_indirect` by any technique.
+//! with `y` the surface that the ray from `x` in the direction `w'` meets, and `L_map` the radiance that
+//! photons give it. Direct light has a noise of its own, that of shadow rays. Gather rays and records of the
+//! irradiance cache bring shares of it that depend on the number of rays, so all lights are put out in the
+//! card image: its layer of indirect light is then `L_indirect` by any technique.
 
 use photoncard_cards::scheduler::{GatherOrder, tiles};
 use photoncard_firmware::kind;
@@ -47,8 +48,8 @@ pub struct Quality {
 }
 
 impl Quality {
-    /// Root mean square error over pixels and channels, over the reference's mean, without the reference's own noise; 0 if that noise is
-    /// more than the difference.
+    /// Root mean square error over pixels and channels, over the reference's mean, without the reference's
+    /// own noise; 0 if that noise is more than the difference.
     pub fn rmse(&self) -> f64 {
         let TileError { squares, noise, .. } = self.total();
         self.relative((squares - noise).max(0.0))
@@ -100,11 +101,12 @@ struct ReferencePixel {
     noise: f64,
 }
 
-/// Reference picture of indirect light by many gather rays, of the pixels that show a lit surface and no emitter.
+/// Reference picture of indirect light by many gather rays, of the pixels that show a lit surface and no
+/// emitter.
 ///
-/// It is the mean of two renders by `n` and `m` rays with different strata, weighted by rays. If their errors are independent and their variances are
-/// `v / n` and `v / m`, the squared difference of the two is `v (1 / n + 1 / m)` on average, and the variance of their mean
-/// `v / (n + m)`.
+/// It is the mean of two renders by `n` and `m` rays with different strata, weighted by rays. If their errors
+/// are independent and their variances are `v / n` and `v / m`, the squared difference of the two is `v (1 /
+/// n + 1 / m)` on average, and the variance of their mean `v / (n + m)`.
 pub struct Reference {
     /// Settings of the reference render.
     settings: RenderSettings,
@@ -119,11 +121,12 @@ fn halves(rays: u32) -> [u32; 2] {
 }
 
 impl Reference {
-    /// Renders `tiles` tiles with `rays` gather rays per pixel by combined sampling, without the irradiance cache, and
-    /// with radiance by density estimation. Eye rays are those of `settings`.
+    /// Renders `tiles` tiles with `rays` gather rays per pixel by combined sampling, without the irradiance
+    /// cache, and with radiance by density estimation. Eye rays are those of `settings`.
     ///
     /// # Errors
-    /// If the settings' camera is not possible in the scene, the card image is malformed, or the bench is stopped.
+    /// If the settings' camera is not possible in the scene, the card image is malformed, or the bench is
+    /// stopped.
     pub fn new(
         bench: &Bench,
         settings: &RenderSettings,
@@ -203,8 +206,8 @@ fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileError
     error
 }
 
-/// `settings` with tiles, order and queues replaced, which do not change pixels, and without shadow rays, which bring no indirect light:
-/// the fastest order.
+/// `settings` with tiles, order and queues replaced, which do not change pixels, and without shadow rays,
+/// which bring no indirect light: the fastest order.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     let mut comparable = RenderSettings {
         schedule: Schedule {

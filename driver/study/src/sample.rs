@@ -1,9 +1,9 @@
 //! Stratified sample of a picture's tiles, and estimates of totals from it.
 //!
-//! Tiles are sorted along the Z-order curve of their centres and cut into as many strata (*stretches*) as there are tiles
-//! to choose, of equal size except for one tile. A hash chooses one tile of each stretch, which represents it. The sample
-//! is thus spread over the picture whatever the shape of the tiles, does not alias with regular patterns of the scene, and
-//! is reproducible.
+//! Tiles are sorted along the Z-order curve of their centres and cut into as many strata (*stretches*) as
+//! there are tiles to choose, of equal size except for one tile. A hash chooses one tile of each stretch,
+//! which represents it. The sample is thus spread over the picture whatever the shape of the tiles, does not
+//! alias with regular patterns of the scene, and is reproducible.
 
 use std::fmt;
 use std::str::FromStr;
@@ -28,7 +28,8 @@ impl SampleRate {
         if numerator == 0 || numerator > denominator { None } else { Some(Self { numerator, denominator }) }
     }
 
-    /// Number of tiles out of `total`: the share, rounded up, or `least` if that is more, but at most `total`.
+    /// Number of tiles out of `total`: the share, rounded up, or `least` if that is more, but at most
+    /// `total`.
     pub fn count(self, total: usize, least: usize) -> usize {
         let share = (total as u64 * u64::from(self.numerator)).div_ceil(u64::from(self.denominator));
         (share as usize).max(least).min(total)
@@ -83,7 +84,8 @@ pub fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
     chosen
 }
 
-/// The bits of a number at the even positions of a number of 64 bits, zeros at the odd ones: half of a Morton code.
+/// The bits of a number at the even positions of a number of 64 bits, zeros at the odd ones: half of a Morton
+/// code.
 fn spread_bits(number: u32) -> u64 {
     (0..32).map(|bit| (u64::from(number) >> bit & 1) << (2 * bit)).sum()
 }
@@ -98,12 +100,14 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// Estimate of a population's sum from a sample of pairs: value, and weight `w`, the members that it stands for.
+    /// Estimate of a population's sum from a sample of pairs: value, and weight `w`, the members that it
+    /// stands for.
     ///
-    /// The sum of value times weight, `+- t s sqrt(sum w (w - 1))`, with the standard deviation `s` of the `n` values
-    /// and Student's `t` of `n - 1` degrees of freedom. With equal weights that is the interval of a simple random
-    /// sample of a finite population. A sample that is spread over the picture errs less than a random one, so the
-    /// interval is wide rather than narrow. A single value that stands for more than itself has an infinite half-width.
+    /// The sum of value times weight, `+- t s sqrt(sum w (w - 1))`, with the standard deviation `s` of the
+    /// `n` values and Student's `t` of `n - 1` degrees of freedom. With equal weights that is the interval of
+    /// a simple random sample of a finite population. A sample that is spread over the picture errs less than
+    /// a random one, so the interval is wide rather than narrow. A single value that stands for more than
+    /// itself has an infinite half-width.
     pub fn of_total(sample: &[(f64, usize)]) -> Self {
         let value = sample.iter().map(|&(value, stands_for)| value * stands_for as f64).sum();
         let spread =
@@ -142,8 +146,8 @@ impl Ratio {
     /// The ratio of an estimate to itself.
     pub(super) const ONE: Self = Self { value: 1.0, lower: 1.0, upper: 1.0 };
 
-    /// Ratio of two independent estimates. Its logarithm has the relative half-widths of both and a `further` one, all independent: the
-    /// root of the sum of their squares.
+    /// Ratio of two independent estimates. Its logarithm has the relative half-widths of both and a `further`
+    /// one, all independent: the root of the sum of their squares.
     pub(super) fn new(numerator: Estimate, denominator: Estimate, further: f64) -> Self {
         let relative = |estimate: Estimate| estimate.half_width / estimate.value;
         let spread = relative(numerator).hypot(relative(denominator)).hypot(further).exp();
@@ -152,8 +156,8 @@ impl Ratio {
     }
 }
 
-/// Half the width of the 95 % confidence interval of a statistic by the jackknife (Tukey 1958), from its values without each one of the
-/// observations; infinite for fewer than two.
+/// Half the width of the 95 % confidence interval of a statistic by the jackknife (Tukey 1958), from its
+/// values without each one of the observations; infinite for fewer than two.
 pub(super) fn jackknife_half_width(without_one: &[f64]) -> f64 {
     if without_one.len() < 2 {
         return f64::INFINITY;
@@ -167,7 +171,8 @@ pub(super) fn jackknife_half_width(without_one: &[f64]) -> f64 {
 /// 97.5 % quantiles of Student's t-distribution of one to ten degrees of freedom.
 const FEW: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
 
-/// The 97.5 % quantile of Student's t-distribution; beyond ten degrees of freedom by the Cornish-Fisher expansion.
+/// The 97.5 % quantile of Student's t-distribution; beyond ten degrees of freedom by the Cornish-Fisher
+/// expansion.
 fn students_t(degrees: usize) -> f64 {
     const Z: f64 = 1.959_964;
     FEW.get(degrees.wrapping_sub(1)).copied().unwrap_or_else(|| {

@@ -1,4 +1,5 @@
-//! Scale of a study: the settings that its renders have in common, and the number of values that it varies them over.
+//! Scale of a study: the settings that its renders have in common, and the number of values that it varies
+//! them over.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;
@@ -74,8 +75,8 @@ impl Scale {
         machine: Machine::NOMINAL,
     };
 
-    /// True if all points share the settings of the dissertation's nominal frame. Only figures of such a scale may stand beside
-    /// published ones.
+    /// True if all points share the settings of the dissertation's nominal frame. Only figures of such a
+    /// scale may stand beside published ones.
     pub fn is_nominal(&self) -> bool {
         let frame =
             |scale: &Self| (scale.side, scale.photons, scale.neighbors, scale.gather_rays, scale.shadow_rays);
@@ -110,7 +111,8 @@ impl Scale {
         if self.is_quick { quick.to_vec() } else { full.to_vec() }
     }
 
-    /// Settings without any technique but an order: 16x16 tiles, one in flight, rays by the reflection, Jensen's kd-tree.
+    /// Settings without any technique but an order: 16x16 tiles, one in flight, rays by the reflection,
+    /// Jensen's kd-tree.
     pub fn settings(&self, order: GatherOrder) -> RenderSettings {
         RenderSettings {
             picture: Picture { width: self.side, height: self.side, ..Picture::default() },
@@ -131,8 +133,8 @@ impl Scale {
         }
     }
 
-    /// Settings with everything on: gathers sorted over the largest tiles, combined sampling, the irradiance cache,
-    /// photons in line leaves.
+    /// Settings with everything on: gathers sorted over the largest tiles, combined sampling, the irradiance
+    /// cache, photons in line leaves.
     pub fn all_on(&self) -> RenderSettings {
         self.settings(GatherOrder::Sort).with(|s| {
             s.photons.layout = PhotonLayout::Lines;
@@ -142,7 +144,8 @@ impl Scale {
         })
     }
 
-    /// [`Self::all_on`] in the dissertation's tiles of 16x16 pixels, of which a frame has enough for many chips.
+    /// [`Self::all_on`] in the dissertation's tiles of 16x16 pixels, of which a frame has enough for many
+    /// chips.
     pub fn all_on_in_small_tiles(&self) -> RenderSettings {
         self.all_on().with(|s| s.schedule.tile = Some(TILE))
     }
@@ -207,8 +210,8 @@ impl Scale {
         rows.into_iter().chain([machine_row(&self.machine)]).collect()
     }
 
-    /// Gathers of a frame in which every gather ray of every pixel ends in one, `side^2 N_FG`: 26.2 million at the
-    /// nominal values.
+    /// Gathers of a frame in which every gather ray of every pixel ends in one, `side^2 N_FG`: 26.2 million
+    /// at the nominal values.
     pub fn nominal_gathers(&self) -> f64 {
         f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
     }

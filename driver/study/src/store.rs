@@ -1,8 +1,8 @@
 //! Finished points of a study, kept so that an interrupted study goes on where it stopped.
 //!
-//! A point is one JSON file that holds the settings it was computed with (its *key*) and its result. The key names
-//! everything that the result depends on, the program's version included: a point is found again only by an equal
-//! key, so that a new version computes all points anew.
+//! A point is one JSON file that holds the settings it was computed with (its *key*) and its result. The key
+//! names everything that the result depends on, the program's version included: a point is found again only
+//! by an equal key, so that a new version computes all points anew.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -85,8 +85,8 @@ impl PointStore {
 
     /// The result of the point of this name and key, if it is finished.
     ///
-    /// A file that cannot be read, is damaged or edited, or holds another key counts as absent and adds to the
-    /// [notices](Self::notices).
+    /// A file that cannot be read, is damaged or edited, or holds another key counts as absent and adds to
+    /// the [notices](Self::notices).
     pub fn get<T: DeserializeOwned>(&mut self, name: &str, key: &Value) -> Option<T> {
         let path = self.path(name, key).ok()?;
         let read = match fs::metadata(&path).map(|found| kind_of(found.file_type())) {
@@ -111,11 +111,12 @@ impl PointStore {
 
     /// Writes the result of a point; it replaces an earlier one of equal name and key.
     ///
-    /// Finite numbers are read back to the last bit. JSON has no infinities and no NaN: a result that may have them
-    /// must use an `Option`, or it is not found again.
+    /// Finite numbers are read back to the last bit. JSON has no infinities and no NaN: a result that may
+    /// have them must use an `Option`, or it is not found again.
     ///
     /// # Errors
-    /// If the name is not of letters, digits, `-` and `.`, the result is not JSON, or the file cannot be written.
+    /// If the name is not of letters, digits, `-` and `.`, the result is not JSON, or the file cannot be
+    /// written.
     pub fn put<T: Serialize>(&self, name: &str, key: &Value, result: &T) -> Result<(), StoreError> {
         let path = self.path(name, key)?;
         let not_json = |source| StoreError::NotJson { name: name.to_owned(), source };

@@ -1,4 +1,5 @@
-//! Pictures one after another on the same cards are those of new cards, and cards receive the lines that have changed.
+//! Pictures one after another on the same cards are those of new cards, and cards receive the lines that have
+//! changed.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -220,7 +221,8 @@ fn one_chip_of_the_process_is_loaded_and_the_others_share_its_image() {
     assert!(shared.film.sums().eq(alone.film.sums()));
     // The others may have rendered all tiles before the first is loaded.
     assert_eq!(shared.statistics.link.image_bytes[1..], [0, 0]);
-    // Counters of modelled memories count loads as well. Two chips would not render this picture while the third is loaded.
+    // Counters of modelled memories count loads as well. Two chips would not render this picture while the
+    // third is loaded.
     let modelled = on("emulated:3", |settings| {
         settings.cards.caches = Some(CacheSettings::default());
         (settings.picture.width, settings.picture.height) = (32, 32);

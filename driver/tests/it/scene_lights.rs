@@ -118,7 +118,8 @@ fn lights_that_are_not_possible_are_refused() {
 
 const BLENDER: &str = "Khronos glTF Blender I/O v5.0.21";
 
-/// A file of `generator` with a point, a directional and a spot light, each of the intensity 683, loaded in `units`.
+/// A file of `generator` with a point, a directional and a spot light, each of the intensity 683, loaded in
+/// `units`.
 fn of_exporter(generator: &str, units: LightUnits) -> Scene {
     let mut json = triangle_json();
     json["asset"]["generator"] = json!(generator);

@@ -1,4 +1,5 @@
-//! Scenes far from the origin of their file equal those at the origin, and keep the file's coordinates outside.
+//! Scenes far from the origin of their file equal those at the origin, and keep the file's coordinates
+//! outside.
 
 use glam::{DVec3, Vec3};
 use photoncard_driver::render::RenderSettings;

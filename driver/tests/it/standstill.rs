@@ -1,5 +1,5 @@
-//! Standstill: cards that answer everything that the transport requests, without progress, or with wrong answers. The
-//! session ends in a clear error.
+//! Standstill: cards that answer everything that the transport requests, without progress, or with wrong
+//! answers. The session ends in a clear error.
 
 use std::sync::Arc;
 use std::time::Duration;

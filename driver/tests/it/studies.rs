@@ -124,7 +124,8 @@ fn studies_report_and_a_second_run_renders_nothing_and_says_the_same() {
     assert_eq!(files(folder.path()), written);
 }
 
-/// Every page of a tiny scale has the banner, every plot its mark, and no file a figure of a publication or a statement on one.
+/// Every page of a tiny scale has the banner, every plot its mark, and no file a figure of a publication or a
+/// statement on one.
 fn is_a_trial_without_published_figures(files: &BTreeMap<PathBuf, Vec<u8>>) {
     let banner = tiny().banner().unwrap();
     for (path, bytes) in files {

@@ -1,7 +1,7 @@
 //! Interface between a board's hardware and the code that all images share.
 
-/// Board with one UART, one clock and one processor. As there is one of each, functions have no `self`. The module
-/// `hardware` of an image defines `ThisBoard`.
+/// Board with one UART, one clock and one processor. As there is one of each, functions have no `self`. The
+/// module `hardware` of an image defines `ThisBoard`.
 pub(crate) trait Board {
     /// Name of the board.
     const NAME: &'static str;

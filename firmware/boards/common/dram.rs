@@ -19,7 +19,7 @@ pub(super) fn take() -> Option<&'static mut [Line]> {
     }
     let (start, end) = (&raw mut __card_dram, &raw mut __card_dram_end);
     let lines = (end.addr() - start.addr()) / LINE_BYTES;
-    // SAFETY: the linker script reserves the memory between the two symbols, which are aligned to a line; any bytes are a
-    // valid line; it is taken once, so no other reference exists.
+    // SAFETY: the linker script reserves the memory between the two symbols, which are aligned to a line; any
+    // bytes are a valid line; it is taken once, so no other reference exists.
     Some(unsafe { core::slice::from_raw_parts_mut(start.cast(), lines) })
 }

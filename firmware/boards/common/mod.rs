@@ -1,4 +1,5 @@
-//! Code that the images of all boards share, including `main`. A board implements registers, time and interrupts.
+//! Code that the images of all boards share, including `main`. A board implements registers, time and
+//! interrupts.
 
 mod board;
 #[expect(unsafe_code, reason = "the linker script defines the address of card memory")]
@@ -74,8 +75,8 @@ fn run<B: Board>() -> ! {
     semihosting::fail(format_args!("the port failed: {error:?}\n"));
 }
 
-/// Prints the counters and the time in milliseconds of each work of [`measure`]. With QEMU's `-icount shift=0` the clock
-/// advances 1 ns per instruction, so a millisecond is a million instructions.
+/// Prints the counters and the time in milliseconds of each work of [`measure`]. With QEMU's `-icount
+/// shift=0` the clock advances 1 ns per instruction, so a millisecond is a million instructions.
 fn measure_and_exit<B: Board>(lines: &[Line]) -> ! {
     static CHIP: Once<MicroChip> = Once::new(MicroChip::new());
     let Some(chip) = CHIP.take() else { semihosting::fail(format_args!("the chip is in use\n")) };

@@ -9,7 +9,8 @@ pub(super) struct Once<T> {
     value: UnsafeCell<T>,
 }
 
-// SAFETY: the value is accessible through `take` alone, which returns it once: it moves between threads, and is not shared.
+// SAFETY: the value is accessible through `take` alone, which returns it once: it moves between threads, and
+// is not shared.
 unsafe impl<T: Send> Sync for Once<T> {}
 
 impl<T> Once<T> {

@@ -7,7 +7,8 @@ impl<T: Copy> Register<T> {
     /// Register at an address.
     ///
     /// # Safety
-    /// The address must be a register of this width, whose reads and writes have no effect on memory that Rust uses.
+    /// The address must be a register of this width, whose reads and writes have no effect on memory that
+    /// Rust uses.
     pub(crate) const unsafe fn at(address: usize) -> Self {
         Self(address as *mut T)
     }

@@ -1,5 +1,5 @@
-//! Semihosting: messages and exit through a debugger or QEMU (Arm's specification "Semihosting"; RISC-V's differs in the
-//! trap instructions alone).
+//! Semihosting: messages and exit through a debugger or QEMU (Arm's specification "Semihosting"; RISC-V's
+//! differs in the trap instructions alone).
 
 use core::arch::asm;
 use core::fmt::{self, Write};
@@ -15,8 +15,8 @@ const FAILED: usize = 101;
 /// True if no debugger receives messages.
 static IS_ALONE: AtomicBool = AtomicBool::new(false);
 
-/// Declares that there is no debugger: messages are dropped. A failure still makes its call, which is then a fault of the
-/// processor, and the board's fault handler ends the program.
+/// Declares that there is no debugger: messages are dropped. A failure still makes its call, which is then a
+/// fault of the processor, and the board's fault handler ends the program.
 #[allow(dead_code, reason = "a board in QEMU has a debugger")]
 pub(crate) fn leave_alone() {
     IS_ALONE.store(true, Ordering::Relaxed);
@@ -33,7 +33,8 @@ unsafe fn call(operation: usize, argument: *const ()) {
         asm!("bkpt 0xab", inout("r0") operation => _, in("r1") argument, options(nostack));
     }
     #[cfg(target_arch = "riscv32")]
-    // SAFETY: as above, in a0. A debugger recognizes the three instructions if they are uncompressed and in one page.
+    // SAFETY: as above, in a0. A debugger recognizes the three instructions if they are uncompressed and in
+    // one page.
     unsafe {
         asm!(
             ".balign 16",

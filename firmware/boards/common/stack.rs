@@ -3,7 +3,8 @@
 /// Value of unused words.
 const PAINT: u32 = 0x5AFE_57AC;
 
-/// Number of words at the end of the stack that must not be used: a frame may leave some of its words unwritten.
+/// Number of words at the end of the stack that must not be used: a frame may leave some of its words
+/// unwritten.
 const GUARD: usize = 16;
 
 /// Number of bytes below the caller's frame that painting itself may use.

@@ -1,5 +1,5 @@
-//! The board's registers and exceptions (Arm, "AN386", DAI 0386; "Cortex-M System Design Kit", DDI 0479; "Armv7-M",
-//! DDI 0403).
+//! The board's registers and exceptions (Arm, "AN386", DAI 0386; "Cortex-M System Design Kit", DDI 0479;
+//! "Armv7-M", DDI 0403).
 
 use core::arch::asm;
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -15,7 +15,8 @@ const CYCLES: u32 = 25_000;
 /// Number of the UART's receive interrupt.
 const UART_RECEIVED: i16 = 0;
 
-// SAFETY: the registers of UART 0, of the system's timer and of the interrupt controller, by the documents above.
+// SAFETY: the registers of UART 0, of the system's timer and of the interrupt controller, by the documents
+// above.
 const UART_DATA: Register<u32> = unsafe { Register::at(0x4000_4000) };
 const UART_STATE: Register<u32> = unsafe { Register::at(0x4000_4004) };
 const UART_CONTROL: Register<u32> = unsafe { Register::at(0x4000_4008) };

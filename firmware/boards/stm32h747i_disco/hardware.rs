@@ -1,5 +1,5 @@
-//! The board's clocks, registers and exceptions (ST, "RM0399", "UM2411"; "Armv7-M", DDI 0403). The code compiles, but was
-//! not run on the board.
+//! The board's clocks, registers and exceptions (ST, "RM0399", "UM2411"; "Armv7-M", DDI 0403). The code
+//! compiles, but was not run on the board.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -32,13 +32,13 @@ pub(crate) type ThisBoard = Disco;
 impl Disco {
     /// UART that is connected to the debugger's serial port.
     fn uart() -> &'static pac::usart1::RegisterBlock {
-        // SAFETY: every register that is written here is written by single stores, with interrupts masked where
-        // the interrupt writes it too.
+        // SAFETY: every register that is written here is written by single stores, with interrupts masked
+        // where the interrupt writes it too.
         unsafe { &*USART1::ptr() }
     }
 
-    /// Maps card memory as normal, cacheable memory. By default its addresses are device memory: slow, and unaligned
-    /// accesses fault.
+    /// Maps card memory as normal, cacheable memory. By default its addresses are device memory: slow, and
+    /// unaligned accesses fault.
     fn make_cacheable(mpu: &MPU, scb: &mut SCB) {
         // SAFETY: the region is not in use yet. Full access, normal memory, write-through, execute never.
         unsafe {

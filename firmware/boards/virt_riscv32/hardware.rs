@@ -1,5 +1,5 @@
-//! The machine's registers and traps (QEMU, `hw/riscv/virt.c`; "NS16550A"; RISC-V "ACLINT", "PLIC" and privileged
-//! specifications).
+//! The machine's registers and traps (QEMU, `hw/riscv/virt.c`; "NS16550A"; RISC-V "ACLINT", "PLIC" and
+//! privileged specifications).
 
 use riscv::interrupt::{Interrupt, machine};
 use riscv::register::{mcause, mepc, mie, mtval};
@@ -14,7 +14,8 @@ const TICKS: u64 = 10_000;
 /// Interrupt number of the UART.
 const UART_IRQ: u32 = 10;
 
-// SAFETY: the registers of the UART, of hart 0's timer and of the interrupt controller, by the documents above.
+// SAFETY: the registers of the UART, of hart 0's timer and of the interrupt controller, by the documents
+// above.
 const UART_DATA: Register<u8> = unsafe { Register::at(0x1000_0000) };
 const UART_INTERRUPT: Register<u8> = unsafe { Register::at(0x1000_0001) };
 const UART_FIFO: Register<u8> = unsafe { Register::at(0x1000_0002) };
@@ -52,7 +53,8 @@ impl Virt {
     }
 
     fn wake_at(ticks: u64) {
-        // The high word is the maximum while the low word changes: no intermediate compare value is in the past.
+        // The high word is the maximum while the low word changes: no intermediate compare value is in the
+        // past.
         TIMER_COMPARE_HIGH.write(u32::MAX);
         TIMER_COMPARE.write(ticks as u32);
         TIMER_COMPARE_HIGH.write((ticks >> 32) as u32);

@@ -314,7 +314,8 @@ impl<K: ChipKind> Engine<K> {
         Ok(())
     }
 
-    /// Adds a pixel, by tile and index, to those to be sent, which are sent if it is not the next of them or no other fits.
+    /// Adds a pixel, by tile and index, to those to be sent, which are sent if it is not the next of them or
+    /// no other fits.
     fn add_pixel(
         &mut self,
         (tile, index): (u32, u32),
@@ -336,7 +337,8 @@ impl<K: ChipKind> Engine<K> {
         if !has_room {
             return Err(Invariant::Reply.fault());
         }
-        // A reply has room for several pixels: the first of a new one does not fill it, so that one reply is sent at most.
+        // A reply has room for several pixels: the first of a new one does not fill it, so that one reply is
+        // sent at most.
         if self.data.len() + bytes > self.data.capacity() {
             self.send_pixels(transport);
         }

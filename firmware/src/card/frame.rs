@@ -58,5 +58,6 @@ fn has_irradiance(header: &Header) -> bool {
 /// Minimum allowed error of interpolated irradiance; smaller errors are below rounding.
 pub const MIN_IRRADIANCE_ERROR: f32 = 1e-6;
 
-/// Maximum width and height of a picture, pixels: an `f32` holds a pixel's index and 7 bits of the position in it.
+/// Maximum width and height of a picture, pixels: an `f32` holds a pixel's index and 7 bits of the position
+/// in it.
 pub const MAX_PICTURE_SIDE: u32 = 1 << 16;

@@ -148,7 +148,8 @@ impl Checksums {
         Ok(Self { first, end, next: first })
     }
 
-    /// The checksum of the next chunk, and whether it is the last asked for. The last chunk in memory may be short.
+    /// The checksum of the next chunk, and whether it is the last asked for. The last chunk in memory may be
+    /// short.
     pub(super) fn step(&mut self, memory: &impl CardMemory, written: u32) -> Result<(u64, bool), Fault> {
         let begin = self.next.saturating_mul(CHUNK_LINES);
         let lines = stored(memory, begin, CHUNK_LINES.min(written.saturating_sub(begin)))?;

@@ -6,15 +6,17 @@
 //! k = s / (t sqrt(L)), rounded, 1 to 16
 //! ```
 //!
-//! with `L` the mean of the probes' light over samples and channels, `s^2` its variance over samples, mean of the channels, and `t` the frame's threshold:
-//! the number of samples for an equal error is proportional to `s`, and noise shows by about the inverse root of the light under a tone curve.
+//! with `L` the mean of the probes' light over samples and channels, `s^2` its variance over samples, mean of
+//! the channels, and `t` the frame's threshold: the number of samples for an equal error is proportional to
+//! `s`, and noise shows by about the inverse root of the light under a tone curve.
 //!
-//! An estimate whose own samples choose their number is biased (Kirk, Arvo 1991, *Unbiased sampling techniques for image synthesis*). Probes
-//! therefore have a fixed weight, half of a sample's, and later paths have patterns of their own
-//! ([`PixelSample::stratified`](crate::render::PixelSample::stratified)): the expectation of later paths depends neither on `k` nor on the probes.
+//! An estimate whose own samples choose their number is biased (Kirk, Arvo 1991, *Unbiased sampling
+//! techniques for image synthesis*). Probes therefore have a fixed weight, half of a sample's, and later
+//! paths have patterns of their own ([`PixelSample::stratified`](crate::render::PixelSample::stratified)):
+//! the expectation of later paths depends neither on `k` nor on the probes.
 //!
-//! Frames are divided by samples, with adaptive sampling or without: a path is a function of pixel, sample and `k`, and `k` is a function of the pixel's probes. A
-//! frame of later samples looks at the probes again.
+//! Frames are divided by samples, with adaptive sampling or without: a path is a function of pixel, sample
+//! and `k`, and `k` is a function of the pixel's probes. A frame of later samples looks at the probes again.
 
 use glam::Vec3;
 use photoncard_shared::message::{FrameParameters, MAX_PATHS, PROBES, WEIGHT_OF_PROBE};
@@ -102,7 +104,8 @@ mod tests {
         }
     }
 
-    /// Estimate of the share of a pixel that is lit, by its left edge up to `coverage`; and its number of paths.
+    /// Estimate of the share of a pixel that is lit, by its left edge up to `coverage`; and its number of
+    /// paths.
     fn lit_share(frame: &FrameParameters, pixel: u32, coverage: f32) -> (f64, u32) {
         let mut probes = Probes::NONE;
         let [mut sum, mut weights] = [0.0, 0.0];
@@ -128,8 +131,8 @@ mod tests {
         (sum / weights, count)
     }
 
-    /// Points after the probes in one stratified pattern lie in the strata that the probes left: an edge at an eighth of the pixel would be a third too
-    /// bright.
+    /// Points after the probes in one stratified pattern lie in the strata that the probes left: an edge at
+    /// an eighth of the pixel would be a third too bright.
     #[test]
     fn the_choice_of_the_number_of_paths_has_no_bias() {
         const PIXELS: u32 = 20_000;

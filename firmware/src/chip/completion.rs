@@ -1,11 +1,11 @@
 //! The completion of a pixel: light that needs no gather rays, albedo, normal and depth.
 //!
-//! Pixels without gather rays of their own are completed first, once the irradiance records of their block are gathered: each path is
-//! looked at once. Those with gather rays are found by it. They are completed when no gather of the block waits, and every path is
-//! looked at again, as no chip has room to keep them.
+//! Pixels without gather rays of their own are completed first, once the irradiance records of their block
+//! are gathered: each path is looked at once. Those with gather rays are found by it. They are completed when
+//! no gather of the block waits, and every path is looked at again, as no chip has room to keep them.
 //!
-//! Probes ([`super::adaptive`]) are looked at here as well: of a pixel without gather rays as its first samples or, in a frame that begins later, before them; of
-//! others in a pass of their own.
+//! Probes ([`super::adaptive`]) are looked at here as well: of a pixel without gather rays as its first
+//! samples or, in a frame that begins later, before them; of others in a pass of their own.
 
 use glam::Vec3;
 use photoncard_shared::message::{Fault, FrameParameters, PROBES};
@@ -27,7 +27,8 @@ use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
 /// Use of the light of a path.
 #[derive(Clone, Copy)]
 enum Use {
-    /// Term of the pixel's sum, with the path's weight. Direct light of a path with gather rays is added by [`Pass::Direct`].
+    /// Term of the pixel's sum, with the path's weight. Direct light of a path with gather rays is added by
+    /// [`Pass::Direct`].
     Term(f32),
     /// Choice of the number of paths alone, with direct light by shadow rays on every path.
     Probe,
@@ -43,8 +44,8 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Completes the next path of a pixel. Returns the pixel with its last path. A pixel with gather rays is left for a later pass if it
-    /// is not known to have any.
+    /// Completes the next path of a pixel. Returns the pixel with its last path. A pixel with gather rays is
+    /// left for a later pass if it is not known to have any.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -175,8 +176,8 @@ impl Completion {
     }
 }
 
-/// Adds emission and interpolated irradiance of one of `paths` paths of a sample and, of a probe or without gather rays, its light by shadow rays and caustics. Returns whether
-/// it has gather rays.
+/// Adds emission and interpolated irradiance of one of `paths` paths of a sample and, of a probe or without
+/// gather rays, its light by shadow rays and caustics. Returns whether it has gather rays.
 fn light_path<K: ChipKind, M: MemoryPort>(
     context: &mut Context<M>,
     cache: &IrradianceCache<K::IrradianceRecords>,

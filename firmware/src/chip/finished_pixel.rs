@@ -42,7 +42,8 @@ impl PixelView {
         let Self(sums) = self;
         let albedo = view.surface.reflector().albedo().clamp(Vec3::ZERO, Vec3::ONE) * ALBEDO_STEPS as f32;
         let normal = view.surface.normal * NORMAL_STEPS as f32;
-        // Conversions are towards zero and saturate; no number of samples of a budget overflows the first two.
+        // Conversions are towards zero and saturate; no number of samples of a budget overflows the first
+        // two.
         for (axis, (albedo, normal)) in albedo.to_array().into_iter().zip(normal.to_array()).enumerate() {
             let (Some(albedo_sum), Some(normal_sum)) = (sums.albedo.get_mut(axis), sums.normal.get_mut(axis))
             else {
@@ -56,7 +57,8 @@ impl PixelView {
         sums.surfaces = sums.surfaces.saturating_add(1);
     }
 
-    /// Sums of the pixel with its sums of light: one, or with layers one for each component and the count of gathers.
+    /// Sums of the pixel with its sums of light: one, or with layers one for each component and the count of
+    /// gathers.
     pub fn sums(&self, light: &[ColourSum]) -> PixelSums {
         match light {
             [direct, indirect, caustic, gathers] => {

@@ -21,8 +21,8 @@ const PLAIN: u16 = u16::MAX;
 /// In place of the number of its sum, a pixel with gather rays and no sum yet.
 const UNSUMMED: u16 = PLAIN - 1;
 
-/// State of a tile in flight. It is rendered in one block or, if its irradiance records do not fit into the cache, in several smaller
-/// ones, one after another.
+/// State of a tile in flight. It is rendered in one block or, if its irradiance records do not fit into the
+/// cache, in several smaller ones, one after another.
 pub(super) struct Flight<K: ChipKind> {
     pub(super) tile: Tile,
     pub(super) counters: Counters,
@@ -109,8 +109,8 @@ impl<K: ChipKind> Flight<K> {
         !self.blocks.is_empty()
     }
 
-    /// Replaces the block, whose records do not fit into the cache, by its two halves. A block of one pixel always
-    /// fits.
+    /// Replaces the block, whose records do not fit into the cache, by its two halves. A block of one pixel
+    /// always fits.
     pub(super) fn divide_block(&mut self) -> Result<(), Fault> {
         let [first, second] = self.block.halves().ok_or(Invariant::Halves.fault())?;
         for half in [second, first] {

@@ -46,8 +46,8 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.len() >= most_waiting::<Q>(frame)
     }
 
-    /// Queues a gather, or does it at once and returns its radiance: without deferred reordering, or if the queue has filled
-    /// up since the last check of [`Self::is_full`].
+    /// Queues a gather, or does it at once and returns its radiance: without deferred reordering, or if the
+    /// queue has filled up since the last check of [`Self::is_full`].
     ///
     /// # Errors
     /// If the image is not sound.

@@ -12,10 +12,11 @@ use crate::fixed_point::ColourSum;
 /// Component of a pixel's light; light paths are in the notation of the crate's page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
-    /// `L S* E` and `L D S* E`: visible emission, and direct light by shadow rays and by the pixel's own gather rays.
+    /// `L S* E` and `L D S* E`: visible emission, and direct light by shadow rays and by the pixel's own
+    /// gather rays.
     Direct,
-    /// `L (S|D)* D S* D S* E`: radiance estimates at the ends of gather rays, and interpolated irradiance, which
-    /// includes the emission met by the irradiance records' rays.
+    /// `L (S|D)* D S* D S* E`: radiance estimates at the ends of gather rays, and interpolated irradiance,
+    /// which includes the emission met by the irradiance records' rays.
     Indirect,
     /// `L S+ D S* E`: radiance estimates in the caustic map.
     Caustic,

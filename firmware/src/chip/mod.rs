@@ -1,10 +1,11 @@
 //! One chip: its tiles in flight, and their passes.
 //!
-//! A tile goes through the passes of `position`, block by block; every pass is done for all gather points before the next begins, so
-//! that gathers of neighbouring points are adjacent. When all rays of the irradiance records of a block are cast, or all rays of its
-//! pixels, their gathers wait in the queue with those of other tiles, and another tile goes on: the queue is drained when it is full, or
-//! when there is nothing else to do. Pixels are completed when the last of these gathers is done: first those that need the records
-//! alone. Each call of [`Chip::step`] does a small piece of this work.
+//! A tile goes through the passes of `position`, block by block; every pass is done for all gather points
+//! before the next begins, so that gathers of neighbouring points are adjacent. When all rays of the
+//! irradiance records of a block are cast, or all rays of its pixels, their gathers wait in the queue with
+//! those of other tiles, and another tile goes on: the queue is drained when it is full, or when there is
+//! nothing else to do. Pixels are completed when the last of these gathers is done: first those that need the
+//! records alone. Each call of [`Chip::step`] does a small piece of this work.
 //!
 //! | state | kept from the command to the last pixel, of each tile in flight |
 //! |---|---|
@@ -74,8 +75,8 @@ const GATHERS_PER_PIECE: u64 = 16;
 pub enum Progress {
     /// There is more to do.
     Busy,
-    /// A pixel of a tile is complete. The pixels of each block of a tile come row by row: those without gather rays of their own,
-    /// then the others.
+    /// A pixel of a tile is complete. The pixels of each block of a tile come row by row: those without
+    /// gather rays of their own, then the others.
     Pixel(FinishedPixel),
     /// A tile is complete, with its last pixel before: its number, and the counts of its work.
     Tile(u32, Counters),
@@ -118,7 +119,8 @@ impl<K: ChipKind> Chip<K> {
         }
     }
 
-    /// Begins a frame, with the lines of card memory beyond the image, where irradiance records may be kept. Without this call none are.
+    /// Begins a frame, with the lines of card memory beyond the image, where irradiance records may be kept.
+    /// Without this call none are.
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         self.shared.store.begin_frame(frame, room);
     }
@@ -128,8 +130,8 @@ impl<K: ChipKind> Chip<K> {
         self.shared.store.forget();
     }
 
-    /// Begins a tile of a frame. Returns false if the tile has no pixels or more than [`Self::tile_pixels`], or as many tiles
-    /// are in flight as the frame or the chip allows.
+    /// Begins a tile of a frame. Returns false if the tile has no pixels or more than [`Self::tile_pixels`],
+    /// or as many tiles are in flight as the frame or the chip allows.
     #[must_use]
     pub fn begin(&mut self, memory: &mut impl MemoryPort, frame: &FrameParameters, tile: Tile) -> bool {
         if tile.pixels() == 0 || tile.pixels() > self.tile_pixels(frame) {
@@ -165,8 +167,8 @@ impl<K: ChipKind> Chip<K> {
         waits
     }
 
-    /// Does the next pieces of work, about 16 rays and gathers: a card polls its link after each step, which must
-    /// be short enough for a prompt reply and long enough to make the cost of polling negligible.
+    /// Does the next pieces of work, about 16 rays and gathers: a card polls its link after each step, which
+    /// must be short enough for a prompt reply and long enough to make the cost of polling negligible.
     ///
     /// # Errors
     /// If the image is not sound, or an [`Invariant`] is broken. All tiles should be dropped then.
@@ -184,8 +186,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Does the next piece of work, and adds its rays and gathers to `work`: some of the queued gathers, one sample of a pixel to be
-    /// completed, or a piece of a pass.
+    /// Does the next piece of work, and adds its rays and gathers to `work`: some of the queued gathers, one
+    /// sample of a pixel to be completed, or a piece of a pass.
     #[inline(always)]
     fn piece<M: MemoryPort>(&mut self, job: &mut RenderJob<M>, work: &mut u64) -> Result<Progress, Fault> {
         if self.shared.gathers.is_draining() {
@@ -222,8 +224,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Begins the next block of a tile in flight, or the gather rays of its pixels. Without one the chip has room for a tile or must drain
-    /// its queue.
+    /// Begins the next block of a tile in flight, or the gather rays of its pixels. Without one the chip has
+    /// room for a tile or must drain its queue.
     fn go_on(&mut self, frame: &FrameParameters) -> Result<Progress, Fault> {
         let of_pass = |pass| self.find(|flight| flight.pass() == pass);
         if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock)) {
@@ -241,8 +243,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(if must_drain { Progress::Busy } else { Progress::Idle })
     }
 
-    /// Completes the next sample of a block whose gathers are done. Its last pixels are followed by those with gather rays, by another block
-    /// or by the end of the tile.
+    /// Completes the next sample of a block whose gathers are done. Its last pixels are followed by those
+    /// with gather rays, by another block or by the end of the tile.
     fn complete<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,

@@ -1,7 +1,8 @@
 //! Sums of the pixels that gather rays are cast for, of all tiles in flight.
 //!
-//! Only such a pixel has light that waits: everything else is added when the pixel is completed. The sums lie in a ring,
-//! in runs of one tile each; a run grows while the tile's eye rays are cast, and ends with the tile.
+//! Only such a pixel has light that waits: everything else is added when the pixel is completed. The sums lie
+//! in a ring, in runs of one tile each; a run grows while the tile's eye rays are cast, and ends with the
+//! tile.
 
 use core::num::NonZeroU32;
 
@@ -73,8 +74,8 @@ impl<C: Capacity> PixelSums<C> {
         !self.runs.iter().any(|run| run.holds(self.end, places))
     }
 
-    /// Appends a pixel without light to the run that began last, and returns its number in the run. To be called
-    /// only if [`Self::has_room`].
+    /// Appends a pixel without light to the run that began last, and returns its number in the run. To be
+    /// called only if [`Self::has_room`].
     pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> Result<u16, Fault> {
         let count = sums_of_pixel(frame.layers) as usize;
         let first = self.end as usize * count;

@@ -1,5 +1,5 @@
-//! The passes of a block's pixels with gather rays of their own, stripe by stripe and sample by sample: these rays, and direct light,
-//! which is weighted against them.
+//! The passes of a block's pixels with gather rays of their own, stripe by stripe and sample by sample: these
+//! rays, and direct light, which is weighted against them.
 
 use core::ops::Range;
 
@@ -32,7 +32,8 @@ pub(super) fn pixel_point(
     // With the cache, gather rays are a pixel's in number, without it a sample's.
     let is_of_pixel = allowed_error(frame).is_some();
     let samples = if is_of_pixel { frame.planned_samples.max(1) } else { 1 };
-    // Paths are for noise that probes see: that of direct light, and of highlights, which gather rays bring as well.
+    // Paths are for noise that probes see: that of direct light, and of highlights, which gather rays bring
+    // as well.
     let sharing = if view.surface.reflection.is_lambertian() { paths.max(1) } else { 1 };
     let rays = frame.gather_rays.div_ceil(samples).div_ceil(sharing);
     if purpose == Purpose::Lobe {
@@ -110,7 +111,8 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// First of some pixels of the block with gather rays of its own and the present path; `None` without one.
+    /// First of some pixels of the block with gather rays of its own and the present path; `None` without
+    /// one.
     fn first_with_path(&self, frame: &FrameParameters, pixels: Range<u32>) -> Option<u32> {
         let Range { mut start, end } = pixels;
         let sample = self.position.sample_of(frame);
@@ -153,7 +155,8 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Adds the light of shadow rays and caustics to the pixel of the present gather point, with the weight of its path.
+    /// Adds the light of shadow rays and caustics to the pixel of the present gather point, with the weight
+    /// of its path.
     pub(super) fn gather_direct_light<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,

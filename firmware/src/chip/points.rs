@@ -13,7 +13,8 @@ use crate::sampler::Pattern;
 pub(super) struct Points<C: Capacity> {
     points: C::Buffer<StoredPoint>,
     owners: C::Buffer<u16>,
-    /// The direction bin of each point's next ray; after the last ray, the last one's. Alone, as most points have no ray in a bin.
+    /// The direction bin of each point's next ray; after the last ray, the last one's. Alone, as most points
+    /// have no ray in a bin.
     bins: C::Buffer<u8>,
 }
 
@@ -32,7 +33,8 @@ impl<C: Capacity> Points<C> {
         self.owners.view().len() as u32
     }
 
-    /// Appends a point with the bin of its first ray. There is room for one of each pixel of a stripe, and of each record of a block.
+    /// Appends a point with the bin of its first ray. There is room for one of each pixel of a stripe, and of
+    /// each record of a block.
     pub(super) fn push(&mut self, owner: u16, point: StoredPoint, bin: u32) -> Result<(), Fault> {
         let full = Invariant::Points.fault();
         self.points.view_mut().push(point).map_err(|_| full)?;
@@ -57,7 +59,8 @@ impl<C: Capacity> Points<C> {
         Some((index as u32, *self.owners.view().get(index)?))
     }
 
-    /// The next rays of the point of an index in the present bin, of `bins`. The position goes on behind them.
+    /// The next rays of the point of an index in the present bin, of `bins`. The position goes on behind
+    /// them.
     #[inline(always)]
     pub(super) fn take_rays(
         &mut self,

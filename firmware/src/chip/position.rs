@@ -45,9 +45,9 @@ impl Block {
     }
 }
 
-/// Passes of a block, in order. The passes from [`Pass::ReadKept`] to [`Pass::WaitForRecords`] are skipped without the irradiance cache, and
-/// those after the first with kept records; [`Pass::CompletePlain`] is skipped where every sample has gather rays, and the passes after it
-/// are of the other pixels alone.
+/// Passes of a block, in order. The passes from [`Pass::ReadKept`] to [`Pass::WaitForRecords`] are skipped
+/// without the irradiance cache, and those after the first with kept records; [`Pass::CompletePlain`] is
+/// skipped where every sample has gather rays, and the passes after it are of the other pixels alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     /// No tile.
@@ -92,7 +92,8 @@ pub(super) struct Position {
     pub(super) path: u32,
     /// Direction bin.
     pub(super) bin: u32,
-    /// First pixel of the stripe: the pixels of the block, row-major, whose gather points are stored together.
+    /// First pixel of the stripe: the pixels of the block, row-major, whose gather points are stored
+    /// together.
     pub(super) first: u32,
     /// Index of the pixel in the stripe or in the block, of the lattice point, or of the gather point.
     pub(super) index: u32,
@@ -113,12 +114,14 @@ impl Position {
         self.rays
     }
 
-    /// Advances by some rays of the present bin and of the gather point `index`: to its other rays, or to the next point.
+    /// Advances by some rays of the present bin and of the gather point `index`: to its other rays, or to the
+    /// next point.
     pub(super) fn pass_rays(&mut self, index: u32, rays: u32, are_last: bool) {
         [self.index, self.rays] = if are_last { [index + 1, 0] } else { [index, self.rays + rays] };
     }
 
-    /// Advances to the first gather point and the next of `count` bins, cyclically. Returns whether the bin was the last.
+    /// Advances to the first gather point and the next of `count` bins, cyclically. Returns whether the bin
+    /// was the last.
     pub(super) fn end_bin(&mut self, count: u32) -> bool {
         self.index = 0;
         next(&mut self.bin, count)
@@ -134,7 +137,8 @@ impl Position {
         frame.first_sample.wrapping_add(self.sample)
     }
 
-    /// Advances to the first path of the next sample of the frame, cyclically. Returns whether the sample was the last.
+    /// Advances to the first path of the next sample of the frame, cyclically. Returns whether the sample was
+    /// the last.
     pub(super) fn next_sample(&mut self, frame: &FrameParameters) -> bool {
         self.path = 0;
         next(&mut self.sample, frame.samples)

@@ -17,7 +17,8 @@ const RAYS_PER_STEP: u32 = 64;
 /// State of a gather point from one direction bin to the next, 48 bytes: the rest is read again.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
-    /// Of pixels: the triangle and the place on it; elsewhere if it is seen by way of perfectly specular surfaces.
+    /// Of pixels: the triangle and the place on it; elsewhere if it is seen by way of perfectly specular
+    /// surfaces.
     pub(super) seen: Seen,
     pub(super) directions: DirectionTable,
     /// The number of rays to cast, and their purpose.
@@ -62,7 +63,8 @@ impl StoredPoint {
         self.directions.bin(pattern, 0, self.rays.number(), bins)
     }
 
-    /// The next rays of a direction bin, at most [`RAYS_PER_STEP`], of which `done` are cast; and the bin of the ray after them. There is one at least.
+    /// The next rays of a direction bin, at most [`RAYS_PER_STEP`], of which `done` are cast; and the bin of
+    /// the ray after them. There is one at least.
     #[inline(always)]
     pub(super) fn next_rays(
         &self,

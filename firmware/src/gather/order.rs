@@ -95,8 +95,8 @@ fn level_masks(level: u32) -> (u32, u32) {
     (1 << level, (1 << level) - 1)
 }
 
-/// Elementary transform of the curve: mirrors the lower bits of `x`, or exchanges those of `x` and `other`. Returns the
-/// new `other`.
+/// Elementary transform of the curve: mirrors the lower bits of `x`, or exchanges those of `x` and `other`.
+/// Returns the new `other`.
 #[inline(always)]
 fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
     if other & bit != 0 {
@@ -108,8 +108,8 @@ fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
     other ^ exchange
 }
 
-/// Index of a cell along the 3D Hilbert curve through `2^bits` cells an axis (Skilling 2004, *Programming the Hilbert
-/// curve*); `bits` from 1 to 10.
+/// Index of a cell along the 3D Hilbert curve through `2^bits` cells an axis (Skilling 2004, *Programming the
+/// Hilbert curve*); `bits` from 1 to 10.
 #[inline]
 pub fn hilbert_index(cell: [u32; 3], bits: u32) -> u32 {
     let [mut x, mut y, mut z] = cell;

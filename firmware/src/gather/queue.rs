@@ -1,6 +1,6 @@
-//! The gather queue of deferred reordering: requests are kept until the queue is full or no other work is left, and
-//! are then done in the order of [`super::HilbertCode::key`]. A full queue is drained before the next request; nothing is
-//! lost.
+//! The gather queue of deferred reordering: requests are kept until the queue is full or no other work is
+//! left, and are then done in the order of [`super::HilbertCode::key`]. A full queue is drained before the
+//! next request; nothing is lost.
 
 use photoncard_shared::message::Drain;
 

@@ -18,7 +18,8 @@ pub struct GatherRequest {
 
 const _: () = assert!(size_of::<GatherRequest>() == 24);
 
-/// The sum that takes the result of a gather: number of the tile in flight, and the gather point in it; 3 bytes.
+/// The sum that takes the result of a gather: number of the tile in flight, and the gather point in it; 3
+/// bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherTarget {
     /// Index of the gather point in 15 bits, and [`Self::OF_RECORD`]; little-endian.

@@ -1,8 +1,8 @@
-//! The hemisphere above a surface in 4x8 cells of equal projected solid angle: a cosine-weighted direction lies in each
-//! with probability 1/32 (Jensen 1995).
+//! The hemisphere above a surface in 4x8 cells of equal projected solid angle: a cosine-weighted direction
+//! lies in each with probability 1/32 (Jensen 1995).
 //!
-//! Rows divide the square of the sine of the angle to the normal, columns the azimuth. Cells are numbered along a walk
-//! through neighbours, every other row backwards.
+//! Rows divide the square of the sine of the angle to the normal, columns the azimuth. Cells are numbered
+//! along a walk through neighbours, every other row backwards.
 
 use core::f32::consts::PI;
 
@@ -49,8 +49,8 @@ pub fn cell_of(normal: Vec3, direction: Vec3) -> Option<u8> {
     Some(cell_at(row, column) as u8)
 }
 
-/// Direction at a point of a cell, uniform in projected solid angle: `along` is the coordinate in the direction of
-/// the walk, `across` the one from the normal to the horizon, both 0 to 1.
+/// Direction at a point of a cell, uniform in projected solid angle: `along` is the coordinate in the
+/// direction of the walk, `across` the one from the normal to the horizon, both 0 to 1.
 #[inline(always)]
 pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) -> Vec3 {
     let [row, column] = row_and_step(cell);

@@ -1,10 +1,12 @@
-//! Flux of indirect light through the cells of the hemisphere, estimated from the nearest photons, and direction tables from it.
+//! Flux of indirect light through the cells of the hemisphere, estimated from the nearest photons, and
+//! direction tables from it.
 //!
-//! Photons straight from a light are excluded: shadow rays bring that light. With k = 100 photons a cell has a few, and its flux is
-//! uncertain by half. A table of raw sums would cost more variance than it saves wherever light comes from all around. The sums are
-//! therefore shrunk towards their mean (James, Stein 1961, *Estimation with quadratic loss*): by the factor
-//! `max(0, 1 - noise / spread)`, with `spread` the sum of squared deviations and `noise` the part of it that the number of photons
-//! explains. Pure noise gives the table of the cosine; light through few cells keeps its shape.
+//! Photons straight from a light are excluded: shadow rays bring that light. With k = 100 photons a cell has
+//! a few, and its flux is uncertain by half. A table of raw sums would cost more variance than it saves
+//! wherever light comes from all around. The sums are therefore shrunk towards their mean (James, Stein 1961,
+//! *Estimation with quadratic loss*): by the factor `max(0, 1 - noise / spread)`, with `spread` the sum of
+//! squared deviations and `noise` the part of it that the number of photons explains. Pure noise gives the
+//! table of the cosine; light through few cells keeps its shape.
 
 use glam::Vec3;
 use photoncard_shared::layout::decode_direction;
@@ -19,8 +21,9 @@ use crate::sampler::radical_inverse;
 use crate::scene::Reflector;
 use crate::vector::{max, unit};
 
-/// Uniform share of the cells of a product (defensive sampling): light varies within a cell too, and may come through a cell without
-/// photons. It bounds the weight of a ray by about twice the albedo. Measured: `docs/techniques.md`.
+/// Uniform share of the cells of a product (defensive sampling): light varies within a cell too, and may come
+/// through a cell without photons. It bounds the weight of a ray by about twice the albedo. Measured:
+/// `docs/techniques.md`.
 const EVEN_SHARE: f32 = 0.55;
 /// Flux of an empty cell over the mean flux: the small energy of Jensen 1995.
 const EMPTY_CELL: f32 = 0.1;
@@ -39,8 +42,8 @@ pub struct IncidentFlux {
 }
 
 impl IncidentFlux {
-    /// Flux of the nearest photons of the point's surface, without photons straight from a light. `colour`, at most
-    /// about 1, weights the channels of their power. `normal_code` is the code of `normal`.
+    /// Flux of the nearest photons of the point's surface, without photons straight from a light. `colour`,
+    /// at most about 1, weights the channels of their power. `normal_code` is the code of `normal`.
     pub fn new(nearest: &NearestPhotons, normal: Vec3, normal_code: u8, colour: Vec3) -> Self {
         let mut flux = Self { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
         let mut same_surface = SameSurface::new(normal_code);

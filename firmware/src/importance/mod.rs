@@ -1,9 +1,11 @@
-//! Directions of final gather rays: importance sampling of the reflection function, of the photons, or of both.
+//! Directions of final gather rays: importance sampling of the reflection function, of the photons, or of
+//! both.
 //!
-//! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and the
-//! reflection's lobe as one more entry, each with a share of the rays. A stratified pattern is sent through the table's inverse
-//! cumulative distribution, and the density of the whole mixture weights each ray, so that no choice of shares biases
-//! the picture. The samplings differ in the source of the shares alone:
+//! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and
+//! the reflection's lobe as one more entry, each with a share of the rays. A stratified pattern is sent
+//! through the table's inverse cumulative distribution, and the density of the whole mixture weights each
+//! ray, so that no choice of shares biases the picture. The samplings differ in the source of the shares
+//! alone:
 //!
 //! | sampling | share of a cell | share of the lobe |
 //! |---|---|---|
@@ -12,7 +14,8 @@
 //! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | that flux, reflected | the part of the lobe that is narrower than a cell |
 //! | mixture | the mean of reflection and photon | half the lobe's albedo |
 //!
-//! Points of few rays have the table of the reflection by every sampling ([`GatherPoint::choose_directions`](crate::render::GatherPoint::choose_directions)).
+//! Points of few rays have the table of the reflection by every sampling
+//! ([`GatherPoint::choose_directions`](crate::render::GatherPoint::choose_directions)).
 //!
 //! Table entries are the direction bins of generative reordering as well: see [`DirectionTable::bin`].
 

@@ -33,7 +33,8 @@ impl DirectionTable {
     /// Equal cells: the density `cos(theta) / pi`.
     pub const COSINE: Self = Self { cells: [1; CELLS], lobe: 0 };
 
-    /// Table in proportion to `cells` and `lobe`, which are finite and not negative. If any cell is positive, all cells get a share.
+    /// Table in proportion to `cells` and `lobe`, which are finite and not negative. If any cell is positive,
+    /// all cells get a share.
     pub(super) fn new(cells: &[f32; CELLS], lobe: f32) -> Self {
         let greatest = cells.iter().fold(0.0, |greatest, &cell| max(cell, greatest));
         if greatest <= 0.0 {
@@ -68,8 +69,8 @@ impl DirectionTable {
         sum(cells) + if entry > LOBE { self.lobe as u32 } else { 0 }
     }
 
-    /// Index of the first ray, of `count` in all, in direction bin `bin` of `bins` or in a later one. Bins divide the walk through the
-    /// entries into equal parts; their rays follow each other.
+    /// Index of the first ray, of `count` in all, in direction bin `bin` of `bins` or in a later one. Bins
+    /// divide the walk through the entries into equal parts; their rays follow each other.
     ///
     /// `count` is at most [`MAX_GATHER_RAYS`](photoncard_shared::budget::MAX_GATHER_RAYS), `bins` at most
     /// [`MAX_BINS`](photoncard_shared::budget::MAX_BINS).
@@ -94,7 +95,8 @@ impl DirectionTable {
             return 0;
         }
         let Place { entry, offset, size } = self.place(pattern, index, count);
-        // Of `bins` parts of the entry the ray's, estimated to within 1 and corrected: a division of integers takes long.
+        // Of `bins` parts of the entry the ray's, estimated to within 1 and corrected: a division of integers
+        // takes long.
         let mut part = (self::part(offset, size) * bins as f32) as u32;
         let begins = |part: u32| part as u64 * size <= offset * bins as u64;
         if !begins(part) {
@@ -109,7 +111,8 @@ impl DirectionTable {
     #[inline(always)]
     fn place(&self, pattern: Pattern, index: u32, count: u32) -> Place {
         let target = stratum_point(pattern, index) * self.total() as u64;
-        // Below the sum of the shares: an entry's end is a whole number of shares, so that the fraction of one decides nothing.
+        // Below the sum of the shares: an entry's end is a whole number of shares, so that the fraction of
+        // one decides nothing.
         let shares = (target >> JITTER_BITS) as u32 / count.max(1);
         let (entry, before) = self.entry_at(shares);
         let [before, size] = [before, self.share(entry)].map(|shares| shares as u64 * whole(count));
@@ -136,7 +139,8 @@ impl DirectionTable {
         (LOBE, before)
     }
 
-    /// Entry of ray `index` of `count`, and the ray's coordinates within the entry, along the walk and across it.
+    /// Entry of ray `index` of `count`, and the ray's coordinates within the entry, along the walk and across
+    /// it.
     #[inline(always)]
     fn entry(&self, pattern: Pattern, index: u32, count: u32) -> (usize, [f32; 2]) {
         let Place { entry, offset, size } = self.place(pattern, index, count);
@@ -200,7 +204,8 @@ impl DirectionTable {
     }
 }
 
-/// Place of a ray along the walk: its entry, and the offset in it, both lengths in units of a share over the length of all strata.
+/// Place of a ray along the walk: its entry, and the offset in it, both lengths in units of a share over the
+/// length of all strata.
 struct Place {
     entry: usize,
     offset: u64,
@@ -240,8 +245,8 @@ fn first_ray(pattern: Pattern, count: u32, beginning: u32, total: u32) -> u32 {
     ray + u32::from(is_before)
 }
 
-/// Quotient, below 2^20, and remainder of a product by a divisor of at most 2^25. Processors of 32 bits divide 64 by hundreds of
-/// instructions; the quotient is estimated in `f32`, to within 1, and corrected.
+/// Quotient, below 2^20, and remainder of a product by a divisor of at most 2^25. Processors of 32 bits
+/// divide 64 by hundreds of instructions; the quotient is estimated in `f32`, to within 1, and corrected.
 #[inline(always)]
 fn divide([a, b]: [u32; 2], divisor: u32) -> (u32, u32) {
     let estimate = (a as f32 * b as f32 / divisor as f32) as u32;

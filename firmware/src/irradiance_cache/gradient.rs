@@ -1,9 +1,10 @@
 //! Irradiance gradients (Ward, Heckbert 1992, *Irradiance gradients*) from rays in cells of the hemisphere.
 //!
 //! The translational gradient is a sum over the borders of neighbouring cells: the speed of a border over the
-//! hemisphere as the point moves, in proportion to the inverse distance of the nearer cell, times the difference of the
-//! cells' radiances. So it is linear in the radiances, with coefficients that depend on distances alone. The survey
-//! finds these before any photon is gathered, so that gathers can add their terms in any order.
+//! hemisphere as the point moves, in proportion to the inverse distance of the nearer cell, times the
+//! difference of the cells' radiances. So it is linear in the radiances, with coefficients that depend on
+//! distances alone. The survey finds these before any photon is gathered, so that gathers can add their terms
+//! in any order.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -35,8 +36,8 @@ const SHIFT: u32 = 23 - STEPS_PER_OCTAVE.ilog2();
 /// Bits of 1.0 above the low ones.
 const ONE: u32 = 1.0_f32.to_bits() >> SHIFT;
 
-/// Code of a ratio: sixteen codes per factor of two, from 2^-8 to 2^8; ratios out of range are clamped, NaN is the
-/// maximum.
+/// Code of a ratio: sixteen codes per factor of two, from 2^-8 to 2^8; ratios out of range are clamped, NaN
+/// is the maximum.
 fn encode(ratio: f32) -> u8 {
     ((ratio.to_bits() >> SHIFT) + MEAN_CODE).saturating_sub(ONE).min(u8::MAX as u32) as u8
 }
@@ -45,8 +46,8 @@ fn decode(code: u8) -> f32 {
     f32::from_bits(((code as u32 + ONE - MEAN_CODE) << SHIFT) | 1 << (SHIFT - 1))
 }
 
-/// Weight of a gather ray in each cell in the translational gradient, along tangent and bitangent, times the harmonic
-/// mean distance: dimensionless, so that sums do not depend on the scale of the scene.
+/// Weight of a gather ray in each cell in the translational gradient, along tangent and bitangent, times the
+/// harmonic mean distance: dimensionless, so that sums do not depend on the scale of the scene.
 pub(super) type Coefficients = [[f32; 2]; CELLS];
 
 /// Coefficients of the cells for the rays of a gather point on a white Lambertian surface.

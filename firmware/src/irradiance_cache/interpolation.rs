@@ -20,8 +20,8 @@ impl<'a> Corners<'a> {
         self.0.into_iter().flatten()
     }
 
-    /// Error of each corner's record at a surface point, infinite without a record. Radii are clamped by neighbours'
-    /// (Křivánek 2006): by the triangle inequality, `R_i <= R_j + |p_i - p_j|`.
+    /// Error of each corner's record at a surface point, infinite without a record. Radii are clamped by
+    /// neighbours' (Křivánek 2006): by the triangle inequality, `R_i <= R_j + |p_i - p_j|`.
     pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
         let mut errors = [f32::INFINITY; 4];
         for (error, record) in errors.iter_mut().zip(self.0) {
@@ -96,8 +96,8 @@ impl<R: Capacity> IrradianceCache<R> {
         self.weights(sample, allowed).is_some()
     }
 
-    /// Interpolated indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample needs a final gather of
-    /// its own.
+    /// Interpolated indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample needs a final
+    /// gather of its own.
     pub fn interpolate(&self, sample: &SeenSample, allowed: f32) -> Option<Vec3> {
         let Weights { cell, weights } = self.weights(sample, allowed)?;
         let surface = sample.surface;

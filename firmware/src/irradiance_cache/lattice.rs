@@ -1,6 +1,7 @@
 //! The lattice of irradiance records: cells of 16x16 pixels, each the root of a quadtree of four levels.
 //!
-//! The lattice belongs to the picture and not to a tile: all tiles compute the same record for a lattice point.
+//! The lattice belongs to the picture and not to a tile: all tiles compute the same record for a lattice
+//! point.
 
 /// Side of the coarsest cells, pixels.
 pub(super) const COARSEST_SIDE: u32 = 16;
@@ -22,8 +23,9 @@ pub struct LatticePoint {
     pub y: u32,
 }
 
-/// Offset of a record's eye ray from its lattice point, pixels: in a symmetric view of a room, edges of walls run
-/// exactly through lattice points, and the survey rays of a record on an edge would miss the adjacent wall.
+/// Offset of a record's eye ray from its lattice point, pixels: in a symmetric view of a room, edges of walls
+/// run exactly through lattice points, and the survey rays of a record on an edge would miss the adjacent
+/// wall.
 const FILM_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
 impl LatticePoint {
@@ -75,7 +77,8 @@ impl Cell {
             .map(|(dx, dy)| LatticePoint { x: x + dx, y: y + dy })
     }
 
-    /// Index of the cell in its quadtree, level by level from the root, 0; below 21 for cells that can be divided.
+    /// Index of the cell in its quadtree, level by level from the root, 0; below 21 for cells that can be
+    /// divided.
     pub(super) fn tree_number(&self) -> u32 {
         let root = Self::coarsest(self.corner.x, self.corner.y);
         let first = ((1 << (2 * self.level)) - 1) / 3;

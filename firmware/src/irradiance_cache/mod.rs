@@ -1,30 +1,34 @@
-//! The parallel irradiance cache: indirect irradiance is gathered at few points, with its gradients, and interpolated
-//! between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992; neighbour clamping after Křivánek 2006, among the
-//! corners of a cell).
+//! The parallel irradiance cache: indirect irradiance is gathered at few points, with its gradients, and
+//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992; neighbour clamping after
+//! Křivánek 2006, among the corners of a cell).
 //!
-//! The published caches are filled on demand, so that each pixel depends on the pixels before it. The dissertation
-//! makes the cache parallel by removing this dependence, without giving the method; this is a reconstruction. The
-//! positions of the records depend only on the geometry seen in one cell of a lattice over the picture:
+//! The published caches are filled on demand, so that each pixel depends on the pixels before it. The
+//! dissertation makes the cache parallel by removing this dependence, without giving the method; this is a
+//! reconstruction. The positions of the records depend only on the geometry seen in one cell of a lattice
+//! over the picture:
 //!
-//! - Records are at the corners of the cells, 16 pixels apart. A survey determines the surface that each record sees,
-//!   and the harmonic mean of its distances to surrounding surfaces along a few rays, without a gather.
-//! - A cell is divided in four, down to a side of 2 pixels, unless its corners cover it: every corner, and every point
-//!   that a division would add, is within the allowed error of all four corner records.
-//! - A sample interpolates the up to four corner records of its undivided cell that are valid at the surface it sees,
-//!   with weights that are continuous across cells of one size. Without a valid record it casts gather rays of its own.
-//! - All records are gathered. The coefficients of their gradients are known from the survey, so that their gathers may
-//!   be reordered like all others, and wait with those of the pixels: geometry alone decides which samples are
-//!   interpolated, and their light is added when all gathers of the block are done. Hardly any record is wasted: each is a
-//!   corner of an undivided cell.
+//! - Records are at the corners of the cells, 16 pixels apart. A survey determines the surface that each
+//!   record sees, and the harmonic mean of its distances to surrounding surfaces along a few rays, without a
+//!   gather.
+//! - A cell is divided in four, down to a side of 2 pixels, unless its corners cover it: every corner, and
+//!   every point that a division would add, is within the allowed error of all four corner records.
+//! - A sample interpolates the up to four corner records of its undivided cell that are valid at the surface
+//!   it sees, with weights that are continuous across cells of one size. Without a valid record it casts
+//!   gather rays of its own.
+//! - All records are gathered. The coefficients of their gradients are known from the survey, so that their
+//!   gathers may be reordered like all others, and wait with those of the pixels: geometry alone decides
+//!   which samples are interpolated, and their light is added when all gathers of the block are done. Hardly
+//!   any record is wasted: each is a corner of an undivided cell.
 //!
-//! Two tiles with a common lattice point therefore compute the same record, and there are no seams. A tile whose
-//! records do not fit into the cache is rendered in smaller blocks: more records are computed twice, and no pixel
-//! changes.
+//! Two tiles with a common lattice point therefore compute the same record, and there are no seams. A tile
+//! whose records do not fit into the cache is rendered in smaller blocks: more records are computed twice,
+//! and no pixel changes.
 //!
-//! Frames of one picture that differ in samples share their records, which [`RecordStore`] keeps in card memory.
+//! Frames of one picture that differ in samples share their records, which [`RecordStore`] keeps in card
+//! memory.
 //!
-//! Direct light is divided between shadow rays and gather rays ([`crate::render::direct`]): the gather rays' part,
-//! mostly light of large emitters, is in the records.
+//! Direct light is divided between shadow rays and gather rays ([`crate::render::direct`]): the gather rays'
+//! part, mostly light of large emitters, is in the records.
 
 mod gradient;
 mod interpolation;
@@ -61,7 +65,8 @@ const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 pub struct IrradianceCache<R: Capacity> {
     /// Records by lattice point; `None` where no surface with a Lambertian part is seen.
     records: R::Map<LatticePoint, Option<Record>>,
-    /// Coarsest cells, each with a bit mask of the divided cells in its quadtree ([`lattice::Cell::tree_number`]).
+    /// Coarsest cells, each with a bit mask of the divided cells in its quadtree
+    /// ([`lattice::Cell::tree_number`]).
     roots: Vec<(LatticePoint, u32), MAX_ROOTS>,
     survey: Survey,
 }
@@ -123,7 +128,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
     }
 
-    /// Begins the gather of a record, by the directions of its gather point, which determine its gradient's coefficients.
+    /// Begins the gather of a record, by the directions of its gather point, which determine its gradient's
+    /// coefficients.
     ///
     /// # Errors
     /// [`Invariant::Record`] if the record is not surveyed.

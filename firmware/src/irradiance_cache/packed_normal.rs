@@ -1,5 +1,5 @@
-//! Unit vectors in 32 bits, on an unfolded octahedron (Cigolle et al. 2014, *A survey of efficient representations for independent unit
-//! vectors*): exact to 1e-4.
+//! Unit vectors in 32 bits, on an unfolded octahedron (Cigolle et al. 2014, *A survey of efficient
+//! representations for independent unit vectors*): exact to 1e-4.
 
 use glam::Vec3;
 

@@ -13,8 +13,8 @@ use crate::vector::{from_upper_half, max, min, tangents, upper_half};
 /// State of a record, with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
-    /// During the survey: inverse distance to the surroundings in each cell of the hemisphere, 1/m, bfloat16; 0 in
-    /// cells to come.
+    /// During the survey: inverse distance to the surroundings in each cell of the hemisphere, 1/m, bfloat16;
+    /// 0 in cells to come.
     Surveying([u16; CELLS]),
     /// After the survey: distances to the surroundings.
     Surveyed(Distances),
@@ -69,8 +69,8 @@ impl GatherSums {
     }
 }
 
-/// Indirect irradiance at a record. Gradients are in the surface's tangent plane, components along tangent and
-/// bitangent.
+/// Indirect irradiance at a record. Gradients are in the surface's tangent plane, components along tangent
+/// and bitangent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Irradiance {
     /// Irradiance over pi, W/(sr m^2): the radiance that a white Lambertian surface reflects.
@@ -89,7 +89,8 @@ pub(super) struct Record {
     pub(super) normal: Vec3,
     /// Unit normal of the triangle on that side; none if it is `normal`.
     pub(super) geometric_normal: PackedNormal,
-    /// Maximum magnitude of the coordinates that the position was computed from, metres: it bounds the rounding error.
+    /// Maximum magnitude of the coordinates that the position was computed from, metres: it bounds the
+    /// rounding error.
     pub(super) magnitude: f32,
     /// Harmonic mean of the distances to the surroundings, metres; undefined before the survey ends.
     pub(super) distance: f32,
@@ -100,12 +101,15 @@ pub(super) struct Record {
 
 /// Maximum harmonic mean distance, for records without surroundings, metres: its square is finite.
 const FARTHEST: f32 = 1e18;
-/// Minimum distance to the surroundings, metres: the sum of the inverse distances, and their squares, are finite.
+/// Minimum distance to the surroundings, metres: the sum of the inverse distances, and their squares, are
+/// finite.
 const NEAREST: f32 = 1.0 / FARTHEST;
-/// Maximum distance of an interpolated point from the record's tangent plane, over `radius sqrt(allowed error)`.
+/// Maximum distance of an interpolated point from the record's tangent plane, over `radius sqrt(allowed
+/// error)`.
 const PLANE_SHARE: f32 = 0.1;
-/// Maximum distance of an interpolated point from the record's tangent plane, over the harmonic mean distance: farther points may lie
-/// behind the surroundings, as the lower side of a lamp does for the ceiling in the gap above it.
+/// Maximum distance of an interpolated point from the record's tangent plane, over the harmonic mean
+/// distance: farther points may lie behind the surroundings, as the lower side of a lamp does for the ceiling
+/// in the gap above it.
 const FREE_SHARE: f32 = 0.5;
 
 impl Record {
@@ -119,8 +123,8 @@ impl Record {
         Self { position, normal, geometric_normal, magnitude, distance: least, radius: least, content }
     }
 
-    /// Sets the distance to the surroundings in a cell of the hemisphere, metres; infinite if there are none. Its
-    /// inverse is rounded to bfloat16.
+    /// Sets the distance to the surroundings in a cell of the hemisphere, metres; infinite if there are none.
+    /// Its inverse is rounded to bfloat16.
     pub(super) fn set_distance(&mut self, cell: u8, distance: f32) -> Result<(), Fault> {
         if let Content::Surveying(inverses) = &mut self.content
             && let Some(inverse) = inverses.get_mut(cell as usize)
@@ -148,9 +152,10 @@ impl Record {
         Surface { geometric_normal, ..Surface::white(self.position, self.normal, self.magnitude) }
     }
 
-    /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, with `radius` R. It is of second order in
-    /// distance and angle, as gradients remove the first-order error of Ward, Rubinstein, Clear 1988. Infinite off the
-    /// record's tangent plane, by less the nearer its surroundings are, and for normals 90 degrees or more apart.
+    /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, with `radius` R. It is of second
+    /// order in distance and angle, as gradients remove the first-order error of Ward, Rubinstein, Clear
+    /// 1988. Infinite off the record's tangent plane, by less the nearer its surroundings are, and for
+    /// normals 90 degrees or more apart.
     pub(super) fn error(&self, radius: f32, allowed: f32, position: Vec3, normal: Vec3) -> f32 {
         let way = position - self.position;
         let cosine = self.normal.dot(normal);
@@ -164,8 +169,8 @@ impl Record {
 }
 
 impl Irradiance {
-    /// Irradiance over pi, extrapolated to a point by the gradients (Ward, Heckbert 1992), from the record at `origin`
-    /// with normal `origin_normal`; not negative.
+    /// Irradiance over pi, extrapolated to a point by the gradients (Ward, Heckbert 1992), from the record at
+    /// `origin` with normal `origin_normal`; not negative.
     pub(super) fn at(&self, origin: Vec3, origin_normal: Vec3, position: Vec3, normal: Vec3) -> Vec3 {
         let (tangent, bitangent) = tangents(origin_normal);
         let along = |gradient: &[Vec3; 2], way: Vec3| {
@@ -177,8 +182,8 @@ impl Irradiance {
         changed.max(Vec3::ZERO)
     }
 
-    /// The irradiance with its translational gradient limited to `mean / distance`, in the mean of the channels:
-    /// steeper gradients are noise.
+    /// The irradiance with its translational gradient limited to `mean / distance`, in the mean of the
+    /// channels: steeper gradients are noise.
     pub(super) fn limited(mut self, distance: f32) -> Self {
         let greatest = self.mean.element_sum() * (1.0 / 3.0) / distance;
         let [x, y] = self.translation.map(|component| component.element_sum() * (1.0 / 3.0));

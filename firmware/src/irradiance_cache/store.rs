@@ -1,9 +1,11 @@
-//! Irradiance records that a chip keeps in card memory from one frame of a picture to the next, beyond the image.
+//! Irradiance records that a chip keeps in card memory from one frame of a picture to the next, beyond the
+//! image.
 //!
-//! Records depend on the scene and the camera, and not on the samples of a frame or its order of work. The gathered records of a block
-//! are written with the division of its cells; a frame of other samples reads them back in place of survey and gathers. A block whose
-//! records do not fit into the cache is noted as well, so that its survey is not repeated. Blocks that are not found are surveyed and
-//! gathered again, to the same bits: those for which there was no room, and all after a change of the image or of the frame.
+//! Records depend on the scene and the camera, and not on the samples of a frame or its order of work. The
+//! gathered records of a block are written with the division of its cells; a frame of other samples reads
+//! them back in place of survey and gathers. A block whose records do not fit into the cache is noted as
+//! well, so that its survey is not repeated. Blocks that are not found are surveyed and gathered again, to
+//! the same bits: those for which there was no room, and all after a change of the image or of the frame.
 //!
 //! | lines | contents |
 //! |---|---|
@@ -58,8 +60,8 @@ impl RecordStore {
     /// The store without room.
     pub const EMPTY: Self = Self { key: None, first: 0, limit: 0, end: 0 };
 
-    /// Begins a frame with `room` beyond the image. Keeps the records of earlier frames that are the same, and forgets others. The
-    /// image must be that of the frames before, or [`Self::forget`] be called.
+    /// Begins a frame with `room` beyond the image. Keeps the records of earlier frames that are the same,
+    /// and forgets others. The image must be that of the frames before, or [`Self::forget`] be called.
     #[inline(never)]
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         let key = key(frame);

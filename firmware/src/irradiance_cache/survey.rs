@@ -1,9 +1,9 @@
 //! The survey: placement of a block's irradiance records, level by level of the lattice.
 //!
-//! For each level, records are first placed at the corners of its cells. Then survey rays are cast from all new
-//! records, all rays in one cell of the hemisphere before the next cell's, as rays of similar direction read the same
-//! lines of the scene. Then cells that are not covered by their corners' records are divided into cells of the next
-//! level.
+//! For each level, records are first placed at the corners of its cells. Then survey rays are cast from all
+//! new records, all rays in one cell of the hemisphere before the next cell's, as rays of similar direction
+//! read the same lines of the scene. Then cells that are not covered by their corners' records are divided
+//! into cells of the next level.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -23,11 +23,13 @@ use crate::vector::min;
 
 /// Minimum reach of a record, pixels: it bounds the cost in corners.
 const MIN_REACH: f32 = 3.0;
-/// Allowed error below which the minimum reach falls in proportion, so that the picture converges to that without records.
+/// Allowed error below which the minimum reach falls in proportion, so that the picture converges to that
+/// without records.
 const ERROR_OF_MIN_REACH: f32 = 0.1;
 
 impl<R: Capacity> IrradianceCache<R> {
-    /// Does the next piece of the survey: one lattice cell, or one ray of each of some records. Returns whether it was the last.
+    /// Does the next piece of the survey: one lattice cell, or one ray of each of some records. Returns
+    /// whether it was the last.
     ///
     /// # Errors
     /// A [`Fault`] if the image is not sound; `Ok(Err(Full))` if the records do not fit into the cache.
@@ -96,8 +98,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(Ok(()))
     }
 
-    /// Casts the rays of the next new records in the current cell of the hemisphere, a bundle. The rays in the last cell end the
-    /// records' survey.
+    /// Casts the rays of the next new records in the current cell of the hemisphere, a bundle. The rays in
+    /// the last cell end the records' survey.
     fn cast<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Survey { index, direction, first, .. } = self.survey;
         let is_last = direction as usize + 1 >= CELLS;
@@ -139,8 +141,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(())
     }
 
-    /// Returns whether all four corners have records, within whose error bounds lie the other corners and all points
-    /// that a division would add.
+    /// Returns whether all four corners have records, within whose error bounds lie the other corners and all
+    /// points that a division would add.
     fn is_covered<M: MemoryPort>(
         &self,
         context: &mut Context<M>,

@@ -9,8 +9,8 @@ use crate::photon::{CandidateBuffer, CandidateStorage};
 
 /// A number of entries, and the containers that hold as many.
 ///
-/// It stands for a const generic parameter where the number follows from a [`ChipKind`](super::ChipKind): the containers are
-/// associated types, so that a chip has one parameter instead of one for each container.
+/// It stands for a const generic parameter where the number follows from a [`ChipKind`](super::ChipKind): the
+/// containers are associated types, so that a chip has one parameter instead of one for each container.
 pub trait Capacity: 'static {
     /// Maximum number of entries.
     const ENTRIES: usize;

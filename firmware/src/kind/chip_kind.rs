@@ -46,7 +46,8 @@ impl TechniqueMemory {
     }
 }
 
-/// Compile-time check that the capacities of a kind are those of its budget, and within the ranges of the chip's indices.
+/// Compile-time check that the capacities of a kind are those of its budget, and within the ranges of the
+/// chip's indices.
 pub(crate) const fn check<K: ChipKind>() {
     let budget = K::BUDGET;
     assert!(K::TilePixels::ENTRIES == budget.tile_pixels as usize, "TilePixels is not of the budget");

@@ -6,7 +6,8 @@ use super::capacity::Entries;
 use super::chip_kind::{ChipKind, TechniqueMemory};
 use super::reference::REFERENCE;
 
-/// Budget of the large chip: a longer gather queue, as many tiles in flight as fill it, and a scene cache of 128 KB.
+/// Budget of the large chip: a longer gather queue, as many tiles in flight as fill it, and a scene cache of
+/// 128 KB.
 pub const LARGE: Budget = Budget {
     sram_bytes: 2 << 20,
     scene_cache_bytes: 128 << 10,

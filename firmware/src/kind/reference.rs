@@ -6,8 +6,9 @@ use super::capacity::Entries;
 use super::chip_kind::{ChipKind, TechniqueMemory};
 use crate::photon::CandidateBuffer;
 
-/// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB (section 7.3.2);
-/// tiles have up to 64x64 pixels (16x16 in the dissertation). One tile in flight leaves room for a long gather queue, and gather points for half a tile.
+/// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB
+/// (section 7.3.2); tiles have up to 64x64 pixels (16x16 in the dissertation). One tile in flight leaves room
+/// for a long gather queue, and gather points for half a tile.
 pub const REFERENCE: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: REFERENCE_DRAM_BYTES,

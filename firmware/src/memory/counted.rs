@@ -40,8 +40,8 @@ impl<M: MemoryPort> MemoryPort for Counted<M> {
     #[inline(always)]
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault> {
         let bytes = used.end.saturating_sub(used.start);
-        // Failed reads are not counted: of a cache line that extends past the end of the memory, only the lines inside
-        // count.
+        // Failed reads are not counted: of a cache line that extends past the end of the memory, only the
+        // lines inside count.
         let line = self.memory.read(structure, address, used)?;
         self.traffic.count(self.stage, structure, bytes);
         Ok(line)

@@ -1,8 +1,8 @@
 //! Set-associative caches of lines with LRU replacement.
 //!
-//! One type for two uses: on a board with slow DRAM a cache keeps lines in on-chip memory; over a [`super::Counted`] it
-//! simulates the fetches of a chip with a cache of this shape. It holds data in either case, so that both have the same
-//! hits by construction, and a wrong line would show in the picture.
+//! One type for two uses: on a board with slow DRAM a cache keeps lines in on-chip memory; over a
+//! [`super::Counted`] it simulates the fetches of a chip with a cache of this shape. It holds data in either
+//! case, so that both have the same hits by construction, and a wrong line would show in the picture.
 
 use core::ops::Range;
 
@@ -35,7 +35,8 @@ pub struct CacheShape {
 /// Invalid parameter of a [`CacheShape`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShapeError {
-    /// The cache line is not a whole number of card memory lines from 1 line to [`CacheShape::MAX_LINE_BYTES`].
+    /// The cache line is not a whole number of card memory lines from 1 line to
+    /// [`CacheShape::MAX_LINE_BYTES`].
     LineBytes,
     /// The number of ways is 0 or above the number of cache lines.
     Ways,
@@ -81,7 +82,8 @@ impl CacheShape {
         self.entries() * self.lines as usize
     }
 
-    /// Set of a block: a run of card memory lines, aligned to the size of a cache line, that one cache line holds.
+    /// Set of a block: a run of card memory lines, aligned to the size of a cache line, that one cache line
+    /// holds.
     #[inline(always)]
     pub fn set(&self, block: u32) -> u32 {
         match self.index {
@@ -122,7 +124,8 @@ pub struct LineCache<E, L> {
     /// Tags by set, in each set from the most to the least recently used.
     entries: E,
     lines: L,
-    /// True if the cache is known to be empty: the thousands of writes that load an image have nothing to invalidate.
+    /// True if the cache is known to be empty: the thousands of writes that load an image have nothing to
+    /// invalidate.
     is_clear: bool,
     /// End of the memory, if filling the last cache line has found it; `u32::MAX` before.
     end: u32,
@@ -209,8 +212,8 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
     }
 }
 
-/// Fills a cache line with a block. Lines after `address` may be outside the memory: returns the first such line, if
-/// any.
+/// Fills a cache line with a block. Lines after `address` may be outside the memory: returns the first such
+/// line, if any.
 ///
 /// # Errors
 /// If the line at `address` is outside the memory.
@@ -234,8 +237,8 @@ fn fill(
     Ok(None)
 }
 
-/// A memory behind caches: one for the photon maps and one for the scene, or one for both. Every tile begins with empty
-/// caches, so that its misses do not depend on the tile before it.
+/// A memory behind caches: one for the photon maps and one for the scene, or one for both. Every tile begins
+/// with empty caches, so that its misses do not depend on the tile before it.
 pub struct LineCaches<M, E, L> {
     memory: M,
     /// Cache of the photon maps, or of everything without a cache of the scene.

@@ -26,14 +26,15 @@ pub trait MemoryPort {
     /// [`FaultCode::LineRange`] outside the memory.
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault>;
 
-    /// A line to be prefetched, if the processor addresses the memory directly. Not a read: `None` where reads are
-    /// cached or counted.
+    /// A line to be prefetched, if the processor addresses the memory directly. Not a read: `None` where
+    /// reads are cached or counted.
     #[inline(always)]
     fn near(&self, _: LineAddress) -> Option<&Line> {
         None
     }
 
-    /// Writes lines from line `first`; `None`, and nothing is written, if they are not all in the memory, or it can be read alone.
+    /// Writes lines from line `first`; `None`, and nothing is written, if they are not all in the memory, or
+    /// it can be read alone.
     fn write(&mut self, _first: LineAddress, _lines: &[[u8; LINE_BYTES]]) -> Option<()> {
         None
     }
@@ -60,17 +61,19 @@ pub trait CardMemory: MemoryPort {
     /// Number of lines.
     fn lines(&self) -> u32;
 
-    /// `count` lines from line `first`, bypassing caches and counters; `None` if they are not all in the memory.
+    /// `count` lines from line `first`, bypassing caches and counters; `None` if they are not all in the
+    /// memory.
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]>;
 
-    /// [`image_checksum`](photoncard_shared::checksum::image_checksum) of the first `lines` lines, if it is known without reading
-    /// them: the memory of an emulated card is an image whose checksum its host has computed.
+    /// [`image_checksum`](photoncard_shared::checksum::image_checksum) of the first `lines` lines, if it is
+    /// known without reading them: the memory of an emulated card is an image whose checksum its host has
+    /// computed.
     fn known_checksum(&self, _lines: u32) -> Option<u64> {
         None
     }
 
-    /// Writes one byte of a written line; `None`, and nothing is written, if it is not in the memory. A memory that the processor
-    /// addresses directly stores the byte alone.
+    /// Writes one byte of a written line; `None`, and nothing is written, if it is not in the memory. A
+    /// memory that the processor addresses directly stores the byte alone.
     fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
         let mut line = *self.stored(address, 1)?.first()?;
         *line.0.get_mut(place)? = byte;

@@ -1,5 +1,5 @@
-//! Candidates of a search for the nearest photons: squared distances and contents, in separate arrays for vector
-//! instructions.
+//! Candidates of a search for the nearest photons: squared distances and contents, in separate arrays for
+//! vector instructions.
 
 use core::cell::Cell;
 
@@ -7,8 +7,8 @@ use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 
 /// A photon near the query: its squared distance and its content.
 ///
-/// Candidates are ordered by distance, then by content. The order is independent of the map's layout and of a photon's
-/// index: candidates that compare equal are interchangeable in any sum.
+/// Candidates are ordered by distance, then by content. The order is independent of the map's layout and of a
+/// photon's index: candidates that compare equal are interchangeable in any sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
     /// Bits of the squared distance.
@@ -82,7 +82,8 @@ impl Candidate {
         Photon::disc_of_flags(self.flags())
     }
 
-    /// Returns whether the photon came straight from a light; in the caustic map, whether it came from a light with extent.
+    /// Returns whether the photon came straight from a light; in the caustic map, whether it came from a
+    /// light with extent.
     #[inline(always)]
     pub fn is_direct(&self) -> bool {
         Photon::direct_of_flags(self.flags())

@@ -1,10 +1,11 @@
-//! Radiance that caustic photons reflect, each spread over a disc of its own radius: a kernel estimate with sample-point bandwidths
-//! (Abramson 1982, *On bandwidth variation in kernel estimates*).
+//! Radiance that caustic photons reflect, each spread over a disc of its own radius: a kernel estimate with
+//! sample-point bandwidths (Abramson 1982, *On bandwidth variation in kernel estimates*).
 //!
-//! `L = sum f(incoming) power K(d / h)`, over the photons of the surface within their radii `h`, with the kernel of Epanechnikov
-//! `K = 2 (1 - d^2 / h^2) / (pi h^2)`, whose integral over a plane is 1: a photon brings its power, however dense others are. The
-//! host chooses each radius by the density of the light that the photon belongs to. Boxes of the tree hold the discs of their photons,
-//! so that a search visits the boxes that hold its position.
+//! `L = sum f(incoming) power K(d / h)`, over the photons of the surface within their radii `h`, with the
+//! kernel of Epanechnikov `K = 2 (1 - d^2 / h^2) / (pi h^2)`, whose integral over a plane is 1: a photon
+//! brings its power, however dense others are. The host chooses each radius by the density of the light that
+//! the photon belongs to. Boxes of the tree hold the discs of their photons, so that a search visits the
+//! boxes that hold its position.
 
 use core::f32::consts::PI;
 
@@ -66,17 +67,18 @@ pub struct CausticSearch<'s, M> {
     pub lobe: DecodedLobe,
     /// Photons that light the lobe.
     pub lit_by: LitBy,
-    /// The shading normal and the triangle's. A photon of incidence `i` counts by `n.i / g.i`, `n` the shading normal and `g` the
-    /// triangle's: the density of photons is the irradiance of the triangle.
+    /// The shading normal and the triangle's. A photon of incidence `i` counts by `n.i / g.i`, `n` the
+    /// shading normal and `g` the triangle's: the density of photons is the irradiance of the triangle.
     pub normals: [Vec3; 2],
 }
 
 /// Maximum of `n.i / g.i`, where light comes along the triangle.
 const MAX_SHADING: f32 = 4.0;
-/// Distance to boxes within which a search visits them, cells of the photon grid: rounding at the borders of the scene.
+/// Distance to boxes within which a search visits them, cells of the photon grid: rounding at the borders of
+/// the scene.
 const MARGIN_CELLS: f32 = 2.0;
-/// Unit of the kernels' factors, 1 over the share of a disc's area: fifty photons of the smallest discs stay below the limit of a
-/// [`ColourSum`], and one of the largest has twenty bits.
+/// Unit of the kernels' factors, 1 over the share of a disc's area: fifty photons of the smallest discs stay
+/// below the limit of a [`ColourSum`], and one of the largest has twenty bits.
 const FACTOR_UNIT: f32 = 32_768.0;
 
 impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {

@@ -1,9 +1,9 @@
-//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the host has estimated the
-//! irradiance at points of all surfaces by the chip's own gathers, and a Lambertian surface takes the irradiance of the
-//! nearest point.
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the host has estimated
+//! the irradiance at points of all surfaces by the chip's own gathers, and a Lambertian surface takes the
+//! irradiance of the nearest point.
 //!
-//! The points lie in a tree of their own, with leaves like photons'. The search is for one point: its distance becomes
-//! the search radius as soon as one is found.
+//! The points lie in a tree of their own, with leaves like photons'. The search is for one point: its
+//! distance becomes the search radius as soon as one is found.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -29,8 +29,8 @@ pub struct FoundIrradiance {
     pub tested: u32,
 }
 
-/// Irradiance at the point nearest to `position`, within `max_distance` metres, on a surface with the `normal` of this
-/// code ([`SameSurface`]). Points' contents break ties between equal distances.
+/// Irradiance at the point nearest to `position`, within `max_distance` metres, on a surface with the
+/// `normal` of this code ([`SameSurface`]). Points' contents break ties between equal distances.
 ///
 /// # Errors
 /// If the image is not sound.

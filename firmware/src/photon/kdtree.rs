@@ -1,5 +1,5 @@
-//! The photon map as a left-balanced kd-tree (Jensen 2001, *Realistic Image Synthesis Using Photon Mapping*, chapter
-//! 6): every node is a photon, and the children of node i are 2 i + 1 and 2 i + 2, without pointers.
+//! The photon map as a left-balanced kd-tree (Jensen 2001, *Realistic Image Synthesis Using Photon Mapping*,
+//! chapter 6): every node is a photon, and the children of node i are 2 i + 1 and 2 i + 2, without pointers.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -22,8 +22,8 @@ struct Deferred {
     distance_squared: f32,
 }
 
-/// Collects the photons nearest to `position` in `nearest`, those that `filter` takes. Returns the number of photons tested, one for each visited
-/// node.
+/// Collects the photons nearest to `position` in `nearest`, those that `filter` takes. Returns the number of
+/// photons tested, one for each visited node.
 ///
 /// # Errors
 /// If the image is not sound.

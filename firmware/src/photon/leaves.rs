@@ -17,8 +17,8 @@ use crate::wide_tree::{BEYOND, Descent, Order, Stack};
 
 const _: () = assert!(LEAF_LANES == LANES);
 
-/// Collects the photons or irradiance points nearest to `position` in `nearest`, those that `filter` takes, from the tree with
-/// nodes and leaves in these two sections. Returns the number of photons tested.
+/// Collects the photons or irradiance points nearest to `position` in `nearest`, those that `filter` takes,
+/// from the tree with nodes and leaves in these two sections. Returns the number of photons tested.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -51,8 +51,8 @@ pub(super) fn gather(
     Ok(tested)
 }
 
-/// Bits of the squared distances to the boxes of a node's children, or [`BEYOND`] past the limit. They are computed
-/// like distances to photons, so that rounding keeps them lower bounds.
+/// Bits of the squared distances to the boxes of a node's children, or [`BEYOND`] past the limit. They are
+/// computed like distances to photons, so that rounding keeps them lower bounds.
 #[inline(always)]
 fn distances_to_boxes(
     isa: impl Isa,

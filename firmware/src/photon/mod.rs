@@ -51,8 +51,8 @@ impl PhotonMap {
     }
 }
 
-/// Collects the photons of a map nearest to `position` in `nearest`; both layouts of the map give equal sets. Returns
-/// the number of photons tested.
+/// Collects the photons of a map nearest to `position` in `nearest`; both layouts of the map give equal sets.
+/// Returns the number of photons tested.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -83,8 +83,8 @@ pub fn gather_visible(
     simd::run(VisibleSearch { scene, memory, map, position, region, nearest })
 }
 
-/// Square of the distance within which a search of a visible region looks first, over that of a disc of the area in which all photons were
-/// found.
+/// Square of the distance within which a search of a visible region looks first, over that of a disc of the
+/// area in which all photons were found.
 const VISIBLE_MOST: f32 = 1.35;
 
 /// Parameters of a gather.
@@ -99,12 +99,13 @@ pub struct GatherLimits {
     pub free_within: f32,
 }
 
-/// Maximum reach of a visible region, over the distance of the k-th of all photons: where most of these are hidden, photons that are
-/// not lie farther away.
+/// Maximum reach of a visible region, over the distance of the k-th of all photons: where most of these are
+/// hidden, photons that are not lie farther away.
 const MAX_REACH: f32 = 2.0;
 
-/// Radiance that the photons of the photon map reflect at a position, by those in the region that it sees where walls may hide others.
-/// `count` is called with the result of each search, of which there are one or two: the number of photons tested, the photons, their light.
+/// Radiance that the photons of the photon map reflect at a position, by those in the region that it sees
+/// where walls may hide others. `count` is called with the result of each search, of which there are one or
+/// two: the number of photons tested, the photons, their light.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -226,8 +227,9 @@ pub struct Selection<'a> {
 impl Kernel for Selection<'_> {
     type Output = Option<Candidate>;
 
-    /// Moves the `count` nearest candidates to the front, unordered, and returns the farthest of them. The elements
-    /// behind are meaningless afterwards. `None`, without a change, if `count` is 0 or above the number of candidates.
+    /// Moves the `count` nearest candidates to the front, unordered, and returns the farthest of them. The
+    /// elements behind are meaningless afterwards. `None`, without a change, if `count` is 0 or above the
+    /// number of candidates.
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let length = self.candidates.capacity();

@@ -1,8 +1,9 @@
 //! The k nearest photons of a stream of candidates.
 //!
-//! Instead of a heap, which is updated for every candidate, a buffer collects more than k candidates; when it is full,
-//! the k nearest are selected in linear time and the search radius shrinks to the k-th distance. The result is a set,
-//! independent of the order of the stream: photons' contents break ties between equal distances.
+//! Instead of a heap, which is updated for every candidate, a buffer collects more than k candidates; when it
+//! is full, the k nearest are selected in linear time and the search radius shrinks to the k-th distance. The
+//! result is a set, independent of the order of the stream: photons' contents break ties between equal
+//! distances.
 
 use photoncard_shared::budget::selected_candidates;
 
@@ -36,7 +37,8 @@ pub struct NearestPhotons<'a> {
 
 impl<'a> NearestPhotons<'a> {
     /// An empty set for the `neighbors` nearest photons within `max_distance`, metres. The buffer should hold
-    /// [`photoncard_shared::budget::gather_candidates`]; `neighbors` is limited to its capacity less [`LANES`] + 1.
+    /// [`photoncard_shared::budget::gather_candidates`]; `neighbors` is limited to its capacity less
+    /// [`LANES`] + 1.
     pub fn new(candidates: Candidates<'a>, neighbors: u32, max_distance: f32) -> Self {
         let room = candidates.capacity().saturating_sub(LANES);
         let neighbors = (neighbors as usize).clamp(1, room.saturating_sub(1).max(1));
@@ -58,7 +60,8 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Limits the search radius of an empty set, m^2: there are no photons beyond. The maximum distance stays.
+    /// Limits the search radius of an empty set, m^2: there are no photons beyond. The maximum distance
+    /// stays.
     pub(super) fn limit_to(&mut self, limit: f32) {
         self.widest = if limit < self.widest { limit } else { self.widest };
         self.limit = if self.widest < self.limit { self.widest } else { self.limit };
@@ -74,8 +77,8 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Begins the search anew, within more of its distance, if narrowing has left out photons that were asked for. Returns whether it
-    /// does.
+    /// Begins the search anew, within more of its distance, if narrowing has left out photons that were asked
+    /// for. Returns whether it does.
     #[inline(always)]
     pub(super) fn widen(&mut self) -> bool {
         let is_short = self.is_narrowed && !self.is_full() && self.limit < self.widest;
@@ -166,7 +169,8 @@ impl<'a> NearestPhotons<'a> {
         self.length >= self.neighbors
     }
 
-    /// After the search, the distance of the last photon asked for, or the maximum distance with fewer, metres.
+    /// After the search, the distance of the last photon asked for, or the maximum distance with fewer,
+    /// metres.
     pub fn radius(&self) -> f32 {
         let (distances, _) = self.columns();
         let farthest = distances.iter().copied().max().filter(|_| self.is_full());

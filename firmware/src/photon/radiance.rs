@@ -1,16 +1,19 @@
-//! Radiance that the nearest photons reflect: the density estimate of Jensen 2001, chapter 7, with three corrections.
+//! Radiance that the nearest photons reflect: the density estimate of Jensen 2001, chapter 7, with three
+//! corrections.
 //!
 //! `L = 1 / (pi r^2 c) sum f(incoming) power`, over the photons within `r`:
 //!
-//! - The distance r to the k-th photon is a stopping rule: with all k photons in the sum the estimate would be too bright by
-//!   `k / (k - 1)`. The k - 1 photons within r are summed, the unbiased estimate of a Poisson density. If fewer than k
-//!   lie within the maximum distance, all of them are summed, and r is that distance.
-//! - Photons of another surface, by their normals, are excluded: those on the other side of a thin wall, and those on the other wall
-//!   of a corner.
-//! - `c` is the area of the surface whose photons are summed, over the disc's area: without it edges and corners would darken, and
-//!   stacked surfaces glow. The host measures it for each photon, with about the photon's own distance to its k-th neighbour. A
-//!   gather uses the c of the nearest photon of its surface, at a distance of about r / sqrt(k), where c has hardly changed.
-//!   Where walls hide photons, both are those of the region that the point sees ([`super::region`]).
+//! - The distance r to the k-th photon is a stopping rule: with all k photons in the sum the estimate would
+//!   be too bright by `k / (k - 1)`. The k - 1 photons within r are summed, the unbiased estimate of a
+//!   Poisson density. If fewer than k lie within the maximum distance, all of them are summed, and r is that
+//!   distance.
+//! - Photons of another surface, by their normals, are excluded: those on the other side of a thin wall, and
+//!   those on the other wall of a corner.
+//! - `c` is the area of the surface whose photons are summed, over the disc's area: without it edges and
+//!   corners would darken, and stacked surfaces glow. The host measures it for each photon, with about the
+//!   photon's own distance to its k-th neighbour. A gather uses the c of the nearest photon of its surface,
+//!   at a distance of about r / sqrt(k), where c has hardly changed. Where walls hide photons, both are those
+//!   of the region that the point sees ([`super::region`]).
 //!
 //! The remaining bias is blur: the radiance is a mean over the disc.
 
@@ -25,7 +28,8 @@ use crate::scene::{DecodedLobe, PartialReflection, magnitude};
 use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, min};
 
-/// Minimum radius of a disc over the query's greatest coordinate, about its rounding error: photons at one point have no density.
+/// Minimum radius of a disc over the query's greatest coordinate, about its rounding error: photons at one
+/// point have no density.
 const MIN_RADIUS_SHARE: f32 = 1e-6;
 
 /// Light that photons bring.
@@ -52,12 +56,12 @@ pub enum Sight {
     Unknown,
 }
 
-/// Area within the distance of the closest photon, over the mean area of a photon, beyond which the photon's disc says too little about
-/// that of the point: on a wall one gather in 1,100 has its closest farther away.
+/// Area within the distance of the closest photon, over the mean area of a photon, beyond which the photon's
+/// disc says too little about that of the point: on a wall one gather in 1,100 has its closest farther away.
 const APART: f32 = 7.0;
 
-/// Radiance of a gather at a position: the photons' power, reflected, over the area of their disc, or of the visible region that they
-/// were searched in.
+/// Radiance of a gather at a position: the photons' power, reflected, over the area of their disc, or of the
+/// visible region that they were searched in.
 #[inline(never)]
 pub fn reflected_radiance(
     nearest: &NearestPhotons,

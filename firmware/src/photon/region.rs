@@ -1,9 +1,11 @@
-//! Visible region: the part of a gather's sphere that its point sees, for places where walls hide photons from it.
+//! Visible region: the part of a gather's sphere that its point sees, for places where walls hide photons
+//! from it.
 //!
-//! A density estimate over a sphere counts photons behind a thin wall that stands on the surface, or in the next room. Rays along the
-//! surface, a little above it, measure the free distance in sixteen directions. They divide the disc into sectors, each of which ends
-//! before the straight line between the two ends of its border rays: no photon behind a plane wall is in a sector. The area of the
-//! estimate is that of the sectors, so that it agrees with the photons that are counted, whatever the rays have met.
+//! A density estimate over a sphere counts photons behind a thin wall that stands on the surface, or in the
+//! next room. Rays along the surface, a little above it, measure the free distance in sixteen directions.
+//! They divide the disc into sectors, each of which ends before the straight line between the two ends of its
+//! border rays: no photon behind a plane wall is in a sector. The area of the estimate is that of the
+//! sectors, so that it agrees with the photons that are counted, whatever the rays have met.
 //!
 //! Photons far off the tangent plane belong to other surfaces, as the boards of a shelf: a region is the part
 //! of the sphere outside a cone about the normal. It ends below what covers the point: photons on the far
@@ -26,11 +28,13 @@ pub const SECTORS: usize = BUNDLE_RAYS;
 
 /// Height of the rays over the surface, over the radius of a gather: lower things hide nothing.
 const HEIGHT: f32 = 0.03;
-/// Distance of the reference point from the surface over the radius of a gather, besides a cell of the photons' grid.
+/// Distance of the reference point from the surface over the radius of a gather, besides a cell of the
+/// photons' grid.
 const LIFT: f32 = 1e-3;
 /// Maximum tangent of the angle between the surface and the way to a photon.
 const MAX_SLOPE: f32 = 0.4;
-/// Radius of a sector over the lesser length of its border rays: the cosine of half its angle, and half a percent for rounding.
+/// Radius of a sector over the lesser length of its border rays: the cosine of half its angle, and half a
+/// percent for rounding.
 const WITHIN: f32 = 0.976;
 /// Radius of a sector that holds all that may be visible, over the greater length of its border rays.
 const BEYOND: f32 = 1.02;
@@ -83,7 +87,8 @@ impl Sectors {
         greatest * (1.0 + MAX_SLOPE * MAX_SLOPE) + self.lift_squared
     }
 
-    /// Sets `outside` to 1 for the points outside the region, given along the axes from its centre, else to 0.
+    /// Sets `outside` to 1 for the points outside the region, given along the axes from its centre, else to
+    /// 0.
     #[inline(always)]
     pub fn test(&self, isa: impl Isa, [u, v, w]: [&[f32; LANES]; 3], outside: &mut [u32; LANES]) {
         let mut indices = [0; LANES];
@@ -112,7 +117,8 @@ impl Sectors {
     }
 }
 
-/// Number of the sector of a direction: bits 0 and 1 count from the first axis to the second, bits 2 and 3 are the signs.
+/// Number of the sector of a direction: bits 0 and 1 count from the first axis to the second, bits 2 and 3
+/// are the signs.
 #[inline(always)]
 fn sector(u: f32, v: f32) -> u32 {
     let (a, b) = (max(u, -u), max(v, -v));
@@ -145,8 +151,8 @@ fn azimuth(ray: usize) -> [f32; 2] {
 }
 
 impl VisibleRegion {
-    /// The region that a point sees on a surface whose normal has the code `normal`, within `reach` metres, for gathers of about the
-    /// radius `radius`. It depends on the scene alone.
+    /// The region that a point sees on a surface whose normal has the code `normal`, within `reach` metres,
+    /// for gathers of about the radius `radius`. It depends on the scene alone.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -250,7 +256,8 @@ fn normal_of(hit: &Hit, towards: Vec3) -> Vec3 {
 
 /// Photons that a search takes, by their places.
 pub(super) trait Filter {
-    /// Sets the distances of photons that are not taken to `u32::MAX`, by the ways from the photons to the query.
+    /// Sets the distances of photons that are not taken to `u32::MAX`, by the ways from the photons to the
+    /// query.
     fn filter(&self, isa: impl Isa, ways: [&[f32; LANES]; 3], distances: &mut [u32; LANES]);
 
     /// True for a photon that is taken, by the way from it to the query.

@@ -8,7 +8,8 @@ use crate::vector::unit;
 /// Minimum cosine between the normals of a photon and of the query that count as one surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
 
-/// Test for photons of one surface. Consecutive photons mostly have equal normals, so that the last result is cached.
+/// Test for photons of one surface. Consecutive photons mostly have equal normals, so that the last result is
+/// cached.
 pub struct SameSurface {
     normal: Vec3,
     last: (u8, bool),

@@ -1,11 +1,11 @@
 //! Selection of the k nearest candidates, in place and without panicking indices.
 //!
-//! On a surface the squared distance of the k-th photon grows in proportion to k. So an interval of distances that
-//! contains the k-th and few others is guessed by interpolation; counting the candidates below its ends verifies and
-//! corrects the guess. One pass then keeps the candidates below the interval and sets aside those in it, of which the
-//! first fill up the k. Where no guess succeeds, as with many candidates at one distance, quickselect (Hoare 1961)
-//! takes over, and after a bounded number of pivots a radix selection, bit by bit of the sort key. All of these give
-//! equal sets.
+//! On a surface the squared distance of the k-th photon grows in proportion to k. So an interval of distances
+//! that contains the k-th and few others is guessed by interpolation; counting the candidates below its ends
+//! verifies and corrects the guess. One pass then keeps the candidates below the interval and sets aside
+//! those in it, of which the first fill up the k. Where no guess succeeds, as with many candidates at one
+//! distance, quickselect (Hoare 1961) takes over, and after a bounded number of pivots a radix selection, bit
+//! by bit of the sort key. All of these give equal sets.
 
 use super::candidates::{Candidate, CandidateCells, Candidates};
 use crate::simd::{Isa, LANES};
@@ -27,9 +27,9 @@ pub(super) struct Chosen {
     pub(super) compared: u32,
 }
 
-/// Moves the `count` nearest of the first `length` candidates to the front, unordered, and returns the farthest of
-/// them. All elements behind, past `length` too, are meaningless afterwards. `None`, without a change, if `count` is 0
-/// or above `length`.
+/// Moves the `count` nearest of the first `length` candidates to the front, unordered, and returns the
+/// farthest of them. All elements behind, past `length` too, are meaningless afterwards. `None`, without a
+/// change, if `count` is 0 or above `length`.
 #[inline(always)]
 pub(super) fn select(
     isa: impl Isa,
@@ -49,15 +49,15 @@ pub(super) fn select(
     Some(Chosen { last, compared: comparisons(length, guesses + 1, between) })
 }
 
-/// Comparisons of a selection: of all distances with the greatest so far; in each pass with both ends of the interval; and
-/// in the interval of each with all lanes, and with the last.
+/// Comparisons of a selection: of all distances with the greatest so far; in each pass with both ends of the
+/// interval; and in the interval of each with all lanes, and with the last.
 #[inline(always)]
 fn comparisons(length: usize, passes: u32, between: usize) -> u32 {
     length as u32 * (1 + 2 * passes) + (between * (BETWEEN + 1)) as u32
 }
 
-/// Bits of an interval `low <= d < high` that contains the `count`-th squared distance and at most [`BETWEEN`] in all;
-/// `None` if [`GUESSES`] do not find one. And the number of guesses.
+/// Bits of an interval `low <= d < high` that contains the `count`-th squared distance and at most
+/// [`BETWEEN`] in all; `None` if [`GUESSES`] do not find one. And the number of guesses.
 #[inline(always)]
 fn guess(distances: &[u32], count: usize) -> Option<(Option<[u32; 2]>, u32)> {
     let farthest = distances.iter().copied().max()?;
@@ -95,7 +95,8 @@ fn count_nearer(distances: &[u32], low: u32, high: u32) -> [usize; 2] {
     nearer.map(|count| count as usize)
 }
 
-/// [`select`] with an interval of [`guess`]. Returns the farthest candidate, and the number of those in the interval.
+/// [`select`] with an interval of [`guess`]. Returns the farthest candidate, and the number of those in the
+/// interval.
 #[inline(always)]
 fn keep(
     isa: impl Isa,

@@ -1,5 +1,5 @@
-//! Caustics, paths `L S+ D S* E`: a gather in the caustic map at the surface that the eye sees (Jensen 1996, *Global illumination using
-//! photon maps*).
+//! Caustics, paths `L S+ D S* E`: a gather in the caustic map at the surface that the eye sees (Jensen 1996,
+//! *Global illumination using photon maps*).
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -54,8 +54,8 @@ pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -
     Ok(caustics.radiance)
 }
 
-/// The reflection that the map lights, and the photons that light its lobe. Gather rays of a narrow lobe meet lights with extent, but
-/// rarely the highlights of other lights.
+/// The reflection that the map lights, and the photons that light its lobe. Gather rays of a narrow lobe meet
+/// lights with extent, but rarely the highlights of other lights.
 fn lit(reflection: &Reflection, gather_rays: u32) -> (Reflection, LitBy) {
     if gather_rays == 0 || !reflection.has_narrow_lobe() {
         (*reflection, LitBy::All)

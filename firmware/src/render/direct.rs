@@ -1,22 +1,25 @@
-//! Direct light, paths `L D S* E`: shadow rays to lights ([`crate::scene::light`]), and final gather rays that meet a light.
+//! Direct light, paths `L D S* E`: shadow rays to lights ([`crate::scene::light`]), and final gather rays
+//! that meet a light.
 //!
-//! Shadow rays are noisy near an emitter, as their contribution grows with the inverse square of the distance; gather rays are noisy
-//! where the emitter is small. Gather rays are cast in any case, so both are combined by the balance heuristic (Veach, Guibas 1995): with
-//! `n` rays of density `p` in one technique and `m` of density `q` in the other, a path has the weight `n p / (n p + m q)` in the first.
-//! The two weights of a path sum to 1, so that direct light is counted once.
+//! Shadow rays are noisy near an emitter, as their contribution grows with the inverse square of the
+//! distance; gather rays are noisy where the emitter is small. Gather rays are cast in any case, so both are
+//! combined by the balance heuristic (Veach, Guibas 1995): with `n` rays of density `p` in one technique and
+//! `m` of density `q` in the other, a path has the weight `n p / (n p + m q)` in the first. The two weights
+//! of a path sum to 1, so that direct light is counted once.
 //!
-//! The emission that rays of an irradiance record meet is interpolated for the samples around it, whose shadow rays bring the rest.
-//! Both sides must compute equal weights. So the record's density is replaced by `cos(theta) / pi`, as samples do not know its
-//! direction table; the number of shadow rays is that of all planned samples of a pixel; and the power heuristic leaves small emitters, which
-//! would make a record noisy, to shadow rays, and a sky to records.
+//! The emission that rays of an irradiance record meet is interpolated for the samples around it, whose
+//! shadow rays bring the rest. Both sides must compute equal weights. So the record's density is replaced by
+//! `cos(theta) / pi`, as samples do not know its direction table; the number of shadow rays is that of all
+//! planned samples of a pixel; and the power heuristic leaves small emitters, which would make a record
+//! noisy, to shadow rays, and a sky to records.
 //!
 //! Points, spots and distant lights are met by no gather ray: shadow rays alone bring their light.
 //!
 //! Flat glass hides no light from a point: shadow rays pass it with its transmittance, and a gather ray that
 //! has passed nothing else meets the light as if it had passed nothing, with equal weights.
 //!
-//! Light samples are stratified over all samples of a pixel: many samples with one or two shadow rays each are as good as one sample
-//! with many.
+//! Light samples are stratified over all samples of a pixel: many samples with one or two shadow rays each
+//! are as good as one sample with many.
 
 use core::f32::consts::FRAC_1_PI;
 
@@ -164,8 +167,8 @@ pub fn seen_by_gather_ray<M: MemoryPort>(
     Ok(met.emission * weight_of_gather_ray(context, point, ray.direction, gather_density, density))
 }
 
-/// Radiance of the environment along a gather ray that leaves the scene, times its weight against shadow rays, W/(sr m^2).
-/// `gather_density` is the ray's probability density, 1/sr.
+/// Radiance of the environment along a gather ray that leaves the scene, times its weight against shadow
+/// rays, W/(sr m^2). `gather_density` is the ray's probability density, 1/sr.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -212,7 +215,8 @@ fn shadow_rays_for_records<M>(context: &Context<M>, density: f32) -> (u32, f32) 
     (context.frame.shadow_rays * context.frame.planned_samples, density)
 }
 
-/// Balance heuristic: weight of the first of two sampling techniques, each with its number of rays and density.
+/// Balance heuristic: weight of the first of two sampling techniques, each with its number of rays and
+/// density.
 #[inline(always)]
 fn balance(way: (u32, f32), other: (u32, f32)) -> f32 {
     1.0 / (1.0 + ratio(other, way))

@@ -12,8 +12,8 @@ use crate::scene::light::environment_radiance;
 use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
 use crate::vector::unit;
 
-/// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are stratified over the pixel filter,
-/// which may reach beyond the pixel and the picture.
+/// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are
+/// stratified over the pixel filter, which may reach beyond the pixel and the picture.
 pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     let PixelSample { x, y, .. } = pixel;
     let (pattern, index) = pixel.stratified(context.frame, Dimension::Pixel);
@@ -27,7 +27,8 @@ pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
 pub struct View {
     /// The surface, its reflection and emission times the throughput of the eye path.
     pub surface: Surface,
-    /// Hit of the eye ray itself; `None` behind perfectly specular surfaces, and for a surface of several layers.
+    /// Hit of the eye ray itself; `None` behind perfectly specular surfaces, and for a surface of several
+    /// layers.
     pub seen: Option<Seen>,
     /// `true` if the eye ray itself meets the surface.
     pub is_first: bool,

@@ -42,8 +42,9 @@ pub fn bundles(rays: Range<u32>) -> impl Iterator<Item = Range<u32>> {
     (start..end).step_by(BUNDLE_RAYS).map(move |first| first..end.min(first + BUNDLE_RAYS as u32))
 }
 
-/// Casts rays of a gather point, at most [`BUNDLE_RAYS`], and puts their contributions into `ends`, without those that meet neither a
-/// surface nor the environment. A contribution is one term of the mean over the point's rays; the gather's result goes to the sum `target`.
+/// Casts rays of a gather point, at most [`BUNDLE_RAYS`], and puts their contributions into `ends`, without
+/// those that meet neither a surface nor the environment. A contribution is one term of the mean over the
+/// point's rays; the gather's result goes to the sum `target`.
 ///
 /// # Errors
 /// If the image is not sound, or there are more than [`BUNDLE_RAYS`] rays.
@@ -155,8 +156,8 @@ fn escaped<M: MemoryPort>(
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
 }
 
-/// Light of punctual lights that the path has collected at narrow lobes, weighted, in the image's radiance units; zero where the caustic
-/// map brings it.
+/// Light of punctual lights that the path has collected at narrow lobes, weighted, in the image's radiance
+/// units; zero where the caustic map brings it.
 fn collected<M>(
     context: &Context<M>,
     point: &GatherPoint,
@@ -225,7 +226,8 @@ pub fn gathered<M: MemoryPort>(
     gathered_radiance((scene, *memory), position, reflection, limits, candidates, &mut count)
 }
 
-/// Precomputed irradiance of the nearest irradiance point of a surface, photon power units/m^2; 0 without one.
+/// Precomputed irradiance of the nearest irradiance point of a surface, photon power units/m^2; 0 without
+/// one.
 #[inline(always)]
 fn irradiance<M: MemoryPort>(context: &mut Context<M>, position: Vec3, normal: u8) -> Result<Vec3, Fault> {
     let max_distance = context.frame.max_distance;

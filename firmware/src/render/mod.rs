@@ -18,7 +18,8 @@ use crate::gather::GatherRequest;
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::SceneImage;
 
-/// Length of a shadow ray over the distance of its light: it ends before the emitter's surface, whatever the rounding.
+/// Length of a shadow ray over the distance of its light: it ends before the emitter's surface, whatever the
+/// rounding.
 const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// Arguments of every pass: scene, memory, frame parameters and counters.
@@ -82,9 +83,9 @@ pub struct PixelSample {
 }
 
 impl PixelSample {
-    /// Pattern that is stratified over the pixel's samples, and the index of this one in it. With adaptive sampling probes and other paths have patterns of
-    /// their own: in one pattern the points after the probes fill the strata that these have left, and their mean would depend on what the probes
-    /// have found.
+    /// Pattern that is stratified over the pixel's samples, and the index of this one in it. With adaptive
+    /// sampling probes and other paths have patterns of their own: in one pattern the points after the probes
+    /// fill the strata that these have left, and their mean would depend on what the probes have found.
     #[inline(always)]
     pub fn stratified(self, frame: &FrameParameters, dimension: Dimension) -> (Pattern, u32) {
         let Self { x, y, sample } = self;

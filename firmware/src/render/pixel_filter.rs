@@ -24,7 +24,8 @@ const BLACKMAN_HARRIS: Quantiles = [
     0.439136, 0.75,
 ];
 
-/// Place of a sample in one direction from the left or upper border of its pixel, pixels, by a number in [0, 1).
+/// Place of a sample in one direction from the left or upper border of its pixel, pixels, by a number in [0,
+/// 1).
 #[inline(always)]
 pub(super) fn place(filter: Filter, number: f32) -> f32 {
     match filter {
@@ -47,8 +48,8 @@ fn offset(quantiles: &Quantiles, number: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Checks the distribution of places against the integral of a filter, a function of the distance from the centre with this
-    /// radius.
+    /// Checks the distribution of places against the integral of a filter, a function of the distance from
+    /// the centre with this radius.
     fn check(filter: Filter, radius: f64, value: impl Fn(f64) -> f64) {
         const CELLS: i32 = 3200;
         let integral = |cells: i32| -> f64 {

@@ -39,8 +39,8 @@ pub enum Purpose {
     Record,
 }
 
-/// Minimum number of gather rays for which photons are searched for a direction table. The search costs as much as a gather ray; fewer rays spread over the cells
-/// too thinly to gain by it: `docs/techniques.md`.
+/// Minimum number of gather rays for which photons are searched for a direction table. The search costs as
+/// much as a gather ray; fewer rays spread over the cells too thinly to gain by it: `docs/techniques.md`.
 const MIN_RAYS_OF_SEARCH: u32 = 8;
 
 impl GatherPoint {
@@ -91,7 +91,8 @@ impl GatherPoint {
         Reflector { normal, outgoing, reflection }
     }
 
-    /// Chooses the directions: by the reflection for few rays, else by the frame's sampling, which may search the nearest photons.
+    /// Chooses the directions: by the reflection for few rays, else by the frame's sampling, which may search
+    /// the nearest photons.
     ///
     /// # Errors
     /// If the image is not sound.

@@ -26,8 +26,8 @@ pub(super) fn count_reflection(
     }
 }
 
-/// Collects the photons of a map nearest to a position in `nearest`, for direction tables and caustics. These searches are few and share
-/// one copy of the code, unlike gathers at the ends of rays.
+/// Collects the photons of a map nearest to a position in `nearest`, for direction tables and caustics. These
+/// searches are few and share one copy of the code, unlike gathers at the ends of rays.
 #[inline(never)]
 pub(super) fn search<M: MemoryPort>(
     context: &mut Context<M>,

@@ -1,9 +1,10 @@
-//! Paths through specular surfaces: mirrors, smooth coats, smooth glass, and for gather rays and photons narrow lobes
-//! ([`crate::scene::Reflection::has_narrow_lobe`]).
+//! Paths through specular surfaces: mirrors, smooth coats, smooth glass, and for gather rays and photons
+//! narrow lobes ([`crate::scene::Reflection::has_narrow_lobe`]).
 //!
-//! At such a surface a path takes one continuation at random, in proportion to its share of the light: reflection, transmission, a
-//! direction of the narrow lobe, or an end at the surface for the rest of its reflection. The samples of a pixel cover all of them.
-//! After [`FREE_BOUNCES`] a path survives by its throughput (Russian roulette), and after [`SPECULAR_BOUNCES`] it is black.
+//! At such a surface a path takes one continuation at random, in proportion to its share of the light:
+//! reflection, transmission, a direction of the narrow lobe, or an end at the surface for the rest of its
+//! reflection. The samples of a pixel cover all of them. After [`FREE_BOUNCES`] a path survives by its
+//! throughput (Russian roulette), and after [`SPECULAR_BOUNCES`] it is black.
 //!
 //! Absorption follows the Beer-Lambert law, with the coefficient of the glass entered last; nested glass is
 //! not tracked. Flat glass changes neither direction nor medium.
@@ -30,7 +31,8 @@ pub struct SpecularPath {
     pub ray: Ray,
     /// Throughput between the path's origin and the present ray, without unit.
     pub throughput: Vec3,
-    /// Light of punctual lights that the narrow lobes passed reflect towards the origin, W/(sr m^2): no ray meets such a light.
+    /// Light of punctual lights that the narrow lobes passed reflect towards the origin, W/(sr m^2): no ray
+    /// meets such a light.
     pub collected: Vec3,
     /// Number of specular surfaces passed.
     pub bounces: u32,
@@ -48,8 +50,8 @@ pub struct SpecularPath {
     absorption: Vec3,
 }
 
-/// Quantity that a path transports. Refraction scales radiance by the square of the relative index of refraction (Veach 1997,
-/// section 5.2), and leaves power unchanged.
+/// Quantity that a path transports. Refraction scales radiance by the square of the relative index of
+/// refraction (Veach 1997, section 5.2), and leaves power unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Carried {
     /// Radiance: the path is followed from the eye, against the light.
@@ -65,8 +67,8 @@ pub enum Passes {
     Specular,
     /// Narrow lobes besides: for gather rays and photons ([`crate::scene::Reflection::has_narrow_lobe`]).
     NarrowLobes,
-    /// Narrow lobes besides, and an end at those that the caustic map lights ([`crate::scene::Reflection::keeps_caustics`]): for its
-    /// photons.
+    /// Narrow lobes besides, and an end at those that the caustic map lights
+    /// ([`crate::scene::Reflection::keeps_caustics`]): for its photons.
     CausticPhotons,
 }
 
@@ -123,8 +125,8 @@ impl SpecularPath {
         self.passes != Passes::Specular && surface.reflection.has_narrow_lobe()
     }
 
-    /// Arrives at a surface. Of `random`, in [0, 1), the first chooses the continuation, the others a direction. Where the path
-    /// ends the surface loses a lobe that the path passes.
+    /// Arrives at a surface. Of `random`, in [0, 1), the first chooses the continuation, the others a
+    /// direction. Where the path ends the surface loses a lobe that the path passes.
     #[inline(always)]
     pub fn arrive(&mut self, surface: &mut Surface, random: [f32; 3]) -> Arrival {
         if !self.may_pass(surface) && self.absorption == Vec3::ZERO {
@@ -204,7 +206,8 @@ impl SpecularPath {
         Arrival::GoesOn
     }
 
-    /// Russian roulette of a path with many bounces: it survives with the probability of its throughput, over which that is divided.
+    /// Russian roulette of a path with many bounces: it survives with the probability of its throughput, over
+    /// which that is divided.
     fn survives(&mut self, random: &dyn Fn(u32) -> f32) -> bool {
         if self.bounces <= FREE_BOUNCES {
             return true;
@@ -217,8 +220,8 @@ impl SpecularPath {
         survives
     }
 
-    /// Follows the path from a surface that it may pass to its end, which replaces `surface` and `hit`. `random` gives a number in
-    /// [0, 1) for each choice, of which no two at any surface have one number.
+    /// Follows the path from a surface that it may pass to its end, which replaces `surface` and `hit`.
+    /// `random` gives a number in [0, 1) for each choice, of which no two at any surface have one number.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -284,8 +287,8 @@ pub fn surface_choice(bounces: u32, choice: u32) -> u32 {
     Choice(Choice::LAYER.0 + choice).number(bounces)
 }
 
-/// Light of one sampled light, if it has no extent, that the narrow lobe of a surface reflects, W/(sr m^2). Lights with extent are met
-/// by the path itself.
+/// Light of one sampled light, if it has no extent, that the narrow lobe of a surface reflects, W/(sr m^2).
+/// Lights with extent are met by the path itself.
 #[inline(never)]
 fn punctual_light<M: MemoryPort>(
     context: &mut Context<M>,

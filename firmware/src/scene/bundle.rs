@@ -1,9 +1,9 @@
-//! Bundles of rays: up to sixteen go through the hierarchy together, so that a line comes once for all rays that meet it (compare
-//! Barringer, Akenine-Möller 2014, *Dynamic ray stream traversal*). Each of them requests it, so that requests are those of work, as of rays alone;
-//! all but the first find it in any cache.
+//! Bundles of rays: up to sixteen go through the hierarchy together, so that a line comes once for all rays
+//! that meet it (compare Barringer, Akenine-Möller 2014, *Dynamic ray stream traversal*). Each of them
+//! requests it, so that requests are those of work, as of rays alone; all but the first find it in any cache.
 //!
-//! Each ray is tested against each box and triangle by the operations of a ray alone ([`super::bvh`]): the hits are equal bit for bit,
-//! whatever the rays beside it.
+//! Each ray is tested against each box and triangle by the operations of a ray alone ([`super::bvh`]): the
+//! hits are equal bit for bit, whatever the rays beside it.
 
 use core::ops::ControlFlow;
 
@@ -23,11 +23,12 @@ use crate::wide_tree::{BEYOND, Descent, Order};
 /// Maximum number of rays of a bundle.
 pub const BUNDLE_RAYS: usize = LANES;
 
-/// A bit for each ray of a bundle: the lower half of the bits that are pushed with a child. The upper half is that of the least of
-/// the rays' distances, rounded down.
+/// A bit for each ray of a bundle: the lower half of the bits that are pushed with a child. The upper half is
+/// that of the least of the rays' distances, rounded down.
 const RAYS: u32 = (1 << BUNDLE_RAYS) - 1;
 
-/// [`closest_hit`] of each of up to [`BUNDLE_RAYS`] rays, put into `hits`, which are `None`: in place, as they are a kilobyte.
+/// [`closest_hit`] of each of up to [`BUNDLE_RAYS`] rays, put into `hits`, which are `None`: in place, as
+/// they are a kilobyte.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -170,7 +171,8 @@ impl<'a, S: Search> Rays<'a, S> {
         }
     }
 
-    /// The bits to push with each child of a node: the rays of `here` that enter its box, and the least distance at which one does.
+    /// The bits to push with each child of a node: the rays of `here` that enter its box, and the least
+    /// distance at which one does.
     #[inline(always)]
     fn enter(&self, isa: impl Isa, node: BvhNode, mut here: u32) -> [u32; LANES] {
         let children = WideNode(node.0).children() as usize;

@@ -1,5 +1,5 @@
-//! The ray caster: traversal of a bounding volume hierarchy with nodes of sixteen children and leaves of up to eight triangles, one
-//! line each.
+//! The ray caster: traversal of a bounding volume hierarchy with nodes of sixteen children and leaves of up
+//! to eight triangles, one line each.
 
 use core::ops::ControlFlow;
 
@@ -92,8 +92,8 @@ pub(super) trait Search {
     /// `true` for a search that goes on behind flat glass.
     const PASSES_FLAT_GLASS: bool;
 
-    /// Takes a hit of the triangle of an index, in a slot of its leaf. The next hits may be up to the returned distance away; after
-    /// [`ControlFlow::Break`] none is needed.
+    /// Takes a hit of the triangle of an index, in a slot of its leaf. The next hits may be up to the
+    /// returned distance away; after [`ControlFlow::Break`] none is needed.
     fn meet(&mut self, hit: Intersection, index: u32, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
 
     /// Passes flat glass of a transmittance.

@@ -43,8 +43,8 @@ impl Corners {
         self.attributes.normals.map(|normals| unit(self.interpolated(normals)))
     }
 
-    /// Tangent, bitangent and normal on the front, interpolated and not normalised, as bakers of normal maps take them.
-    /// `front_normal` is that of a flat triangle. The material must have a normal map.
+    /// Tangent, bitangent and normal on the front, interpolated and not normalised, as bakers of normal maps
+    /// take them. `front_normal` is that of a flat triangle. The material must have a normal map.
     pub(super) fn frame(
         &self,
         scene: &SceneImage,

@@ -1,5 +1,5 @@
-//! Coverage: cut-outs (glTF's `alphaMode` `MASK`), points of a triangle whose alpha is below the material's cutoff, and partial
-//! coverage (`BLEND`), of which a ray sees the surface with the probability alpha.
+//! Coverage: cut-outs (glTF's `alphaMode` `MASK`), points of a triangle whose alpha is below the material's
+//! cutoff, and partial coverage (`BLEND`), of which a ray sees the surface with the probability alpha.
 
 use glam::Vec3;
 use photoncard_shared::layout::{BLENDS, DOUBLE_SIDED, Material, Reflectance, Triangle};
@@ -11,9 +11,9 @@ use super::{Ray, SceneImage};
 use crate::memory::MemoryPort;
 use crate::sampler::{hash, unit_interval};
 
-/// `true` if a ray meets a triangle at a point, with barycentric `weights`, that its cut-outs or its coverage leave. The choice depends
-/// on the ray and the triangle alone: shadow rays, gather rays and photons agree on the mean. The back of a one-sided surface of
-/// partial coverage is not there.
+/// `true` if a ray meets a triangle at a point, with barycentric `weights`, that its cut-outs or its coverage
+/// leave. The choice depends on the ray and the triangle alone: shadow rays, gather rays and photons agree on
+/// the mean. The back of a one-sided surface of partial coverage is not there.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -40,7 +40,8 @@ fn is_back(ray: &Ray, triangle: &Triangle) -> bool {
     (b - a).cross(c - a).dot(ray.direction) > 0.0
 }
 
-/// Covered share at a point of triangle `index`, of a material, with barycentric `weights`: 0 or 1 with cut-outs, alpha with partial coverage.
+/// Covered share at a point of triangle `index`, of a material, with barycentric `weights`: 0 or 1 with
+/// cut-outs, alpha with partial coverage.
 ///
 /// # Errors
 /// If the image is not sound.

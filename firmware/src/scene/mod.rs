@@ -83,7 +83,8 @@ impl SceneImage {
         read_slot(memory, kind.structure(), line, slot, first..first + N as u32).ok_or(fault)?
     }
 
-    /// Reads line `index` of a section with records of one line each. The bytes in `used` are counted as requested.
+    /// Reads line `index` of a section with records of one line each. The bytes in `used` are counted as
+    /// requested.
     ///
     /// # Errors
     /// As [`Self::record`].
@@ -126,8 +127,8 @@ fn read_slot<const N: usize>(
 
 /// A point just off a surface, on the side of `normal`, from which a ray does not meet the surface again.
 ///
-/// A computed point deviates from the triangle's plane by a few units in the last place of `magnitude`, the greatest coordinate of
-/// the corners and of the ray's origin. The offset is 32 such units.
+/// A computed point deviates from the triangle's plane by a few units in the last place of `magnitude`, the
+/// greatest coordinate of the corners and of the ray's origin. The offset is 32 such units.
 #[inline(always)]
 pub fn offset_origin(position: Vec3, normal: Vec3, magnitude: f32) -> Vec3 {
     position + normal * (magnitude * (32.0 * f32::EPSILON) + f32::MIN_POSITIVE)

@@ -10,8 +10,8 @@ use super::materials::read_layers;
 use crate::memory::MemoryPort;
 use crate::vector::unit;
 
-/// Unit normal of a material's base on the front: by its normal map, or interpolated; `None` for the triangle's own.
-/// `front_normal` is the triangle's.
+/// Unit normal of a material's base on the front: by its normal map, or interpolated; `None` for the
+/// triangle's own. `front_normal` is the triangle's.
 #[inline(always)]
 pub(super) fn base_normal(
     scene: &SceneImage,
@@ -28,7 +28,8 @@ pub(super) fn base_normal(
     mapped_normal(scene, memory, map, corners, front_normal)
 }
 
-/// Unit normal on the front by a normal texture and the scale of its x and y; interpolated for [`NO_TEXTURE`].
+/// Unit normal on the front by a normal texture and the scale of its x and y; interpolated for
+/// [`NO_TEXTURE`].
 #[inline(never)]
 pub(super) fn mapped_normal(
     scene: &SceneImage,

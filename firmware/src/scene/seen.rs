@@ -34,7 +34,8 @@ impl Seen {
         Self { triangle: hit.index, weights: [v, w] }
     }
 
-    /// Reads the surface on the side of the ray's origin into `surface`, of several layers the base. Its `distance` is 0.
+    /// Reads the surface on the side of the ray's origin into `surface`, of several layers the base. Its
+    /// `distance` is 0.
     ///
     /// # Errors
     /// If the image is not sound.

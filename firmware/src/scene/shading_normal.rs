@@ -1,5 +1,5 @@
-//! Shading normals, interpolated or mapped, made to agree with the triangle: without it, surfaces are black where the normal turns
-//! away from the viewer, or mirrors the view into the surface.
+//! Shading normals, interpolated or mapped, made to agree with the triangle: without it, surfaces are black
+//! where the normal turns away from the viewer, or mirrors the view into the surface.
 
 use glam::Vec3;
 
@@ -25,8 +25,8 @@ pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Ve
     if turned.dot(geometric_normal) > 0.0 { turned } else { geometric_normal }
 }
 
-/// A shading normal of a surface whose albedo is by this share that of a lobe around the mirror direction: [`bent`] by the share, as
-/// the Lambertian rest reflects by the normal itself.
+/// A shading normal of a surface whose albedo is by this share that of a lobe around the mirror direction:
+/// [`bent`] by the share, as the Lambertian rest reflects by the normal itself.
 #[inline(always)]
 pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     if share <= 0.0 || normal == geometric_normal {
@@ -36,11 +36,12 @@ pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_
     if bent == normal { normal } else { unit(normal + (bent - normal) * min(share, 1.0)) }
 }
 
-/// A unit shading normal, bent towards the triangle's until the mirror direction of `outgoing`, which lies above the triangle, does
-/// so as well: its cosine is at least 0.01, and at grazing views 0.9 of that of `outgoing`.
+/// A unit shading normal, bent towards the triangle's until the mirror direction of `outgoing`, which lies
+/// above the triangle, does so as well: its cosine is at least 0.01, and at grazing views 0.9 of that of
+/// `outgoing`.
 ///
-/// In the plane of the two normals, at the angle `a` from the triangle's, `outgoing` has the projection `r (sin b, cos b)`, and its
-/// mirror direction the cosine `r cos(2 a - b)`.
+/// In the plane of the two normals, at the angle `a` from the triangle's, `outgoing` has the projection `r
+/// (sin b, cos b)`, and its mirror direction the cosine `r cos(2 a - b)`.
 pub(super) fn bent(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     let height = geometric_normal.dot(outgoing);
     let least = min(0.9 * height, MIN_COSINE);

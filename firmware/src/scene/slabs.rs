@@ -3,9 +3,9 @@
 //! A side of a box is at `corner + unit * side`, `side` a byte. The distance to its plane is
 //! `(corner - origin) / d + side * (unit / d)`; the first term and `unit / d` are common to a node's boxes.
 //!
-//! The test is conservative under rounding (compare Ize 2013, *Robust BVH ray traversal*): the first term is decreased for near planes
-//! and increased for far ones by more than its rounding error and the triangle test's; boxes are enlarged by more than the rounding
-//! error of the second term and the sum.
+//! The test is conservative under rounding (compare Ize 2013, *Robust BVH ray traversal*): the first term is
+//! decreased for near planes and increased for far ones by more than its rounding error and the triangle
+//! test's; boxes are enlarged by more than the rounding error of the second term and the sum.
 
 use photoncard_shared::layout::{BvhAxis, BvhNode, NODE_CHILDREN};
 
@@ -31,7 +31,8 @@ struct SlabAxis {
 /// Relative margin for rounding errors.
 const MARGIN: f32 = 8.0 * f32::EPSILON;
 
-/// Minimum magnitude of a direction's component: smaller ones, whose reciprocals overflow, are replaced by it.
+/// Minimum magnitude of a direction's component: smaller ones, whose reciprocals overflow, are replaced by
+/// it.
 const MIN_COMPONENT: f32 = 1e-20;
 
 impl Slabs {
@@ -78,7 +79,8 @@ impl SlabAxis {
     }
 }
 
-/// Planes of a node's boxes on one axis: distance along the ray is `first + side * unit` or `last + side * unit`.
+/// Planes of a node's boxes on one axis: distance along the ray is `first + side * unit` or `last + side *
+/// unit`.
 struct Planes<'a> {
     near: &'a [u8; NODE_CHILDREN],
     far: &'a [u8; NODE_CHILDREN],

@@ -60,7 +60,8 @@ impl Specular {
         self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
     }
 
-    /// Mirror direction of `outgoing` about the shading normal, bent where that direction would be below the surface.
+    /// Mirror direction of `outgoing` about the shading normal, bent where that direction would be below the
+    /// surface.
     pub(crate) fn reflected_direction(outgoing: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
         let direction = mirror(outgoing, bent(normal, outgoing, geometric_normal));
         // Rounding, at grazing views.
@@ -108,8 +109,8 @@ pub(super) struct Glass {
 }
 
 impl Glass {
-    /// Share of light that is scattered instead of transmitted, and specular part. Normals are on the side of `outgoing`, the inside of the solid if
-    /// `is_inside`.
+    /// Share of light that is scattered instead of transmitted, and specular part. Normals are on the side of
+    /// `outgoing`, the inside of the solid if `is_inside`.
     pub(super) fn at(
         &self,
         outgoing: Vec3,
@@ -175,8 +176,8 @@ impl Glass {
     }
 }
 
-/// Fresnel reflectance of unpolarised light at a dielectric, and cosine of the refracted direction; 1 and 0 under total internal
-/// reflection. `index` is the ratio of the indices of refraction, behind over in front.
+/// Fresnel reflectance of unpolarised light at a dielectric, and cosine of the refracted direction; 1 and 0
+/// under total internal reflection. `index` is the ratio of the indices of refraction, behind over in front.
 fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
     let sine_squared = (1.0 - cosine * cosine) / (index * index);
     let cosine_squared = 1.0 - sine_squared;

@@ -1,4 +1,5 @@
-//! Surfaces: a triangle's material at the point where a ray meets it, textures applied, seen from the ray's side.
+//! Surfaces: a triangle's material at the point where a ray meets it, textures applied, seen from the ray's
+//! side.
 
 use glam::Vec3;
 use photoncard_shared::layout::{
@@ -31,7 +32,8 @@ pub struct Surface {
     pub geometric_normal: Vec3,
     /// Unit vector back along the ray.
     pub outgoing: Vec3,
-    /// The reflection of this side, without its perfectly specular part; black on the back of a one-sided surface.
+    /// The reflection of this side, without its perfectly specular part; black on the back of a one-sided
+    /// surface.
     pub reflection: Reflection,
     /// The perfectly specular part.
     pub specular: Specular,
@@ -41,11 +43,13 @@ pub struct Surface {
     pub emission: Vec3,
     /// Index of the emitter that the surface belongs to, if it is one.
     pub emitter: Option<u32>,
-    /// Probability with which the surface's layer was taken, 1 for a surface of one layer: reflection and emission are over it.
+    /// Probability with which the surface's layer was taken, 1 for a surface of one layer: reflection and
+    /// emission are over it.
     pub probability: f32,
     /// Share of the surface that is there, 1 without partial coverage: rays meet it with this probability.
     pub coverage: f32,
-    /// `true` for the other side of a surface, seen through it. Photons are stored on the side where they arrive.
+    /// `true` for the other side of a surface, seen through it. Photons are stored on the side where they
+    /// arrive.
     pub is_behind: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
@@ -117,8 +121,8 @@ impl Surface {
         offset_origin(self.position, -self.geometric_normal, self.magnitude)
     }
 
-    /// `true` for a direction above both shading and geometric normal's horizon. Light from other directions is excluded, so that
-    /// smooth normals leak none.
+    /// `true` for a direction above both shading and geometric normal's horizon. Light from other directions
+    /// is excluded, so that smooth normals leak none.
     #[inline(always)]
     pub fn is_above(&self, direction: Vec3) -> bool {
         self.normal.dot(direction) > 0.0 && self.geometric_normal.dot(direction) > 0.0
@@ -133,8 +137,9 @@ impl Surface {
     }
 }
 
-/// Reads the surface where a ray meets a triangle into `surface`: in place, as a chip copies its 230 bytes one by one. `random` gives [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of its layers; the base is the
-/// layer of 0.
+/// Reads the surface where a ray meets a triangle into `surface`: in place, as a chip copies its 230 bytes
+/// one by one. `random` gives [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of its layers; the base
+/// is the layer of 0.
 ///
 /// # Errors
 /// If the triangle's material is not in the image.
@@ -244,9 +249,10 @@ fn finish(
 /// Minimum probability of each of two parts with normals of their own.
 const MIN_PART: f32 = 1.0 / 8.0;
 
-/// Gives a surface the shading normals of its parts, instead of the one of its corners or texture: the Lambertian part has that one, a
-/// lobe or a mirror the bent one. Of a narrow lobe and a Lambertian part whose normals differ, one is taken by a random number in
-/// [0, 1), over its probability. A wide lobe, for which photons are stored, shares a normal with the Lambertian part.
+/// Gives a surface the shading normals of its parts, instead of the one of its corners or texture: the
+/// Lambertian part has that one, a lobe or a mirror the bent one. Of a narrow lobe and a Lambertian part
+/// whose normals differ, one is taken by a random number in [0, 1), over its probability. A wide lobe, for
+/// which photons are stored, shares a normal with the Lambertian part.
 #[inline(never)]
 fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
     let Surface { normal, geometric_normal, outgoing, reflection, .. } = *surface;
@@ -260,7 +266,8 @@ fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
         return;
     }
     let bent = bent(turned, outgoing, geometric_normal);
-    // Not by the difference from `normal`, which rounding decides: a stored hit, read again, must give the same answer.
+    // Not by the difference from `normal`, which rounding decides: a stored hit, read again, must give the
+    // same answer.
     if bent == turned && !points_away(normal, outgoing) {
         return;
     }

@@ -1,8 +1,8 @@
 //! Ray against triangle, watertight: Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*.
 //!
-//! A ray that passes an edge shared by two triangles meets at least one of them. Coordinates are sheared so that the
-//! ray runs along +z; the signs of three edge functions decide. Where one is zero in `f32` it is computed again in
-//! `f64`, in which the products are exact.
+//! A ray that passes an edge shared by two triangles meets at least one of them. Coordinates are sheared so
+//! that the ray runs along +z; the signs of three edge functions decide. Where one is zero in `f32` it is
+//! computed again in `f64`, in which the products are exact.
 
 use glam::Vec3;
 use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, Triangle, VERTEX_LANES};
@@ -74,7 +74,8 @@ impl RayFrame {
         Self { axes, origin: on_axes(ray.origin), shear: [x / z, y / z, 1.0 / z] }
     }
 
-    /// Corner relative to the origin, sheared, from its coordinates on the permuted axes; and its depth before scaling.
+    /// Corner relative to the origin, sheared, from its coordinates on the permuted axes; and its depth
+    /// before scaling.
     #[inline(always)]
     fn shear(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
         let [origin_x, origin_y, origin_z] = self.origin;
@@ -183,7 +184,8 @@ pub(super) type Corners = [[u32; LEAF_TRIANGLES]; 3];
 
 /// Triangles of a leaf in a ray's frame.
 pub(super) struct ShearedLeaf<'a> {
-    /// Bit mask of the triangles that the ray's line may meet: a superset of the hits of [`RayFrame::intersect_slot`].
+    /// Bit mask of the triangles that the ray's line may meet: a superset of the hits of
+    /// [`RayFrame::intersect_slot`].
     pub(super) may_meet: u32,
     /// Vertices across the ray.
     across: [f32; LANES],

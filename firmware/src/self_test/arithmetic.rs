@@ -1,7 +1,7 @@
 //! Arithmetic that pictures depend on: its results are equal, bit for bit, on every processor.
 //!
-//! A host sends operands and computes the same. A chip whose results differ flushes denormal numbers to zero, rounds in another
-//! direction, or runs code in which a multiplication and an addition were fused.
+//! A host sends operands and computes the same. A chip whose results differ flushes denormal numbers to zero,
+//! rounds in another direction, or runs code in which a multiplication and an addition were fused.
 
 use photoncard_shared::message::{OPERAND_BYTES, RESULT_BYTES, RESULTS};
 
@@ -30,7 +30,8 @@ pub const EXPRESSIONS: [&str; RESULTS] = [
     "a < b, a = b, a > b",
 ];
 
-/// Bits of a result. All NaNs are one: which one an operation gives depends on the processor, and no pixel on it.
+/// Bits of a result. All NaNs are one: which one an operation gives depends on the processor, and no pixel on
+/// it.
 fn bits(value: f32) -> u32 {
     if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() }
 }

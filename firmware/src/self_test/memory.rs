@@ -10,10 +10,12 @@ use crate::memory::{CardMemory, outside};
 /// Lines written or read in one step: 8 KB.
 const STEP_LINES: u32 = 64;
 
-/// Lines after which a test reports its progress: 1 MB, so that a memory of more than 9 KB/s makes progress within 120 s.
+/// Lines after which a test reports its progress: 1 MB, so that a memory of more than 9 KB/s makes progress
+/// within 120 s.
 const REPORT_LINES: u32 = 8192;
 
-/// Value that a pattern gives the word of an index. It is not inlined: each loop over words would be compiled once for each pattern.
+/// Value that a pattern gives the word of an index. It is not inlined: each loop over words would be compiled
+/// once for each pattern.
 #[inline(never)]
 pub fn expected(pattern: MemoryPattern, index: u32) -> u32 {
     match pattern {
@@ -69,8 +71,8 @@ impl MemoryTester {
         Ok(Self { progress: MemoryTest { lines, pattern, written: 0, checked: 0, wrong } })
     }
 
-    /// Writes or reads the next lines. Returns the progress if it is to be reported: after each megabyte, and at the end of the
-    /// memory.
+    /// Writes or reads the next lines. Returns the progress if it is to be reported: after each megabyte, and
+    /// at the end of the memory.
     ///
     /// # Errors
     /// [`FaultCode::LineRange`] if the memory has fewer lines than it says.

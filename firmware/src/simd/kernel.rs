@@ -15,7 +15,8 @@ pub trait Isa: Copy {
     /// Mask of the lanes below a bound, lane 0 in the lowest bit.
     fn below(self, values: &[u32; LANES], bound: u32) -> u32;
 
-    /// Moves the lanes of a mask to the front of `packed`, in order. The other lanes of `packed` are meaningless.
+    /// Moves the lanes of a mask to the front of `packed`, in order. The other lanes of `packed` are
+    /// meaningless.
     fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]);
 
     /// [`Isa::pack`] for 64-bit lanes.
@@ -34,8 +35,8 @@ pub trait Kernel {
     /// Result of the kernel.
     type Output;
 
-    /// Runs the kernel. This method and all that it calls must be `#[inline(always)]`; otherwise they are compiled
-    /// without the instructions of `isa`.
+    /// Runs the kernel. This method and all that it calls must be `#[inline(always)]`; otherwise they are
+    /// compiled without the instructions of `isa`.
     fn run(self, isa: impl Isa) -> Self::Output;
 }
 

@@ -1,9 +1,10 @@
 //! Vector instructions on sixteen lanes, chosen at run time.
 //!
-//! A [`Kernel`] is written once, as loops over [`LANES`] lanes that all do the same. It is compiled for each [`Isa`]
-//! that the processor may have: the loops become vector instructions, and operations that compilers do not find in
-//! loops, to compare and to pack lanes, are methods of the `Isa`. Every lane rounds like a scalar and nothing is
-//! contracted, so that all give the same bits; [`Portable`] is the fallback for every processor.
+//! A [`Kernel`] is written once, as loops over [`LANES`] lanes that all do the same. It is compiled for each
+//! [`Isa`] that the processor may have: the loops become vector instructions, and operations that compilers
+//! do not find in loops, to compare and to pack lanes, are methods of the `Isa`. Every lane rounds like a
+//! scalar and nothing is contracted, so that all give the same bits; [`Portable`] is the fallback for every
+//! processor.
 
 mod kernel;
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]

@@ -86,7 +86,8 @@ const CACHE_LINE_BYTES: usize = 64;
 #[inline(always)]
 fn prefetch(line: &Line) {
     for part in line.0.chunks(CACHE_LINE_BYTES) {
-        // SAFETY: every processor of this kind has the instruction, which changes nothing that a program can see.
+        // SAFETY: every processor of this kind has the instruction, which changes nothing that a program can
+        // see.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(part.as_ptr().cast()) };
     }
 }
@@ -119,8 +120,8 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]) {
         let [lower, upper] = [mask as u8, (mask >> 8) as u8];
-        // SAFETY: the instructions are there, and sixteen numbers of eight bytes to read and to write: the second
-        // eight are written after at most eight of the first.
+        // SAFETY: the instructions are there, and sixteen numbers of eight bytes to read and to write: the
+        // second eight are written after at most eight of the first.
         unsafe {
             let first = _mm512_loadu_si512(values.as_ptr().cast());
             let second = _mm512_loadu_si512(values.as_ptr().add(8).cast());
@@ -134,7 +135,8 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES] {
         let mut permuted = [0.0; HALF_LANES];
-        // SAFETY: the instructions are there, sixteen numbers and eight indices to read, and eight numbers to write.
+        // SAFETY: the instructions are there, sixteen numbers and eight indices to read, and eight numbers to
+        // write.
         unsafe {
             let indices = _mm256_loadu_si256(indices.as_ptr().cast());
             let lower = _mm256_loadu_ps(values.as_ptr());
@@ -216,8 +218,8 @@ impl Isa for Avx2 {
         for half in values.as_chunks::<8>().0 {
             let lanes = mask as u8;
             mask >>= 8;
-            // SAFETY: the instructions are there, eight numbers to read, and as many to write: the second eight are written
-            // after at most eight of the first.
+            // SAFETY: the instructions are there, eight numbers to read, and as many to write: the second
+            // eight are written after at most eight of the first.
             unsafe {
                 let order = order(&LANES_OF[usize::from(lanes)]);
                 let values = _mm256_loadu_si256(half.as_ptr().cast());
@@ -234,8 +236,8 @@ impl Isa for Avx2 {
         for quarter in values.as_chunks::<4>().0 {
             let lanes = mask & 15;
             mask >>= 4;
-            // SAFETY: the instructions are there, four numbers to read, and as many to write: before the last four at most
-            // twelve are.
+            // SAFETY: the instructions are there, four numbers to read, and as many to write: before the last
+            // four at most twelve are.
             unsafe {
                 let order = order(&LONG_LANES_OF[lanes as usize]);
                 let values = _mm256_loadu_si256(quarter.as_ptr().cast());
@@ -248,7 +250,8 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES] {
         let mut permuted = [0.0; HALF_LANES];
-        // SAFETY: the instructions are there, sixteen numbers and eight indices to read, and eight numbers to write.
+        // SAFETY: the instructions are there, sixteen numbers and eight indices to read, and eight numbers to
+        // write.
         unsafe {
             let indices = _mm256_loadu_si256(indices.as_ptr().cast());
             let half = |first: *const f32| _mm256_permutevar8x32_ps(_mm256_loadu_ps(first), indices);

@@ -34,12 +34,12 @@ pub(crate) struct CardOptions {
     /// Model the memory of emulated chips, and report its reads in the statistics
     #[arg(long, hide_short_help = true)]
     counters: bool,
-    /// Caches of the modelled memory, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=... [default:
-    /// the sizes of the first card's kind, such as photon=128K/128/4,scene=75K/128/4]
+    /// Caches of the modelled memory, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=...
+    /// [default: the sizes of the first card's kind, such as photon=128K/128/4,scene=75K/128/4]
     #[arg(long, value_name = "CACHES", hide_short_help = true)]
     cache: Option<CacheSettings>,
-    /// Write every read of an emulated chip for a simulator of caches or of DRAM, compressed by gzip; a frame has billions: use
-    /// --crop
+    /// Write every read of an emulated chip for a simulator of caches or of DRAM, compressed by gzip; a frame
+    /// has billions: use --crop
     #[arg(long, value_name = "OUT.gz", value_parser = file(), hide_short_help = true)]
     pub(crate) trace: Option<PathBuf>,
     /// Reads and format of the trace
@@ -51,7 +51,8 @@ pub(crate) struct CardOptions {
         hide_short_help = true
     )]
     trace_format: TraceFormat,
-    /// Follow each read of a trace for Dinero by its structure, its stage and its number of bytes, which Dinero ignores
+    /// Follow each read of a trace for Dinero by its structure, its stage and its number of bytes, which
+    /// Dinero ignores
     #[arg(long, requires = "trace", hide_short_help = true)]
     trace_labels: bool,
 }

@@ -1,4 +1,5 @@
-//! Names of output files: the name's ending states the format, and `-` is standard output where text goes there.
+//! Names of output files: the name's ending states the format, and `-` is standard output where text goes
+//! there.
 
 use std::path::{Path, PathBuf};
 

@@ -20,8 +20,9 @@ const MAX_FRAME: u32 = 999_999;
 pub(crate) struct FrameOptions {
     /// Frames of the scene's animations: 1-240, several ranges 1-10,20, or every tenth frame 1-240x10
     ///
-    /// Frame N is the scene N / --fps seconds after the begin of its animations. Names of outputs have a run of #, which the frame's number
-    /// replaces: out.####.exr. The settings that --quality finds are those of the scene as it stands, for all frames.
+    /// Frame N is the scene N / --fps seconds after the begin of its animations. Names of outputs have a run
+    /// of #, which the frame's number replaces: out.####.exr. The settings that --quality finds are those of
+    /// the scene as it stands, for all frames.
     #[arg(long, value_name = "RANGES", value_parser = frames)]
     frames: Option<Frames>,
     /// Animation that plays, by its name; may be repeated [default: all of the file]
@@ -70,7 +71,8 @@ impl FrameOptions {
     }
 }
 
-/// Path of the file of the greatest number up to a frame's that a pattern with a run of `#` names; the pattern itself without one.
+/// Path of the file of the greatest number up to a frame's that a pattern with a run of `#` names; the
+/// pattern itself without one.
 pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     if numbered(pattern, frame).is_none() {
         return Some(pattern.to_owned());
@@ -87,7 +89,8 @@ pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     numbered(pattern, last)
 }
 
-/// Path of a frame's output: the last run of `#` in the file's name becomes the number, with zeros before it. `None` without a `#`.
+/// Path of a frame's output: the last run of `#` in the file's name becomes the number, with zeros before it.
+/// `None` without a `#`.
 pub(crate) fn numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     let name = pattern.file_name()?.to_str()?;
     let end = name.rfind('#')? + 1;

@@ -18,8 +18,8 @@ pub(crate) struct OutputOptions {
     /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated [default:
     /// SCENE's name with .png]
     ///
-    /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures. With --part the file is OUT.part, for
-    /// photoncard merge. - is a PNG on standard output.
+    /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures. With --part
+    /// the file is OUT.part, for photoncard merge. - is a PNG on standard output.
     #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", value_parser = picture())]
     pub(crate) pictures: Vec<PictureOutput>,
     /// Continue a render that was stopped or has failed
@@ -34,7 +34,8 @@ pub(crate) struct OutputOptions {
     pub(super) sample_type: Option<SampleFormat>,
     #[command(flatten)]
     pub(crate) tone: ToneOptions,
-    /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port: 14158]
+    /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port:
+    /// 14158]
     #[arg(long, value_name = "HOST:PORT", hide_short_help = true)]
     pub(super) display_server: Option<DisplayAddress>,
     /// Write statistics of the render as JSON; - for standard output

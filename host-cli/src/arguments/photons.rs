@@ -19,19 +19,21 @@ pub(crate) struct PhotonOptions {
     /// Photons that a gather searches for [default: by --quality]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     neighbors: Option<u32>,
-    /// Photons of the caustic map: light focused by mirrors, glass and glossy surfaces [default: by --quality, if the scene has any]
+    /// Photons of the caustic map: light focused by mirrors, glass and glossy surfaces [default: by
+    /// --quality, if the scene has any]
     ///
     /// With 0 gather rays carry this light, with more noise, and that of punctual lights is lost.
     #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true)]
     pub(super) caustic_photons: Option<usize>,
-    /// Photons that a gather of caustics searches for, at least 8: fewer are sharper, more are smoother [default: 50]
+    /// Photons that a gather of caustics searches for, at least 8: fewer are sharper, more are smoother
+    /// [default: 50]
     #[arg(long, value_name = "K", allow_negative_numbers = true, hide_short_help = true)]
     pub(super) caustic_neighbors: Option<u32>,
     /// Maximum distance of a gather in metres, or auto: by the density of the photons
     #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) max_distance: MaxDistance,
-    /// Estimate of the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe always uses
-    /// density
+    /// Estimate of the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe
+    /// always uses density
     #[arg(long, default_value = PhotonMaps::default().radiance.name(), value_parser = choice::<Radiance>(), hide_short_help = true)]
     pub(super) radiance: Radiance,
 }

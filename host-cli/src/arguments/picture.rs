@@ -60,7 +60,8 @@ pub(crate) struct PictureOptions {
     camera_at: Option<[f64; 3]>,
     /// Place in the middle of the picture, metres [default: in the camera's own direction]
     ///
-    /// The top of the picture is towards +y. Straight up and straight down the right is +x, so that the top is +z and -z.
+    /// The top of the picture is towards +y. Straight up and straight down the right is +x, so that the top
+    /// is +z and -z.
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     look_at: Option<[f64; 3]>,
     /// Vertical field of view [default: the camera's own]

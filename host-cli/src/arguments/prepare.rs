@@ -24,8 +24,9 @@ pub(crate) struct PrepareOptions {
     pub(crate) scene: SceneOptions,
     /// The file to write, for photoncard render --prepared
     ///
-    /// Frames in which nothing but cameras moves share a file. Where meshes or lights move, a frame that differs from the one before has a file of its
-    /// own: the name has a run of #, which the frame's number replaces.
+    /// Frames in which nothing but cameras moves share a file. Where meshes or lights move, a frame that
+    /// differs from the one before has a file of its own: the name has a run of #, which the frame's number
+    /// replaces.
     #[arg(short, long, value_name = "OUT.card", value_parser = file())]
     pub(crate) output: PathBuf,
     /// Quality of the pictures, by which the options that are not stated are chosen

@@ -40,8 +40,9 @@ pub(crate) const OF_PREPARATION: [&str; 29] = [
 pub(crate) struct PreparedOption {
     /// SCENE is a file that photoncard prepare has written: no glTF file is read, and no photon is traced
     ///
-    /// The scene, its photons, rays and samples are those that were stated to photoncard prepare. Options of the picture and of its camera are stated as
-    /// for a glTF file. Of frames that were prepared --frames states those to render, and SCENE has a run of # where there is a file for each.
+    /// The scene, its photons, rays and samples are those that were stated to photoncard prepare. Options of
+    /// the picture and of its camera are stated as for a glTF file. Of frames that were prepared --frames
+    /// states those to render, and SCENE has a run of # where there is a file for each.
     #[arg(long, help_heading = "Scene", conflicts_with_all = OF_PREPARATION)]
     pub(crate) prepared: bool,
 }

@@ -40,9 +40,10 @@ pub(crate) struct RenderOptions {
     pub(super) photons: PhotonOptions,
     /// Guide photons to the whole scene, or to what this camera uses
     ///
-    /// By the camera more photons are where the picture uses them: light through a window wastes fewer on the outside of a
-    /// house. The picture's expected value stays. With auto a pilot measures what that gains, unless all that it would
-    /// choose is stated. Pictures of several cameras, such as frames and prepared scenes, share photons for the scene.
+    /// By the camera more photons are where the picture uses them: light through a window wastes fewer on the
+    /// outside of a house. The picture's expected value stays. With auto a pilot measures what that gains,
+    /// unless all that it would choose is stated. Pictures of several cameras, such as frames and prepared
+    /// scenes, share photons for the scene.
     #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::Auto.name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
     photons_for: PhotonsFor,
     #[command(flatten)]
@@ -88,8 +89,8 @@ impl RenderOptions {
         self.integrator.planned_spp.is_some()
     }
 
-    /// Settings that a fit begins with: those of kept samples in place of `settings` where the options state none, if the render goes on
-    /// from any.
+    /// Settings that a fit begins with: those of kept samples in place of `settings` where the options state
+    /// none, if the render goes on from any.
     ///
     /// # Errors
     /// If the file of kept samples cannot be read.

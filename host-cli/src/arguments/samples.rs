@@ -10,21 +10,25 @@ use photoncard_driver::render::Aim;
 pub(crate) struct SampleOptions {
     /// Add samples until so much time has passed since the start: 90, 60s, 5m or 2h
     ///
-    /// Passes double the number of samples; the last one is as long as the time allows. With --noise, whichever comes first ends the render.
+    /// Passes double the number of samples; the last one is as long as the time allows. With --noise,
+    /// whichever comes first ends the render.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with_all = NOT_BY_PASSES)]
     time: Option<Duration>,
     /// Add samples until the estimated standard error of the pixels is below this share of the picture's mean
     ///
-    /// The estimate is the root mean square over all pixels, by the difference of passes. It is of the noise of samples alone: photons and rays
-    /// of irradiance records, where they are not stated, are as many as keep their errors small beside it.
+    /// The estimate is the root mean square over all pixels, by the difference of passes. It is of the noise
+    /// of samples alone: photons and rays of irradiance records, where they are not stated, are as many as
+    /// keep their errors small beside it.
     #[arg(long, value_name = "ERROR", value_parser = noise, allow_negative_numbers = true, conflicts_with_all = NOT_BY_PASSES)]
     noise: Option<f64>,
-    /// Keep the samples beside the finished picture, in OUT.exr.partial: --resume with a greater --spp adds to them
+    /// Keep the samples beside the finished picture, in OUT.exr.partial: --resume with a greater --spp adds
+    /// to them
     #[arg(long, hide_short_help = true, conflicts_with_all = ["time", "noise"])]
     pub(crate) keep_samples: bool,
 }
 
-/// Options that a picture by passes does not have: their number of samples, memory or tiles are of one render.
+/// Options that a picture by passes does not have: their number of samples, memory or tiles are of one
+/// render.
 const NOT_BY_PASSES: [&str; 6] = ["spp", "resume", "cache", "trace", "verify", "frames"];
 
 impl SampleOptions {

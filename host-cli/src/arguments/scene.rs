@@ -14,13 +14,15 @@ pub(crate) struct SceneOptions {
     pub(crate) path: PathBuf,
     /// Change a material, a light or the environment: NAME.PROPERTY=VALUE; may be repeated
     ///
-    /// Properties of a material are diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha and emission;
-    /// those of a point, spot or directional light are colour, intensity and position. environment.strength is a factor of the environment.
+    /// Properties of a material are diffuse, specular, exponent, metallic, roughness, transmission, ior,
+    /// thickness, alpha and emission; those of a point, spot or directional light are colour, intensity and
+    /// position. environment.strength is a factor of the environment.
     #[arg(long = "set", value_name = "ASSIGNMENT", help_heading = "Scene", hide_short_help = true)]
     pub(crate) assignments: Vec<String>,
     /// Add the light that rough metals and coats reflect several times between their microfacets
     ///
-    /// Blender does so by default; glTF's model leaves this light out, and a metal of roughness 1 is less than half as bright.
+    /// Blender does so by default; glTF's model leaves this light out, and a metal of roughness 1 is less
+    /// than half as bright.
     #[arg(long, help_heading = "Scene", hide_short_help = true)]
     pub(crate) energy_compensation: bool,
     /// Variant of the scene's materials, by its name [default: the materials that its meshes state]

@@ -11,8 +11,8 @@ use super::choice::choice;
 #[derive(Args)]
 #[command(next_help_heading = "Order of the work")]
 pub(crate) struct ScheduleOptions {
-    /// Side of a tile, pixels [default: the widest that all cards have room for, for several cards halved until each
-    /// has four tiles, down to 16]
+    /// Side of a tile, pixels [default: the widest that all cards have room for, for several cards halved
+    /// until each has four tiles, down to 16]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) tile: Option<u32>,
     /// Order of the photon gathers; it never changes the picture
@@ -32,9 +32,11 @@ pub(crate) struct ScheduleOptions {
 #[derive(Args)]
 #[command(next_help_heading = "Order of the work")]
 pub(crate) struct PartOptions {
-    /// Render the K-th of N parts of the picture alone, to -o OUT.part; photoncard merge makes the picture of all
+    /// Render the K-th of N parts of the picture alone, to -o OUT.part; photoncard merge makes the picture of
+    /// all
     ///
-    /// Parts cost about alike, and may be rendered by any machines and cards, in any order. The picture is, to the bit, that of one render.
+    /// Parts cost about alike, and may be rendered by any machines and cards, in any order. The picture is,
+    /// to the bit, that of one render.
     #[arg(long, value_name = "K/N", conflicts_with_all = ["time", "noise", "keep_samples"])]
     pub(crate) part: Option<Part>,
 }

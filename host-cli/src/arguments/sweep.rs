@@ -56,7 +56,8 @@ struct SweepSettings {
     /// Kind of the chips
     #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>(), help_heading = "Cards")]
     card: EmulatedKind,
-    /// Caches of the modelled memory, as of a render; several are varied [default: photon=128K/128/4,scene=75K/128/4]
+    /// Caches of the modelled memory, as of a render; several are varied [default:
+    /// photon=128K/128/4,scene=75K/128/4]
     #[arg(long = "cache", value_name = "CACHES", help_heading = "Cards")]
     caches: Vec<CacheSettings>,
 }

@@ -1,7 +1,8 @@
 //! `photoncard farm`: the job of a render, printed for a farm's engine.
 //!
-//! Each engine gets the same script ([`script`]), whose steps may be repeated at any time: a scene that is prepared again is compared with the one that is there,
-//! parts that are there are not rendered again, and a part that was begun is gone on with. The engines differ in who calls the steps.
+//! Each engine gets the same script ([`script`]), whose steps may be repeated at any time: a scene that is
+//! prepared again is compared with the one that is there, parts that are there are not rendered again, and a
+//! part that was begun is gone on with. The engines differ in who calls the steps.
 
 mod flamenco;
 mod job;

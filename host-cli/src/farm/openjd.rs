@@ -33,7 +33,8 @@ fn name(job: &Job) -> String {
     format!("photoncard {name}")
 }
 
-/// Step that renders all tasks. A chunk of frames is rendered by one process, one of parts by one after another.
+/// Step that renders all tasks. A chunk of frames is rendered by one process, one of parts by one after
+/// another.
 fn render(job: &Job) -> Value {
     let chunks = json!({"defaultTaskCount": 1, "rangeConstraint": "CONTIGUOUS"});
     let parts = format!("1-{}", job.parts);

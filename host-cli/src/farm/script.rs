@@ -3,8 +3,8 @@
 use super::job::{Frames, Job};
 use crate::shell::quoted;
 
-/// Functions `prepare`, `part` and `merge`, and `task`, which renders the task of a number from 0 on. `extra` are further options of renders. The script that
-/// has them begins in the job's home.
+/// Functions `prepare`, `part` and `merge`, and `task`, which renders the task of a number from 0 on. `extra`
+/// are further options of renders. The script that has them begins in the job's home.
 pub(super) fn functions(job: &Job, extra: &str) -> String {
     let parts = job.parts;
     let (folder, prepare) = (word(&job.folder), prepare(job, extra));
@@ -32,7 +32,8 @@ fn words(words: &[String]) -> String {
     words.iter().map(|each| format!(" {}", word(each))).collect()
 }
 
-/// A word in the quotes of a shell. No two braces follow each other: they enclose expressions of Open Job Description.
+/// A word in the quotes of a shell. No two braces follow each other: they enclose expressions of Open Job
+/// Description.
 fn word(word: &str) -> String {
     quoted(word).replace('{', "{''").replace('}', "}''")
 }

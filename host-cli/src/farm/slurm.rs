@@ -5,7 +5,8 @@ use super::parallel::comment;
 use super::script::functions;
 use crate::shell::quoted;
 
-/// Maximum number of tasks in an array: one less than Slurm's own limit if its administrator has set no other.
+/// Maximum number of tasks in an array: one less than Slurm's own limit if its administrator has set no
+/// other.
 const MAX_ARRAY: u64 = 1000;
 
 /// The script of a job.

@@ -1,4 +1,5 @@
-//! Progress and failure as Open Job Description reads them from standard output: `openjd_progress: PERCENT`, `openjd_fail: MESSAGE`.
+//! Progress and failure as Open Job Description reads them from standard output: `openjd_progress: PERCENT`,
+//! `openjd_fail: MESSAGE`.
 
 use std::sync::Mutex;
 use std::sync::PoisonError;

@@ -4,10 +4,11 @@ use std::collections::VecDeque;
 
 /// Estimate of the remaining time of pieces of work that `workers` do in parallel.
 ///
-/// A worker does a piece after another, so that the last completion times of all workers add up to the time that the finished
-/// pieces took. With `n` finished pieces, the mean `t` of the last `min(n, workers)` completion times and `N` pieces in all, the work
-/// ends at about `t N / max(n, workers)`. Between completions the time counts down, until a piece that takes longer than the mean
-/// is overdue. Pieces finished before the start count as done, and not as speed.
+/// A worker does a piece after another, so that the last completion times of all workers add up to the time
+/// that the finished pieces took. With `n` finished pieces, the mean `t` of the last `min(n, workers)`
+/// completion times and `N` pieces in all, the work ends at about `t N / max(n, workers)`. Between
+/// completions the time counts down, until a piece that takes longer than the mean is overdue. Pieces
+/// finished before the start count as done, and not as speed.
 pub(crate) struct Remaining {
     workers: usize,
     /// Pieces finished before the start.
@@ -70,8 +71,9 @@ mod tests {
 
     use super::*;
 
-    /// Estimates of a render whose tiles take `costs` seconds, done in their order by `workers`: at each time the estimate, and the
-    /// time that is left in truth, at all completions and at ten times between each two.
+    /// Estimates of a render whose tiles take `costs` seconds, done in their order by `workers`: at each time
+    /// the estimate, and the time that is left in truth, at all completions and at ten times between each
+    /// two.
     fn estimates(costs: &[f64], workers: usize, before: u64) -> Vec<(f64, Option<f64>, f64)> {
         let mut free = vec![0.0_f64; workers];
         let mut ends: Vec<f64> = Vec::new();
@@ -103,8 +105,9 @@ mod tests {
         (0..count).map(|index| low + (high - low) * (0.618_034 * (index + 1) as f64).fract()).collect()
     }
 
-    /// Checks that the estimate is right within a share of the remaining time once a fifth of the time is over, except for the
-    /// last `tail` seconds, and that it never jumps by more than that share from one report to the next.
+    /// Checks that the estimate is right within a share of the remaining time once a fifth of the time is
+    /// over, except for the last `tail` seconds, and that it never jumps by more than that share from one
+    /// report to the next.
     fn check_steady(estimates: &[(f64, Option<f64>, f64)], share: f64, tail: f64) {
         let end = estimates[0].2;
         let mut previous: Option<(f64, f64)> = None;
@@ -155,7 +158,8 @@ mod tests {
         }
     }
 
-    /// A fourth of the picture costs ten times as much as the rest; its tiles come spread, as a render deals them.
+    /// A fourth of the picture costs ten times as much as the rest; its tiles come spread, as a render deals
+    /// them.
     #[test]
     fn a_heavy_region_is_right_within_a_third_after_a_fifth() {
         for first_heavy in [0, 8, 20, 24] {

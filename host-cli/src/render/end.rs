@@ -50,7 +50,8 @@ fn percent(share: f64) -> String {
     format!("{} %", digits.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// Options that render the picture of `statistics` at once, beside those of the command but its aim; `is_fitted` if a pilot has found some.
+/// Options that render the picture of `statistics` at once, beside those of the command but its aim;
+/// `is_fitted` if a pilot has found some.
 pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
     let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
     let are_needed = [

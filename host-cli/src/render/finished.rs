@@ -11,7 +11,8 @@ use serde_json::Value;
 use super::messages;
 use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 
-/// Settings in a picture that follow from the others: a render finds them when it traces photons and places the camera.
+/// Settings in a picture that follow from the others: a render finds them when it traces photons and places
+/// the camera.
 const FOUND: [&str; 2] = ["max-distance", "view"];
 
 /// Returns whether all files of a frame are there, so that it may be finished.

@@ -138,7 +138,8 @@ impl<'a> Sequence<'a> {
         Ok(())
     }
 
-    /// The picture of the scene. Its settings are chosen with the first one, by the scene as it stands, whichever frame that is.
+    /// The picture of the scene. Its settings are chosen with the first one, by the scene as it stands,
+    /// whichever frame that is.
     fn picture(&mut self, settings: &mut RenderSettings) -> Result<(Rendering, Option<Fit>), RenderError> {
         let Self { options, moments, rest, renderer, progress, .. } = self;
         let scene = moments.scene();

@@ -86,7 +86,8 @@ pub(super) fn by_quality(quality: Quality) -> String {
     format!("quality {}", quality.name())
 }
 
-/// Settings of a render that are found for a scene or kept; `are_planned` if passes decide the number of samples.
+/// Settings of a render that are found for a scene or kept; `are_planned` if passes decide the number of
+/// samples.
 pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     let RenderSettings { photons, integrator, .. } = settings;
     let (interpolated, of) = match integrator.irradiance_error {

@@ -70,8 +70,8 @@ fn with_part(head: &PartHead, part: Part) -> Vec<String> {
     words
 }
 
-/// Path of another part: the last number of the name that is the part's is replaced, with the zeros before it; without one the number
-/// goes before the ending.
+/// Path of another part: the last number of the name that is the part's is replaced, with the zeros before
+/// it; without one the number goes before the ending.
 fn name_of(path: &Path, part: Part, other: Part) -> PathBuf {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut pieces: Vec<String> = Vec::new();

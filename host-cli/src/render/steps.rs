@@ -77,7 +77,8 @@ pub(super) fn finish(
     Ok(())
 }
 
-/// Photons and integrator of the options, with what the quality has found for this scene where nothing is stated or kept.
+/// Photons and integrator of the options, with what the quality has found for this scene where nothing is
+/// stated or kept.
 pub(super) fn chosen(
     options: &RenderOptions,
     unfitted: Unfitted,

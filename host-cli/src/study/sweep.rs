@@ -48,7 +48,8 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     Ok(SweepOptions { sweep, name, scene, out, threads, machine, provenance })
 }
 
-/// Point of the arguments with values replaced. The picture has the camera's aspect ratio, if no size is given.
+/// Point of the arguments with values replaced. The picture has the camera's aspect ratio, if no size is
+/// given.
 fn point(
     arguments: &SweepArguments,
     values: &[Value],

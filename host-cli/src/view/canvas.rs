@@ -1,7 +1,8 @@
-//! The tiles that pages are shown: those of the newest wish that has any, numbered in the order in which they were finished.
+//! The tiles that pages are shown: those of the newest wish that has any, numbered in the order in which they
+//! were finished.
 //!
-//! A page needs to remember one number alone, that of the next tile: tiles that are outdated are gone when it asks. So a slow page gets
-//! fewer and newer tiles, and takes no memory.
+//! A page needs to remember one number alone, that of the next tile: tiles that are outdated are gone when it
+//! asks. So a slow page gets fewer and newer tiles, and takes no memory.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;

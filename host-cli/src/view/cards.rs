@@ -75,7 +75,8 @@ impl CardBoard {
         }
     }
 
-    /// A lost card elsewhere that is to be tried now, with its number; each is tried after a pause that doubles.
+    /// A lost card elsewhere that is to be tried now, with its number; each is tried after a pause that
+    /// doubles.
     pub(super) fn next_to_try(&mut self, now: Duration) -> Option<(usize, CardAddress)> {
         let is_due =
             |card: &Card| card.standing == Standing::Lost && card.address.is_some() && card.try_at <= now;

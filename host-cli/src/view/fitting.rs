@@ -1,4 +1,5 @@
-//! Pilot renders, by which a quality finds its settings: on a thread beside the painter, so that a new wish need not wait for them.
+//! Pilot renders, by which a quality finds its settings: on a thread beside the painter, so that a new wish
+//! need not wait for them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

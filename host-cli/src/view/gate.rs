@@ -1,8 +1,8 @@
 //! Who may have what: checks of a request's address, its origin and its token.
 //!
-//! A page of another site must not reach the view. A browser states in `Host` which name it has looked up, so that a foreign name that
-//! leads here is refused (DNS rebinding); in `Origin` it states whose script asks for a connection; and only who has seen the printed
-//! address knows the token.
+//! A page of another site must not reach the view. A browser states in `Host` which name it has looked up, so
+//! that a foreign name that leads here is refused (DNS rebinding); in `Origin` it states whose script asks
+//! for a connection; and only who has seen the printed address knows the token.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
@@ -83,8 +83,8 @@ impl Gate {
         .ok_or(Refusal::new(404, "Not Found", "there is nothing at this address"))
     }
 
-    /// Returns whether a name of a host is one of this server's: the address that it listens at, `localhost` on this machine, or
-    /// any address, but no name, if it listens at all of them.
+    /// Returns whether a name of a host is one of this server's: the address that it listens at, `localhost`
+    /// on this machine, or any address, but no name, if it listens at all of them.
     fn is_own(&self, host: &str) -> bool {
         let Self { address, .. } = self;
         let name = match host.strip_suffix(&format!(":{}", address.port())) {

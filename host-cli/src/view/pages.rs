@@ -35,7 +35,8 @@ pub(super) struct Revisions {
 pub(super) struct Page {
     replies: VecDeque<String>,
     seen: Revisions,
-    /// Number of the wish of the last state that was sent: a page must know a picture's size before its tiles.
+    /// Number of the wish of the last state that was sent: a page must know a picture's size before its
+    /// tiles.
     told: u32,
     shown: Shown,
     /// Number of the next tile.
@@ -83,8 +84,8 @@ impl Page {
         self.received = self.received.max(bytes.min(self.sent));
     }
 
-    /// Next message to send; `None` if there is nothing, or the page is behind. A state comes before the first tile of its wish, and the
-    /// settled one after the last tile.
+    /// Next message to send; `None` if there is nothing, or the page is behind. A state comes before the
+    /// first tile of its wish, and the settled one after the last tile.
     pub(super) fn take(
         &mut self,
         canvas: &Canvas,

@@ -85,7 +85,8 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Waits for what pilot renders find. Those that a new wish has interrupted go on, and are of the view in which they began.
+    /// Waits for what pilot renders find. Those that a new wish has interrupted go on, and are of the view in
+    /// which they began.
     fn fit(&mut self, task: &Task) -> Result<(), RenderError> {
         let begin = || Fitting::start(self.scene.clone(), self.quality, task.settings.clone(), self.threads);
         let fitting = match self.fitting.take() {

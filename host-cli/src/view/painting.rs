@@ -39,7 +39,8 @@ impl View {
         self.refinement.prepares(is_preparing, now);
     }
 
-    /// Takes a tile of the running work, which `card` has rendered, with the lines that it has read from DRAM.
+    /// Takes a tile of the running work, which `card` has rendered, with the lines that it has read from
+    /// DRAM.
     pub(super) fn put(&mut self, origin: Origin, card: &str, dram_lines: Option<u64>, tile: &FinishedTile) {
         let (number, is_new) = self.cards.rendered(card);
         if is_new {
@@ -81,8 +82,8 @@ impl View {
         self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
     }
 
-    /// Takes the end of work that is not possible. The newest wish goes back to the settings of the picture that settled last, if these are
-    /// others.
+    /// Takes the end of work that is not possible. The newest wish goes back to the settings of the picture
+    /// that settled last, if these are others.
     pub(super) fn refuse(&mut self, task: &Task, reason: &str, now: Duration) {
         self.tell_error(reason);
         self.finish(task, Outcome::Refused, None, now);

@@ -2,15 +2,17 @@
 
 use photoncard_driver::render::{Filter, Integrator, RenderSettings, Sampling};
 
-/// Number of pixels up to which a coarse picture gathers for each of them; beyond, interpolating irradiance is faster.
+/// Number of pixels up to which a coarse picture gathers for each of them; beyond, interpolating irradiance
+/// is faster.
 const FEW_PIXELS: u64 = 1 << 12;
 /// Gather rays of a pixel, and of an irradiance record.
 const RAYS: [u32; 2] = [6, 16];
 /// Relative error of interpolated irradiance.
 const IRRADIANCE_ERROR: f32 = 1.0;
 
-/// Settings of a coarse picture, a pixel for each square of `step` x `step`. The photon maps are those of the settled picture: none is
-/// traced anew. Few rays are best sent by the reflection alone, which takes no search of photons for a table of directions.
+/// Settings of a coarse picture, a pixel for each square of `step` x `step`. The photon maps are those of the
+/// settled picture: none is traced anew. Few rays are best sent by the reflection alone, which takes no
+/// search of photons for a table of directions.
 pub(super) fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
     settings.clone().with(|settings| {
         let picture = &mut settings.picture;

@@ -1,9 +1,9 @@
-//! Order of a view's pictures: from the coarsest one of a new camera to the picture of `photoncard render`. A state machine without
-//! thread, clock or picture.
+//! Order of a view's pictures: from the coarsest one of a new camera to the picture of `photoncard render`. A
+//! state machine without thread, clock or picture.
 //!
-//! The newest wish wins: it stops what is rendered for an older one. The first pass of a wish is spared if the one before it was
-//! stopped, so that there is always a picture, however fast wishes follow each other; and photons that serve the newest wish as well
-//! are traced to their end.
+//! The newest wish wins: it stops what is rendered for an older one. The first pass of a wish is spared if
+//! the one before it was stopped, so that there is always a picture, however fast wishes follow each other;
+//! and photons that serve the newest wish as well are traced to their end.
 
 use std::time::Duration;
 
@@ -17,7 +17,8 @@ const MAX_PAUSE: Duration = Duration::from_secs(8);
 
 /// Side of the squares of the first pass, pixels.
 pub(super) const COARSEST: u32 = 8;
-/// Time of the pass of every pixel up to which no other follows the first: their pictures would hardly be seen.
+/// Time of the pass of every pixel up to which no other follows the first: their pictures would hardly be
+/// seen.
 const SEEN: Duration = Duration::from_millis(800);
 /// Time of the pass of every pixel up to which that of every second is left out, which takes a quarter of it.
 const AWAITED: Duration = Duration::from_secs(4);
@@ -50,8 +51,8 @@ fn next_pass(pass: Pass, time: Duration, is_fitted: bool) -> Option<Pass> {
     }
 }
 
-/// Side of the squares after a pass of the side `step` that took `time`: a half, or 1 where the pass of every pixel is near, if it takes
-/// as long for each of them.
+/// Side of the squares after a pass of the side `step` that took `time`: a half, or 1 where the pass of every
+/// pixel is near, if it takes as long for each of them.
 fn next_step(step: u32, time: Duration) -> u32 {
     let limit = if step > FINE { SEEN } else { AWAITED };
     if time * (step * step) <= limit { 1 } else { step / 2 }
@@ -181,7 +182,8 @@ impl Refinement {
         work.pass != Pass::FIRST || self.may_stop_first
     }
 
-    /// Number of the wish whose work is running and need not stop: the newest one, or an older one that is spared.
+    /// Number of the wish whose work is running and need not stop: the newest one, or an older one that is
+    /// spared.
     pub(super) fn spares(&self) -> Option<u32> {
         self.running.filter(|_| !self.must_stop()).map(|work| work.version)
     }

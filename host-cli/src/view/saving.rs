@@ -1,4 +1,5 @@
-//! Pictures that pages save: plain names in one folder, and never in place of a file that the view has not written.
+//! Pictures that pages save: plain names in one folder, and never in place of a file that the view has not
+//! written.
 
 use std::collections::BTreeMap;
 use std::fs::{self, Metadata};
@@ -19,7 +20,8 @@ pub(super) struct Folder {
     saved: BTreeMap<String, Identity>,
 }
 
-/// Identity of a file with its content: a file that takes its place has another one, and so has one that others have written to.
+/// Identity of a file with its content: a file that takes its place has another one, and so has one that
+/// others have written to.
 #[derive(PartialEq)]
 struct Identity {
     length: u64,

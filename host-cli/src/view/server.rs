@@ -1,4 +1,5 @@
-//! The server of a page: its files, and its sockets. Each connection has a thread of its own, and there are few.
+//! The server of a page: its files, and its sockets. Each connection has a thread of its own, and there are
+//! few.
 //!
 //! A connection is a stranger until the gate lets it in. Strangers have places of their own, and the oldest
 //! makes room for a new one: neither do those that say nothing keep a page out, nor do pages keep out the

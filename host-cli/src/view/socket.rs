@@ -1,4 +1,5 @@
-//! A page's WebSocket: a thread that reads, and one that writes. Frames of either are written whole, under one lock.
+//! A page's WebSocket: a thread that reads, and one that writes. Frames of either are written whole, under
+//! one lock.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};

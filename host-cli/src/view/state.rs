@@ -1,4 +1,5 @@
-//! State of a view: wishes, their pictures, and pages. Without threads, clock or input and output, which are in [`super::hub`].
+//! State of a view: wishes, their pictures, and pages. Without threads, clock or input and output, which are
+//! in [`super::hub`].
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -268,7 +269,8 @@ impl View {
         Ok(())
     }
 
-    /// Drops what no page should see any more. A first pass that is spared is seen until the newest wish has a tile.
+    /// Drops what no page should see any more. A first pass that is spared is seen until the newest wish has
+    /// a tile.
     pub(super) fn begin_picture(&mut self) {
         match self.spared() {
             Some(version) => self.canvas.keep_version(version),

@@ -83,7 +83,8 @@ impl Wish {
         }
     }
 
-    /// Checks the settings against what emulated cards can hold; what others can is not known before they are greeted.
+    /// Checks the settings against what emulated cards can hold; what others can is not known before they are
+    /// greeted.
     ///
     /// # Errors
     /// The first setting that is not possible on a card.
@@ -131,8 +132,8 @@ pub(super) fn numbers<T: ToString>(values: &[T]) -> String {
 pub(super) struct Sketch(Scene);
 
 impl Sketch {
-    /// Sketch of a scene before assignments: a triangle of each material that any triangle has, and the brightest texel of
-    /// the environment.
+    /// Sketch of a scene before assignments: a triangle of each material that any triangle has, and the
+    /// brightest texel of the environment.
     pub(super) fn new(scene: &Scene) -> Self {
         let mut materials = BTreeSet::new();
         let triangles = scene.triangles.iter().filter(|triangle| materials.insert(triangle.material));

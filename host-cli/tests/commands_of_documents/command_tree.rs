@@ -44,7 +44,8 @@ impl CommandTree {
         having.map(|(command, _)| command.as_str()).collect()
     }
 
-    /// Defect of arguments that the program does not accept. With `--help` at their end it parses them and does no work.
+    /// Defect of arguments that the program does not accept. With `--help` at their end it parses them and
+    /// does no work.
     pub(crate) fn defect_of_arguments(&self, arguments: &[&str]) -> Option<String> {
         let outcome = self.room.run(&[arguments, &["--help"]].concat());
         let said = outcome.stderr.trim();

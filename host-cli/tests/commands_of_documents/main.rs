@@ -1,4 +1,5 @@
-//! Commands of the documents are those that the program has: README.md, docs/*.md, and the README.md of scenes and tests.
+//! Commands of the documents are those that the program has: README.md, docs/*.md, and the README.md of
+//! scenes and tests.
 //!
 //! Each fenced block of a document states by its info string what it is:
 //!
@@ -11,7 +12,8 @@
 //! | `text synopsis` | forms of commands with placeholders | commands and options exist |
 //! | another language | no commands | none |
 //!
-//! In inline code commands, options, those values that are no placeholders, and paths of the repository exist.
+//! In inline code commands, options, those values that are no placeholders, and paths of the repository
+//! exist.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -96,7 +96,8 @@ pub(crate) fn defects_of_inline_code(tree: &CommandTree, text: &str) -> Vec<Stri
     defects
 }
 
-/// Defects of options and of those values that are no placeholders: a command has all of the options, and accepts each value.
+/// Defects of options and of those values that are no placeholders: a command has all of the options, and
+/// accepts each value.
 fn defects_of_options(tree: &CommandTree, words: &[&str]) -> Vec<String> {
     let options: Vec<_> = words.iter().copied().filter(|word| word.starts_with("--")).collect();
     let commands = tree.commands_with(&options);

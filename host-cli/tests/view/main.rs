@@ -101,7 +101,8 @@ fn the_settled_picture_is_that_of_the_command_shown() {
     }
 }
 
-/// The tiles of a settled picture took together what its command takes; with samples in several passes as well.
+/// The tiles of a settled picture took together what its command takes; with samples in several passes as
+/// well.
 #[test]
 #[cfg(unix)]
 fn tiles_tell_what_they_took() {
@@ -132,7 +133,8 @@ fn tiles_tell_what_they_took() {
     }
 }
 
-/// The shown command of a view whose quality finds its settings by pilot renders states all that they have found.
+/// The shown command of a view whose quality finds its settings by pilot renders states all that they have
+/// found.
 #[test]
 #[cfg(unix)]
 fn a_quality_finds_the_settings_of_the_settled_picture() {

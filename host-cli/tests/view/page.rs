@@ -100,7 +100,8 @@ pub(crate) struct Page {
     pub(crate) pixels: HashMap<(u32, u32), [f32; 3]>,
     /// Side of a pixel's square in each tile, with its wish.
     pub(crate) steps: Vec<(u32, u32)>,
-    /// Gathers, irradiance records and lines of DRAM of each tile of the newest wish whose pixels are the picture's, by its corner.
+    /// Gathers, irradiance records and lines of DRAM of each tile of the newest wish whose pixels are the
+    /// picture's, by its corner.
     pub(crate) work: HashMap<(u32, u32), [u32; 3]>,
 }
 

@@ -42,7 +42,8 @@ impl Browser {
         Some(Self { process, address, control, _profile: profile })
     }
 
-    /// A new tab with a window of its own, of a size, in which nothing is loaded: one behind another would stand still.
+    /// A new tab with a window of its own, of a size, in which nothing is loaded: one behind another would
+    /// stand still.
     pub(crate) fn tab(&mut self, size: [u32; 2]) -> Tab {
         let target =
             self.control.call("Target.createTarget", &json!({"url": "about:blank", "newWindow": true}));

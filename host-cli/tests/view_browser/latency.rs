@@ -61,7 +61,8 @@ fn start(room: &Room, file: &str, size: &str) -> View {
     View::start(room, &shipped(file), &["--size", size])
 }
 
-/// A tab in which the settled picture has begun: pilot renders have found its settings, and its photons are traced.
+/// A tab in which the settled picture has begun: pilot renders have found its settings, and its photons are
+/// traced.
 fn refined(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = shown(browser, view);
     tab.wait("photoncard.state.settled || photoncard.picture.samples === photoncard.state.spp", LIMIT);

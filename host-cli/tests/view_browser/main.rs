@@ -1,4 +1,5 @@
-//! The page of `photoncard view` in a headless Chromium: what it shows is what the command renders, whatever is done to it.
+//! The page of `photoncard view` in a headless Chromium: what it shows is what the command renders, whatever
+//! is done to it.
 
 #[path = "../support/mod.rs"]
 mod support;
@@ -54,7 +55,8 @@ fn opened(browser: &mut Browser, view: &View) -> Tab {
     tab
 }
 
-/// Saves the picture by the page, and renders the command line that it shows, which writes `picture.exr`: the files must be equal.
+/// Saves the picture by the page, and renders the command line that it shows, which writes `picture.exr`: the
+/// files must be equal.
 fn check_saved(room: &Room, tab: &mut Tab, name: &str) {
     let line = tab.save(name, "exr");
     run_shown(room, &line);
@@ -261,8 +263,8 @@ fn a_page_of_another_origin_is_refused() {
 
 /// Bytes that the page may hold more after many actions: a small picture, and the last measurements.
 const MAX_PAGE: u64 = 8 << 20;
-/// Bytes that the command may hold more: tiles of two pictures and three films of 700x500 pixels, which is the largest window, each
-/// pixel with its layers. Tiles that were kept after each action would take more.
+/// Bytes that the command may hold more: tiles of two pictures and three films of 700x500 pixels, which is
+/// the largest window, each pixel with its layers. Tiles that were kept after each action would take more.
 const MAX_COMMAND: u64 = 5 * 700 * 500 * 112;
 
 fn check_memory((whose, after, before): (&str, u64, u64), limit: u64) {

@@ -1,7 +1,7 @@
 //! Dimensions of the atrium, in metres.
 //!
-//! The arcades stand on the centre line of a rectangle of 24 by 9 m about the origin. A side's own frame
-//! has x along the arcade, y up and z outwards, with z = 0 on the centre line; an *offset* is a z in that frame.
+//! The arcades stand on the centre line of a rectangle of 24 by 9 m about the origin. A side's own frame has
+//! x along the arcade, y up and z outwards, with z = 0 on the centre line; an *offset* is a z in that frame.
 //! Parts that meet reach a little into each other, so that no two surfaces are coplanar.
 
 use glam::Vec2;

@@ -103,7 +103,8 @@ fn court() -> (SceneBuilder, Palette) {
     (scene, colours)
 }
 
-/// Adds the parts that run around the whole court: steps, cornices with the floors behind them, rails, outer wall.
+/// Adds the parts that run around the whole court: steps, cornices with the floors behind them, rails, outer
+/// wall.
 fn build_rings(scene: &mut SceneBuilder, colours: &Palette) {
     let steps = [[-0.9, -0.1], [0.62, -0.1], [0.62, STEP_TOP], [-0.6, STEP_TOP], [-0.6, 0.08], [-0.9, 0.08]];
     scene.object("steps", &masonry::ring(&steps), colours.trim);

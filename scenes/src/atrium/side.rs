@@ -63,7 +63,8 @@ impl Side<'_> {
         BAY / 2.0 * (index as f32 + 0.5) - self.half
     }
 
-    /// Local x of the borders between bays, and of the centres of the gaps between the outer bays and the corners.
+    /// Local x of the borders between bays, and of the centres of the gaps between the outer bays and the
+    /// corners.
     fn joints(&self) -> Vec<f32> {
         let end = self.half + CORRIDOR[0] / 2.0;
         let between = (1..self.bays).map(|index| BAY * index as f32 - self.half);

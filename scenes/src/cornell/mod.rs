@@ -1,5 +1,5 @@
-//! The Cornell box, scaled to two metres, and three variants: with a glossy floor, with a lamp that faces the ceiling, and
-//! with a mirror ball and a glass ball instead of its blocks.
+//! The Cornell box, scaled to two metres, and three variants: with a glossy floor, with a lamp that faces the
+//! ceiling, and with a mirror ball and a glass ball instead of its blocks.
 
 mod moving;
 
@@ -57,7 +57,8 @@ const GREEN: [f64; 3] = [0.105421, 0.37798, 0.076425];
 const RED: [f64; 3] = [0.570068, 0.0430135, 0.0443706];
 const LIGHT_RADIANCE: [f64; 3] = [18.387, 13.9873, 6.75357];
 
-/// A lamp that faces upwards, and the cup around it: half its side, and the heights of its bottom and its rim, metres.
+/// A lamp that faces upwards, and the cup around it: half its side, and the heights of its bottom and its
+/// rim, metres.
 const UPLIGHT: Quad = [[-0.12, 0.72, 0.12], [0.12, 0.72, 0.12], [0.12, 0.72, -0.12], [-0.12, 0.72, -0.12]];
 const CUP: (f32, f32, f32) = (0.14, 0.7, 0.86);
 const CUP_ALBEDO: [f64; 3] = [0.1; 3];
@@ -76,7 +77,8 @@ const GLASS: Glass =
 const FRONT: Camera =
     Camera { eye: Vec3::new(0.0, 0.0, 3.9), target: Vec3::ZERO, yfov: 0.6860487863861751, aspect_ratio: 1.0 };
 
-/// A camera that looks down from near, so that the floor fills the picture, from its open edge to the back wall.
+/// A camera that looks down from near, so that the floor fills the picture, from its open edge to the back
+/// wall.
 const TOWARDS_FLOOR: Camera = Camera {
     eye: Vec3::new(-0.15, 0.5, 1.75),
     target: Vec3::new(-0.15, -1.0, 0.2),
@@ -147,8 +149,8 @@ pub(crate) fn glossy_floor() -> Vec<u8> {
     scene.into_gltf()
 }
 
-/// The Lambertian box, lit by a lamp in a cup that only a spot of the ceiling sees: nearly all light is indirect, by
-/// way of that spot.
+/// The Lambertian box, lit by a lamp in a cup that only a spot of the ceiling sees: nearly all light is
+/// indirect, by way of that spot.
 pub(crate) fn uplight() -> Vec<u8> {
     cornell_box(None, add_uplight).into_gltf()
 }

@@ -1,4 +1,5 @@
-//! The Cornell box with what moves in it: a lamp that swings, a reed that bends by its joints, a block that bulges, and a camera.
+//! The Cornell box with what moves in it: a lamp that swings, a reed that bends by its joints, a block that
+//! bulges, and a camera.
 
 use glam::{Quat, Vec3};
 
@@ -21,7 +22,8 @@ const LAMP_RADIANCE: [f64; 3] = [4.0, 3.0, 1.7];
 /// Intensity of the point light below the lamp, W/sr.
 const GLOW: f64 = 0.4;
 
-/// Foot of the reed, its height and half its width, metres, the number of its segments, and its largest angles, radians.
+/// Foot of the reed, its height and half its width, metres, the number of its segments, and its largest
+/// angles, radians.
 const FOOT: Vec3 = Vec3::new(-0.45, -1.0, -0.2);
 const HEIGHT: f32 = 1.2;
 const REED: f32 = 0.12;

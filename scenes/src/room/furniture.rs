@@ -60,7 +60,8 @@ pub(super) fn vase() -> Mesh {
     mesh
 }
 
-/// The side of the drum as a strip: top and bottom vertices in turns, counterclockwise from above, the seam twice.
+/// The side of the drum as a strip: top and bottom vertices in turns, counterclockwise from above, the seam
+/// twice.
 pub(super) fn drum_side() -> Mesh {
     let mut mesh = Mesh::default();
     for segment in 0..=DRUM_SEGMENTS {

@@ -1,4 +1,5 @@
-//! Patterns of the room's textures. None equals its mirror image, so that a texture that is mapped wrongly shows.
+//! Patterns of the room's textures. None equals its mirror image, so that a texture that is mapped wrongly
+//! shows.
 
 use core::f32::consts::TAU;
 
@@ -58,7 +59,8 @@ pub(super) fn wallpaper() -> Picture {
     })
 }
 
-/// Slats that cross, with a leaf in every other gap; alpha falls off smoothly, through one half at their edges.
+/// Slats that cross, with a leaf in every other gap; alpha falls off smoothly, through one half at their
+/// edges.
 pub(super) fn lattice() -> Picture {
     const SIDE: u32 = 128;
     Picture::new([SIDE, SIDE], |column, row| {

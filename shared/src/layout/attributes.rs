@@ -36,8 +36,8 @@ impl LeafAttributes {
         self.first | if self.two_sets { TWO_SETS } else { 0 }
     }
 
-    /// Index of the record that holds set 0 or 1 of a slot's texture coordinates. The record of set 0 holds the other
-    /// attributes.
+    /// Index of the record that holds set 0 or 1 of a slot's texture coordinates. The record of set 0 holds
+    /// the other attributes.
     #[inline(always)]
     pub fn record(self, slot: u32, set: u32) -> u32 {
         let index = if self.two_sets { 2 * slot + (set & 1) } else { slot };
@@ -121,12 +121,12 @@ impl Attributes {
     }
 }
 
-/// Quantisation steps of an octahedral coordinate: even, so that the axes are exact, and below 2^16 - 1, so that no
-/// code is [`NO_NORMALS`].
+/// Quantisation steps of an octahedral coordinate: even, so that the axes are exact, and below 2^16 - 1, so
+/// that no code is [`NO_NORMALS`].
 const STEPS: f32 = 65534.0;
 
-/// Octahedral code of a unit vector, 16 bits an axis (Cigolle et al. 2014, *A survey of efficient representations for
-/// independent unit vectors*).
+/// Octahedral code of a unit vector, 16 bits an axis (Cigolle et al. 2014, *A survey of efficient
+/// representations for independent unit vectors*).
 pub(super) fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
     let sum = (abs(x) + abs(y) + abs(z)).max(f32::MIN_POSITIVE);
     let [u, v] = [x / sum, y / sum];

@@ -54,7 +54,8 @@ pub struct Triangle {
     pub vertices: [[f32; 3]; 3],
     /// Index of the material, below [`MAX_MATERIALS`].
     pub material: u32,
-    /// True if alpha (of the base texture or the vertex colours) may cut out parts of the triangle: glTF's `MASK`.
+    /// True if alpha (of the base texture or the vertex colours) may cut out parts of the triangle: glTF's
+    /// `MASK`.
     pub cut_out: bool,
     /// True for flat glass, which light passes without a change of direction: thin walls and panes, perfectly
     /// smooth.
@@ -62,7 +63,8 @@ pub struct Triangle {
 }
 
 impl BvhLeaf<'_> {
-    /// Bytes that a triangle of known slot is in: all but the number of triangles and vertices, which a visit of the leaf needs.
+    /// Bytes that a triangle of known slot is in: all but the number of triangles and vertices, which a visit
+    /// of the leaf needs.
     pub const OF_TRIANGLE: Range<u32> = 0..LINE_BYTES as u32 - 1;
 
     /// Number of triangles, at most [`LEAF_TRIANGLES`].
@@ -173,8 +175,8 @@ impl BvhLeaf<'_> {
         self.0.get(index).copied().unwrap_or(0)
     }
 
-    /// The line of a leaf; `None` without triangles, with more triangles, vertices or materials than a leaf can hold,
-    /// or with a material index of [`MAX_MATERIALS`] or more.
+    /// The line of a leaf; `None` without triangles, with more triangles, vertices or materials than a leaf
+    /// can hold, or with a material index of [`MAX_MATERIALS`] or more.
     pub fn encode(triangles: &[Triangle]) -> Option<[u8; LINE_BYTES]> {
         if triangles.is_empty() || triangles.len() > LEAF_TRIANGLES {
             return None;
@@ -184,8 +186,8 @@ impl BvhLeaf<'_> {
         let mut materials = Distinct::<u32, LEAF_MATERIALS>::new();
         for (slot, triangle) in triangles.iter().enumerate() {
             for (corner, vertex) in triangle.vertices.iter().enumerate() {
-                // Compared as bits: of 0 and -0 the first to come would replace the other, and hits would depend on the
-                // order.
+                // Compared as bits: of 0 and -0 the first to come would replace the other, and hits would
+                // depend on the order.
                 let vertex = vertices.index(vertex.map(f32::to_bits))?;
                 let at = CORNERS + 4 * corner;
                 let before = read_u32(&line, at);

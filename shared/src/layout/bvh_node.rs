@@ -1,15 +1,16 @@
 //! Inner nodes of the bounding volume hierarchy: the boxes of sixteen children, in one line.
 //!
-//! The boxes are quantised to 8 bits an axis on a grid of the node, whose unit is a power of two on every axis (Ylitie,
-//! Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*). A child's box is
-//! larger than its contents by [`MARGIN`] units at least, more than the ray caster's rounding.
+//! The boxes are quantised to 8 bits an axis on a grid of the node, whose unit is a power of two on every
+//! axis (Ylitie, Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide
+//! BVHs*). A child's box is larger than its contents by [`MARGIN`] units at least, more than the ray caster's
+//! rounding.
 
 use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
 use super::{read_vector, write_f32};
 use crate::address::LINE_BYTES;
 
-/// An inner node of the bounding volume hierarchy, one line: a [`WideNode`] whose sides are in the node's units from
-/// its corner, and
+/// An inner node of the bounding volume hierarchy, one line: a [`WideNode`] whose sides are in the node's
+/// units from its corner, and
 ///
 /// | bytes | contents |
 /// |---|---|
@@ -21,7 +22,8 @@ pub struct BvhNode<'a>(pub &'a [u8; LINE_BYTES]);
 const UNITS: usize = 22;
 /// Minimum distance of a box's side from its contents, in the node's units.
 const MARGIN: f64 = 1.0 / 4096.0;
-/// Minimum of the biased exponents: 2^-95 m, far above the subnormal numbers, so that products with a unit are exact.
+/// Minimum of the biased exponents: 2^-95 m, far above the subnormal numbers, so that products with a unit
+/// are exact.
 const MIN_UNIT: u8 = 32;
 const EXPONENT_SHIFT: u32 = 23;
 
@@ -34,7 +36,8 @@ pub struct NodeBox {
     pub upper: [f32; 3],
 }
 
-/// One axis of the children's boxes: child `i` extends from `corner + unit * lower[i]` to `corner + unit * upper[i]`.
+/// One axis of the children's boxes: child `i` extends from `corner + unit * lower[i]` to `corner + unit *
+/// upper[i]`.
 #[derive(Clone, Copy)]
 pub struct BvhAxis<'a> {
     /// Minimum corner of the node's 8-bit grid, metres.

@@ -1,5 +1,6 @@
-//! Unit vectors in one or two bytes, by the octahedral map (Meyer et al. 2010, *On floating-point normal vectors*): the
-//! sphere is projected onto the octahedron `|x| + |y| + |z| = 1`, which is unfolded to a square.
+//! Unit vectors in one or two bytes, by the octahedral map (Meyer et al. 2010, *On floating-point normal
+//! vectors*): the sphere is projected onto the octahedron `|x| + |y| + |z| = 1`, which is unfolded to a
+//! square.
 //!
 //! A coordinate has an odd number of codes, so that the six axes are exact.
 
@@ -22,7 +23,8 @@ pub fn decode_direction(bytes: [u8; 2]) -> [f32; 3] {
     fold(u, v)
 }
 
-/// Octahedral code of a unit normal in one byte; error at most 16 degrees: enough to distinguish adjacent surfaces.
+/// Octahedral code of a unit normal in one byte; error at most 16 degrees: enough to distinguish adjacent
+/// surfaces.
 #[inline]
 pub fn encode_normal(vector: [f32; 3]) -> u8 {
     let [u, v] = unfold(vector);

@@ -7,11 +7,11 @@ use super::{DOUBLE_SIDED, Record, read_f32, read_u32, read_vector, write_f32, wr
 pub struct Emitter {
     /// Shape and directional distribution.
     pub kind: EmitterKind,
-    /// Emitted radiance of a triangle, W/(sr m^2), to be multiplied by its emissive texture; intensity of a point or
-    /// spot light, W/sr.
+    /// Emitted radiance of a triangle, W/(sr m^2), to be multiplied by its emissive texture; intensity of a
+    /// point or spot light, W/sr.
     pub emission: [f32; 3],
-    /// Bit trail of the emitter: its path from the root of the light tree, two bits a level for the child's index, the
-    /// root's in the lowest.
+    /// Bit trail of the emitter: its path from the root of the light tree, two bits a level for the child's
+    /// index, the root's in the lowest.
     pub trail: u32,
 }
 
@@ -36,8 +36,8 @@ pub enum EmitterKind {
         /// Position, metres.
         position: [f32; 3],
     },
-    /// A spot light (glTF `KHR_lights_punctual`): intensity times `clamp(cos * scale + offset, 0, 1)^2`, where `cos` is
-    /// the cosine of the angle to the axis.
+    /// A spot light (glTF `KHR_lights_punctual`): intensity times `clamp(cos * scale + offset, 0, 1)^2`,
+    /// where `cos` is the cosine of the angle to the axis.
     Spot {
         /// Position, metres.
         position: [f32; 3],

@@ -1,5 +1,5 @@
-//! Content of an irradiance point: irradiance and surface normal in eight bytes, the size of a photon's content, so
-//! that both kinds are stored in [`super::PhotonLeaf`]s.
+//! Content of an irradiance point: irradiance and surface normal in eight bytes, the size of a photon's
+//! content, so that both kinds are stored in [`super::PhotonLeaf`]s.
 
 use super::PHOTON_CONTENT_BYTES;
 
@@ -11,9 +11,9 @@ use super::PHOTON_CONTENT_BYTES;
 /// | 48..56 | surface normal, [`super::encode_normal`], on the lit side |
 /// | 56..64 | shared exponent `e`: a component is `mantissa * 2^(e - 143)` |
 ///
-/// The largest component's mantissa is at least 2^15: the error of every component is at most 2^-16 of the largest. The
-/// 8-bit mantissas of [`super::Rgbe`] would not do: errors average out in a sum over a hundred photons, but not in a
-/// single point.
+/// The largest component's mantissa is at least 2^15: the error of every component is at most 2^-16 of the
+/// largest. The 8-bit mantissas of [`super::Rgbe`] would not do: errors average out in a sum over a hundred
+/// photons, but not in a single point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IrradiancePoint {
     /// Irradiance, photon power units/m^2.
@@ -30,15 +30,16 @@ const EXPONENT_SHIFT: u32 = NORMAL_SHIFT + 8;
 const EXPONENT_BIAS: i32 = 143;
 
 impl IrradiancePoint {
-    /// The point's bytes, rounded to nearest. Negative and NaN components are stored as 0, components above `f32::MAX`
-    /// as `f32::MAX`.
+    /// The point's bytes, rounded to nearest. Negative and NaN components are stored as 0, components above
+    /// `f32::MAX` as `f32::MAX`.
     #[inline]
     pub fn to_content(&self) -> [u8; PHOTON_CONTENT_BYTES] {
         let irradiance = self.irradiance.map(|c| if c > 0.0 { c.min(f32::MAX) } else { 0.0 });
         let largest = irradiance.into_iter().fold(0.0, f32::max);
         let mut bits = u64::from(self.normal) << NORMAL_SHIFT;
         if largest >= f32::MIN_POSITIVE {
-            // largest = m 2^e with m in [1, 2); its mantissa is in [2^15, 2^16), and is not rounded up to 2^16.
+            // largest = m 2^e with m in [1, 2); its mantissa is in [2^15, 2^16), and is not rounded up to
+            // 2^16.
             let unit = (largest.to_bits() >> 23) as i32 - 127 - 15;
             let mantissa = |c: f32| ((scaled(c, -unit) + 0.5) as u32).min(MAX_MANTISSA);
             for (shift, component) in (0..).step_by(MANTISSA_BITS as usize).zip(irradiance) {

@@ -15,7 +15,8 @@ pub fn kernel_share(code: u8) -> f32 {
     f32::from_bits((EXPONENT_BIAS - u32::from(LAST - (code & LAST))) << MANTISSA_BITS)
 }
 
-/// Code of the smallest disc whose area is at least `share` of that of the last code; the first or the last code beyond them.
+/// Code of the smallest disc whose area is at least `share` of that of the last code; the first or the last
+/// code beyond them.
 pub fn encode_kernel(share: f32) -> u8 {
     (0..LAST).find(|&code| kernel_share(code) >= share).unwrap_or(LAST)
 }

@@ -1,12 +1,13 @@
-//! Layers of materials beyond the base: textures of the dielectric's reflectance, normal map, clearcoat, sheen and transmission.
+//! Layers of materials beyond the base: textures of the dielectric's reflectance, normal map, clearcoat,
+//! sheen and transmission.
 
 use super::{NO_TEXTURE, Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
 /// Layers of a material, which few materials have. Every texture multiplies the factor of its name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layers {
-    /// F0 of the dielectric before its limit of 1 and without `specularFactor`: F0 of the index of refraction times
-    /// `specularColorFactor`.
+    /// F0 of the dielectric before its limit of 1 and without `specularFactor`: F0 of the index of refraction
+    /// times `specularColorFactor`.
     pub specular: [f32; 3],
     /// Scale of x and y of the normal texture.
     pub normal_scale: f32,
@@ -20,7 +21,8 @@ pub struct Layers {
     pub sheen: [f32; 3],
     /// Roughness of the sheen, 0 to 1.
     pub sheen_roughness: f32,
-    /// Share of the diffuse light that leaves at the other side, 0 to 1 (`KHR_materials_diffuse_transmission`).
+    /// Share of the diffuse light that leaves at the other side, 0 to 1
+    /// (`KHR_materials_diffuse_transmission`).
     pub diffuse_transmission: f32,
     /// Colour of the diffuse light that leaves at the other side, 0 to 1.
     pub diffuse_transmission_colour: [f32; 3],

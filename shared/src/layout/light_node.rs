@@ -30,7 +30,8 @@ pub struct LightChild {
     pub share: f32,
     /// Axis of the bounding cone of the emission normals; a vector of length 0.57 to 1.
     pub axis: [f32; 3],
-    /// Cosine of the cone's half angle; -1 for all directions, as with point lights and double-sided triangles.
+    /// Cosine of the cone's half angle; -1 for all directions, as with point lights and double-sided
+    /// triangles.
     pub cosine: f32,
     /// The node or emitter itself.
     pub link: LightLink,

@@ -4,25 +4,27 @@ use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write
 
 /// Flag of [`Material::flags`]: the back reflects and emits like the front (glTF `doubleSided`).
 pub const DOUBLE_SIDED: u32 = 1;
-/// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a thin wall, which transmits light without refraction (in
-/// glTF, no `KHR_materials_volume` or one of thickness 0).
+/// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a thin wall, which transmits light without
+/// refraction (in glTF, no `KHR_materials_volume` or one of thickness 0).
 pub const THIN_WALLED: u32 = 2;
 /// Flag of [`Material::flags`]: some triangles of the material have [`super::Attributes`].
 pub const HAS_ATTRIBUTES: u32 = 4;
 
-/// Flag of [`Material::flags`]: the GGX lobe is narrow somewhere, and is followed by rays instead of being estimated from photons.
+/// Flag of [`Material::flags`]: the GGX lobe is narrow somewhere, and is followed by rays instead of being
+/// estimated from photons.
 pub const NARROW_LOBE: u32 = 8;
 
-/// `a = roughness^2` below which a GGX lobe is narrow: half of its light is within 28 degrees, an eighth of the hemisphere. A
-/// material with a narrow lobe at some texel has [`NARROW_LOBE`] for all texels: photons are stored for the lobe everywhere on a
-/// surface or nowhere.
+/// `a = roughness^2` below which a GGX lobe is narrow: half of its light is within 28 degrees, an eighth of
+/// the hemisphere. A material with a narrow lobe at some texel has [`NARROW_LOBE`] for all texels: photons
+/// are stored for the lobe everywhere on a surface or nowhere.
 pub const NARROW_ALPHA: f32 = 0.25;
 
-/// Flag of [`Material::flags`]: [`Material::cutoff`] is a factor of alpha, the share of the surface that is there (glTF's `alphaMode`
-/// `BLEND`).
+/// Flag of [`Material::flags`]: [`Material::cutoff`] is a factor of alpha, the share of the surface that is
+/// there (glTF's `alphaMode` `BLEND`).
 pub const BLENDS: u32 = 64;
 
-/// Flag of [`Material::flags`]: the GGX lobe is brightened by the light that a rough microsurface reflects several times.
+/// Flag of [`Material::flags`]: the GGX lobe is brightened by the light that a rough microsurface reflects
+/// several times.
 pub const COMPENSATED: u32 = 128;
 
 /// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a face of a pane, a slab with parallel faces whose
@@ -55,11 +57,11 @@ pub struct Material {
     /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`], [`BLENDS`],
     /// [`COMPENSATED`] and [`PANE`].
     pub flags: u32,
-    /// glTF's `alphaCutoff`: triangles with cut-outs are absent where the product of base texture and vertex alpha is
-    /// below it. With [`BLENDS`] the product of the three is their coverage.
+    /// glTF's `alphaCutoff`: triangles with cut-outs are absent where the product of base texture and vertex
+    /// alpha is below it. With [`BLENDS`] the product of the three is their coverage.
     pub cutoff: f32,
-    /// Indices of the textures of base colour (or diffuse albedo), metallic-roughness (roughness in green, metalness in
-    /// blue) and emission; [`NO_TEXTURE`] if absent.
+    /// Indices of the textures of base colour (or diffuse albedo), metallic-roughness (roughness in green,
+    /// metalness in blue) and emission; [`NO_TEXTURE`] if absent.
     pub textures: [u16; 3],
     /// Index of the material's [`super::Layers`], below 2^23 - 1; `None` without.
     pub layers: Option<u32>,
@@ -97,13 +99,13 @@ pub enum Reflectance {
         /// Absorption coefficient inside, 1/m; of a [`PANE`] its optical depth, the coefficient times the
         /// thickness.
         absorption: [f32; 3],
-        /// Fraction, 0 to 1, of the light not reflected by the interface that is transmitted; a Lambertian surface of
-        /// the base colour reflects the rest.
+        /// Fraction, 0 to 1, of the light not reflected by the interface that is transmitted; a Lambertian
+        /// surface of the base colour reflects the rest.
         transmission: f32,
         /// Index of refraction.
         ior: f32,
-        /// Factor of the dielectric's Fresnel reflectance (`specularFactor` of `KHR_materials_specular`), 0 to 1 in
-        /// steps of 1/255.
+        /// Factor of the dielectric's Fresnel reflectance (`specularFactor` of `KHR_materials_specular`), 0
+        /// to 1 in steps of 1/255.
         specular: f32,
         /// Metalness, 0 to 1; metal transmits nothing.
         metallic: f32,

@@ -14,17 +14,19 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// | 16..18 | incoming direction, from the surface towards the origin of the photon, [`super::encode_direction`] |
 /// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
 ///
-/// The *disc fraction* is the area of the surfaces whose photons a gather around this photon sums up, over the area
-/// `pi r^2` of a flat disc of the gather's radius: 1 on a plain wall, less at edges and in corners, more where surfaces
-/// are stacked. The density estimate divides by `pi r^2` times this fraction. Where walls hide parts of the disc from the photon
-/// ([`is_of_region`]), a gather counts photons of the region that its point sees alone, and divides by that region's area in the plane
-/// times the fraction. It is stored as a code of [`disc_fraction`].
+/// The *disc fraction* is the area of the surfaces whose photons a gather around this photon sums up, over
+/// the area `pi r^2` of a flat disc of the gather's radius: 1 on a plain wall, less at edges and in corners,
+/// more where surfaces are stacked. The density estimate divides by `pi r^2` times this fraction. Where walls
+/// hide parts of the disc from the photon ([`is_of_region`]), a gather counts photons of the region that its
+/// point sees alone, and divides by that region's area in the plane times the fraction. It is stored as a
+/// code of [`disc_fraction`].
 ///
-/// In the caustic map these bits hold the code of the radius that the photon is spread over, of [`super::kernel_share`].
+/// In the caustic map these bits hold the code of the radius that the photon is spread over, of
+/// [`super::kernel_share`].
 ///
-/// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it, but importance
-/// sampling, which asks for the directions of indirect light, leaves it out. In the caustic map the flag marks light of a surface or of
-/// the environment, which gather rays of a narrow lobe meet as well.
+/// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it, but
+/// importance sampling, which asks for the directions of indirect light, leaves it out. In the caustic map
+/// the flag marks light of a surface or of the environment, which gather rays of a narrow lobe meet as well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
     /// Position, metres.
@@ -64,7 +66,8 @@ const SMALL_STEP: f64 = 1.4;
 const FINE_STEPS: u8 = 6;
 const DISC_FRACTIONS: [f32; DISC_CODES] = disc_fractions();
 
-/// Geometric series from 0.038 to 4 of a disc, and from 0.31 to 4 of a region: the relative error of rounding hardly varies.
+/// Geometric series from 0.038 to 4 of a disc, and from 0.31 to 4 of a region: the relative error of rounding
+/// hardly varies.
 #[expect(clippy::indexing_slicing, reason = "computed when it is compiled")]
 const fn disc_fractions() -> [f32; DISC_CODES] {
     let mut fractions = [1.0; DISC_CODES];
@@ -101,15 +104,16 @@ pub fn disc_fraction(code: u8) -> f32 {
     DISC_FRACTIONS.get((code & DISC_MASK) as usize).copied().unwrap_or(1.0)
 }
 
-/// True if the fraction of a code is that of the region which the photon sees, as parts of its disc are hidden by walls.
+/// True if the fraction of a code is that of the region which the photon sees, as parts of its disc are
+/// hidden by walls.
 #[inline(always)]
 pub fn is_of_region(code: u8) -> bool {
     code & DISC_MASK >= FIRST_REGION
 }
 
-/// Code of the disc fraction, or with `of_region` of the fraction of a visible region, dithered: `dither` in [0, 1) chooses between
-/// the two neighbouring codes such that the mean of `1 / disc_fraction(code)`, the factor of gathers, is `1 / fraction`. Fractions
-/// out of range take the first or last code.
+/// Code of the disc fraction, or with `of_region` of the fraction of a visible region, dithered: `dither` in
+/// [0, 1) chooses between the two neighbouring codes such that the mean of `1 / disc_fraction(code)`, the
+/// factor of gathers, is `1 / fraction`. Fractions out of range take the first or last code.
 #[inline]
 pub fn encode_disc(fraction: f32, of_region: bool, dither: f32) -> u8 {
     let (first, end) = if of_region { (FIRST_REGION, DISC_CODES as u8) } else { (0, FIRST_REGION) };
@@ -208,7 +212,8 @@ impl Photon {
     }
 }
 
-/// RGBE (Ward 1991): three non-negative components of 8 bits with a shared exponent, `mantissa * 2^(exponent - 136)`.
+/// RGBE (Ward 1991): three non-negative components of 8 bits with a shared exponent, `mantissa * 2^(exponent
+/// - 136)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rgbe(pub [u8; 4]);
 
@@ -218,8 +223,9 @@ impl Rgbe {
 
     /// The RGBE code of a colour, dithered; negative and non-finite components are encoded as 0.
     ///
-    /// The random bits of `dither` choose between the two neighbours of each component, so that the mean over many
-    /// encodings is the colour: rounding to nearest would have the same bias for all photons of one light.
+    /// The random bits of `dither` choose between the two neighbours of each component, so that the mean over
+    /// many encodings is the colour: rounding to nearest would have the same bias for all photons of one
+    /// light.
     #[inline]
     pub fn encode(colour: [f32; 3], dither: u32) -> Self {
         let colour = colour.map(|c| if c.is_finite() && c > 0.0 { c } else { 0.0 });
@@ -227,7 +233,8 @@ impl Rgbe {
         if largest < f32::MIN_POSITIVE {
             return Self([0; 4]);
         }
-        // largest = m 2^e with m in [1, 2); its mantissa byte is then in [128, 255], and must not round up to 256.
+        // largest = m 2^e with m in [1, 2); its mantissa byte is then in [128, 255], and must not round up to
+        // 256.
         let mut exponent = (largest.to_bits() >> 23) as i32 - 127 + 1;
         if largest * power_of_two(8 - exponent) > 255.0 {
             exponent += 1;

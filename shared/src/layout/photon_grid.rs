@@ -6,8 +6,9 @@ pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
 /// Bound of the magnitude of `origin + q`: integers up to 2^24 are exact in `f32`.
 const MAX_COORDINATE: f64 = (1 << 24) as f64;
 
-/// The grid of the photons' positions: `(origin + q) * cell` for grid coordinates `q` below 2^20, exact in `f32`. The
-/// longest side of the scene takes half of the 2^20 cells or more; fewer far from the origin, where `f32` is coarser.
+/// The grid of the photons' positions: `(origin + q) * cell` for grid coordinates `q` below 2^20, exact in
+/// `f32`. The longest side of the scene takes half of the 2^20 cells or more; fewer far from the origin,
+/// where `f32` is coarser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
     /// Minimum corner, cells.

@@ -1,8 +1,8 @@
 //! Leaves of the photon map: neighbouring photons, in one line.
 //!
-//! A leaf is as exact as [`super::Photon`]: positions lie on the [`super::PhotonGrid`] in either layout, and a leaf
-//! stores them as 16-bit offsets from its corner. The offsets of one axis are contiguous, so that one vector
-//! instruction reads them all.
+//! A leaf is as exact as [`super::Photon`]: positions lie on the [`super::PhotonGrid`] in either layout, and
+//! a leaf stores them as 16-bit offsets from its corner. The offsets of one axis are contiguous, so that one
+//! vector instruction reads them all.
 
 use super::photon::{PHOTON_CONTENT_BYTES, Photon};
 use super::photon_grid::{GRID_BITS, GRID_MASK};
@@ -17,8 +17,8 @@ use crate::address::LINE_BYTES;
 /// | 8.. | for each varying axis, the photons' offsets from the corner, two bytes each |
 /// | ..128 | contents of the photons, 8 bytes each, in reverse: the first photon's at the end of the line |
 ///
-/// A coordinate of the corner has 20 bits, or 17 on a varying axis, where it is a multiple of 8. At least one axis is
-/// marked as varying. Contents are the last 8 bytes of [`super::Photon`], without the splitting axis.
+/// A coordinate of the corner has 20 bits, or 17 on a varying axis, where it is a multiple of 8. At least one
+/// axis is marked as varying. Contents are the last 8 bytes of [`super::Photon`], without the splitting axis.
 #[derive(Clone, Copy)]
 pub struct PhotonLeaf<'a> {
     line: &'a [u8; LINE_BYTES],
@@ -105,7 +105,8 @@ impl<'a> PhotonLeaf<'a> {
     fn coordinates_of(&self, axis: LeafAxis) -> LeafCoordinates<'a> {
         const NONE: &[[u8; 2]; LEAF_LANES] = &[[0; 2]; LEAF_LANES];
         let LeafAxis { corner, first, mask } = axis;
-        // Never out of range: with the maximum number of photons, the lanes of the third axis end within the line.
+        // Never out of range: with the maximum number of photons, the lanes of the third axis end within the
+        // line.
         let bytes = self.line.get(first as usize..).unwrap_or_default();
         LeafCoordinates { corner, offsets: bytes.as_chunks().0.first_chunk().unwrap_or(NONE), mask }
     }

@@ -1,14 +1,15 @@
 //! Inner nodes of the photon map: the boxes of sixteen children, in one line.
 //!
-//! The boxes are quantised conservatively to 8 bits an axis on a grid of the node: a child's box contains all its
-//! photons. One side of all children's boxes is contiguous, so that one vector instruction reads it.
+//! The boxes are quantised conservatively to 8 bits an axis on a grid of the node: a child's box contains all
+//! its photons. One side of all children's boxes is contiguous, so that one vector instruction reads it.
 
 use super::photon_grid::GRID_MASK;
 use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// An inner node of a photon map, one line: a [`WideNode`] whose sides are in the node's units from its corner, and
+/// An inner node of a photon map, one line: a [`WideNode`] whose sides are in the node's units from its
+/// corner, and
 ///
 /// | bytes | contents |
 /// |---|---|
@@ -47,8 +48,8 @@ pub struct NodeCoordinates<'a> {
 }
 
 impl<'a> PhotonNode<'a> {
-    /// Square of the distance of the k-th photon over k, m^2, for most points among the node's photons: most searches that begin here
-    /// need not go farther. 0 in a node without leaves, and where nothing is known.
+    /// Square of the distance of the k-th photon over k, m^2, for most points among the node's photons: most
+    /// searches that begin here need not go farther. 0 in a node without leaves, and where nothing is known.
     #[inline(always)]
     pub fn photon_share(&self) -> f32 {
         let [low, high] = [SHARE, SHARE + 1].map(|at| u32::from(WideNode(self.0).byte(at)));

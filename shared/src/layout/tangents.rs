@@ -34,7 +34,8 @@ impl Tangents {
     /// Corners without tangents.
     pub const NONE: Self = Self { directions: [[0.0; 3]; 3], signs: [1.0; 3] };
 
-    /// Index of the record with the tangents of a slot of a leaf. Only leaves with a material that needs them have such records.
+    /// Index of the record with the tangents of a slot of a leaf. Only leaves with a material that needs them
+    /// have such records.
     #[inline(always)]
     pub fn locate(leaf: LeafAttributes, slot: u32) -> u32 {
         leaf.first.wrapping_sub(Self::RECORDS as u32).wrapping_add(Self::record(slot))

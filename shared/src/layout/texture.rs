@@ -52,10 +52,11 @@ pub enum TexelFormat {
     Linear,
     /// OpenGL's `RGB9_E5`: red, green and blue of nine bits each, a shared exponent of five; alpha is 1.
     SharedExponent,
-    /// Two linear channels of 16 bits, little-endian: the first is red and blue, the second green; alpha is 1.
+    /// Two linear channels of 16 bits, little-endian: the first is red and blue, the second green; alpha is
+    /// 1.
     LinearPair,
-    /// Red and green of a normal map, linear, 16 bits each, little-endian. Blue is that of a unit normal on the
-    /// front, for normals of `2 channel - 1`; alpha is 1.
+    /// Red and green of a normal map, linear, 16 bits each, little-endian. Blue is that of a unit normal on
+    /// the front, for normals of `2 channel - 1`; alpha is 1.
     NormalPair,
 }
 

@@ -1,5 +1,5 @@
-//! The common part of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node of up to sixteen children. Children
-//! that are leaves come before children that are nodes; the indices of either kind are consecutive.
+//! The common part of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node of up to sixteen children.
+//! Children that are leaves come before children that are nodes; the indices of either kind are consecutive.
 
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;

@@ -30,8 +30,8 @@ pub enum FaultCode {
     ImageChecksum,
     /// The image's header is not sound; detail: the image's layout version for a wrong version, else 0.
     ImageHeader,
-    /// A frame parameter is outside the budget, not a number, or asks for what the image does not have; detail: the number of
-    /// the [`Parameter`].
+    /// A frame parameter is outside the budget, not a number, or asks for what the image does not have;
+    /// detail: the number of the [`Parameter`].
     Parameter,
     /// A tile is empty, outside the picture or above the budget; detail: its number.
     Tile,
@@ -85,7 +85,8 @@ impl Invariant {
     }
 }
 
-/// The fields of [`FrameParameters`](super::FrameParameters), by the numbers that [`FaultCode::Parameter`] carries.
+/// The fields of [`FrameParameters`](super::FrameParameters), by the numbers that [`FaultCode::Parameter`]
+/// carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Parameter {

@@ -1,6 +1,7 @@
 //! Pixels: sums over samples, in which chips send them, and the values that they stand for.
 //!
-//! Sums are integers: those of several renders of a pixel, of different samples, add up to the sums of all samples, to the bit.
+//! Sums are integers: those of several renders of a pixel, of different samples, add up to the sums of all
+//! samples, to the bit.
 
 /// 2^40: fractions of a radiance unit in a sum of light.
 const LIGHT_STEPS: f64 = (1_u64 << 40) as f64;
@@ -10,8 +11,8 @@ pub const ALBEDO_STEPS: u32 = 1 << 19;
 pub const NORMAL_STEPS: u32 = 1 << 18;
 /// Fractions of the depth unit in a sum of depths.
 pub const DEPTH_STEPS: u32 = 1 << 16;
-/// Number of a pixel's first samples, its probes, in a frame with adaptive sampling: the number of paths of each later sample is chosen by their
-/// variance.
+/// Number of a pixel's first samples, its probes, in a frame with adaptive sampling: the number of paths of
+/// each later sample is chosen by their variance.
 pub const PROBES: u32 = 4;
 /// Weight of a probe's light, in samples: fixed, so that the choice of the number of paths has no bias.
 pub const WEIGHT_OF_PROBE: f32 = 0.5;
@@ -45,8 +46,8 @@ pub struct Pixel {
     pub radiance: [f32; 3],
     /// Mean albedo of the visible surfaces, 0 to 1 a channel; 0 if no sample sees a surface.
     pub albedo: [f32; 3],
-    /// Mean of the visible surfaces' unit normals, in world space, on the side of the eye; 0 if no sample sees a
-    /// surface.
+    /// Mean of the visible surfaces' unit normals, in world space, on the side of the eye; 0 if no sample
+    /// sees a surface.
     pub normal: [f32; 3],
     /// Mean depth of the visible surfaces, metres along the view axis; infinite if no sample sees a surface.
     pub depth: f32,
@@ -55,11 +56,11 @@ pub struct Pixel {
 /// Layers of a pixel: the components of its radiance, and its number of final gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelLayers {
-    /// Direct light, W/(sr m^2): visible emission, and light of emitters by shadow rays and by the pixel's own gather
-    /// rays.
+    /// Direct light, W/(sr m^2): visible emission, and light of emitters by shadow rays and by the pixel's
+    /// own gather rays.
     pub direct: [f32; 3],
-    /// Indirect light, W/(sr m^2): radiance estimates at the ends of gather rays, and interpolated irradiance, which
-    /// includes the emission met by the irradiance records' rays.
+    /// Indirect light, W/(sr m^2): radiance estimates at the ends of gather rays, and interpolated
+    /// irradiance, which includes the emission met by the irradiance records' rays.
     pub indirect: [f32; 3],
     /// Caustics, W/(sr m^2): radiance estimates in the caustic map.
     pub caustic: [f32; 3],
@@ -67,7 +68,8 @@ pub struct PixelLayers {
     pub gathers: f32,
 }
 
-/// Units of the sums of an image's pixels; the header's [`Header::sum_scale`](crate::image::Header::sum_scale).
+/// Units of the sums of an image's pixels; the header's
+/// [`Header::sum_scale`](crate::image::Header::sum_scale).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SumScale {
     /// Unit of light, W/(sr m^2), a power of two.
@@ -79,7 +81,8 @@ pub struct SumScale {
 /// Sums of a pixel over its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PixelSums {
-    /// Radiance, 2^-40 radiance units; at least 0, saturating. With layers it is the sum of the three components.
+    /// Radiance, 2^-40 radiance units; at least 0, saturating. With layers it is the sum of the three
+    /// components.
     pub light: [i64; 3],
     /// Albedo, multiples of 1 / [`ALBEDO_STEPS`].
     pub albedo: [u32; 3],
@@ -93,7 +96,8 @@ pub struct PixelSums {
     pub layers: Option<LayerSums>,
 }
 
-/// Sums of the components of a pixel's light, in the units of [`PixelSums::light`], and its number of final gathers.
+/// Sums of the components of a pixel's light, in the units of [`PixelSums::light`], and its number of final
+/// gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LayerSums {
     /// [`PixelLayers::direct`].

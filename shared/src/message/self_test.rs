@@ -7,8 +7,9 @@ use crate::address::LINE_BYTES;
 /// Words of 32 bits in a line.
 pub const WORDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
-/// Pattern of a memory test: the contents of every 32-bit word, a function of the word's index. Each pattern is written over the whole
-/// memory and then read back, so that what a data cache holds of it is evicted in between.
+/// Pattern of a memory test: the contents of every 32-bit word, a function of the word's index. Each pattern
+/// is written over the whole memory and then read back, so that what a data cache holds of it is evicted in
+/// between.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MemoryPattern {
     /// One bit set, another in each word of a line: data lines that are stuck at 0, or connected.
@@ -19,7 +20,8 @@ pub enum MemoryPattern {
     Address,
     /// The complement of the word's index: every bit has the other value.
     Complement,
-    /// The complement of the word's index, of which one byte is then replaced by a store of that byte alone: byte lanes.
+    /// The complement of the word's index, of which one byte is then replaced by a store of that byte alone:
+    /// byte lanes.
     ByteLanes,
 }
 

@@ -88,8 +88,8 @@ pub(super) struct LinkSession {
     next: u16,
     /// Number of frames with messages, and probes, sent.
     transmissions: u16,
-    /// Number of messages that the other end had sent at its last answer: missing ones below it are lost. Taken by the next
-    /// probe.
+    /// Number of messages that the other end had sent at its last answer: missing ones below it are lost.
+    /// Taken by the next probe.
     lost_below: Option<u16>,
     /// Payload of the last probe of the other end.
     asked: [u8; 2],
@@ -330,8 +330,8 @@ impl LinkSession {
         }
     }
 
-    /// Marks messages lost by an answer: sent before the probe and not arrived at the other end, or sent by the other end before
-    /// the answer and not arrived here.
+    /// Marks messages lost by an answer: sent before the probe and not arrived at the other end, or sent by
+    /// the other end before the answer and not arrived here.
     fn conclude(&mut self, probe: u16, sent: u16) {
         self.lose(|_, transmission| is_before(transmission, probe));
         let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);

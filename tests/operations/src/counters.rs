@@ -1,10 +1,11 @@
-//! The operations themselves: what a processor without floating-point instructions calls, each counted by its kind and the place of
-//! the call. They use the instructions of SSE2, which the rest of the program does without, and so round as every processor does.
+//! The operations themselves: what a processor without floating-point instructions calls, each counted by its
+//! kind and the place of the call. They use the instructions of SSE2, which the rest of the program does
+//! without, and so round as every processor does.
 
 use core::arch::global_asm;
 
-/// Kinds of operations, in the order of their tables: additions and subtractions, multiplications, divisions, square roots, comparisons,
-/// conversions, roundings to whole numbers, calls of libm's other functions.
+/// Kinds of operations, in the order of their tables: additions and subtractions, multiplications, divisions,
+/// square roots, comparisons, conversions, roundings to whole numbers, calls of libm's other functions.
 pub(crate) const KINDS: usize = 8;
 
 /// Size of the program's code that a table has room for, bytes.

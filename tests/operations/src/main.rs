@@ -1,9 +1,11 @@
-//! The firmware of a reference chip, compiled without floating-point instructions: every operation is a call, which is counted by its
-//! kind and its place in the code (`counters`). A program of Linux on x86-64 without libraries.
+//! The firmware of a reference chip, compiled without floating-point instructions: every operation is a call,
+//! which is counted by its kind and its place in the code (`counters`). A program of Linux on x86-64 without
+//! libraries.
 //!
-//! Standard input is a file of lines: a card image, the frame's parameters, and tiles, each of the last two as a byte of length and a
-//! message. Standard output is, for each tile, its counters in such a line; and behind them three numbers of eight bytes for each place
-//! that did something: the kind, the address behind the call, the count.
+//! Standard input is a file of lines: a card image, the frame's parameters, and tiles, each of the last two
+//! as a byte of length and a message. Standard output is, for each tile, its counters in such a line; and
+//! behind them three numbers of eight bytes for each place that did something: the kind, the address behind
+//! the call, the count.
 #![no_std]
 #![no_main]
 

@@ -26,8 +26,9 @@ pub(super) struct Scenes {
     folder: TempDir,
 }
 
-/// Scene with every feature that the loader reads: a hierarchy, sparse positions, normals, coordinates, colours, a skin,
-/// instances, a strip, textures, a lobe, glass, a converted material, variants, lights, an orthographic camera, animations, morph targets.
+/// Scene with every feature that the loader reads: a hierarchy, sparse positions, normals, coordinates,
+/// colours, a skin, instances, a strip, textures, a lobe, glass, a converted material, variants, lights, an
+/// orthographic camera, animations, morph targets.
 const RICH: &[u8] = include_bytes!("../../fuzz/rich.gltf");
 const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/furnace.gltf"),
@@ -39,8 +40,8 @@ const SHIPPED: [&[u8]; 3] = [
 const PNG: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/texel.png");
 const JPEG: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/grey.jpg");
 
-/// Bytes of a triangle: vertices, indices, an index and a position of a sparse accessor, coordinates, colours, joints,
-/// weights, a matrix, images, and times, rotations and weights of keyframes.
+/// Bytes of a triangle: vertices, indices, an index and a position of a sparse accessor, coordinates,
+/// colours, joints, weights, a matrix, images, and times, rotations and weights of keyframes.
 fn triangle_bytes() -> Vec<u8> {
     let vertices = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let indices = [0_u16, 1, 2, 1].map(u16::to_le_bytes);

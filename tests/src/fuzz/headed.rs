@@ -1,4 +1,5 @@
-//! Fuzzing of files with headings: parts of pictures, and prepared scenes. Their checksums are made anew in half of the inputs, as somebody would who means harm.
+//! Fuzzing of files with headings: parts of pictures, and prepared scenes. Their checksums are made anew in
+//! half of the inputs, as somebody would who means harm.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +17,8 @@ use super::random::Random;
 use super::target::Target;
 use crate::everything::everything;
 
-/// Maximum number of bytes that a file may have allocated: patches of the largest picture, of which the file has next to none.
+/// Maximum number of bytes that a file may have allocated: patches of the largest picture, of which the file
+/// has next to none.
 const BOUND: usize = 256 << 20;
 /// Multiple of bytes at which the lines of a prepared scene begin.
 const PAGE: usize = 4096;

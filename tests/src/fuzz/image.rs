@@ -29,8 +29,8 @@ pub(super) struct Image {
     seeds: Vec<Vec<u8>>,
 }
 
-/// Images of a lit room with a few photons, in both layouts of the photon map, with irradiance points; and of a scene with
-/// every feature, with a caustic map.
+/// Images of a lit room with a few photons, in both layouts of the photon map, with irradiance points; and of
+/// a scene with every feature, with a caustic map.
 fn images() -> [CardImage; 3] {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;

@@ -1,7 +1,8 @@
-//! Fuzzing of all readers of foreign bytes: mutated inputs, each a function of its target, a seed and a number.
+//! Fuzzing of all readers of foreign bytes: mutated inputs, each a function of its target, a seed and a
+//! number.
 //!
-//! No input may panic, take longer than some seconds, or allocate more than a bound. A coverage-guided fuzzer would do
-//! more, but needs another compiler; here a failing input is replayed by its number.
+//! No input may panic, take longer than some seconds, or allocate more than a bound. A coverage-guided fuzzer
+//! would do more, but needs another compiler; here a failing input is replayed by its number.
 
 mod compressed;
 pub(crate) mod environment;

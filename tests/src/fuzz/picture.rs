@@ -88,8 +88,8 @@ impl Target for Pictures {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Deflate expands a byte to at most 1100: halves of three channels, which are read as floats of twice the size, and
-        // three blocks.
+        // Deflate expands a byte to at most 1100: halves of three channels, which are read as floats of twice
+        // the size, and three blocks.
         bound(input, 8192)
     }
 

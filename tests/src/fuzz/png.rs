@@ -12,7 +12,8 @@ type Chunk = ([u8; 4], Vec<u8>);
 const TYPES: [&[u8; 4]; 9] =
     [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"gAMA", b"iCCP", b"acTL", b"fcTL"];
 
-/// Makes one edit of the chunks of a file: of one chunk's data, or of their list. Bytes after the chunks are lost.
+/// Makes one edit of the chunks of a file: of one chunk's data, or of their list. Bytes after the chunks are
+/// lost.
 pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     let mut chunks = split(file);
     if chunks.is_empty() {

@@ -59,8 +59,8 @@ pub struct Report {
     pub inputs: u64,
     /// Number of inputs that were valid.
     pub sound: u64,
-    /// Maximum number of bytes that one input had allocated at once, with the input's number; 0 if [`PeakAlloc`] is not the
-    /// allocator.
+    /// Maximum number of bytes that one input had allocated at once, with the input's number; 0 if
+    /// [`PeakAlloc`] is not the allocator.
     pub peak: (usize, u64),
     /// Maximum time of an input, with the input's number.
     pub slowest: (Duration, u64),
@@ -74,8 +74,8 @@ thread_local! {
     static LAST_PANIC: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Installs a hook that stores the message of a worker's panic instead of printing it: some panics are caught by the tested
-/// code.
+/// Installs a hook that stores the message of a worker's panic instead of printing it: some panics are caught
+/// by the tested code.
 fn keep_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -118,7 +118,8 @@ pub fn fuzz(target: &Arc<dyn Target>, settings: &Settings) -> Report {
     report
 }
 
-/// Waits for the worker's report, or for an input that takes too long. As a thread cannot be killed, it keeps running.
+/// Waits for the worker's report, or for an input that takes too long. As a thread cannot be killed, it keeps
+/// running.
 fn watch(reports: &Receiver<Report>, at: &AtomicU64, patience: Duration) -> Report {
     let (mut last, mut since) = (at.load(Ordering::Relaxed), Instant::now());
     loop {

@@ -1,4 +1,5 @@
-//! Fuzzing of a host's session by a hostile card: mutated replies in any order, without a request, and resets.
+//! Fuzzing of a host's session by a hostile card: mutated replies in any order, without a request, and
+//! resets.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -34,8 +35,8 @@ const MAX_FRAMES: usize = 64;
 /// Number of steps after which a session with a silent card has failed.
 const MAX_STEPS: usize = 400;
 
-/// Action of the card in a step: the first byte of each record of an input. Other values send the reply that follows. The
-/// first byte of the input determines whether the frame has layers.
+/// Action of the card in a step: the first byte of each record of an input. Other values send the reply that
+/// follows. The first byte of the input determines whether the frame has layers.
 const RESET: u8 = 0xff;
 const WAIT: u8 = 0xfe;
 

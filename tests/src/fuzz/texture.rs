@@ -35,7 +35,8 @@ const SEEDS: [&[u8]; 14] = [
     include_bytes!("../../../driver/scene/tests/it/images/uastc-zstd.ktx2"),
 ];
 
-/// Memory of the card, bytes. It bounds the texels of WebP and of ETC1S in KTX2, which may take no bytes of the file at all.
+/// Memory of the card, bytes. It bounds the texels of WebP and of ETC1S in KTX2, which may take no bytes of
+/// the file at all.
 const DRAM_BYTES: u32 = 2 << 20;
 
 /// Scene whose second buffer view, of `image_bytes` bytes, is the base colour of its only triangle.
@@ -80,8 +81,8 @@ impl Target for Textures {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Deflate expands a byte to at most 1032, each of eight texels if they have one bit; decoding requests 16 bytes per
-        // texel.
+        // Deflate expands a byte to at most 1032, each of eight texels if they have one bit; decoding
+        // requests 16 bytes per texel.
         bound(input, 1032 * 8 * 17)
     }
 

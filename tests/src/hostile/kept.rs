@@ -1,7 +1,8 @@
 //! Files that the command keeps and reads again, damaged before it starts or while it works.
 //!
-//! Works are done with small scenes, so that an input takes some hundredths of a second. The command must end with the picture of undamaged files, or with an error that says something and without a
-//! picture. A damage that forges checksums makes another valid file, and is not tried here.
+//! Works are done with small scenes, so that an input takes some hundredths of a second. The command must end
+//! with the picture of undamaged files, or with an error that says something and without a picture. A damage
+//! that forges checksums makes another valid file, and is not tried here.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -296,7 +297,8 @@ impl<'s> Bench<'s> {
     }
 }
 
-/// Damages a file as copying, disks and memory do. `donors` are files that may have been written over a part of it.
+/// Damages a file as copying, disks and memory do. `donors` are files that may have been written over a part
+/// of it.
 fn damage(bytes: &mut Vec<u8>, donors: &[&[u8]], random: &mut Random) {
     let length = bytes.len();
     match random.below(12) {

@@ -1,10 +1,11 @@
 //! Damaged real files: scenes and images that ship are mutated and read in processes of limited memory.
 //!
-//! Files that the command keeps, such as parts of pictures, are mutated while it works as well, and its pictures are compared.
+//! Files that the command keeps, such as parts of pictures, are mutated while it works as well, and its
+//! pictures are compared.
 //!
-//! The fuzz targets catch panics in their own process and start from small generated files. Here a process reads a batch of
-//! inputs, and its end is the result: an exit status, a signal, or a time-out. Every input is a function of its kind, a
-//! seed and a number.
+//! The fuzz targets catch panics in their own process and start from small generated files. Here a process
+//! reads a batch of inputs, and its end is the result: an exit status, a signal, or a time-out. Every input
+//! is a function of its kind, a seed and a number.
 
 mod inputs;
 mod kept;
@@ -21,7 +22,8 @@ pub use self::supervisor::{Finding, Report, supervise};
 /// Kind of files to damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// PNG, JPEG, WebP and KTX2 as textures, Radiance and `OpenEXR` pictures as environments; the latter are compared as well.
+    /// PNG, JPEG, WebP and KTX2 as textures, Radiance and `OpenEXR` pictures as environments; the latter are
+    /// compared as well.
     Images,
     /// glTF as text and as GLB, loaded, packed, and rendered with few photons and rays.
     Scenes,

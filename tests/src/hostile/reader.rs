@@ -14,14 +14,15 @@ use super::inputs::as_file;
 use super::{Inputs, Settings};
 use crate::fuzz::gltf::load;
 
-/// Maximum number of triangles of a scene that is always rendered; larger ones are only loaded and packed, with rare
-/// exceptions.
+/// Maximum number of triangles of a scene that is always rendered; larger ones are only loaded and packed,
+/// with rare exceptions.
 const MAX_RENDERED: usize = 3000;
 
 /// Maximum number of pixels of a picture that is compared; larger ones are read only.
 const MAX_COMPARED: usize = 1 << 18;
 
-/// Reads inputs, and reports each on standard output: its number before reading, and whether it was valid afterwards.
+/// Reads inputs, and reports each on standard output: its number before reading, and whether it was valid
+/// afterwards.
 ///
 /// # Panics
 /// If the tested reader panics, which is a finding.

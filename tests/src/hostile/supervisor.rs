@@ -39,8 +39,9 @@ pub struct Report {
     pub findings: Vec<Finding>,
 }
 
-/// Reads inputs in processes of limited memory. `reader` is the program that calls [`read_batch`](super::read_batch) for
-/// the arguments `read KIND SEED FIRST INPUTS FOLDER`; it reads no kept files.
+/// Reads inputs in processes of limited memory. `reader` is the program that calls
+/// [`read_batch`](super::read_batch) for the arguments `read KIND SEED FIRST INPUTS FOLDER`; it reads no kept
+/// files.
 ///
 /// # Errors
 /// If a process cannot be started or a file cannot be written.
@@ -79,7 +80,8 @@ pub(super) fn limited(settings: &Settings, program: &Path) -> Command {
     command
 }
 
-/// Starts a process that reads inputs until the last one or its end. Returns the number of inputs that are done.
+/// Starts a process that reads inputs until the last one or its end. Returns the number of inputs that are
+/// done.
 fn read_some(
     reader: &Path,
     settings: &Settings,

@@ -1,5 +1,5 @@
-//! Counts of floating-point operations: tiles rendered by the firmware of `tests/operations`, whose every operation is a call that is
-//! counted by its kind and its place in the code.
+//! Counts of floating-point operations: tiles rendered by the firmware of `tests/operations`, whose every
+//! operation is a call that is counted by its kind and its place in the code.
 
 pub mod run;
 mod steps;
@@ -47,7 +47,8 @@ pub struct Instrument {
 }
 
 impl Instrument {
-    /// Builds the program. `Err` with the reason if this machine cannot: it is for Linux on x86-64, and its target has to be installed.
+    /// Builds the program. `Err` with the reason if this machine cannot: it is for Linux on x86-64, and its
+    /// target has to be installed.
     ///
     /// # Panics
     /// If the program does not build on a machine that has all that it takes.

@@ -29,7 +29,8 @@ pub struct Run {
 }
 
 impl Run {
-    /// Renders `count` tiles of a scene that ships, spread over the picture: where operations are counted, and on an emulated chip.
+    /// Renders `count` tiles of a scene that ships, spread over the picture: where operations are counted,
+    /// and on an emulated chip.
     ///
     /// # Panics
     /// If the scene cannot be rendered, or the two do not count equal work.

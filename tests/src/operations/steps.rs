@@ -2,7 +2,8 @@
 
 use photoncard_driver::cost_model::arithmetic::Step;
 
-/// Place of an operation: the functions of the firmware around it, the innermost first; and the line and column of each.
+/// Place of an operation: the functions of the firmware around it, the innermost first; and the line and
+/// column of each.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Place(Vec<Frame>);
 
@@ -49,8 +50,8 @@ impl Place {
     }
 }
 
-/// Step that an operation belongs to. The innermost function that says it decides; what is compiled into no other function, such as
-/// codes of directions, belongs to the gathers, which need it most.
+/// Step that an operation belongs to. The innermost function that says it decides; what is compiled into no
+/// other function, such as codes of directions, belongs to the gathers, which need it most.
 pub(super) fn step_of(place: &Place) -> Step {
     ray_caster(place)
         .or_else(|| photons(place))

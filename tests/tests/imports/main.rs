@@ -1,12 +1,13 @@
 //! No file imports one that imports it back, directly or around: each can be read without its users.
 //!
-//! Read are all files of all targets of the workspace. A file imports another if a path in it, of a `use` or of an expression, names
-//! an item that the other defines, whichever module hands the item on by `pub use`. Neither a `mod` declaration nor a `pub use` of a
-//! name that the file itself does not use is an import.
+//! Read are all files of all targets of the workspace. A file imports another if a path in it, of a `use` or
+//! of an expression, names an item that the other defines, whichever module hands the item on by `pub use`.
+//! Neither a `mod` declaration nor a `pub use` of a name that the file itself does not use is an import.
 //!
-//! No types are resolved, so that two uses of another file remain unseen: a method or a field of a value whose type the file does not
-//! name, such as an inherent method that another file defines for a type; and paths in the body of a `macro_rules!`, or in arguments of
-//! a macro that are no expressions with commas between them.
+//! No types are resolved, so that two uses of another file remain unseen: a method or a field of a value
+//! whose type the file does not name, such as an inherent method that another file defines for a type; and
+//! paths in the body of a `macro_rules!`, or in arguments of a macro that are no expressions with commas
+//! between them.
 
 mod circles;
 mod modules;

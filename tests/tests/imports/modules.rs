@@ -134,8 +134,8 @@ impl Crate {
         }
     }
 
-    /// Targets of the rest of a path from a module. A name that is not found in it, such as one that a macro defines,
-    /// counts as its own.
+    /// Targets of the rest of a path from a module. A name that is not found in it, such as one that a macro
+    /// defines, counts as its own.
     fn walk(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
         let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         let found = self.look_up(module, first, rest, asked);

@@ -23,8 +23,8 @@ pub(crate) struct Names {
 /// Paths of a module.
 #[derive(Default)]
 pub(crate) struct Paths {
-    /// Paths of `use`, and all other paths of at least two segments: a single name is imported or defined by the module, or
-    /// is a variable.
+    /// Paths of `use`, and all other paths of at least two segments: a single name is imported or defined by
+    /// the module, or is a variable.
     pub(crate) imports: Vec<PathText>,
     /// Paths of `pub use`, by name.
     pub(crate) handed_on: BTreeMap<String, PathText>,
@@ -115,7 +115,8 @@ impl<'ast> Visit<'ast> for Paths {
     fn visit_macro(&mut self, called: &'ast Macro) {
         self.visit_path(&called.path);
         let arguments = Punctuated::<Expr, Token![,]>::parse_terminated.parse2(called.tokens.clone());
-        // The visitor borrows from the syntax tree of the file, which outlives the arguments: another visitor reads them.
+        // The visitor borrows from the syntax tree of the file, which outlives the arguments: another visitor
+        // reads them.
         let mut paths = Paths::default();
         arguments.iter().flatten().for_each(|argument| paths.visit_expr(argument));
         self.imports.append(&mut paths.imports);

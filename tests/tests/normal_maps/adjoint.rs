@@ -25,7 +25,8 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
 }
 
-/// Point of a sequence that is even in four dimensions: multiples of the powers of the root of `g^5 = g + 1` (Roberts 2018).
+/// Point of a sequence that is even in four dimensions: multiples of the powers of the root of `g^5 = g + 1`
+/// (Roberts 2018).
 fn place(index: u32) -> [f32; 4] {
     const G: f64 = 1.167_303_978_261_418_7;
     [1, 2, 3, 4].map(|power| (0.5 + f64::from(index) / G.powi(power)).fract() as f32)
@@ -133,8 +134,9 @@ fn pane() -> Material {
     Material::new("pane", reflection)
 }
 
-/// Sun through a pane lights a floor by the caustic map: by what the pane transmits less than without it, though the lobe and the base of
-/// the floor are parts with normals of their own, for one of which photons are stored.
+/// Sun through a pane lights a floor by the caustic map: by what the pane transmits less than without it,
+/// though the lobe and the base of the floor are parts with normals of their own, for one of which photons
+/// are stored.
 #[test]
 fn photons_light_a_floor_of_two_parts_once() {
     let normals = [tilted(50.0, 180.0), tilted(50.0, 0.0), tilted(20.0, 90.0)];

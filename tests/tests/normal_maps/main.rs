@@ -103,7 +103,8 @@ fn directional(direction: DVec3, irradiance: f32) -> PunctualLight {
     }
 }
 
-/// A lone plane does not light itself: rays of irradiance records stay above the triangle, whatever the normal of the map.
+/// A lone plane does not light itself: rays of irradiance records stay above the triangle, whatever the
+/// normal of the map.
 #[test]
 fn irradiance_records_of_a_lone_bumpy_plate_gather_nothing() {
     for normals in [vec![tilted(15.0, 40.0)], vec![tilted(25.0, 10.0), tilted(30.0, 200.0)]] {
@@ -207,7 +208,8 @@ fn metal_times_cosine(normal: DVec3, outgoing: DVec3, incident: DVec3, roughness
     distribution * visibility * fresnel * i
 }
 
-/// The normal nearest to `normal`, in its plane with z, whose mirror direction is not below the plate: by bisection.
+/// The normal nearest to `normal`, in its plane with z, whose mirror direction is not below the plate: by
+/// bisection.
 fn bent(normal: DVec3, outgoing: DVec3) -> DVec3 {
     let least = (0.9 * outgoing.z).min(0.01);
     let is_above = |n: DVec3| (n * (2.0 * n.dot(outgoing)) - outgoing).z >= least;
@@ -242,7 +244,8 @@ fn bumps() -> Vec<DVec3> {
     (0..16).map(|k| tilted(f64::from(k % 4 + 1) * 10.0, 97.0 * f64::from(k))).collect()
 }
 
-/// Albedo of a bumpy plate, mean over its texels: [`bent`] or not, or of the same texels above their own horizons alone.
+/// Albedo of a bumpy plate, mean over its texels: [`bent`] or not, or of the same texels above their own
+/// horizons alone.
 fn albedos(outgoing: DVec3, roughness: Option<f64>) -> [f64; 3] {
     let count = bumps().len() as f64;
     let mut sums = [0.0; 3];
@@ -317,8 +320,8 @@ fn schlick(f0: f64, outgoing: DVec3, incident: DVec3) -> f64 {
     f0 + (1.0 - f0) * (1.0 - (outgoing + incident).normalize().dot(outgoing)).powi(5)
 }
 
-/// Albedo of a bumpy plate of plastic, mean over its texels: the lobe by the normal that is [`bent`], above it the share of light that
-/// it leaves to the Lambertian base, by the texel's own normal.
+/// Albedo of a bumpy plate of plastic, mean over its texels: the lobe by the normal that is [`bent`], above
+/// it the share of light that it leaves to the Lambertian base, by the texel's own normal.
 fn plastic_albedo(outgoing: DVec3, roughness: f64) -> f64 {
     let base = f64::from(ALBEDO);
     let lobe = |normal: DVec3, outgoing: DVec3| {
@@ -352,7 +355,8 @@ fn plastic(roughness: f32) -> Material {
     Material::new("plastic", reflection)
 }
 
-/// Texels that are seen at a grazing angle reflect by the bent normal, and their base must have the light that is left there.
+/// Texels that are seen at a grazing angle reflect by the bent normal, and their base must have the light
+/// that is left there.
 #[test]
 fn bumpy_plates_of_plastic_lose_no_light_where_the_normal_of_the_lobe_is_bent() {
     for (degrees, roughness) in [(0.0, 0.3), (60.0, 0.3), (75.0, 0.3), (75.0, 0.45)] {
@@ -399,7 +403,8 @@ fn a_smooth_ball_of_plastic_is_as_bright_as_a_plate() {
     assert!((round / flat - 1.0).abs() < 0.005, "{round} {flat}");
 }
 
-/// A coarse ball, whose smooth normals deviate from its facets, with bumps: its silhouette included, it reflects a white sky.
+/// A coarse ball, whose smooth normals deviate from its facets, with bumps: its silhouette included, it
+/// reflects a white sky.
 #[test]
 fn glossy_bumpy_balls_have_neither_black_nor_bright_fringes() {
     for roughness in [0.0, 0.1, 0.3] {

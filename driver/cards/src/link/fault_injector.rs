@@ -1,7 +1,8 @@
-//! Simulation of a bad line: bytes are damaged, lost, repeated, delayed and cut into pieces by random numbers.
+//! Simulation of a bad line: bytes are damaged, lost, repeated, delayed and cut into pieces by random
+//! numbers.
 //!
-//! A byte's faults depend on the seed, its direction and its position among all bytes of its direction, not on time or on
-//! the sizes of reads and writes.
+//! A byte's faults depend on the seed, its direction and its position among all bytes of its direction, not
+//! on time or on the sizes of reads and writes.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -166,7 +167,8 @@ impl FaultInjector {
         buffer: &mut [u8],
         wait: Duration,
     ) -> Result<usize, PortError> {
-        // The caller may not write again for long, so pending bytes are sent here. The read reports a closed port as well.
+        // The caller may not write again for long, so pending bytes are sent here. The read reports a closed
+        // port as well.
         let _ = self.flush(port, Duration::ZERO);
         if self.incoming.bytes.is_empty() {
             let mut bytes = [0; PIECE];

@@ -1,7 +1,9 @@
-//! Link within the process: two bounded queues of bytes. They fill up more readily than hardware, which tests flow control.
+//! Link within the process: two bounded queues of bytes. They fill up more readily than hardware, which tests
+//! flow control.
 //!
-//! A card writes a frame of some hundred bytes at a time, and to wake the host for each takes longer than the host's work on it.
-//! The end of a [patient](LoopbackPort::patient) writer wakes the reader for many frames at once.
+//! A card writes a frame of some hundred bytes at a time, and to wake the host for each takes longer than the
+//! host's work on it. The end of a [patient](LoopbackPort::patient) writer wakes the reader for many frames
+//! at once.
 
 use std::collections::VecDeque;
 use std::io::Read;
@@ -75,8 +77,8 @@ pub fn loopback(capacity: usize) -> (LoopbackPort, LoopbackPort) {
 }
 
 impl LoopbackPort {
-    /// The port of a writer that goes on to call it while it has work, and before it waits: the reader is woken once so many bytes are
-    /// there, after some time, or when the writer itself waits for bytes.
+    /// The port of a writer that goes on to call it while it has work, and before it waits: the reader is
+    /// woken once so many bytes are there, after some time, or when the writer itself waits for bytes.
     #[must_use]
     pub fn patient(mut self, wakes_at: usize) -> Self {
         self.wakes_at = wakes_at.min(self.capacity);

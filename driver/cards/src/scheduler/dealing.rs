@@ -13,7 +13,8 @@ const HELP_AFTER: u32 = 2;
 const HELP_WITHOUT_MEAN: Duration = Duration::from_secs(1);
 /// Number of waiting tiles for each other card, and each tile that a card has, at which it may have one more.
 const PLENTY: usize = 4;
-/// Number of tiles awaiting comparison that are searched for a card before other waiting tiles are considered.
+/// Number of tiles awaiting comparison that are searched for a card before other waiting tiles are
+/// considered.
 pub(super) const COMPARED_AT_ONCE: usize = 256;
 
 impl Scheduler {
@@ -45,8 +46,9 @@ impl Scheduler {
         !self.entries[index].crashes.is_empty()
     }
 
-    /// Returns whether a card may have one tile more: any card that has none, and others as long as plenty wait for each other card. Tiles
-    /// that wait at a card behind a long one are late, and near the end no card would be free to take them.
+    /// Returns whether a card may have one tile more: any card that has none, and others as long as plenty
+    /// wait for each other card. Tiles that wait at a card behind a long one are late, and near the end no
+    /// card would be free to take them.
     fn has_share(&self, card: CardNumber) -> bool {
         let others = self.living().filter(|&other| other != card).count();
         self.waiting_anywhere() > PLENTY * self.cards[card].tiles.len() * others
@@ -80,8 +82,8 @@ impl Scheduler {
         entry.is_open() && entry.copies.is_empty() && !entry.has_answer_of(card)
     }
 
-    /// Next tile that is set apart, once all others are done, for one of the cards that have crashed at it the minimum
-    /// number of times.
+    /// Next tile that is set apart, once all others are done, for one of the cards that have crashed at it
+    /// the minimum number of times.
     fn next_set_apart(&mut self, card: CardNumber) -> Option<usize> {
         if self.set_apart.is_empty() || self.open_entries().any(|entry| entry.crashes.len() < CRASHES_APART) {
             return None;
@@ -111,8 +113,8 @@ impl Scheduler {
         self.times.mean().map_or(HELP_WITHOUT_MEAN, |mean| mean.saturating_mul(HELP_AFTER))
     }
 
-    /// Tile that an idle card duplicates, because other cards have had it for too long: one with the minimum number of
-    /// copies, and among these the oldest.
+    /// Tile that an idle card duplicates, because other cards have had it for too long: one with the minimum
+    /// number of copies, and among these the oldest.
     fn next_to_help(&mut self, card: CardNumber, now: Duration) -> Option<usize> {
         if !self.has_helpers || !self.cards[card].tiles.is_empty() || now < self.next_help {
             return None;

@@ -56,7 +56,8 @@ pub enum SchedulerError {
     },
 }
 
-/// Formats a tile as an argument of `--crop`: first column and one past the last, first row and one past the last.
+/// Formats a tile as an argument of `--crop`: first column and one past the last, first row and one past the
+/// last.
 pub(crate) struct Rectangle<'a>(pub(crate) &'a Tile);
 
 impl fmt::Display for Rectangle<'_> {

@@ -1,4 +1,5 @@
-//! Homes: the cards that have rendered the tiles of a picture before, and hold the irradiance records of these.
+//! Homes: the cards that have rendered the tiles of a picture before, and hold the irradiance records of
+//! these.
 
 use std::collections::HashMap;
 use std::time::Duration;
@@ -9,7 +10,8 @@ use super::Scheduler;
 use super::card::CardNumber;
 use super::entry::Progress;
 
-/// Number of tiles at home up to which a card that is at work is waited for, as others would have to gather their records.
+/// Number of tiles at home up to which a card that is at work is waited for, as others would have to gather
+/// their records.
 const MAX_AT_HOME: usize = 4;
 
 impl Scheduler {
@@ -45,7 +47,8 @@ impl Scheduler {
         self.waiting.extend(tiles);
     }
 
-    /// Takes a tile from the card that has most at home, and would render it last; `None` if that card is about to render its own.
+    /// Takes a tile from the card that has most at home, and would render it last; `None` if that card is
+    /// about to render its own.
     pub(super) fn next_of_others(&mut self, now: Duration) -> Option<usize> {
         let patience = self.patience();
         let has_most = |card: &CardNumber| self.cards[*card].at_home.len();

@@ -1,18 +1,20 @@
 //! Assignment of tiles to cards.
 //!
-//! Tiles wait in one queue. A card with a free credit takes the next one, unless so few are left that other cards would go without; no
-//! card waits for another, and results arrive in any order. A tile's pixels do not depend on its card or its time.
+//! Tiles wait in one queue. A card with a free credit takes the next one, unless so few are left that other
+//! cards would go without; no card waits for another, and results arrive in any order. A tile's pixels do not
+//! depend on its card or its time.
 //!
-//! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third decides; the tiles
-//!   that the outvoted card alone has rendered are rendered again.
+//! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third
+//!   decides; the tiles that the outvoted card alone has rendered are rendered again.
 //! - A tile that is brighter than any but a lamp beside a surface makes it is verified as well, if there is
-//!   another card. A tile that is not is believed against one that is. A card alone is believed, and its tiles counted.
-//! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the cards that have
-//!   crashed at it the minimum number of times, and is abandoned after five crashes.
-//! - A tile of a picture by passes waits for the card that rendered it before, which has kept its irradiance records. Idle cards take tiles
-//!   of others from the end, unless these will soon come to them.
-//! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once that exceeds
-//!   twice the mean time of a tile. The first answer counts.
+//!   another card. A tile that is not is believed against one that is. A card alone is believed, and its
+//!   tiles counted.
+//! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the
+//!   cards that have crashed at it the minimum number of times, and is abandoned after five crashes.
+//! - A tile of a picture by passes waits for the card that rendered it before, which has kept its irradiance
+//!   records. Idle cards take tiles of others from the end, unless these will soon come to them.
+//! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once
+//!   that exceeds twice the mean time of a tile. The first answer counts.
 //!
 //! The scheduler has no thread, lock or clock: [`crate::dispatcher`] connects it to sessions and sinks.
 
@@ -49,8 +51,8 @@ const CRASHES_APART: usize = 2;
 const MAX_CRASHES: usize = 5;
 /// Maximum time of a ray over the mean of the card's slowest tile.
 const SLOWER_THAN_BEFORE: f64 = 50.0;
-/// Maximum time of a ray over the mean of the slowest tile of all cards, for a card without rendered tiles: a Cortex-M4F
-/// takes some 400 times as long as a chip that a desktop computer emulates.
+/// Maximum time of a ray over the mean of the slowest tile of all cards, for a card without rendered tiles: a
+/// Cortex-M4F takes some 400 times as long as a chip that a desktop computer emulates.
 const SLOWER_THAN_OTHERS: f64 = 1000.0;
 
 /// Tiles of a picture, with their progress.
@@ -226,8 +228,8 @@ impl Scheduler {
         }
     }
 
-    /// Removes a tile from a card that has not rendered it. It goes to the front of the queue, as it has waited longest.
-    /// `has_crashed` is true if the card was working on it.
+    /// Removes a tile from a card that has not rendered it. It goes to the front of the queue, as it has
+    /// waited longest. `has_crashed` is true if the card was working on it.
     pub fn give_back(&mut self, card: CardNumber, id: u32, has_crashed: bool, now: Duration) {
         let Some((index, _)) = self.remove_copy(card, id, now) else { return };
         let entry = &mut self.entries[index];
@@ -339,8 +341,8 @@ impl Scheduler {
         revoked
     }
 
-    /// Maximum time of a ray or its gather on a card, seconds, from the times of rendered tiles; `None` before the first
-    /// tile of any card.
+    /// Maximum time of a ray or its gather on a card, seconds, from the times of rendered tiles; `None`
+    /// before the first tile of any card.
     pub fn slowest(&self, card: CardNumber) -> Option<f64> {
         let before = self.cards[card].slowest.map(|seconds| seconds * SLOWER_THAN_BEFORE);
         let others = self.cards.iter().filter_map(|card| card.slowest).reduce(f64::max);

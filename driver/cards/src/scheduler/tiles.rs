@@ -17,8 +17,8 @@ pub enum GatherOrder {
     Hash,
     /// Rays by direction bins; gathers wait in the queue and are sorted along a Hilbert curve.
     Sort,
-    /// All gathers of the frame along one Hilbert curve. Only emulated chips can do it: they leave their gathers to the
-    /// host.
+    /// All gathers of the frame along one Hilbert curve. Only emulated chips can do it: they leave their
+    /// gathers to the host.
     Hilbert,
 }
 
@@ -47,8 +47,8 @@ impl GatherOrder {
         matches!(self, Self::Hash | Self::Sort)
     }
 
-    /// Returns whether the gathers of the whole frame are ordered together: the host does them, and all tiles are finished
-    /// at the end.
+    /// Returns whether the gathers of the whole frame are ordered together: the host does them, and all tiles
+    /// are finished at the end.
     pub fn is_of_whole_frame(self) -> bool {
         self == Self::Hilbert
     }
@@ -81,9 +81,9 @@ pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     tiles
 }
 
-/// Tiles, numbered from 0, in an order in which the first ones of any number lie all over the picture, so that they take about as long
-/// as any others: by the fraction of `number / golden ratio`. Between the first `k` of `n` numbers there are gaps of three lengths at
-/// most, all about `n / k` (three-gap theorem).
+/// Tiles, numbered from 0, in an order in which the first ones of any number lie all over the picture, so
+/// that they take about as long as any others: by the fraction of `number / golden ratio`. Between the first
+/// `k` of `n` numbers there are gaps of three lengths at most, all about `n / k` (three-gap theorem).
 pub fn spread(mut tiles: Vec<Tile>) -> Vec<Tile> {
     /// `2^32` over the golden ratio.
     const GOLDEN: u32 = 0x9E37_79B9;

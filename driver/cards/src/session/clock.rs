@@ -9,18 +9,20 @@ const SILENCE: Duration = Duration::from_secs(10);
 /// Silence before the first probe; it doubles with each probe that is not answered.
 const PATIENCE: Duration = Duration::from_millis(200);
 const MAX_PATIENCE: Duration = Duration::from_secs(1);
-/// Maximum time from a card's first answer to its reply to the hello. A slow serial line takes a second or two.
+/// Maximum time from a card's first answer to its reply to the hello. A slow serial line takes a second or
+/// two.
 const GREETING: Duration = Duration::from_secs(5);
 /// Lower bound of the time limit of a tile, if times of rendered tiles are known.
 const TILE: Duration = Duration::from_secs(30);
-/// Maximum time without progress, except for tiles. The longest step, the verification of a received image, takes seconds.
+/// Maximum time without progress, except for tiles. The longest step, the verification of a received image,
+/// takes seconds.
 const STANDSTILL: Duration = Duration::from_secs(120);
-/// Time per ray with its gather that extends [`STANDSTILL`] while a tile is rendered and no times are known, as all pixels
-/// may arrive at its end: some fifty times the slowest chip measured.
+/// Time per ray with its gather that extends [`STANDSTILL`] while a tile is rendered and no times are known,
+/// as all pixels may arrive at its end: some fifty times the slowest chip measured.
 const RAY: Duration = Duration::from_millis(20);
 
-/// Maximum time between two polls of the link that counts as time. Longer gaps mean that the host itself was stopped, or
-/// without a processor.
+/// Maximum time between two polls of the link that counts as time. Longer gaps mean that the host itself was
+/// stopped, or without a processor.
 const MAX_BETWEEN_LOOKS: Duration = Duration::from_secs(1);
 
 /// Times of a session's link.
@@ -61,7 +63,8 @@ impl Clock {
         self.heard.is_some()
     }
 
-    /// Records that bytes were sent, whose answer takes its time. A line that accepts no bytes counts as silent.
+    /// Records that bytes were sent, whose answer takes its time. A line that accepts no bytes counts as
+    /// silent.
     pub(super) fn sent(&mut self, now: Duration) {
         self.asked = now;
     }
@@ -98,8 +101,8 @@ impl Clock {
         self.heard.is_some_and(|heard| now.saturating_sub(heard) > GREETING)
     }
 
-    /// Checks the silence, and the time without progress, of a card whose largest tile has `rays` rays. `slowest` is the
-    /// maximum time of a ray or its gather, seconds, if known.
+    /// Checks the silence, and the time without progress, of a card whose largest tile has `rays` rays.
+    /// `slowest` is the maximum time of a ray or its gather, seconds, if known.
     ///
     /// # Errors
     /// If either is too long.

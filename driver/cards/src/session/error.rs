@@ -129,7 +129,8 @@ fn ending(error: &PortError) -> String {
     }
 }
 
-/// Checks a card's versions. They are decoded before the rest of a hello, whose format may differ between versions.
+/// Checks a card's versions. They are decoded before the rest of a hello, whose format may differ between
+/// versions.
 pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     if card.protocol != PROTOCOL_VERSION {
         return Err(SessionError::Protocol { card: card.protocol, host: PROTOCOL_VERSION });
@@ -140,7 +141,8 @@ pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Checks a card's budget against the first one that it reported, for which settings, image and tiles were checked.
+/// Checks a card's budget against the first one that it reported, for which settings, image and tiles were
+/// checked.
 pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<(), SessionError> {
     if budget.tiles == 0 {
         return Err(SessionError::NoTiles);
@@ -152,7 +154,8 @@ pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<()
 }
 
 impl SessionError {
-    /// Tile of which the card sent wrong pixels, if this is the error: none of its pixels can be trusted then.
+    /// Tile of which the card sent wrong pixels, if this is the error: none of its pixels can be trusted
+    /// then.
     pub fn lie(&self) -> Option<Tile> {
         match *self {
             Self::Value { tile, .. } | Self::Outvoted { tile } => Some(tile),

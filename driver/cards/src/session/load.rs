@@ -1,5 +1,5 @@
-//! Loading of the image: only runs of lines that the card lacks are sent. They follow from the image that it holds or, if that is not
-//! known, from the checksums of its chunks.
+//! Loading of the image: only runs of lines that the card lacks are sent. They follow from the image that it
+//! holds or, if that is not known, from the checksums of its chunks.
 
 use std::ops::Range;
 

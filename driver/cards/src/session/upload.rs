@@ -13,7 +13,8 @@ pub(super) type Runs = Arc<[Range<usize>]>;
 /// Lines of an image, in memory that the host keeps.
 type SharedLines = Arc<dyn AsRef<[Line]> + Send + Sync>;
 
-/// Card image as it is sent to cards. Checksums and changed lines are computed once, however many cards there are.
+/// Card image as it is sent to cards. Checksums and changed lines are computed once, however many cards there
+/// are.
 pub struct Upload {
     lines: SharedLines,
     checksum: u64,

@@ -1,8 +1,8 @@
-//! Optimization of a binary tree: parts are taken out and inserted where the tree's surface area is least (Meister, Bittner 2017,
-//! *Parallel reinsertion for bounding volume hierarchy optimization*).
+//! Optimization of a binary tree: parts are taken out and inserted where the tree's surface area is least
+//! (Meister, Bittner 2017, *Parallel reinsertion for bounding volume hierarchy optimization*).
 //!
-//! Rounds, order and results are those of obvhs, whose search for the best place is called here for many parts at once. The tree
-//! does not depend on the number of threads.
+//! Rounds, order and results are those of obvhs, whose search for the best place is called here for many
+//! parts at once. The tree does not depend on the number of threads.
 
 use obvhs::bvh2::reinsertion::{Reinsertion, find_reinsertion, reinsert_node};
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};

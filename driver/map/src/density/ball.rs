@@ -22,7 +22,8 @@ pub(super) struct Ball {
 pub(super) struct LeafNearBall {
     /// By corner, axis and slot.
     corners: [[[f32; LEAF_TRIANGLES]; 3]; 3],
-    /// Bit mask of the triangles that have an area, and whose bounding boxes and planes are within distance 1 of the origin.
+    /// Bit mask of the triangles that have an area, and whose bounding boxes and planes are within distance 1
+    /// of the origin.
     near: u32,
     /// Bit mask of the triangles with a coordinate beyond [`MAX_EXTENT`].
     large: u32,
@@ -88,7 +89,8 @@ impl Kernel for NearTriangles<'_> {
     }
 }
 
-/// True if a triangle has an area, and its bounding box and its plane are within distance 1 of the origin; and true if it is large.
+/// True if a triangle has an area, and its bounding box and its plane are within distance 1 of the origin;
+/// and true if it is large.
 #[inline(always)]
 fn place([a, b, c]: &[[[f32; LEAF_TRIANGLES]; 3]; 3], slot: usize) -> (bool, bool) {
     let (mut outside, mut extent) = ([0.0; 3], 0.0);
@@ -105,7 +107,8 @@ fn place([a, b, c]: &[[[f32; LEAF_TRIANGLES]; 3]; 3], slot: usize) -> (bool, boo
     ((dot(outside, outside) <= 1.0) & (size > 0.0) & (distance * distance <= size), extent > MAX_EXTENT)
 }
 
-/// Calls `visit` for all triangles that may intersect a ball, until one call returns false. Returns whether all calls returned true.
+/// Calls `visit` for all triangles that may intersect a ball, until one call returns false. Returns whether
+/// all calls returned true.
 #[inline(always)]
 pub(super) fn for_each_near(
     scene: &SceneImage,

@@ -1,8 +1,8 @@
 //! Parallel chords of a ball.
 //!
-//! The area of a surface is the area of its projection over the cosine between their normals, `A = A_p / cos`. Evenly
-//! spread chords therefore measure it: each stands for an equal share of the disc across them, and each crossing for that
-//! share over its cosine.
+//! The area of a surface is the area of its projection over the cosine between their normals, `A = A_p /
+//! cos`. Evenly spread chords therefore measure it: each stands for an equal share of the disc across them,
+//! and each crossing for that share over its cosine.
 
 use glam::Vec3;
 use photoncard_firmware::simd::LANES;

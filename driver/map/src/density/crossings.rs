@@ -1,8 +1,9 @@
 //! Crossings of chords and triangles, and which of them lie outside all solids.
 //!
-//! All crossings of a chord count, not only the first, except those inside a solid and those without light below others
-//! ([`super::evidence`]). The *depth* of a point is the number of solids that contain it. It follows from the front and back faces that
-//! are crossed on a path from a reference point outside all solids, a little above the photon.
+//! All crossings of a chord count, not only the first, except those inside a solid and those without light
+//! below others ([`super::evidence`]). The *depth* of a point is the number of solids that contain it. It
+//! follows from the front and back faces that are crossed on a path from a reference point outside all
+//! solids, a little above the photon.
 
 use std::cmp::Reverse;
 
@@ -28,7 +29,8 @@ pub(super) struct Layer {
     pub(super) triangle: u32,
 }
 
-/// Sort key of a crossing: greater for higher ones, and at one height for fronts. It is not 0, as heights are within 1.
+/// Sort key of a crossing: greater for higher ones, and at one height for fronts. It is not 0, as heights are
+/// within 1.
 #[inline(always)]
 fn key(height: f32, is_front: bool) -> u32 {
     let bits = height.to_bits();
@@ -47,8 +49,8 @@ fn height(key: u32) -> f32 {
     f32::from_bits(if ascending >> 31 == 0 { !ascending } else { ascending & !(1 << 31) })
 }
 
-/// The side of a triangle that a chord meets on its way down: bits 0 to 7 are the code of its normal, bit 8 is set if no photons
-/// are stored there, and bits 9 and 10 are one more than the change of depth.
+/// The side of a triangle that a chord meets on its way down: bits 0 to 7 are the code of its normal, bit 8
+/// is set if no photons are stored there, and bits 9 and 10 are one more than the change of depth.
 #[inline(always)]
 fn face(sides: Sides, is_front: bool) -> u32 {
     let normal = sides.normal(is_front).map_or(1 << 8, u32::from);
@@ -125,7 +127,8 @@ impl Crossings {
         self.depths[chord / LANES][chord % LANES] = depth;
     }
 
-    /// Collects the crossings outside all solids, by chords. Those below another one of their chord are put into `covered`.
+    /// Collects the crossings outside all solids, by chords. Those below another one of their chord are put
+    /// into `covered`.
     pub(super) fn open_surfaces(
         &mut self,
         chords: &Chords,
@@ -164,7 +167,8 @@ impl Level {
     fn sort(&mut self, other: &mut Self) {
         for lane in 0..LANES {
             let [a, b] = [self.keys[lane], other.keys[lane]];
-            // By their difference: lanes that are chosen in memory would be written one by one, and read back slowly.
+            // By their difference: lanes that are chosen in memory would be written one by one, and read back
+            // slowly.
             let exchange = if b >= a { u32::MAX } else { 0 };
             let slopes = (self.slopes[lane] ^ other.slopes[lane]) & exchange;
             let faces = (self.faces[lane] ^ other.faces[lane]) & exchange;
@@ -238,8 +242,8 @@ impl Kernel for OpenAll<'_> {
     }
 }
 
-/// Finds the crossings outside all solids. `depths` are those of the chords at the reference point, of which `reference` is the
-/// height as an integer.
+/// Finds the crossings outside all solids. `depths` are those of the chords at the reference point, of which
+/// `reference` is the height as an integer.
 #[inline(always)]
 fn open(isa: impl Isa, levels: &mut [Level], depths: &mut [i32; LANES], reference: u32) {
     for level in levels.iter() {

@@ -1,14 +1,15 @@
 //! Disc fractions: the boundary correction of the density estimate.
 //!
-//! A gather divides by the area of a flat disc. Its search covers a sphere, however, and finds the photons of all surfaces
-//! in it, of which those with a similar normal count. Near an edge or in a corner these surfaces have less area than the
-//! disc, and the estimate would be too dark: on a Cornell box by some 2 % of all indirect light. On steps, or between
-//! balusters, they may have more, and it would be too bright. This module measures the area once for every photon, for the
-//! radius of a gather at the photon, along chords of the sphere ([`super::chords`]). A gather then divides by this area
-//! ([`photoncard_firmware::photon`]).
+//! A gather divides by the area of a flat disc. Its search covers a sphere, however, and finds the photons of
+//! all surfaces in it, of which those with a similar normal count. Near an edge or in a corner these surfaces
+//! have less area than the disc, and the estimate would be too dark: on a Cornell box by some 2 % of all
+//! indirect light. On steps, or between balusters, they may have more, and it would be too bright. This
+//! module measures the area once for every photon, for the radius of a gather at the photon, along chords of
+//! the sphere ([`super::chords`]). A gather then divides by this area ([`photoncard_firmware::photon`]).
 //!
-//! Most photons lie inside a large flat surface, with a fraction of 1: such leaves are recognized by the triangles around
-//! them. The photons of other leaves share the search for the radius, the query for triangles and the chords.
+//! Most photons lie inside a large flat surface, with a fraction of 1: such leaves are recognized by the
+//! triangles around them. The photons of other leaves share the search for the radius, the query for
+//! triangles and the chords.
 
 use glam::Vec3;
 use photoncard_firmware::photon::{MIN_NORMAL_COSINE, VisibleRegion};
@@ -38,15 +39,17 @@ const LEAVES_PER_TASK: usize = 64;
 const MIN_SHARED_COSINE: f32 = 0.85;
 /// Height of the reference point above a photon, in radii, if no surface is nearer.
 const OPEN_HEIGHT: f32 = 0.1;
-/// Radius of the sphere in which nothing must be hidden for a gather of all photons, over that of a photon's gather: the gather's point
-/// lies beside the photon.
+/// Radius of the sphere in which nothing must be hidden for a gather of all photons, over that of a photon's
+/// gather: the gather's point lies beside the photon.
 const MARGIN: f32 = 1.15;
-/// Greatest difference of the hidden shares of area and light in that sphere for which a gather takes all photons.
+/// Greatest difference of the hidden shares of area and light in that sphere for which a gather takes all
+/// photons.
 const MAX_DIFFERENCE: f32 = 0.06;
 /// Greatest difference in the ball around photons, over the area of one photon's sphere, for which none of
 /// them is taken to have more than [`MAX_DIFFERENCE`].
 const NEAR_DIFFERENCE: f32 = 0.03;
-/// Radius of gathers over that of a disc with as many photons as a leaf, estimated by the greatest distance from its middle.
+/// Radius of gathers over that of a disc with as many photons as a leaf, estimated by the greatest distance
+/// from its middle.
 const BY_SPREAD: f32 = 1.2;
 /// Maximum distance at which a photon shows that a surface has light, over the radius of a gather.
 const EVIDENT: f32 = 0.7;
@@ -68,8 +71,8 @@ type Codes = [u8; LEAF_PHOTONS];
 /// Photons of one leaf.
 type DiscPhotons = heapless::Vec<DiscPhoton, LEAF_PHOTONS>;
 
-/// Measures the disc fraction of every photon for gathers of `neighbors` photons at some distances, and writes it into
-/// the image. `go_on` is called before each task.
+/// Measures the disc fraction of every photon for gathers of `neighbors` photons at some distances, and
+/// writes it into the image. `go_on` is called before each task.
 ///
 /// # Errors
 /// If the image is malformed, or `go_on` returns false.
@@ -251,8 +254,8 @@ impl<'a> Meter<'a> {
     ) -> Result<(), Fault> {
         let spread = spread(&photons, middle);
         let outer = MARGIN * radius + spread;
-        // The paths from the reference point lie in the ball as well. Double precision: the squares of no two lengths
-        // overflow.
+        // The paths from the reference point lie in the ball as well. Double precision: the squares of no two
+        // lengths overflow.
         let [across, along] = [outer, spread + OPEN_HEIGHT * radius].map(f64::from);
         let reach = (across * across + along * along).sqrt() as f32;
         let ball = Ball { centre: middle.position, radius: 1.001 * reach + 2.0 * self.lift(radius) };
@@ -333,7 +336,8 @@ impl<'a> Meter<'a> {
         run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift })
     }
 
-    /// Adds surfaces below others where photons show that they have light. One within the grid's error below another is the same.
+    /// Adds surfaces below others where photons show that they have light. One within the grid's error below
+    /// another is the same.
     fn add_covered(&mut self, photon: Vec3, frame: &ChordFrame, cluster: &Cluster) -> Result<(), Fault> {
         if self.covered.is_empty() {
             return Ok(());
@@ -361,7 +365,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// True if light that photons of a group do not see may differ from the light that they see, by the first of them.
+    /// True if light that photons of a group do not see may differ from the light that they see, by the first
+    /// of them.
     fn may_differ(
         &mut self,
         group: &[DiscPhoton],
@@ -427,8 +432,8 @@ impl<'a> Meter<'a> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Frame along the normal of a photon. The reference point is above the photon with no surface in between: at
-    /// [`OPEN_HEIGHT`], or halfway to the nearest surface above.
+    /// Frame along the normal of a photon. The reference point is above the photon with no surface in
+    /// between: at [`OPEN_HEIGHT`], or halfway to the nearest surface above.
     fn frame(&self, photon: &DiscPhoton, cluster: &Cluster) -> Result<ChordFrame, Fault> {
         let Cluster { ball, radius, .. } = *cluster;
         let normal = self.exact_normal(photon, radius)?;
@@ -451,13 +456,14 @@ impl<'a> Meter<'a> {
         Ok(found.filter(|normal| normal.dot(coded) >= MIN_NORMAL_COSINE).unwrap_or(coded))
     }
 
-    /// Height above a photon at which rays start, metres: a small part of the radius, and more than the grid may have moved
-    /// the photon below its surface.
+    /// Height above a photon at which rays start, metres: a small part of the radius, and more than the grid
+    /// may have moved the photon below its surface.
     fn lift(&self, radius: f32) -> f32 {
         1e-3 * radius + self.searcher.scene.header.photon_grid.cell
     }
 
-    /// Nearest surface from `origin` along a unit vector: its distance, and its normal on the side of `origin`.
+    /// Nearest surface from `origin` along a unit vector: its distance, and its normal on the side of
+    /// `origin`.
     fn first_on_way(
         &self,
         origin: Vec3,
@@ -508,8 +514,8 @@ impl<'a> Meter<'a> {
 }
 
 impl Fraction {
-    /// Fraction of a photon's disc, or of its region where light behind walls differs from that before them: by more than photons differ
-    /// by chance.
+    /// Fraction of a photon's disc, or of its region where light behind walls differs from that before them:
+    /// by more than photons differ by chance.
     fn new(areas: &Areas, powers: &Areas) -> Self {
         let chance = areas.hidden * (1.0 - areas.hidden) / powers.points.max(1.0);
         let differs = (areas.hidden - powers.hidden).abs() > MAX_DIFFERENCE + 1.5 * chance.sqrt();
@@ -539,8 +545,8 @@ fn split_off(photons: &mut DiscPhotons, is_chosen: impl Fn(&DiscPhoton) -> bool)
     chosen
 }
 
-/// Encoded fractions of a leaf. The dithers of its photons are spread evenly (golden ratio), so that the rounding errors of
-/// neighbours cancel.
+/// Encoded fractions of a leaf. The dithers of its photons are spread evenly (golden ratio), so that the
+/// rounding errors of neighbours cancel.
 fn codes(fractions: &[Fraction; LEAF_PHOTONS], leaf: usize) -> Codes {
     const GOLDEN_RATIO: u32 = 0x9e37_79b9;
     let first = hash(leaf as u32);

@@ -1,8 +1,9 @@
 //! Photons as evidence of light: whether light reaches a surface that another one covers.
 //!
-//! A wall behind a picture, a floor under a carpet or the inside of a box of double-sided sheets is a surface without light, that no
-//! photon meets. The boards of a shelf and the slats of a blind have light. Geometry does not tell them apart: meshes are open, touch
-//! each other, and stand apart by less than a millimetre. The photons of the map do.
+//! A wall behind a picture, a floor under a carpet or the inside of a box of double-sided sheets is a surface
+//! without light, that no photon meets. The boards of a shelf and the slats of a blind have light. Geometry
+//! does not tell them apart: meshes are open, touch each other, and stand apart by less than a millimetre.
+//! The photons of the map do.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -34,7 +35,8 @@ struct Place {
 pub(super) struct Evidence {
     places: Vec<Place>,
     stack: Vec<Child>,
-    /// Photons on surfaces across the chords, in the ball's coordinates along the frame's axes; unused lanes are far away.
+    /// Photons on surfaces across the chords, in the ball's coordinates along the frame's axes; unused lanes
+    /// are far away.
     along: Vec<LaneVector>,
     /// Squared distances of the photons of a photon's own surface, m^2.
     own: Vec<f32>,
@@ -42,7 +44,8 @@ pub(super) struct Evidence {
     near: f32,
 }
 
-/// Number of photons of a surface expected near a chord: where it has as much light as the measured one, one chord in 150 has none.
+/// Number of photons of a surface expected near a chord: where it has as much light as the measured one, one
+/// chord in 150 has none.
 const SEVERAL: usize = 5;
 /// Maximum tangent of the angle between a photon's surface and the way to another photon of it.
 const OWN_SLOPE: f32 = 0.25;
@@ -101,8 +104,8 @@ impl Evidence {
         }
     }
 
-    /// Chooses the photons on surfaces across the chords of a frame, as evidence within a distance in which a photon's own surface
-    /// has several; at most `most` metres.
+    /// Chooses the photons on surfaces across the chords of a frame, as evidence within a distance in which a
+    /// photon's own surface has several; at most `most` metres.
     pub(super) fn choose(&mut self, ball: Ball, frame: &ChordFrame, (photon, most): (Vec3, f32)) {
         self.along.clear();
         self.own.clear();

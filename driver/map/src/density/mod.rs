@@ -1,8 +1,8 @@
 //! Preparation of the density estimate on the host.
 //!
-//! Both results depend on the image and the number of neighbours: distances of gathers, from the density of the
-//! photons (`search`), and for every photon its disc fraction, the area of surface within the radius of a gather over the
-//! area of a flat disc (`disc`).
+//! Both results depend on the image and the number of neighbours: distances of gathers, from the density of
+//! the photons (`search`), and for every photon its disc fraction, the area of surface within the radius of a
+//! gather over the area of a flat disc (`disc`).
 
 mod ball;
 mod block;

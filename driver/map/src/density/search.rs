@@ -17,7 +17,8 @@ use crate::photon::Importons;
 const MOST: f32 = 1.4;
 /// Share of the sampled photons whose k-th neighbour lies within the usual distance.
 const USUAL_SHARE: f64 = 0.95;
-/// Automatic maximum distance over the greatest distance of a sampled photon's k-th neighbour: there may be greater ones.
+/// Automatic maximum distance over the greatest distance of a sampled photon's k-th neighbour: there may be
+/// greater ones.
 const BEYOND_SAMPLES: f32 = 1.5;
 
 /// A search of the photon map, with its buffer.
@@ -54,8 +55,8 @@ impl<'a> Searcher<'a> {
 pub(crate) struct GatherDistances {
     /// Distance within which most photons have k neighbours.
     pub(crate) usual: f32,
-    /// Maximum distance of gathers: all sampled photons have k neighbours within, so that the radius of a gather follows the density at its
-    /// point.
+    /// Maximum distance of gathers: all sampled photons have k neighbours within, so that the radius of a
+    /// gather follows the density at its point.
     pub(crate) greatest: f32,
 }
 

@@ -1,5 +1,5 @@
-//! Intersection of chords and triangles: sixteen triangles are projected along the chords, then sixteen chords are tested
-//! against one triangle.
+//! Intersection of chords and triangles: sixteen triangles are projected along the chords, then sixteen
+//! chords are tested against one triangle.
 
 use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
@@ -57,7 +57,8 @@ struct Shadows {
     corners: [LaneVector; 3],
     /// Line of each edge, `x a + y b + c`, positive inside.
     edges: [LaneVector; 3],
-    /// Value of each edge's line that points inside exceed: those exactly on a shared edge belong to one of its two triangles.
+    /// Value of each edge's line that points inside exceed: those exactly on a shared edge belong to one of
+    /// its two triangles.
     bounds: [Lane; 3],
     /// Height of the plane, `x a + y b + c`.
     heights: LaneVector,
@@ -99,8 +100,8 @@ impl Shadows {
             let ([x, y, _], [p, q, _]) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
             let [a, b, c] = &mut self.edges[edge];
             for lane in 0..LANES {
-                // The lines of a shared edge are opposite to the last bit in its two triangles. So is the sign: both test
-                // one line.
+                // The lines of a shared edge are opposite to the last bit in its two triangles. So is the
+                // sign: both test one line.
                 let sign = if self.is_front[lane] != 0.0 { 1.0 } else { -1.0 };
                 a[lane] = (y[lane] - q[lane]) * sign;
                 b[lane] = (p[lane] - x[lane]) * sign;
@@ -172,8 +173,8 @@ impl Shadows {
         isa.below(&apart, 1)
     }
 
-    /// Heights at which a batch of chords meets a triangle's plane, and 1 for the chords that do not meet the triangle within the
-    /// ball, else 0.
+    /// Heights at which a batch of chords meets a triangle's plane, and 1 for the chords that do not meet the
+    /// triangle within the ball, else 0.
     #[inline(always)]
     fn cross(&self, triangle: usize, batch: &Batch) -> (Lane, [u32; LANES]) {
         let edges = [0, 1, 2].map(|edge: usize| at(&self.edges[edge], triangle));
@@ -210,8 +211,8 @@ fn along([a, b, c]: [f32; 3], [x, y, z]: &LaneVector) -> Lane {
     sum
 }
 
-/// Cut of a triangle by the horizontal plane through the reference point: a segment from `start` to `end`, relative to that
-/// point, with the front on its left.
+/// Cut of a triangle by the horizontal plane through the reference point: a segment from `start` to `end`,
+/// relative to that point, with the front on its left.
 struct Cut {
     start: [f32; 2],
     end: [f32; 2],
@@ -233,8 +234,8 @@ impl Cut {
         Some(Self { start: start?, end: end? })
     }
 
-    /// Changes the depth of each chord whose path from the reference point crosses the cut: +1 where it enters by the
-    /// front, else -1.
+    /// Changes the depth of each chord whose path from the reference point crosses the cut: +1 where it
+    /// enters by the front, else -1.
     #[inline(always)]
     fn count(&self, chords: &Chords, open: Vec3, depths: &mut [[i32; LANES]; BATCHES]) {
         let ([a, b], [c, d]) = (self.start, self.end);

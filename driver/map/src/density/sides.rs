@@ -18,7 +18,8 @@ use crate::pack::CardImage;
 pub(super) struct Sides {
     /// Codes of the normals of front and back; `None` for a side where no photons are stored.
     normals: [Option<u8>; 2],
-    /// True if the back faces the inside of a solid. The back of a double-sided sheet is as open as its front.
+    /// True if the back faces the inside of a solid. The back of a double-sided sheet is as open as its
+    /// front.
     pub(super) is_solid: bool,
     /// True if parts of the triangle are not there, by its texture.
     pub(super) has_cut_outs: bool,
@@ -108,9 +109,10 @@ impl SideTable {
         self.sides.get(triangle as usize).copied().unwrap_or_default()
     }
 
-    /// Marks double-sided triangles that form closed surfaces as solid: no light enters, unless they emit it themselves or
-    /// transmit it. A surface is closed if at each of its edges it goes on with another triangle in the opposite direction. Where
-    /// meshes touch and more than two triangles share an edge, those bound a solid together that no other lies between.
+    /// Marks double-sided triangles that form closed surfaces as solid: no light enters, unless they emit it
+    /// themselves or transmit it. A surface is closed if at each of its edges it goes on with another
+    /// triangle in the opposite direction. Where meshes touch and more than two triangles share an edge,
+    /// those bound a solid together that no other lies between.
     fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -192,8 +194,9 @@ impl Sides {
     }
 }
 
-/// Triangles around an edge, each with the one that bounds a solid together with it, by their angles; `None` where its back is open. A
-/// triangle is `true` if it has the edge in its direction, then its index and its corners.
+/// Triangles around an edge, each with the one that bounds a solid together with it, by their angles; `None`
+/// where its back is open. A triangle is `true` if it has the edge in its direction, then its index and its
+/// corners.
 fn around_edge(
     edge: [[u32; 3]; 2],
     triangles: impl Iterator<Item = (bool, usize, [[u32; 3]; 3])>,
@@ -209,7 +212,8 @@ fn around_edge(
             (libm::atan2(way.dot(y), way.dot(x)), is_forward, index)
         })
         .collect();
-    // A solid lies from a triangle against the edge's direction to one along it. At equal angles one ends before another begins.
+    // A solid lies from a triangle against the edge's direction to one along it. At equal angles one ends
+    // before another begins.
     around.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
     let count = around.len();
     let other = |index: usize| {

@@ -20,7 +20,8 @@ impl SameSurfaces {
         Self([const { OnceLock::new() }; CODES])
     }
 
-    /// For each code of a normal, true if a gather counts it to the surface of a photon whose normal has the code `normal`.
+    /// For each code of a normal, true if a gather counts it to the surface of a photon whose normal has the
+    /// code `normal`.
     fn of(&self, normal: u8) -> &[bool; CODES] {
         self.0[usize::from(normal)].get_or_init(|| {
             let (mut same, mut code) = (SameSurface::new(normal), 0_u8);
@@ -87,8 +88,8 @@ impl OpenSurfaces {
     }
 }
 
-/// Kernel that computes a disc fraction: area of the chosen surface within the sphere around a photon over the area of its
-/// disc.
+/// Kernel that computes a disc fraction: area of the chosen surface within the sphere around a photon over
+/// the area of its disc.
 pub(super) struct FractionWithin<'a> {
     pub(super) chords: &'a Chords,
     pub(super) surfaces: &'a OpenSurfaces,
@@ -202,8 +203,8 @@ impl Kernel for AreasWithin<'_> {
 }
 
 impl SurfaceLanes {
-    /// Ways to the points from a place. The grid may move a photon off its plane; heights within that error count as 0, so that a plane
-    /// has fraction 1.
+    /// Ways to the points from a place. The grid may move a photon off its plane; heights within that error
+    /// count as 0, so that a plane has fraction 1.
     #[inline(always)]
     fn ways(&self, from: Vec3, lift: f32) -> [Lane; 3] {
         let [p, q, r] = from.to_array();

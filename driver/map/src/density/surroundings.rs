@@ -1,8 +1,8 @@
 //! Triangles in a ball, found once for all chords and short rays in it.
 //!
-//! A descent in the hierarchy for every ray would visit the same few leaves again and again. Here one descent finds all
-//! triangles in a ball; then sixteen of them are tested against one ray, or sixteen chords against one of them. Coordinates
-//! are relative to the ball's centre and in units of its radius.
+//! A descent in the hierarchy for every ray would visit the same few leaves again and again. Here one descent
+//! finds all triangles in a ball; then sixteen of them are tested against one ray, or sixteen chords against
+//! one of them. Coordinates are relative to the ball's centre and in units of its radius.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -25,7 +25,8 @@ const MAX_TRIANGLES: usize = 4096;
 const MAX_WITH_TWINS: usize = 512;
 /// Maximum number of triangles of a plain wall within a ball.
 const MAX_PLAIN: usize = 24;
-/// Minimum cosine between normals of one plane: a deviation of a thousandth of the radius at the ball's border.
+/// Minimum cosine between normals of one plane: a deviation of a thousandth of the radius at the ball's
+/// border.
 const MIN_PLAIN_COSINE: f32 = 1.0 - 5e-7;
 
 /// Triangles in a ball.
@@ -39,8 +40,8 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Finds the triangles in a ball. Returns false if they are too many or too large for a list; the list is then
-    /// incomplete, and not to be used.
+    /// Finds the triangles in a ball. Returns false if they are too many or too large for a list; the list is
+    /// then incomplete, and not to be used.
     ///
     /// # Errors
     /// If the image is malformed.
@@ -60,8 +61,8 @@ impl Surroundings {
         all
     }
 
-    /// True if all triangles in a ball form one plain wall around its centre, on the side of the wall's normal. The list of
-    /// triangles stays as it was.
+    /// True if all triangles in a ball form one plain wall around its centre, on the side of the wall's
+    /// normal. The list of triangles stays as it was.
     ///
     /// # Errors
     /// If the image is malformed.
@@ -117,8 +118,8 @@ impl Surroundings {
         true
     }
 
-    /// Nearest triangle from `origin` along a unit vector, if within `max_distance`: its distance, metres, and its unit
-    /// normal on the side of `origin`.
+    /// Nearest triangle from `origin` along a unit vector, if within `max_distance`: its distance, metres,
+    /// and its unit normal on the side of `origin`.
     pub(super) fn first_on_way(
         &self,
         origin: Vec3,
@@ -158,8 +159,8 @@ impl PlainWall<'_> {
     }
 }
 
-/// True if coplanar triangles cover the disc of radius 1 around the origin exactly once: one of them covers the origin, and
-/// each edge within the disc is shared with one other triangle.
+/// True if coplanar triangles cover the disc of radius 1 around the origin exactly once: one of them covers
+/// the origin, and each edge within the disc is shared with one other triangle.
 fn covers(triangles: &[[Vec3; 3]], normal: Vec3) -> bool {
     let edges = |[a, b, c]: [Vec3; 3]| [(a, b), (b, c), (c, a)];
     let is_left = |(a, b): (Vec3, Vec3)| (b - a).cross(-a).dot(normal) >= 0.0;

@@ -39,8 +39,8 @@ impl<'s> EmissiveTextures<'s> {
             * if is_seen { mean.value() } else { self.coarse_mean(texture.image as usize, image, &footprint) }
     }
 
-    /// Mean of a texture over a triangle that shows too many texels: of the finest level whose cells are few enough, or
-    /// of the whole image.
+    /// Mean of a texture over a triangle that shows too many texels: of the finest level whose cells are few
+    /// enough, or of the whole image.
     fn coarse_mean(&self, index: usize, image: &Image, footprint: &Footprint) -> DVec3 {
         let levels = &self.pyramids[index].get_or_init(|| Pyramid::new(image)).levels;
         for level in levels {

@@ -1,4 +1,5 @@
-//! Environment in the format of a card: an `RGB9_E5` texture, and a grid of cells that importance-samples its directions.
+//! Environment in the format of a card: an `RGB9_E5` texture, and a grid of cells that importance-samples its
+//! directions.
 
 use std::f64::consts::PI;
 
@@ -145,7 +146,8 @@ impl Cells {
         Self { columns, rows, weights, divided }
     }
 
-    /// Thresholds of the rows, then of the cells of each row ([`thresholds`]); and those of the parts of divided cells.
+    /// Thresholds of the rows, then of the cells of each row ([`thresholds`]); and those of the parts of
+    /// divided cells.
     pub(super) fn thresholds(&self) -> Vec<u32> {
         let mut all = of_grid(&self.weights, self.columns);
         if !self.divided.is_empty() {

@@ -1,4 +1,5 @@
-//! Divided cells of an environment: those whose light comes through small parts of them, such as a sun of one texel.
+//! Divided cells of an environment: those whose light comes through small parts of them, such as a sun of one
+//! texel.
 
 use std::f64::consts::PI;
 
@@ -9,8 +10,8 @@ use rayon::prelude::*;
 pub(crate) const SIDE: u32 = 32;
 /// Maximum number of divided cells: their thresholds take 4.2 kB each.
 const MAX_DIVIDED: usize = 16;
-/// Minimum light of a cell that is as bright as its brightest texel, over the light of all: the variance of a light sample that the cell
-/// makes, relative to the square of its mean.
+/// Minimum light of a cell that is as bright as its brightest texel, over the light of all: the variance of a
+/// light sample that the cell makes, relative to the square of its mean.
 const LEAST_VARIANCE: f64 = 1.0 / 16.0;
 /// Minimum of the greatest light of a part, over the mean, of a cell that is divided.
 const LEAST_CONTRAST: f64 = 4.0;
@@ -97,7 +98,8 @@ impl Parts {
     }
 }
 
-/// Radiance of the brightest texel of each cell, mean of the channels, with the texels that interpolation brings into it.
+/// Radiance of the brightest texel of each cell, mean of the channels, with the texels that interpolation
+/// brings into it.
 fn brightest(environment: &Environment, [columns, rows]: [u32; 2]) -> Vec<f64> {
     let Environment { width, height, .. } = *environment;
     let mut brightest = vec![0.0_f64; (columns * rows) as usize];
@@ -117,7 +119,8 @@ fn brightest(environment: &Environment, [columns, rows]: [u32; 2]) -> Vec<f64> {
     brightest
 }
 
-/// Mean radiance of the channels at texture coordinates `(u, v)`, interpolated bilinearly as on a card, W/(sr m^2).
+/// Mean radiance of the channels at texture coordinates `(u, v)`, interpolated bilinearly as on a card, W/(sr
+/// m^2).
 pub(super) fn luminance(environment: &Environment, [u, v]: [f64; 2]) -> f64 {
     let [width, height] = [environment.width, environment.height].map(i64::from);
     let [x, y] = [u * width as f64 - 0.5, v * height as f64 - 0.5];

@@ -27,10 +27,10 @@ impl Footprint {
         Self { wrap: texture.wrap, corners }
     }
 
-    /// Calls `visit` for every cell that contributes to the triangle's surface, with the cell's index and whether its
-    /// centre lies on the triangle; for cells of a repeated image repeatedly. `size` is the image's grid, columns and
-    /// rows; a cell contributes up to `reach` cells from its centre. Returns `false`, and visits none, if the cells are
-    /// too many.
+    /// Calls `visit` for every cell that contributes to the triangle's surface, with the cell's index and
+    /// whether its centre lies on the triangle; for cells of a repeated image repeatedly. `size` is the
+    /// image's grid, columns and rows; a cell contributes up to `reach` cells from its centre. Returns
+    /// `false`, and visits none, if the cells are too many.
     pub(super) fn for_each_cell(
         &self,
         size: [u32; 2],
@@ -69,7 +69,8 @@ impl Footprint {
     }
 }
 
-/// The interval `[left, right]` that a triangle covers between `top` and `bottom`; `None` if it does not reach there.
+/// The interval `[left, right]` that a triangle covers between `top` and `bottom`; `None` if it does not
+/// reach there.
 fn across([a, b, c]: [[f64; 2]; 3], top: f64, bottom: f64) -> Option<[f64; 2]> {
     let mut sides: Option<[f64; 2]> = None;
     let mut include = |x: f64| {

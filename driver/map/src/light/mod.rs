@@ -1,5 +1,5 @@
-//! Lights of a scene in the format of a card: emissive triangles, points and spots in a light tree, distant lights, and the
-//! environment; with the probabilities of choosing each for shadow rays and for photons.
+//! Lights of a scene in the format of a card: emissive triangles, points and spots in a light tree, distant
+//! lights, and the environment; with the probabilities of choosing each for shadow rays and for photons.
 
 mod colour;
 mod emission;
@@ -93,7 +93,8 @@ impl Lights {
         self.of_triangles.get(triangle as usize).copied().flatten()
     }
 
-    /// Records of the emitters; `index_in_image` maps a triangle's index in the scene to its index in the card image.
+    /// Records of the emitters; `index_in_image` maps a triangle's index in the scene to its index in the
+    /// card image.
     pub(crate) fn emitters(
         &self,
         index_in_image: impl Fn(usize) -> u32,
@@ -226,7 +227,8 @@ struct Spot {
 }
 
 impl Spot {
-    /// The falloff that `KHR_lights_punctual` recommends, between the cosines of the inner and the outer cone.
+    /// The falloff that `KHR_lights_punctual` recommends, between the cosines of the inner and the outer
+    /// cone.
     fn new(inner_cosine: f32, outer_cosine: f32) -> Self {
         let scale = 1.0 / (inner_cosine - outer_cosine).max(0.001);
         Self { scale, offset: -outer_cosine * scale }
@@ -235,8 +237,8 @@ impl Spot {
     /// Integral of the falloff over all directions, sr.
     fn solid_angle(&self) -> f64 {
         let [scale, offset] = [self.scale, self.offset].map(f64::from);
-        // The root of the falloff rises linearly in the cosine, from 0 at the outer cone to `reached` at the inner cone
-        // or at the axis; it is 1 within the inner cone, whose `1 - cos` is `whole`.
+        // The root of the falloff rises linearly in the cosine, from 0 at the outer cone to `reached` at the
+        // inner cone or at the axis; it is 1 within the inner cone, whose `1 - cos` is `whole`.
         let reached = (scale + offset).clamp(0.0, 1.0);
         let whole = (1.0 - (1.0 - offset) / scale).max(0.0);
         2.0 * PI * (reached * reached * reached / (3.0 * scale) + whole)

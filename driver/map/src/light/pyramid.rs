@@ -1,5 +1,5 @@
-//! Image pyramids of emissive textures (Williams, "Pyramidal Parametrics", 1983): the mean over many texels as the mean
-//! over few cells.
+//! Image pyramids of emissive textures (Williams, "Pyramidal Parametrics", 1983): the mean over many texels
+//! as the mean over few cells.
 
 use glam::Vec3;
 use photoncard_firmware::scene::decode_texel;
@@ -23,11 +23,12 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Maximum distance from its centre at which a cell contributes, cells. Interpolation carries a texel at the border
-    /// half a texel farther; and where [`STEP`] does not divide a side, a cell has the whole cells of the finer level
-    /// that begin in it, which reach beyond its border by up to 0.67 cells.
+    /// Maximum distance from its centre at which a cell contributes, cells. Interpolation carries a texel at
+    /// the border half a texel farther; and where [`STEP`] does not divide a side, a cell has the whole cells
+    /// of the finer level that begin in it, which reach beyond its border by up to 0.67 cells.
     pub(super) const REACH: f64 = 1.5;
-    /// Weight of a cell whose centre is not on the triangle: small, but not 0, as it may be the only one that emits.
+    /// Weight of a cell whose centre is not on the triangle: small, but not 0, as it may be the only one that
+    /// emits.
     pub(super) const OUTSIDE: f64 = 1.0 / 16.0;
 
     /// Level above a finer grid of `finer_size` columns and rows; `finer` returns the grid's cells by index.

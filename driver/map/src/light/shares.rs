@@ -6,7 +6,8 @@ use photoncard_shared::layout::DistantLight;
 
 use super::{EnvironmentMap, mean};
 
-/// Probabilities of choosing the emitters, the environment or the distant lights: their sum is exactly 1, or each is 0.
+/// Probabilities of choosing the emitters, the environment or the distant lights: their sum is exactly 1, or
+/// each is 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shares {
     pub(super) emitters: f32,
@@ -18,8 +19,9 @@ pub(super) struct Shares {
 const PARTS: f64 = 65536.0;
 
 impl Shares {
-    /// Shares `0.5 power / total + 0.5 / kinds`, over the kinds that have power: half of the samples do not follow
-    /// power, since lights that are strong for the whole scene may be hidden from most of what is seen.
+    /// Shares `0.5 power / total + 0.5 / kinds`, over the kinds that have power: half of the samples do not
+    /// follow power, since lights that are strong for the whole scene may be hidden from most of what is
+    /// seen.
     pub(super) fn new(powers: [f64; 3]) -> Self {
         let total: f64 = powers.iter().sum();
         let kinds = powers.iter().filter(|&&power| power > 0.0).count() as f64;

@@ -41,15 +41,15 @@ pub(crate) enum Source {
 pub(crate) struct Sources {
     list: Vec<Source>,
     thresholds: Vec<u32>,
-    /// Lower and upper corner of the box that light from infinitely far enters through, a little larger than the
-    /// scene's bounds.
+    /// Lower and upper corner of the box that light from infinitely far enters through, a little larger than
+    /// the scene's bounds.
     pub(crate) bounds: [Vec3; 2],
     /// Targets that photons are aimed at; empty if they are not aimed.
     pub(crate) targets: Targets,
     /// Power of all sources, watts, mean of the channels; 0 if photons may be aimed.
     pub(crate) power: f64,
-    /// Maximum over the sources of power in the strongest channel over probability, watts: the unit of photons' powers is derived from it.
-    /// A photon that is not aimed may be stronger, where photons are.
+    /// Maximum over the sources of power in the strongest channel over probability, watts: the unit of
+    /// photons' powers is derived from it. A photon that is not aimed may be stronger, where photons are.
     pub(crate) strongest: f32,
 }
 
@@ -64,8 +64,8 @@ pub(crate) struct ChosenSource {
 
 /// Minimum share of an emitter's light that is assumed to go towards the targets.
 const MIN_AIMED_SHARE: f64 = 1e-3;
-/// Margin of the box beyond the scene's bounds, relative to the longest side or a tenth of the maximum coordinate,
-/// whichever is larger.
+/// Margin of the box beyond the scene's bounds, relative to the longest side or a tenth of the maximum
+/// coordinate, whichever is larger.
 const MARGIN: f32 = 1e-4;
 
 impl Sources {
@@ -80,8 +80,8 @@ impl Sources {
         (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
     }
 
-    /// The sources of a scene, for photons in all directions, most of them aimed at surfaces that are no lamps: the lights may be
-    /// far from these. `None` if there are none.
+    /// The sources of a scene, for photons in all directions, most of them aimed at surfaces that are no
+    /// lamps: the lights may be far from these. `None` if there are none.
     pub(crate) fn aimed(scene: &Scene, lights: &Lights) -> Option<Self> {
         let targets = Targets::lit(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
@@ -143,8 +143,8 @@ impl Sources {
     }
 }
 
-/// Approximate share of an emitter's light that goes towards the targets: their solid angle at the emitter's centre
-/// over `4 pi`, and at least [`MIN_AIMED_SHARE`], as other points of the emitter may see more of them.
+/// Approximate share of an emitter's light that goes towards the targets: their solid angle at the emitter's
+/// centre over `4 pi`, and at least [`MIN_AIMED_SHARE`], as other points of the emitter may see more of them.
 fn aimed_share(targets: &Targets, corners: &[DVec3]) -> f64 {
     let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
     (f64::from(targets.solid_angle(middle.as_vec3())) / (4.0 * PI)).clamp(MIN_AIMED_SHARE, 1.0)
@@ -177,8 +177,8 @@ impl AllSources {
         self.strongest.push(strongest);
     }
 
-    /// Adds the cells of the environment. `shown(direction)` is the area that a cell's light passes through; `same` is this
-    /// area if it is equal for all directions.
+    /// Adds the cells of the environment. `shown(direction)` is the area that a cell's light passes through;
+    /// `same` is this area if it is equal for all directions.
     fn add_cells(&mut self, lights: &Lights, shown: impl Fn(DVec3) -> f64, same: Option<f64>, size: DVec3) {
         let Some(map) = lights.environment() else { return };
         let cells = &map.cells;

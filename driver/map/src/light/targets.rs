@@ -1,8 +1,8 @@
 //! Targets of photons: spheres around some of a scene's surfaces.
 //!
-//! A sphere is chosen in proportion to the solid angle that it subtends, and a direction uniformly within this angle. Where
-//! spheres overlap, a direction may be chosen through any of them: its density is the number of spheres in this direction
-//! over the sum of the solid angles of all spheres.
+//! A sphere is chosen in proportion to the solid angle that it subtends, and a direction uniformly within
+//! this angle. Where spheres overlap, a direction may be chosen through any of them: its density is the
+//! number of spheres in this direction over the sum of the solid angles of all spheres.
 
 use std::f32::consts::PI;
 
@@ -51,8 +51,8 @@ impl Targets {
         Self::around(scene, &scene.specular_materials(), 1.0)
     }
 
-    /// All surfaces of a scene but lamps, that is uniform emitters of at least [`LAMP_SHARE`] of the greatest emission: what these
-    /// reflect of other light hardly shows.
+    /// All surfaces of a scene but lamps, that is uniform emitters of at least [`LAMP_SHARE`] of the greatest
+    /// emission: what these reflect of other light hardly shows.
     pub(super) fn lit(scene: &Scene) -> Self {
         let emission = |material: &Material| material.emission.max_element();
         let greatest = scene.materials.iter().map(emission).fold(0.0, f32::max);
@@ -104,7 +104,8 @@ impl Targets {
         self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()).sum()
     }
 
-    /// Chooses by a number in [0, 1) whether to aim at a sphere. The remainder of the number is rescaled to [0, 1).
+    /// Chooses by a number in [0, 1) whether to aim at a sphere. The remainder of the number is rescaled to
+    /// [0, 1).
     pub(crate) fn is_aimed(&self, number: f32) -> (bool, f32) {
         if number < self.share {
             (true, number / self.share)
@@ -113,8 +114,8 @@ impl Targets {
         }
     }
 
-    /// Density of the direction or the place of a photon that is aimed with the probability [`Self::share`]; `aimed` and `free` are the
-    /// densities with and without an aim.
+    /// Density of the direction or the place of a photon that is aimed with the probability [`Self::share`];
+    /// `aimed` and `free` are the densities with and without an aim.
     pub(crate) fn mixed(&self, aimed: f32, free: f32) -> f32 {
         self.share * aimed + (1.0 - self.share) * free
     }
@@ -138,7 +139,8 @@ impl Targets {
         self.spheres.iter().map(Sphere::disc_area).sum()
     }
 
-    /// Samples a direction from a point through a sphere by a point of the unit square. `None` without spheres.
+    /// Samples a direction from a point through a sphere by a point of the unit square. `None` without
+    /// spheres.
     pub(crate) fn direction(&self, from: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.solid_angle(from);
         let (index, c) = choose(c, all, self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()))?;
@@ -148,8 +150,8 @@ impl Targets {
         Some(Aim { towards, measure: all / (1 + covering) as f32 })
     }
 
-    /// Samples a line of a direction through a sphere by a point of the unit square: its point in the plane through the
-    /// origin that is normal to the direction. `None` without spheres.
+    /// Samples a line of a direction through a sphere by a point of the unit square: its point in the plane
+    /// through the origin that is normal to the direction. `None` without spheres.
     pub(crate) fn place(&self, direction: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.area();
         let (index, c) = choose(c, all, self.spheres.iter().map(Sphere::disc_area))?;
@@ -164,7 +166,8 @@ impl Targets {
     }
 }
 
-/// Index of the share of `all` that a number in [0, 1) falls in, and the remainder of the number, rescaled to [0, 1).
+/// Index of the share of `all` that a number in [0, 1) falls in, and the remainder of the number, rescaled to
+/// [0, 1).
 fn choose(number: f32, all: f32, shares: impl Iterator<Item = f32>) -> Option<(usize, f32)> {
     let mut left = number * all;
     let mut last = None;
@@ -254,7 +257,8 @@ impl Part {
         Some(Self { triangles, sphere: Sphere { centre, radius }, may_be_split })
     }
 
-    /// Two halves of the part along its longest axis, if their spheres have less projected area together than its own.
+    /// Two halves of the part along its longest axis, if their spheres have less projected area together than
+    /// its own.
     fn split(&self) -> Option<[Self; 2]> {
         let middle = |[a, b, c]: &[Vec3; 3]| (a + b + c) / 3.0;
         let lower = self.triangles.iter().map(middle).reduce(Vec3::min)?;

@@ -3,8 +3,8 @@
 /// The sum of all shares, 2^32.
 pub(super) const ALL: f64 = 4_294_967_296.0;
 
-/// Cumulative shares of 2^32 in proportion to weights. Each share is at least 1, so that every index can be chosen; the
-/// last threshold is 2^32 - 1. If all weights are 0 the shares are equal.
+/// Cumulative shares of 2^32 in proportion to weights. Each share is at least 1, so that every index can be
+/// chosen; the last threshold is 2^32 - 1. If all weights are 0 the shares are equal.
 pub(crate) fn thresholds(weights: &[f64]) -> Vec<u32> {
     let total: f64 = weights.iter().sum();
     let spare = ALL - 1.0 - weights.len() as f64;

@@ -1,9 +1,10 @@
-//! Construction of the light tree: a hierarchy of emitters with bounds of their positions, their directions and their
-//! power.
+//! Construction of the light tree: a hierarchy of emitters with bounds of their positions, their directions
+//! and their power.
 //!
-//! Emitters are split in two by the surface area orientation heuristic (Conty Estevez, Kulla 2018, *Importance sampling
-//! of many lights with adaptive tree splitting*), in bins along each axis, and each half again: a node has four
-//! children. A split that would make the tree deeper than a trail can encode is replaced by a split at the median.
+//! Emitters are split in two by the surface area orientation heuristic (Conty Estevez, Kulla 2018,
+//! *Importance sampling of many lights with adaptive tree splitting*), in bins along each axis, and each half
+//! again: a node has four children. A split that would make the tree deeper than a trail can encode is
+//! replaced by a split at the median.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -27,7 +28,8 @@ pub(super) struct Bounds {
 pub(super) struct LightTree {
     /// Nodes, the root first; none without emitters.
     pub(super) nodes: Vec<[u8; LINE_BYTES]>,
-    /// Trail to each emitter: the number of the child on each level, two bits each, the root's in the lowest bits.
+    /// Trail to each emitter: the number of the child on each level, two bits each, the root's in the lowest
+    /// bits.
     pub(super) trails: Vec<u32>,
 }
 
@@ -202,8 +204,8 @@ impl Cone {
         Self { axis, angle }
     }
 
-    /// The orientation measure `M_Omega` of Conty Estevez and Kulla, for Lambertian emission (`theta_e = pi / 2`): the
-    /// solid angle of the emitted directions, weighted by the cosine beyond the cone of normals.
+    /// The orientation measure `M_Omega` of Conty Estevez and Kulla, for Lambertian emission (`theta_e = pi /
+    /// 2`): the solid angle of the emitted directions, weighted by the cosine beyond the cone of normals.
     fn measure(self) -> f64 {
         let reach = (self.angle + FRAC_PI_2).min(PI);
         let (sin, cos) = libm::sincos(self.angle);
@@ -219,7 +221,8 @@ struct Summary {
     count: usize,
     lower: DVec3,
     upper: DVec3,
-    /// Maximum distance of a corner from the box's centre, metres; computed by [`Self::new`] alone, 0 in partial summaries.
+    /// Maximum distance of a corner from the box's centre, metres; computed by [`Self::new`] alone, 0 in
+    /// partial summaries.
     radius: f64,
     cone: Cone,
     power: f64,
@@ -316,7 +319,8 @@ mod tests {
         (0..count).map(triangle).collect()
     }
 
-    /// Follows the trail of an emitter; `check` is called for every child on it. Returns the number of levels.
+    /// Follows the trail of an emitter; `check` is called for every child on it. Returns the number of
+    /// levels.
     fn follow(tree: &LightTree, emitter: u32, check: &mut dyn FnMut(&LightChild)) -> usize {
         let (mut node, mut trail) = (0, tree.trails[emitter as usize]);
         for level in 1..=LIGHT_TREE_LEVELS {

@@ -82,8 +82,8 @@ impl CardImage {
         first..first + records.div_ceil(kind.records_per_line()) as usize
     }
 
-    /// The image with its lights out: no surface and no environment emits, and there are no lights to sample. Photons stay, so that a
-    /// render of it shows the light of the photon map alone.
+    /// The image with its lights out: no surface and no environment emits, and there are no lights to sample.
+    /// Photons stay, so that a render of it shows the light of the photon map alone.
     #[must_use]
     pub fn without_emission(&self) -> Self {
         let mut dark = self.clone();
@@ -104,7 +104,8 @@ impl CardImage {
         dark
     }
 
-    /// Bounding box of the scene, enlarged by the rounding of the root's 8-bit grid; `None` without triangles.
+    /// Bounding box of the scene, enlarged by the rounding of the root's 8-bit grid; `None` without
+    /// triangles.
     pub(super) fn bounds(&self) -> Option<NodeBox> {
         let Line(root) = self.section(SectionKind::Nodes).first()?;
         let children = 0..WideNode(root).children() as usize;

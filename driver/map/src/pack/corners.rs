@@ -77,7 +77,8 @@ fn tangents(scene: &Scene, triangle: &Triangle) -> Tangents {
     })
 }
 
-/// Record of vertex attributes with one set of texture coordinates; `emitter` is the triangle's emitter, if any.
+/// Record of vertex attributes with one set of texture coordinates; `emitter` is the triangle's emitter, if
+/// any.
 fn record(attributes: &VertexAttributes, set: usize, emitter: Option<u32>) -> layout::Attributes {
     layout::Attributes {
         normals: attributes.normals.map(|normals| normals.map(|normal| normal.to_array())),

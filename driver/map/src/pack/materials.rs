@@ -61,8 +61,9 @@ fn lobe_flag(scene: &Scene, material: &Material) -> u32 {
     if scene.has_narrow_lobe(material) { NARROW_LOBE } else { 0 }
 }
 
-/// Record of a material; `flags` are those that follow from the scene: [`HAS_ATTRIBUTES`] if any of its triangles may have
-/// attributes, and [`NARROW_LOBE`]; `layers` is the index of its layers. `u16` indexes all textures of the scene.
+/// Record of a material; `flags` are those that follow from the scene: [`HAS_ATTRIBUTES`] if any of its
+/// triangles may have attributes, and [`NARROW_LOBE`]; `layers` is the index of its layers. `u16` indexes all
+/// textures of the scene.
 fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::Material {
     let transmission = transmission_of(material);
     flags |= if material.double_sided { DOUBLE_SIDED } else { 0 };
@@ -84,7 +85,8 @@ fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::M
     }
 }
 
-/// Maximum share of diffuse transmission. Photons are stored where the base reflects diffusely, at both sides.
+/// Maximum share of diffuse transmission. Photons are stored where the base reflects diffusely, at both
+/// sides.
 const MAX_DIFFUSE_TRANSMISSION: f32 = 63.0 / 64.0;
 
 fn texture(index: Option<u32>) -> u16 {
@@ -126,8 +128,8 @@ fn layers_record(layers: &Layers) -> [u8; layout::Layers::BYTES] {
     .to_bytes()
 }
 
-/// Alpha cutoff for the product of texture and vertex alpha: the material's cutoff over its alpha factor. Of partial coverage, that
-/// factor.
+/// Alpha cutoff for the product of texture and vertex alpha: the material's cutoff over its alpha factor. Of
+/// partial coverage, that factor.
 fn cutoff(material: &Material) -> f32 {
     if material.blends {
         return material.alpha;

@@ -24,8 +24,8 @@ pub(super) fn records(
         .iter()
         .map(|image| {
             let texture = layout::Texture { first_line, ..bare(image) };
-            // An overflow is impossible after `lines` are appended: lines are counted there, and an image has fewer lines
-            // than texels.
+            // An overflow is impossible after `lines` are appended: lines are counted there, and an image has
+            // fewer lines than texels.
             first_line = first_line.wrapping_add(texture.lines());
             texture
         })

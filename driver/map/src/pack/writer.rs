@@ -14,7 +14,8 @@ pub(crate) struct ImageWriter {
 }
 
 impl ImageWriter {
-    /// Writer of an image without sections. `header` holds its units and lights; lines and sections are counted here.
+    /// Writer of an image without sections. `header` holds its units and lights; lines and sections are
+    /// counted here.
     pub(super) fn new(header: Header) -> Self {
         Self { header, lines: vec![Line::ZERO; HEADER_LINES] }
     }

@@ -1,8 +1,9 @@
 //! Emission: the first ray of a photon path, and its power.
 //!
-//! The first four random numbers of a path, for position and direction, are a low-discrepancy sequence in the number of the
-//! path (the additive recurrence of Roberts 2018, *The unreasonable effectiveness of quasirandom sequences*), shifted by
-//! the seed. Random numbers of bounces are hashes of (seed, path, bounce).
+//! The first four random numbers of a path, for position and direction, are a low-discrepancy sequence in the
+//! number of the path (the additive recurrence of Roberts 2018, *The unreasonable effectiveness of
+//! quasirandom sequences*), shifted by the seed. Random numbers of bounces are hashes of (seed, path,
+//! bounce).
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -112,8 +113,9 @@ pub(super) fn emission_point(guide: Option<&Guide>, random: PathRandom) -> Warpe
     guide.map_or(Warped { point, weight: 1.0 }, |guide| guide.warp(point))
 }
 
-/// Emission of a path: samples a source by its power, a position and a direction. `None` if Russian roulette ends the path,
-/// the direction carries no light, or there are no sources. A guide warps the distribution of all of these.
+/// Emission of a path: samples a source by its power, a position and a direction. `None` if Russian roulette
+/// ends the path, the direction carries no light, or there are no sources. A guide warps the distribution of
+/// all of these.
 pub(super) fn emit(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -157,8 +159,8 @@ pub(super) fn emit(
     Ok(emission.map(|emission| Emission { power: emission.power * weight, ..emission }))
 }
 
-/// Russian roulette where an emitter is darker than its mean, as in dark parts of an emissive texture: photons of equal
-/// power have less variance.
+/// Russian roulette where an emitter is darker than its mean, as in dark parts of an emissive texture:
+/// photons of equal power have less variance.
 fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emission> {
     let probability = (f64::from(emission.power.element_sum()) / (3.0 * mean_power)) as f32;
     // Differences by rounding are ignored.
@@ -176,8 +178,9 @@ struct Way<'s> {
 }
 
 impl Way<'_> {
-    /// The emission with its power over the density of both ways (the balance heuristic of Veach 1997, section 9.2.2), instead of
-    /// over that of its own one. `densities` are those of aimed and of other photons, for its ray.
+    /// The emission with its power over the density of both ways (the balance heuristic of Veach 1997,
+    /// section 9.2.2), instead of over that of its own one. `densities` are those of aimed and of other
+    /// photons, for its ray.
     fn balanced(&self, emission: Option<Emission>, densities: impl Fn(&Ray) -> [f32; 2]) -> Option<Emission> {
         let emission = emission?;
         if [0.0, 1.0].contains(&self.targets.share) {
@@ -233,7 +236,8 @@ fn from_emitter(
     })
 }
 
-/// Emission from a point by a radiant intensity that lies in a cone, W/sr: towards the targets, or in the cone.
+/// Emission from a point by a radiant intensity that lies in a cone, W/sr: towards the targets, or in the
+/// cone.
 fn from_point(
     way: Way,
     position: Vec3,
@@ -319,7 +323,8 @@ fn meets_box(bounds: [Vec3; 2], ray: &Ray) -> bool {
     first <= last
 }
 
-/// Emission from infinitely far through the faces of the scene's bounding box, each in proportion to its projected area.
+/// Emission from infinitely far through the faces of the scene's bounding box, each in proportion to its
+/// projected area.
 fn through_box(bounds: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
     let [lower, upper] = bounds;
     let size = upper - lower;

@@ -1,9 +1,10 @@
-//! Guiding of emission: a warp of the unit hypercube that emission is sampled from, towards the points whose paths are useful.
+//! Guiding of emission: a warp of the unit hypercube that emission is sampled from, towards the points whose
+//! paths are useful.
 //!
-//! The hypercube is halved again and again, each box along the dimension that separates useful from useless paths best. A point
-//! descends by hierarchical sample warping (Clarberg et al. 2005, *Wavelet importance sampling*): within a box its coordinate along the
-//! divided dimension is compared with the probability of the lower half, and rescaled. Points that are stratified in each dimension so
-//! remain stratified.
+//! The hypercube is halved again and again, each box along the dimension that separates useful from useless
+//! paths best. A point descends by hierarchical sample warping (Clarberg et al. 2005, *Wavelet importance
+//! sampling*): within a box its coordinate along the divided dimension is compared with the probability of
+//! the lower half, and rescaled. Points that are stratified in each dimension so remain stratified.
 
 /// Number of dimensions of the hypercube.
 pub(super) const DIMENSIONS: usize = 4;
@@ -29,7 +30,8 @@ pub(super) struct Sample {
     pub(super) point: Point,
     /// Sum of the uses of its photons.
     pub(super) use_of_path: f64,
-    /// Sum of the squares of the uses of its photons, which are in different places: the variance that they bring.
+    /// Sum of the squares of the uses of its photons, which are in different places: the variance that they
+    /// bring.
     pub(super) squares: f64,
     /// Weight of the point.
     pub(super) weight: f32,
@@ -169,8 +171,8 @@ struct Builder {
 }
 
 impl Builder {
-    /// Adds a box with its division. `halvings` counts those along each dimension; `mean_square` is that of the enclosing box. Returns the
-    /// box's share.
+    /// Adds a box with its division. `halvings` counts those along each dimension; `mean_square` is that of
+    /// the enclosing box. Returns the box's share.
     fn divide(
         &mut self,
         samples: &mut [Sample],
@@ -201,8 +203,8 @@ fn is_upper(sample: &Sample, dimension: usize, halvings: u32) -> bool {
     sample.point[dimension] >> (63 - halvings) & 1 == 1
 }
 
-/// Dimension along which the halves of a box differ most: the sum of their optimal shares is least. `None` for a box that is not divided,
-/// for too few of its samples are of use.
+/// Dimension along which the halves of a box differ most: the sum of their optimal shares is least. `None`
+/// for a box that is not divided, for too few of its samples are of use.
 fn best_dimension(samples: &[Sample], halvings: [u32; DIMENSIONS]) -> Option<usize> {
     if Sums::of(samples).useful < 2 * MIN_USEFUL {
         return None;

@@ -43,7 +43,8 @@ pub(crate) struct Importons {
 }
 
 impl Importons {
-    /// Importons of a camera. Photons are gathered within areas of `indirect` and `caustic` of the surface that the picture uses.
+    /// Importons of a camera. Photons are gathered within areas of `indirect` and `caustic` of the surface
+    /// that the picture uses.
     ///
     /// # Errors
     /// If the image is not sound.
@@ -110,7 +111,8 @@ struct Walk<'a, M> {
 }
 
 impl<M: MemoryPort> Walk<'_, M> {
-    /// Adds the importons of an eye path and of its gather rays; `left` and `above` are the corner of its part of the picture.
+    /// Adds the importons of an eye path and of its gather rays; `left` and `above` are the corner of its
+    /// part of the picture.
     fn look(
         &mut self,
         camera: &Camera,
@@ -173,7 +175,8 @@ fn importon(surface: &Surface, throughput: Vec3) -> Option<Importon> {
 /// Cell of a grid: its coordinates, and the side of the axis that a surface's normal is nearest to.
 type Cell = ([i32; 3], u8);
 
-/// Weights of importons in cells of space and of directions of normals: photons on the other side of a wall are of no use.
+/// Weights of importons in cells of space and of directions of normals: photons on the other side of a wall
+/// are of no use.
 pub(crate) struct ImportonGrid {
     /// Side of a cell, metres.
     side: f32,
@@ -188,7 +191,8 @@ const AIMED_WEIGHT: f64 = 0.95;
 const OUTLIERS: f32 = 0.02;
 
 impl ImportonGrid {
-    /// Grid of importons, whose cells are as wide as the areas that photons are gathered from: `share` of the surface.
+    /// Grid of importons, whose cells are as wide as the areas that photons are gathered from: `share` of the
+    /// surface.
     fn new(importons: &[Importon], share: f32) -> Self {
         let share = share.max(MIN_IMPORTONS / importons.len().max(1) as f32);
         let side = (area(importons) * share).sqrt().max(f32::MIN_POSITIVE);
@@ -200,8 +204,8 @@ impl ImportonGrid {
         grid
     }
 
-    /// Use of a photon of power 1. The variance that a photon brings to the picture's pixels is the square of its power times the density of
-    /// importons around it, and the use is the square root.
+    /// Use of a photon of power 1. The variance that a photon brings to the picture's pixels is the square of
+    /// its power times the density of importons around it, and the use is the square root.
     pub(super) fn use_of(&self, photon: &Photon) -> f64 {
         let cell = self.cell(photon.position.into(), photon.normal);
         self.cells.get(&cell).copied().unwrap_or(0.0).sqrt()

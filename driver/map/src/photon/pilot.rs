@@ -1,4 +1,5 @@
-//! Pilots: first paths of other seeds than the map's, by which the sources and the guide of its paths are chosen.
+//! Pilots: first paths of other seeds than the map's, by which the sources and the guide of its paths are
+//! chosen.
 
 use std::collections::BTreeMap;
 
@@ -31,18 +32,19 @@ pub struct Guiding {
 const AIM_TASKS: u64 = 4;
 /// Number of tasks of each pilot for the share of caustics.
 const SHARE_TASKS: u64 = 8;
-/// Number of lower bits of a grid coordinate that a cell of the pilots for the share of caustics spans: 32 to 64 cells along the longest
-/// side of the scene.
+/// Number of lower bits of a grid coordinate that a cell of the pilots for the share of caustics spans: 32 to
+/// 64 cells along the longest side of the scene.
 const CELL_BITS: u32 = GRID_BITS - 6;
-/// Maximum of the spread of guided paths, aimed at importons over not aimed, for which paths are aimed at them: a little above 1, as a pilot
-/// of unaimed paths misses rare ones of great use.
+/// Maximum of the spread of guided paths, aimed at importons over not aimed, for which paths are aimed at
+/// them: a little above 1, as a pilot of unaimed paths misses rare ones of great use.
 const MAX_SPREAD_BY_AIM: f64 = 1.1;
-/// Minimum of the pilots' effective numbers of photons, aimed over unaimed, for which paths are aimed: 2, so that noise of the pilots
-/// changes nothing in rooms, where both are about equal.
+/// Minimum of the pilots' effective numbers of photons, aimed over unaimed, for which paths are aimed: 2, so
+/// that noise of the pilots changes nothing in rooms, where both are about equal.
 const MIN_GAIN_BY_AIM: f64 = 2.0;
 /// Difference of the seeds of a map and of the first round of the pilot for its guide.
 const GUIDE_SEED: u32 = 0x7feb_352d;
-/// Number of rounds of the pilot for a guide, each guided by the one before: paths through a small window are rare in the first.
+/// Number of rounds of the pilot for a guide, each guided by the one before: paths through a small window are
+/// rare in the first.
 const GUIDE_ROUNDS: u32 = 3;
 /// Number of photons for each path of a round.
 const PHOTONS_PER_GUIDE_PATH: u64 = 8;
@@ -51,8 +53,8 @@ const MIN_GUIDE_TASKS: u64 = 32;
 /// Maximum number of tasks of a round.
 const MAX_GUIDE_TASKS: u64 = 128;
 
-/// Tracer of the photon map whose paths store more photons: of unaimed paths, or of aimed ones, where far more of these meet a
-/// surface.
+/// Tracer of the photon map whose paths store more photons: of unaimed paths, or of aimed ones, where far
+/// more of these meet a surface.
 pub(super) fn tracer_of_more_photons(packed: &PackedScene, seed: u32) -> Result<Tracer<'_>, Fault> {
     let unaimed = Tracer::new(packed, packed.sources(), seed, Purpose::Indirect);
     let Some(sources) = packed.aimed_sources() else { return Ok(unaimed) };
@@ -77,8 +79,8 @@ fn first_photons(tracer: &Tracer, packed: &PackedScene, tasks: u64) -> Result<Ve
     Ok(tasks?.into_iter().flat_map(|traced| traced.photons).collect())
 }
 
-/// Share of the power that arrives at surfaces, of all bounces, that caustics bring where they are: the mean over their light; 1 if no
-/// other light arrives.
+/// Share of the power that arrives at surfaces, of all bounces, that caustics bring where they are: the mean
+/// over their light; 1 if no other light arrives.
 pub(super) fn caustic_share(packed: &PackedScene, seed: u32) -> Result<f64, Fault> {
     let power_by = |sources: Option<&Sources>, purpose: Purpose| {
         // Paths of another seed, so that the number of paths does not depend on the photons of the map.
@@ -151,7 +153,8 @@ pub(super) fn more_useful<'s>(
     Ok(if of_second < MAX_SPREAD_BY_AIM * of_first { second } else { first })
 }
 
-/// Guide of a tracer's paths towards importons, for a number of photons; `None` if no path of the pilot is of use.
+/// Guide of a tracer's paths towards importons, for a number of photons; `None` if no path of the pilot is of
+/// use.
 pub(super) fn guide(
     tracer: &Tracer,
     packed: &PackedScene,

@@ -130,8 +130,8 @@ impl Photons {
         Self { list, grid, power_unit }
     }
 
-    /// These photons with the first of others, a share of all, in place of as many of these: paths are numbered, and independent of each
-    /// other, so that those of the first numbers are traced anew.
+    /// These photons with the first of others, a share of all, in place of as many of these: paths are
+    /// numbered, and independent of each other, so that those of the first numbers are traced anew.
     #[must_use]
     pub fn with_replaced(&self, others: &Self, share: f64) -> Self {
         let count = ((share * self.len() as f64) as usize).min(self.len()).min(others.len());

@@ -32,8 +32,8 @@ const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 const MAX_PATHS_TO_CAUSTICS: f64 = 1_000_000.0;
 /// Minimum number of further paths for caustics.
 const MIN_PATHS_TO_CAUSTICS: u64 = 125_000;
-/// Share of the power that surfaces receive from which on caustics are worth [`MAX_PATHS_TO_CAUSTICS`]: paths of smaller shares are
-/// proportionally fewer.
+/// Share of the power that surfaces receive from which on caustics are worth [`MAX_PATHS_TO_CAUSTICS`]: paths
+/// of smaller shares are proportionally fewer.
 const FULL_CAUSTIC_SHARE: f64 = 0.1;
 
 /// Traces paths until `count` photons are stored; none if no surface stores photons, and fewer if most light
@@ -74,8 +74,9 @@ pub(crate) fn trace_for(
     Ok(traced)
 }
 
-/// Traces paths until `count` caustic photons are stored, or as many as they are worth: where fewer than one path in twenty stores a
-/// photon, their number follows from the share of light that caustics bring. `go_on` returns whether to go on.
+/// Traces paths until `count` caustic photons are stored, or as many as they are worth: where fewer than one
+/// path in twenty stores a photon, their number follows from the share of light that caustics bring. `go_on`
+/// returns whether to go on.
 ///
 /// # Errors
 /// If `go_on` returns false.
@@ -111,13 +112,15 @@ pub(crate) fn trace_caustics_for(
     if go_on() { Ok(traced.photons) } else { Err(PhotonError::Stopped) }
 }
 
-/// Number of paths that caustics are worth, besides those in proportion to their photons, for their share of the light.
+/// Number of paths that caustics are worth, besides those in proportion to their photons, for their share of
+/// the light.
 fn paths_worth(share: f64) -> u64 {
     let full = (share / FULL_CAUSTIC_SHARE).min(1.0);
     MIN_PATHS_TO_CAUSTICS.max((full * MAX_PATHS_TO_CAUSTICS) as u64)
 }
 
-/// Traces paths until `count` photons are stored, or `further(photons, paths)`, the number of paths that may follow, is 0.
+/// Traces paths until `count` photons are stored, or `further(photons, paths)`, the number of paths that may
+/// follow, is 0.
 fn trace_while(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,
@@ -177,8 +180,8 @@ fn trace_while(
     Ok(PhotonPass { photons, paths, guiding })
 }
 
-/// Tracer of the photons of a map, whose paths start at the sources of most use. `towards` are importons, with sources that are aimed at
-/// them.
+/// Tracer of the photons of a map, whose paths start at the sources of most use. `towards` are importons,
+/// with sources that are aimed at them.
 fn tracer<'s>(
     packed: &'s PackedScene,
     (seed, purpose): (u32, Purpose),
@@ -193,8 +196,8 @@ fn tracer<'s>(
     more_useful([tracer, Tracer::new(packed, aimed, seed, purpose)], packed, importons)
 }
 
-/// Number of tasks of the next round, from the photons per path so far; at most 64, so that progress shows. It does not
-/// affect which paths are traced.
+/// Number of tasks of the next round, from the photons per path so far; at most 64, so that progress shows.
+/// It does not affect which paths are traced.
 fn next_tasks(missing: usize, stored: usize, paths: u64) -> u64 {
     let photons_per_path = if stored > 0 { stored as f64 / paths as f64 } else { 4.0 };
     let needed = (missing as f64 / photons_per_path) as u64;

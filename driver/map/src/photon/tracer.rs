@@ -29,7 +29,8 @@ pub(super) struct Traced {
 }
 
 impl Traced {
-    /// Number of paths until `count` photons are stored, the last path included; all paths if they store fewer.
+    /// Number of paths until `count` photons are stored, the last path included; all paths if they store
+    /// fewer.
     pub(super) fn paths_until(&self, count: usize) -> u64 {
         let before = self.ends.partition_point(|&end| (end as usize) < count);
         (before + 1).min(self.ends.len()) as u64
@@ -60,8 +61,8 @@ pub(super) struct Tracer<'s> {
 
 impl<'s> Tracer<'s> {
     pub(super) fn new(packed: &PackedScene, sources: &'s Sources, seed: u32, purpose: Purpose) -> Self {
-        // Photons rarely gain power after emission: factor 2 at a Phong lobe, 16 at glass whose reflection is almost the
-        // mirror's alone.
+        // Photons rarely gain power after emission: factor 2 at a Phong lobe, 16 at glass whose reflection is
+        // almost the mirror's alone.
         let path_unit = power_of_two_above(sources.strongest.into());
         let (scene, grid) = (packed.view().0, packed.photon_grid());
         Self { scene, sources, guide: None, grid, path_unit, seed, purpose }
@@ -156,8 +157,8 @@ impl<'s> Tracer<'s> {
         Ok(())
     }
 
-    /// Record of a photon that arrives at a surface. Of photons that reach the surface some meet its base, and gathers are there as
-    /// rarely: the record has the power of all.
+    /// Record of a photon that arrives at a surface. Of photons that reach the surface some meet its base,
+    /// and gathers are there as rarely: the record has the power of all.
     fn stored(&self, surface: &Surface, arrived: Vec3, direct: bool, dither: u32) -> StoredPhoton {
         let power = arrived / (surface.probability * surface.coverage);
         let photon = Photon {
@@ -182,9 +183,9 @@ fn is_lit(surface: &Surface, has_extent: bool) -> bool {
 /// Maximum of [`shading_share`].
 const MAX_SHADING_SHARE: f32 = 4.0;
 
-/// Correction of a photon's power for a shading normal `n` at a triangle with the normal `g`: `|n.i| |g.o| / (|n.o| |g.i|)`
-/// with the directions of incidence `i` and exitance `o` (Veach 1997, *Robust Monte Carlo methods for light transport
-/// simulation*, section 5.3).
+/// Correction of a photon's power for a shading normal `n` at a triangle with the normal `g`: `|n.i| |g.o| /
+/// (|n.o| |g.i|)` with the directions of incidence `i` and exitance `o` (Veach 1997, *Robust Monte Carlo
+/// methods for light transport simulation*, section 5.3).
 fn shading_share(surface: &Surface, left: Vec3) -> f32 {
     let Surface { normal, geometric_normal, outgoing: arrived, .. } = *surface;
     if normal == geometric_normal {
@@ -195,8 +196,8 @@ fn shading_share(surface: &Surface, left: Vec3) -> f32 {
     if share < MAX_SHADING_SHARE { share } else { MAX_SHADING_SHARE }
 }
 
-/// Russian roulette: a photon survives with the probability `reflected / arrived` of its strongest channel, over which its
-/// power is divided.
+/// Russian roulette: a photon survives with the probability `reflected / arrived` of its strongest channel,
+/// over which its power is divided.
 fn survive(arrived: Vec3, reflected: Vec3, roulette: f32) -> Option<Vec3> {
     let probability = (reflected.max_element() / arrived.max_element()).min(1.0);
     (roulette < probability).then(|| reflected / probability)

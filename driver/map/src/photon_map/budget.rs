@@ -13,8 +13,8 @@ use crate::pack::{CardImage, PackError, PackedScene};
 /// Approximate number of photons per line, lines of inner nodes included.
 const PHOTONS_OF_A_LEAF: usize = 9;
 
-/// Checks whether the image of a packed scene with a photon map of these settings may fit a card's memory. The lines of
-/// leaves are estimated; [`check_image`] counts them.
+/// Checks whether the image of a packed scene with a photon map of these settings may fit a card's memory.
+/// The lines of leaves are estimated; [`check_image`] counts them.
 ///
 /// # Errors
 /// [`PackError::Dram`], with the setting to lower.

@@ -1,10 +1,10 @@
-//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the chip's own density estimate at
-//! every photon, for a white diffuser, is stored in the image. A gather takes the irradiance of the nearest point on its
-//! surface.
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the chip's own density
+//! estimate at every photon, for a white diffuser, is stored in the image. A gather takes the irradiance of
+//! the nearest point on its surface.
 //!
-//! At a photon the density estimate is too high by one photon, the photon itself. The nearest point to a given position,
-//! however, is known to have no other between them, which lowers the estimate by one photon. For photons in random
-//! positions both cancel in the mean.
+//! At a photon the density estimate is too high by one photon, the photon itself. The nearest point to a
+//! given position, however, is known to have no other between them, which lowers the estimate by one photon.
+//! For photons in random positions both cancel in the mean.
 
 use glam::Vec3;
 use photoncard_firmware::gather::HilbertCode;
@@ -29,8 +29,9 @@ const POINTS_OF_A_TASK: usize = 256;
 /// Grid point and code of a surface normal.
 type SurfacePoint = ([u32; 3], u8);
 
-/// Adds irradiance points to an image with photons, for gathers of `neighbors` photons within `max_distance`, metres. They
-/// depend on the photons alone, not on the layout of their map. `go_on` is called before each task.
+/// Adds irradiance points to an image with photons, for gathers of `neighbors` photons within `max_distance`,
+/// metres. They depend on the photons alone, not on the layout of their map. `go_on` is called before each
+/// task.
 ///
 /// # Errors
 /// If the image is malformed or grows too large, or `go_on` returns false.

@@ -10,8 +10,8 @@ use crate::photon::StoredPhoton;
 /// Number of photons below which a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
 
-/// Moves the photons of an image from leaves into a kd-tree; irradiance points and caustic photons are removed. Searches
-/// find the same photons in both layouts.
+/// Moves the photons of an image from leaves into a kd-tree; irradiance points and caustic photons are
+/// removed. Searches find the same photons in both layouts.
 ///
 /// # Errors
 /// [`PackError::TooLarge`] if there are more lines than an address can number.
@@ -51,8 +51,9 @@ fn left_nodes(count: usize) -> usize {
     (last_level / 2).saturating_sub(1) + in_last_level.min(last_level / 2)
 }
 
-/// Sorts photons into in-order: of every subtree first the left subtree, then the root, then the right subtree. Each is
-/// split along the longest side of its bounding box. The tree does not depend on the photons' initial order or on threads.
+/// Sorts photons into in-order: of every subtree first the left subtree, then the root, then the right
+/// subtree. Each is split along the longest side of its bounding box. The tree does not depend on the
+/// photons' initial order or on threads.
 fn balance(photons: &mut [StoredPhoton]) {
     if photons.len() < 2 {
         return;
@@ -78,8 +79,8 @@ fn longest_side(photons: &[StoredPhoton]) -> usize {
     (0..3).max_by_key(side).unwrap_or(0)
 }
 
-/// Calls `put` for every node of a balanced tree with its index in the heap, where the children of `i` are `2 i + 1` and
-/// `2 i + 2`.
+/// Calls `put` for every node of a balanced tree with its index in the heap, where the children of `i` are `2
+/// i + 1` and `2 i + 2`.
 fn for_each_in_heap(photons: &[StoredPhoton], put: &mut impl FnMut(usize, StoredPhoton)) {
     // Subtrees to visit: the heap index of each root, and the photons in-order.
     let mut waiting = vec![(0, photons)];

@@ -1,8 +1,9 @@
 //! Radii of the kernels of caustic photons, by the density of the light that each belongs to.
 //!
-//! Photons of one light have like directions: those that a ball scatters over a room are few, and lie among the many of a patch of sun.
-//! The radius of a photon is that within which a number of photons of its surface and of about its direction lie, so that neither a
-//! sparse light shows its photons nor a dense one is blurred by it.
+//! Photons of one light have like directions: those that a ball scatters over a room are few, and lie among
+//! the many of a patch of sun. The radius of a photon is that within which a number of photons of its surface
+//! and of about its direction lie, so that neither a sparse light shows its photons nor a dense one is
+//! blurred by it.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_kernel, kernel_share};
@@ -10,21 +11,25 @@ use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_
 use super::neighbors::{Place, Places, arrange};
 use crate::photon::{Photons, StoredPhoton};
 
-/// Maximum number of neighbours by which the density is estimated: the radius is that of more of them, at this density.
+/// Maximum number of neighbours by which the density is estimated: the radius is that of more of them, at
+/// this density.
 const MAX_PROBED: u32 = 64;
-/// Area of a kernel's disc over that of an even disc of equal variance: a kernel that falls to its edge sees fewer photons.
+/// Area of a kernel's disc over that of an even disc of equal variance: a kernel that falls to its edge sees
+/// fewer photons.
 const AREA: f32 = 4.0 / 3.0;
-/// Maximum radius over the diagonal of the scene: light that is sparser shows its photons, as faint spots of this size.
+/// Maximum radius over the diagonal of the scene: light that is sparser shows its photons, as faint spots of
+/// this size.
 const MAX_SHARE_OF_DIAGONAL: f32 = 0.1;
 /// Minimum radius, cells of the photon grid.
 const MIN_CELLS: f32 = 4.0;
-/// Ratio of the area of a photon's disc and that of its code, at which the code changes: the middle of two powers of two.
+/// Ratio of the area of a photon's disc and that of its code, at which the code changes: the middle of two
+/// powers of two.
 const ROUNDING: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Cells by which the reach of a photon is rounded up.
 const MARGIN_CELLS: u32 = 2;
 
-/// Gives each photon the code of its radius, in which about `neighbors` of its light lie, and changes the photons'
-/// order. Returns the radius of the last code, metres.
+/// Gives each photon the code of its radius, in which about `neighbors` of its light lie, and changes the
+/// photons' order. Returns the radius of the last code, metres.
 pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f32 {
     let grid = photons.grid();
     arrange(photons.stored_mut());
@@ -86,7 +91,8 @@ mod tests {
         (0..count).map(move |index| Vec3::new(number(2 * index), 0.0, number(2 * index + 1)) * side)
     }
 
-    /// A thousand photons of a square metre are hidden in ten thousand of another light: each has the radius of its own.
+    /// A thousand photons of a square metre are hidden in ten thousand of another light: each has the radius
+    /// of its own.
     #[test]
     fn a_radius_is_by_the_density_of_the_photons_own_light() {
         let sun = square(1.0, 100_000).map(|place| photon(place, Vec3::Y));

@@ -1,10 +1,10 @@
-//! The line layout of the photon map: leaves of one line each, split where a search is least likely to visit both sides,
-//! and inner nodes of up to sixteen children, one line each.
+//! The line layout of the photon map: leaves of one line each, split where a search is least likely to visit
+//! both sides, and inner nodes of up to sixteen children, one line each.
 //!
-//! Splitting planes are chosen by the voxel volume heuristic (Wald, Günther, Slusallek 2004, *Balancing considered
-//! harmful*): the probability that a search visits a box is proportional to its volume after enlargement by the search
-//! radius. Splits are rounded to whole leaves, so that lines are full. The binary tree is then folded into wide nodes of
-//! minimum expected visits, by the same probabilities.
+//! Splitting planes are chosen by the voxel volume heuristic (Wald, Günther, Slusallek 2004, *Balancing
+//! considered harmful*): the probability that a search visits a box is proportional to its volume after
+//! enlargement by the search radius. Splits are rounded to whole leaves, so that lines are full. The binary
+//! tree is then folded into wide nodes of minimum expected visits, by the same probabilities.
 
 use std::num::NonZeroU8;
 
@@ -43,12 +43,14 @@ pub(super) struct PhotonTree<'a> {
 }
 
 impl<'a> PhotonTree<'a> {
-    /// Tree of photons, for searches of about `radius` cells. It does not depend on threads. `None` without photons.
+    /// Tree of photons, for searches of about `radius` cells. It does not depend on threads. `None` without
+    /// photons.
     pub(super) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
         Self::of(photons, &Searches { radius, reach: &|_| 0 })
     }
 
-    /// Tree of photons whose boxes hold all points within the reach of a photon, cells, for searches at a point.
+    /// Tree of photons whose boxes hold all points within the reach of a photon, cells, for searches at a
+    /// point.
     pub(super) fn of_discs(photons: &'a mut [StoredPhoton], reach: Reach) -> Option<Self> {
         let mut reaches: Vec<u32> = photons.iter().map(reach).collect();
         if reaches.is_empty() {
@@ -176,11 +178,13 @@ impl Extent {
     /// Approximate number of photons per leaf in the box.
     fn leaf_photons(&self, photons: usize) -> usize {
         let axes = (0..3).filter(|&axis| self.side(axis) > 0).count();
-        // Photons lie on surfaces: many photons on several, few photons on one, which may be oblique to the axes.
+        // Photons lie on surfaces: many photons on several, few photons on one, which may be oblique to the
+        // axes.
         leaf_capacity(if photons > MANY { axes.min(2) } else { axes })
     }
 
-    /// Axis of the split, and the number of photons below the plane: a whole number of leaves, if there is more than one.
+    /// Axis of the split, and the number of photons below the plane: a whole number of leaves, if there is
+    /// more than one.
     fn split(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let (axis, below) = self.cheapest(photons, radius);
         let count = photons.len();
@@ -266,8 +270,8 @@ mod tests {
             .collect()
     }
 
-    /// Collects every photon below `child`, and checks that it lies within the boxes of all ancestors. Returns the number
-    /// of stack entries that a search needs.
+    /// Collects every photon below `child`, and checks that it lies within the boxes of all ancestors.
+    /// Returns the number of stack entries that a search needs.
     fn walk(lines: &PhotonLines, child: Child, room: GridBox, found: &mut Vec<Placed>) -> usize {
         let node = match child {
             Child::Leaf(leaf) => {

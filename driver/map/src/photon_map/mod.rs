@@ -1,7 +1,7 @@
 //! The photon map: photons, trees above them, caustics and irradiance points as sections of the card image.
 //!
-//! The module uses [`crate::pack`], which writes sections, [`crate::photon`], which traces photons, and `density`, which
-//! measures the maximum distance of gathers and the disc fractions.
+//! The module uses [`crate::pack`], which writes sections, [`crate::photon`], which traces photons, and
+//! `density`, which measures the maximum distance of gathers and the disc fractions.
 
 mod budget;
 mod irradiance;
@@ -35,7 +35,8 @@ use crate::photon::{
     ImportonGrid, Importons, PhotonError, PhotonPass, Photons, trace_caustics_for, trace_for,
 };
 
-/// Lower bound of the maximum distance of a gather, in cells of the photon grid, so that the grid does not show.
+/// Lower bound of the maximum distance of a gather, in cells of the photon grid, so that the grid does not
+/// show.
 const MIN_CELLS: f32 = 8.0;
 
 /// Card image with its photon map, ready for gathers.
@@ -67,8 +68,8 @@ pub struct PhotonTimes {
     pub estimating: Duration,
 }
 
-/// Traces photons in a packed scene and completes its image with the photon map. `progress` is called with the number of
-/// photons stored, also while the map is measured, and returns whether to go on.
+/// Traces photons in a packed scene and completes its image with the photon map. `progress` is called with
+/// the number of photons stored, also while the map is measured, and returns whether to go on.
 ///
 /// # Errors
 /// If the scene is too wide, the image grows too large, or `progress` returns false.
@@ -197,7 +198,8 @@ fn importons(packed: &PackedScene, settings: &PhotonSettings) -> Result<Option<I
     importons.transpose().map_err(PhotonError::Unsound)
 }
 
-/// Caustic photons, if requested and if any are found. Without a caustic map gather rays carry the light of caustics.
+/// Caustic photons, if requested and if any are found. Without a caustic map gather rays carry the light of
+/// caustics.
 fn caustics(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,

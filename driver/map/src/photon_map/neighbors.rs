@@ -96,9 +96,9 @@ impl Places {
         Self { places, levels }
     }
 
-    /// Distance of the neighbour of a number, from 1 on, of each place among those like it, or of one near it; `limit`
-    /// if there are fewer within it. For places that are [`SHARED_SHARE`] of such a distance apart they differ by that
-    /// share at most.
+    /// Distance of the neighbour of a number, from 1 on, of each place among those like it, or of one near
+    /// it; `limit` if there are fewer within it. For places that are [`SHARED_SHARE`] of such a distance
+    /// apart they differ by that share at most.
     pub(super) fn distances(&self, number: usize, limit: f32) -> Vec<f32> {
         let leaves = self.places.par_chunks(LEAF).enumerate();
         leaves.flat_map_iter(|(leaf, places)| self.distances_of_leaf(leaf, places, number, limit)).collect()
@@ -122,8 +122,8 @@ impl Places {
         distances
     }
 
-    /// Distance of a place's neighbour of a number, from 1 on, among those like it; `limit` if there are fewer within
-    /// it.
+    /// Distance of a place's neighbour of a number, from 1 on, among those like it; `limit` if there are
+    /// fewer within it.
     fn distance_of_neighbor(&self, index: usize, number: usize, limit: f32) -> f32 {
         let own = &self.places[index];
         let mut limit = limit * limit;

@@ -13,8 +13,8 @@ const MIN_NEIGHBORS: usize = 4;
 /// Inverse of a share of the photons that suffices, however few neighbours it contains.
 const MIN_STEP: usize = 32;
 
-/// Radius of a typical search for `neighbors` photons, in cells of the photon grid. Before there is a tree to search, it is
-/// estimated in a subset of the photons, for a proportionally smaller number of neighbours.
+/// Radius of a typical search for `neighbors` photons, in cells of the photon grid. Before there is a tree to
+/// search, it is estimated in a subset of the photons, for a proportionally smaller number of neighbours.
 pub(super) fn typical_radius(photons: &Photons, neighbors: u32) -> f64 {
     let all = photons.stored();
     let neighbors = neighbors as usize;

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct PhotonSettings {
     /// Seed of the photon paths.
     pub seed: u32,
-    /// Camera whose picture alone uses the photons, which are then guided towards what it uses; `None` for any camera.
+    /// Camera whose picture alone uses the photons, which are then guided towards what it uses; `None` for
+    /// any camera.
     pub camera: Option<Camera>,
     /// Number of photons to store.
     pub photons: usize,

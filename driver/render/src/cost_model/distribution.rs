@@ -1,4 +1,5 @@
-//! Distribution of bytes that all chips receive, such as changed lines of the photon map, over the host's link.
+//! Distribution of bytes that all chips receive, such as changed lines of the photon map, over the host's
+//! link.
 
 use super::{Machine, Symbols};
 
@@ -7,8 +8,9 @@ use super::{Machine, Symbols};
 pub enum Distribution {
     /// The host sends them to each chip: they pass its link once for each.
     Separate,
-    /// A tree of switches between host and chips, as in the dissertation's figure 7.1: they pass the host's link once, and each switch
-    /// forwards what it receives to all that hangs on it, at the speed of the host's link, as soon as it holds a whole frame.
+    /// A tree of switches between host and chips, as in the dissertation's figure 7.1: they pass the host's
+    /// link once, and each switch forwards what it receives to all that hangs on it, at the speed of the
+    /// host's link, as soon as it holds a whole frame.
     Tree,
 }
 
@@ -24,8 +26,8 @@ impl Distribution {
         levels
     }
 
-    /// Seconds until all chips hold `bytes` bytes `I`: `N I / B` separately, `I / B + ceil(log_f N) S_F / B` by a tree. Nothing takes no
-    /// time.
+    /// Seconds until all chips hold `bytes` bytes `I`: `N I / B` separately, `I / B + ceil(log_f N) S_F / B`
+    /// by a tree. Nothing takes no time.
     pub fn seconds(self, bytes: f64, chips: u64, symbols: &Symbols, machine: &Machine) -> f64 {
         match self {
             _ if bytes <= 0.0 => 0.0,

@@ -1,9 +1,11 @@
-//! The dissertation's cost model (chapter 7): a frame's demand of arithmetic and memory, and the chips that meet it.
+//! The dissertation's cost model (chapter 7): a frame's demand of arithmetic and memory, and the chips that
+//! meet it.
 //!
-//! [`Symbols`] are the parameters of Table 7.1, a [`Workload`] the counts of rays, gathers and bytes of one frame, a
-//! [`Cost`] the FLOPs and bytes that they take of each unit of the chip, and a [`Prediction`] the speed of a
-//! [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted, at the table's cost of each piece; [`arithmetic`] are those
-//! that the firmware does. A [`Distribution`] is the time of an upload to all chips. Formulas: `docs/scaling.md`.
+//! [`Symbols`] are the parameters of Table 7.1, a [`Workload`] the counts of rays, gathers and bytes of one
+//! frame, a [`Cost`] the FLOPs and bytes that they take of each unit of the chip, and a [`Prediction`] the
+//! speed of a [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted, at the
+//! table's cost of each piece; [`arithmetic`] are those that the firmware does. A [`Distribution`] is the
+//! time of an upload to all chips. Formulas: `docs/scaling.md`.
 
 pub mod arithmetic;
 mod distribution;
@@ -45,8 +47,8 @@ pub struct Cost {
 }
 
 impl Cost {
-    /// Cost with the reflection evaluated in two stages: the first once where a gather ray ends, the second for each
-    /// photon.
+    /// Cost with the reflection evaluated in two stages: the first once where a gather ray ends, the second
+    /// for each photon.
     pub fn new(workload: &Workload, symbols: &Symbols) -> Self {
         let [stage_1, stage_2] = [symbols.reflection_stage_1, symbols.reflection_stage_2];
         let of_gather = stage_1 + workload.photons_per_gather * stage_2;
@@ -57,20 +59,21 @@ impl Cost {
         }
     }
 
-    /// Cost with the whole reflection function evaluated for every photon, without irradiance cache and importance
-    /// tables.
+    /// Cost with the whole reflection function evaluated for every photon, without irradiance cache and
+    /// importance tables.
     ///
-    /// For [`Workload::naive`] this is `T P [(1 + N_FG + N_S) C_RayCast + N_FG C_G + (N_FG k + N_FG + N_S) 3 (C_B1 +
-    /// C_B2)]` FLOPs a frame, the dissertation's 7.4 TFLOPS at 30 frames/s. The dissertation's own formula is not in
-    /// the public excerpts: this one is a hypothesis that meets the figure.
+    /// For [`Workload::naive`] this is `T P [(1 + N_FG + N_S) C_RayCast + N_FG C_G + (N_FG k + N_FG + N_S) 3
+    /// (C_B1 + C_B2)]` FLOPs a frame, the dissertation's 7.4 TFLOPS at 30 frames/s. The dissertation's own
+    /// formula is not in the public excerpts: this one is a hypothesis that meets the figure.
     pub fn naive(workload: &Workload, symbols: &Symbols) -> Self {
         let evaluations = workload.ray_gathers * workload.photons_per_gather + reflected_rays(workload);
         let reflection = evaluations * (symbols.reflection_stage_1 + symbols.reflection_stage_2);
         Self::of_units(workload, symbols, reflection)
     }
 
-    /// Cost by counted arithmetic: rays against boxes and triangles, and surfaces, in the ray caster; searches and all reflection in the
-    /// gather unit; directions, irradiance cache and pixels in the controller.
+    /// Cost by counted arithmetic: rays against boxes and triangles, and surfaces, in the ray caster;
+    /// searches and all reflection in the gather unit; directions, irradiance cache and pixels in the
+    /// controller.
     pub fn counted(workload: &Workload, arithmetic: &Arithmetic) -> Self {
         let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
         Self {
@@ -113,8 +116,8 @@ fn reflected_rays(workload: &Workload) -> f64 {
     workload.gather_rays + workload.shadow_rays
 }
 
-/// FLOPs of importance tables and irradiance cache. The dissertation's formula is not in the public excerpts: the terms and
-/// their FLOPs are this project's.
+/// FLOPs of importance tables and irradiance cache. The dissertation's formula is not in the public excerpts:
+/// the terms and their FLOPs are this project's.
 fn controller_flops(workload: &Workload, symbols: &Symbols) -> f64 {
     let table = workload.photons_per_gather * symbols.table_photon + symbols.table_cells * symbols.table_cell;
     let interpolation = symbols.records_per_pixel * symbols.interpolation;

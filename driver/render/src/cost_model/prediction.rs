@@ -20,8 +20,9 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// The chip that section 7.1 expects of 2010: 90 GB/s and 500 GFLOPS. The link is this project's choice: 4 GB/s each
-    /// way, the sixteen lanes of PCI Express 1.x in a workstation of 2007. So are 100 ns, a read from DRAM of any year, and 128 tasks.
+    /// The chip that section 7.1 expects of 2010: 90 GB/s and 500 GFLOPS. The link is this project's choice:
+    /// 4 GB/s each way, the sixteen lanes of PCI Express 1.x in a workstation of 2007. So are 100 ns, a read
+    /// from DRAM of any year, and 128 tasks.
     pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9, latency: 100e-9, tasks: 128 };
 
     /// Latency of a read in nanoseconds, to a thousandth of one.
@@ -55,14 +56,15 @@ pub struct ChipsNeeded {
     pub bandwidth: u64,
     /// Chips needed for arithmetic alone.
     pub computation: u64,
-    /// Chips needed for both; `None` if the host's link cannot carry the frame rate whatever the number of chips.
+    /// Chips needed for both; `None` if the host's link cannot carry the frame rate whatever the number of
+    /// chips.
     pub overall: Option<u64>,
 }
 
 /// Upper bound of the speed at which a machine renders frames of some cost.
 ///
-/// Memory, arithmetic and link work at the same time, as in a pipeline that never waits, and tiles are dealt without
-/// loss. The rate of a resource that a frame does not use is infinite.
+/// Memory, arithmetic and link work at the same time, as in a pipeline that never waits, and tiles are dealt
+/// without loss. The rate of a resource that a frame does not use is infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// Tiles a second that one chip's memory bandwidth allows.
@@ -105,8 +107,8 @@ impl Prediction {
         self.chips_frames_per_second(chips).min(self.link_frames_per_second)
     }
 
-    /// The resource that limits `chips` chips. Of equal limits the chips' is named, as more chips help there; of
-    /// bandwidth and arithmetic bandwidth.
+    /// The resource that limits `chips` chips. Of equal limits the chips' is named, as more chips help there;
+    /// of bandwidth and arithmetic bandwidth.
     pub fn binding(&self, chips: u64) -> Resource {
         if self.link_frames_per_second < self.chips_frames_per_second(chips) {
             Resource::HostLink
@@ -117,8 +119,8 @@ impl Prediction {
         }
     }
 
-    /// Minimum numbers of chips for a frame rate, at least one. A rate that is met but for rounding (relative error
-    /// 1e-9) is met.
+    /// Minimum numbers of chips for a frame rate, at least one. A rate that is met but for rounding (relative
+    /// error 1e-9) is met.
     pub fn chips_needed(&self, frames_per_second: f64) -> ChipsNeeded {
         let chips = |tiles_per_second: f64| {
             let ratio = frames_per_second * self.tiles / tiles_per_second;

@@ -78,8 +78,8 @@ pub struct Symbols {
 }
 
 impl Symbols {
-    /// Nominal values of Table 7.1. The public excerpts of the table give only a range for `N_PM`: its lower end is
-    /// taken, which is also the driver's default.
+    /// Nominal values of Table 7.1. The public excerpts of the table give only a range for `N_PM`: its lower
+    /// end is taken, which is also the driver's default.
     pub const NOMINAL: Self = Self {
         tile_pixels: 256.0,
         tiles: 1024.0,

@@ -4,8 +4,8 @@ use photoncard_shared::counters::Counters;
 
 use super::Symbols;
 
-/// Counts of rays, gathers, samples and bytes of one frame, summed over all chips. *Nominal* is the value that Table
-/// 7.1's symbols imply.
+/// Counts of rays, gathers, samples and bytes of one frame, summed over all chips. *Nominal* is the value
+/// that Table 7.1's symbols imply.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Workload {
     /// Rays from the eye. Nominal: `T P`.
@@ -18,7 +18,8 @@ pub struct Workload {
     pub survey_rays: f64,
     /// Searches of the photon map where a gather ray ends. Nominal: `T P R_FG N_FG`, one a gather ray.
     pub ray_gathers: f64,
-    /// Searches of the photon map that fill an importance table. Nominal: `T P R_FG`, one a pixel that gathers.
+    /// Searches of the photon map that fill an importance table. Nominal: `T P R_FG`, one a pixel that
+    /// gathers.
     pub table_gathers: f64,
     /// Photons that a gather returns and that are then reflected, or counted in a table. Nominal: `k`.
     pub photons_per_gather: f64,
@@ -34,7 +35,8 @@ pub struct Workload {
     pub tiles: f64,
     /// Bytes from the chips to the host: pixels. Nominal: `T P B_P`.
     pub bytes_to_host: f64,
-    /// Bytes from the host to the chips: tile commands. Nominal: `T B_T`. The card image is loaded before the frame.
+    /// Bytes from the host to the chips: tile commands. Nominal: `T B_T`. The card image is loaded before the
+    /// frame.
     pub bytes_from_host: f64,
 }
 
@@ -56,8 +58,8 @@ impl Workload {
         workload
     }
 
-    /// Workload of a frame without the techniques, by Table 7.1: every pixel has a final gather of `N_FG` rays, and
-    /// each photon gather reads `B_N` bytes.
+    /// Workload of a frame without the techniques, by Table 7.1: every pixel has a final gather of `N_FG`
+    /// rays, and each photon gather reads `B_N` bytes.
     pub fn naive(symbols: &Symbols) -> Self {
         let rays = symbols.pixels() * symbols.gather_rays;
         let mut workload = Self { gather_rays: rays, ray_gathers: rays, ..Self::of_pixels(symbols) };

@@ -1,7 +1,7 @@
 //! The packets of tev's protocol, as its `README.md` and `src/Ipc.cpp` describe them.
 //!
-//! A packet is its length in bytes (`u32`, itself included), the number of an operation (one byte) and its arguments.
-//! Numbers are little-endian, strings end with a zero byte, a Boolean is a byte of 0 or 1.
+//! A packet is its length in bytes (`u32`, itself included), the number of an operation (one byte) and its
+//! arguments. Numbers are little-endian, strings end with a zero byte, a Boolean is a byte of 0 or 1.
 //!
 //! ```text
 //! CreateImage    4   grab focus, image, width i32, height i32, channels i32, the channels' names
@@ -9,8 +9,9 @@
 //!                    offset of each channel i64, stride of each channel i64, f32 ...
 //! ```
 //!
-//! Offsets and strides count `f32`: pixel `p` of the rectangle, in rows, has in channel `c` the value `offset[c] + p *
-//! stride[c]`. Here a pixel's channels lie side by side. `CreateImage` replaces an image of equal name.
+//! Offsets and strides count `f32`: pixel `p` of the rectangle, in rows, has in channel `c` the value
+//! `offset[c] + p * stride[c]`. Here a pixel's channels lie side by side. `CreateImage` replaces an image of
+//! equal name.
 
 use photoncard_picture::printable::printable;
 use photoncard_shared::message::Tile;

@@ -48,7 +48,8 @@ pub struct Display {
 }
 
 impl Display {
-    /// Begins to show the crop window `window` with some channels. Errors are reported by [`Viewer::failure`].
+    /// Begins to show the crop window `window` with some channels. Errors are reported by
+    /// [`Viewer::failure`].
     pub fn open(settings: &DisplaySettings, window: Window, channels: &[Channel]) -> Self {
         Self::with_room_for(MAX_WAITING, settings, window, channels)
     }
@@ -130,8 +131,8 @@ impl Viewer for Display {
         self.queue.lock().take_failure().map(Into::into)
     }
 
-    /// Sends the tiles that found no room before, and waits until all packets are sent: at most 20 s, at most 2 s
-    /// without progress.
+    /// Sends the tiles that found no room before, and waits until all packets are sent: at most 20 s, at most
+    /// 2 s without progress.
     fn finish(&self, film: &Film) {
         let missed = std::mem::take(&mut self.queue.lock().missed);
         let mut watch = Watch::new();

@@ -1,7 +1,7 @@
 //! Contents of the lines that a chip reads: the boxes, triangles and photons among which it searches.
 //!
-//! A chip tests all that is in a line, so that these counts are exact numbers of the steps of its units; the cost model
-//! ([`crate::cost_model`]) multiplies them by the operations of a step.
+//! A chip tests all that is in a line, so that these counts are exact numbers of the steps of its units; the
+//! cost model ([`crate::cost_model`]) multiplies them by the operations of a step.
 
 use std::ops::Range;
 

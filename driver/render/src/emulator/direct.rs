@@ -64,14 +64,16 @@ impl From<Fault> for TileError {
     }
 }
 
-/// A new chip. It is built on the stack first: in a frame of its own, as the caller's may be of a thread with a small stack.
+/// A new chip. It is built on the stack first: in a frame of its own, as the caller's may be of a thread with
+/// a small stack.
 #[inline(never)]
 pub fn new_chip<K: ChipKind>() -> Box<Chip<K>> {
     Box::new(Chip::new())
 }
 
-/// Renders tiles on chips of the kind `K`, one a thread of `pool`, whose stacks must hold a chip while it is built. Each tile has a new
-/// memory that `model` makes, so that it begins with empty caches. `is_stopped` is polled before each.
+/// Renders tiles on chips of the kind `K`, one a thread of `pool`, whose stacks must hold a chip while it is
+/// built. Each tile has a new memory that `model` makes, so that it begins with empty caches. `is_stopped` is
+/// polled before each.
 ///
 /// # Errors
 /// If the card image is malformed, or the work is stopped.
@@ -93,8 +95,8 @@ pub fn render_tiles_apart<'a, K: ChipKind, M: MeasuredMemory>(
     pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip::<K>, render_one).collect())
 }
 
-/// Renders a tile on a chip with a memory of its own. With an `outlet` the pixels' gathers are sent to it instead, and the
-/// caller evaluates them and adds them to the sums.
+/// Renders a tile on a chip with a memory of its own. With an `outlet` the pixels' gathers are sent to it
+/// instead, and the caller evaluates them and adds them to the sums.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for the tile.
@@ -117,8 +119,8 @@ pub fn render_tile<K: ChipKind>(
     Ok(RenderedTile { traffic: memory.traffic(), ..rendered })
 }
 
-/// Renders tiles on a chip, with as many in flight as the frame and the chip allow. `take` is called with each tile when it is done, in
-/// any order, without its traffic, and returns whether to go on.
+/// Renders tiles on a chip, with as many in flight as the frame and the chip allow. `take` is called with
+/// each tile when it is done, in any order, without its traffic, and returns whether to go on.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for a tile.

@@ -1,10 +1,11 @@
 //! DRAM of an emulated card, stored copy-on-write over the host's card image.
 //!
-//! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card may be given the image by
-//! reference before its first line, and checks it like a received one; or it receives the image line by line over its link. As long as
-//! the received lines equal the lines of the host's image at the same addresses, the card stores no copy and reads the host's; lines
-//! beyond the image are its own. At the first line of the image that differs it switches to lines of its own, so that a card always
-//! reads what was written.
+//! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card may
+//! be given the image by reference before its first line, and checks it like a received one; or it receives
+//! the image line by line over its link. As long as the received lines equal the lines of the host's image at
+//! the same addresses, the card stores no copy and reads the host's; lines beyond the image are its own. At
+//! the first line of the image that differs it switches to lines of its own, so that a card always reads what
+//! was written.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -27,7 +28,8 @@ struct Given {
 }
 
 impl SharedImage {
-    /// Shares the image with the cards; later calls have no effect. Cards that hold it need not compute a known checksum again.
+    /// Shares the image with the cards; later calls have no effect. Cards that hold it need not compute a
+    /// known checksum again.
     pub fn give(&self, image: Arc<CardImage>, checksum: Option<u64>) {
         // Cards that receive another image store it themselves.
         let _ = self.0.set(Given { image, checksum });
@@ -96,8 +98,8 @@ impl EmulatedDram {
         }
     }
 
-    /// Stores lines by reference if they equal the shared image's and follow the lines stored so far. Returns whether they
-    /// do.
+    /// Stores lines by reference if they equal the shared image's and follow the lines stored so far. Returns
+    /// whether they do.
     fn share(&mut self, first: usize, lines: &[[u8; LINE_BYTES]]) -> bool {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty())
             && let Some(Given { image, .. }) = self.shared.0.get()
@@ -114,7 +116,8 @@ impl EmulatedDram {
         shares
     }
 
-    /// The card's own lines, and the index in them of the line `first`. In a shared image the card stores all lines itself.
+    /// The card's own lines, and the index in them of the line `first`. In a shared image the card stores all
+    /// lines itself.
     fn own_from(&mut self, first: usize) -> (&mut Vec<Line>, usize) {
         if let Stored::Shared { image, written, beyond } = &self.lines
             && first < image.lines().len()

@@ -11,8 +11,8 @@ use super::trace::TraceFile;
 
 /// Memory that measures its traffic, of a kind that the chip does not know.
 ///
-/// The chip is compiled for each kind of memory, and all that a measured memory does would be compiled into each of its reads: of the
-/// kinds that measure it is compiled for this one.
+/// The chip is compiled for each kind of memory, and all that a measured memory does would be compiled into
+/// each of its reads: of the kinds that measure it is compiled for this one.
 pub struct Measured<'a>(Box<dyn MeasuredCard + Send + 'a>);
 
 trait MeasuredCard: CardMemory + MeasuredMemory {}

@@ -40,7 +40,8 @@ pub struct CacheSpec {
 }
 
 impl CacheSpec {
-    /// The dissertation's cache of the photon map: 128 KB in lines of 128 bytes (section 6.5); 4 ways are our choice.
+    /// The dissertation's cache of the photon map: 128 KB in lines of 128 bytes (section 6.5); 4 ways are our
+    /// choice.
     pub const PHOTON: Self = Self { bytes: 128 << 10, line_bytes: 128, ways: 4, index: SetIndex::Modulo };
     /// The dissertation's cache of the ray caster: 75 KB (section 7.3.2), otherwise as [`Self::PHOTON`].
     pub const SCENE: Self = Self { bytes: 75 << 10, ..Self::PHOTON };
@@ -94,7 +95,8 @@ impl fmt::Display for CacheSettings {
 impl FromStr for CacheSettings {
     type Err = String;
 
-    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash`, whose parts are optional, or `unified=256K/128/8`.
+    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash`, whose parts are optional, or
+    /// `unified=256K/128/8`.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut photon = None;
         let mut scene = None;

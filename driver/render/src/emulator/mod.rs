@@ -78,7 +78,8 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
-    /// Name of the kind of chip with this budget, which may be on a board: `reference`, `large`, `micro` or `other`.
+    /// Name of the kind of chip with this budget, which may be on a board: `reference`, `large`, `micro` or
+    /// `other`.
     pub fn name_of(budget: &Budget) -> &'static str {
         match *budget {
             kind::REFERENCE => "reference",
@@ -147,8 +148,8 @@ pub struct EmulatedCard {
 }
 
 impl EmulatedCard {
-    /// Starts a card. Without a model its memory has no caches and no counters. A card that is loaded with the image in `shared` keeps no copy
-    /// of it.
+    /// Starts a card. Without a model its memory has no caches and no counters. A card that is loaded with
+    /// the image in `shared` keeps no copy of it.
     ///
     /// # Errors
     /// If the card's thread cannot be started.
@@ -173,8 +174,8 @@ impl EmulatedCard {
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
     }
 
-    /// Takes the empty memory of a card to which nothing was loaded; `None` from the second call on, and of a modelled memory. An image that is
-    /// given to it is held by reference.
+    /// Takes the empty memory of a card to which nothing was loaded; `None` from the second call on, and of a
+    /// modelled memory. An image that is given to it is held by reference.
     pub fn take_empty_memory(&mut self) -> Option<SharedImage> {
         self.held.take()
     }
@@ -257,7 +258,8 @@ fn run(
     }
 }
 
-/// Serves a card with some memory until the host drops its end of the link. Returns the result of `end` on the memory.
+/// Serves a card with some memory until the host drops its end of the link. Returns the result of `end` on
+/// the memory.
 fn serve_on<M: CardMemory, R>(
     kind: EmulatedKind,
     memory: M,

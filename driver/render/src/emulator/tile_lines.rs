@@ -1,4 +1,5 @@
-//! Lines that a chip has read from its DRAM for each tile: a note beside the link, as cards and host are in one process.
+//! Lines that a chip has read from its DRAM for each tile: a note beside the link, as cards and host are in
+//! one process.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -20,8 +21,8 @@ impl TileLines {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(tile, lines);
     }
 
-    /// Takes the lines of a tile that the card has rendered; `None` if its memory is not modelled. Of tiles in flight together each
-    /// has the lines since the end of the one before.
+    /// Takes the lines of a tile that the card has rendered; `None` if its memory is not modelled. Of tiles
+    /// in flight together each has the lines since the end of the one before.
     pub fn take(&self, tile: u32) -> Option<u64> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&tile)
     }

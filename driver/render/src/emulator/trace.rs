@@ -1,9 +1,11 @@
-//! Files of traces of a chip's memory: every read of its tiles, above the caches for a cache simulator, or below them for a DRAM simulator.
+//! Files of traces of a chip's memory: every read of its tiles, above the caches for a cache simulator, or
+//! below them for a DRAM simulator.
 //!
-//! Above the caches a trace has the classic input format of Dinero. Each line of text is one access: a label, a blank, a byte address in
-//! hexadecimal. Label 0 is a read of data; label 4 is Dinero's escape that flushes its caches, written at the beginning of every tile
-//! with address 0. Dinero ignores the rest of a line: a labelled trace has structure, stage and bytes of the read there. Below the
-//! caches, each line of text is a fetch of one line of card memory, in the format of Ramulator 2 or of `DRAMsim3`. See `docs/memory.md`.
+//! Above the caches a trace has the classic input format of Dinero. Each line of text is one access: a label,
+//! a blank, a byte address in hexadecimal. Label 0 is a read of data; label 4 is Dinero's escape that flushes
+//! its caches, written at the beginning of every tile with address 0. Dinero ignores the rest of a line: a
+//! labelled trace has structure, stage and bytes of the read there. Below the caches, each line of text is a
+//! fetch of one line of card memory, in the format of Ramulator 2 or of `DRAMsim3`. See `docs/memory.md`.
 
 use std::fmt::Arguments;
 use std::io::{self, Write};
@@ -20,8 +22,8 @@ use photoncard_shared::address::Structure;
 
 /// Size of a block of text that is compressed at once, bytes.
 const BUFFER: usize = 64 << 10;
-/// Maximum length of a line: a label, 39 bits in hexadecimal, the names of a structure and of a stage, three digits of bytes, blanks
-/// and the line feed.
+/// Maximum length of a line: a label, 39 bits in hexadecimal, the names of a structure and of a stage, three
+/// digits of bytes, blanks and the line feed.
 const LONGEST_LINE: usize = 64;
 
 const READ: u8 = 0;
@@ -35,7 +37,8 @@ pub enum TraceFormat {
     Dinero,
     /// Lines from DRAM, for Ramulator 2's load-store trace.
     Ramulator,
-    /// Lines from DRAM, for `DRAMsim3`: each a cycle after the one before, so that the DRAM is never without work.
+    /// Lines from DRAM, for `DRAMsim3`: each a cycle after the one before, so that the DRAM is never without
+    /// work.
     Dramsim3,
 }
 
@@ -63,7 +66,8 @@ pub struct TraceSettings {
     pub has_labels: bool,
 }
 
-/// Unfinished trace file, compressed by gzip. The file appears under its name only when the trace is finished.
+/// Unfinished trace file, compressed by gzip. The file appears under its name only when the trace is
+/// finished.
 pub struct TraceFile {
     encoder: GzEncoder<PendingFile>,
     buffer: Vec<u8>,

@@ -1,8 +1,8 @@
 //! All gathers of a frame along one Hilbert curve: the bound that the orders of a chip are compared with.
 //!
-//! No chip can do it: the gathers of a frame are gigabytes. Emulated chips hand their gathers to the host, which sorts
-//! them and has them done when all rays are cast (Steinhurst, Coombe, Lastra 2005). Gathers of irradiance records,
-//! whose results are needed before the pixels, stay on the chips.
+//! No chip can do it: the gathers of a frame are gigabytes. Emulated chips hand their gathers to the host,
+//! which sorts them and has them done when all rays are cast (Steinhurst, Coombe, Lastra 2005). Gathers of
+//! irradiance records, whose results are needed before the pixels, stay on the chips.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -33,7 +33,8 @@ const MAX_GATHERS: u64 = 1 << 27;
 const GATHERS_PER_CAST: u64 = 1 << 21;
 /// Number of gathers of one task.
 const GATHERS_PER_TASK: usize = 4096;
-/// Number of gathers of one task where memory is modelled: so many that the empty caches at its beginning hardly count.
+/// Number of gathers of one task where memory is modelled: so many that the empty caches at its beginning
+/// hardly count.
 const GATHERS_PER_COUNTED_TASK: usize = 1 << 22;
 /// Minimum number of gathers between two reports of progress.
 const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
@@ -74,8 +75,8 @@ struct Waiting {
     request: GatherRequest,
 }
 
-/// State of a frame: the sums of its pixels, tile after tile, one per pixel or several with layers, and the gathers
-/// that are still to be added to them.
+/// State of a frame: the sums of its pixels, tile after tile, one per pixel or several with layers, and the
+/// gathers that are still to be added to them.
 struct Frame {
     sums: Vec<ColourSum>,
     /// The other channels of the pixels.
@@ -118,16 +119,17 @@ pub struct CurveJob<'a> {
 pub struct CurveOutcome {
     /// Counts of the work.
     pub counters: Counters,
-    /// Memory traffic, if the memory is modelled: caches are empty when a tile begins, and at every 2^22-th gather.
+    /// Memory traffic, if the memory is modelled: caches are empty when a tile begins, and at every 2^22-th
+    /// gather.
     pub traffic: MemoryTraffic,
 }
 
-/// Renders tiles into sinks, all of them at the end. `progress(done, total)` is called with the work that is done, in
-/// tiles, and returns whether to go on. With `caches` the memory is modelled.
+/// Renders tiles into sinks, all of them at the end. `progress(done, total)` is called with the work that is
+/// done, in tiles, and returns whether to go on. With `caches` the memory is modelled.
 ///
 /// # Errors
-/// If the frame has too many gathers, the card image is malformed, the threads cannot be started, or `progress` returns
-/// false.
+/// If the frame has too many gathers, the card image is malformed, the threads cannot be started, or
+/// `progress` returns false.
 pub fn render_along_curve(
     job: CurveJob,
     caches: Option<&CacheSettings>,
@@ -216,8 +218,8 @@ impl Frame {
         Ok(all)
     }
 
-    /// Takes over the sums and gathers of tiles. Only the gathers of glossy lobes beside an irradiance cache, and of several paths a sample, can exceed
-    /// the room that is reserved.
+    /// Takes over the sums and gathers of tiles. Only the gathers of glossy lobes beside an irradiance cache,
+    /// and of several paths a sample, can exceed the room that is reserved.
     fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), FrameError> {
         for CastTile { tile, waiting } in tiles {
             let gathers = (self.waiting.len() + waiting.len()) as u64;

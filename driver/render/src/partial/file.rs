@@ -1,5 +1,5 @@
-//! The file of a partial render, opened safely: links are not followed, pipes do not block, and no foreign file is written
-//! or removed.
+//! The file of a partial render, opened safely: links are not followed, pipes do not block, and no foreign
+//! file is written or removed.
 
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
@@ -44,7 +44,8 @@ pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>>
     }))
 }
 
-/// Opens and locks the file. If it does not exist, it is created if `create` is true; otherwise the result is `None`.
+/// Opens and locks the file. If it does not exist, it is created if `create` is true; otherwise the result is
+/// `None`.
 pub(super) fn open(path: &Path, create: bool) -> Result<Option<File>, PartialError> {
     let failed = |source| PartialError::File { path: path.to_owned(), source };
     for _ in 0..MAX_TRIES {
@@ -87,7 +88,8 @@ fn open_there(path: &Path) -> io::Result<File> {
     File::options().read(true).write(true).open(path)
 }
 
-/// Refuses anything but a regular file, and a file with several hard links, which may belong to somebody else.
+/// Refuses anything but a regular file, and a file with several hard links, which may belong to somebody
+/// else.
 fn check_kind(path: &Path, found: &Metadata) -> Result<(), PartialError> {
     let linked = has_other_names(found).then_some("file with other hard links");
     match kind_of(found.file_type()).or(linked) {

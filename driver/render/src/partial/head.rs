@@ -34,7 +34,8 @@ pub struct PartialSettings {
 }
 
 impl PartialSettings {
-    /// Settings of the samples that a render goes on from, by the names of options; `None` if it is not to be resumed, or there are none.
+    /// Settings of the samples that a render goes on from, by the names of options; `None` if it is not to be
+    /// resumed, or there are none.
     ///
     /// # Errors
     /// If the file is no partial render of this version, its settings are damaged, or it is in use by another

@@ -1,7 +1,8 @@
-//! Records of finished tiles in a partial render: `magic number | x, y, width, height | first sample, samples | pixels | CRC-32C`.
+//! Records of finished tiles in a partial render: `magic number | x, y, width, height | first sample, samples
+//! | pixels | CRC-32C`.
 //!
-//! The checksum begins with that of the file's head: records of another picture, which a copy over this file that was
-//! interrupted leaves in it, are invalid.
+//! The checksum begins with that of the file's head: records of another picture, which a copy over this file
+//! that was interrupted leaves in it, are invalid.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
@@ -23,12 +24,12 @@ pub(super) const HEAD_BYTES: usize = MAGIC.len() + 24;
 pub(super) const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of pixels of a tile: the largest budget of a chip.
 const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
-/// Limit of the bytes that a reader may spend on invalid tiles, in addition to the file's size: some hundred of the largest
-/// tiles. Without a limit, a hostile file would take hours.
+/// Limit of the bytes that a reader may spend on invalid tiles, in addition to the file's size: some hundred
+/// of the largest tiles. Without a limit, a hostile file would take hours.
 const MAX_IN_VAIN: u64 = 32 << 20;
 
-/// Encodes the record of a finished tile, whose samples begin with `first_sample`, for a file whose head has the checksum
-/// `file`.
+/// Encodes the record of a finished tile, whose samples begin with `first_sample`, for a file whose head has
+/// the checksum `file`.
 pub(crate) fn record(finished: &FinishedTile, first_sample: u32, file: u32) -> Vec<u8> {
     let mut bytes = head(finished.tile(), first_sample, finished.format().samples);
     bytes.extend(finished.records());
@@ -57,8 +58,8 @@ pub(crate) fn record_bytes(tile: &Tile, format: &SumFormat) -> u64 {
     (HEAD_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * format.record_bytes() as u64
 }
 
-/// Decodes the record of a tile with all samples of the format, from a file whose head has the checksum `file`; `None` unless
-/// it is that, sound and whole.
+/// Decodes the record of a tile with all samples of the format, from a file whose head has the checksum
+/// `file`; `None` unless it is that, sound and whole.
 pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat, file: u32) -> Option<FinishedTile> {
     let (bytes, sum) = record.split_last_chunk::<CHECKSUM_BYTES>()?;
     let pixels = bytes.strip_prefix(&*head(tile, 0, format.samples))?;
@@ -66,8 +67,9 @@ pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat, file: u32) -
     is_sound.then(|| FinishedTile::new(*tile, pixels.to_vec(), format, Counters::ZERO)).flatten()
 }
 
-/// Reads all valid tiles from offset `start` on, behind a head of the checksum `file`. Returns the end of the last one. After invalid bytes the
-/// search continues at the next magic number. It stops when the invalid tiles exceed the file's size plus [`MAX_IN_VAIN`].
+/// Reads all valid tiles from offset `start` on, behind a head of the checksum `file`. Returns the end of the
+/// last one. After invalid bytes the search continues at the next magic number. It stops when the invalid
+/// tiles exceed the file's size plus [`MAX_IN_VAIN`].
 pub(super) fn read_tiles(
     reader: &mut BufReader<&File>,
     start: u64,
@@ -102,7 +104,8 @@ pub(super) fn has_record(reader: &mut impl BufRead) -> io::Result<bool> {
     Ok(skip_magic(reader)?.is_some())
 }
 
-/// Skips to the end of the next magic number. Returns the number of bytes skipped; `None` if the file ends before.
+/// Skips to the end of the next magic number. Returns the number of bytes skipped; `None` if the file ends
+/// before.
 fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     let (mut skipped, mut matched) = (0, 0);
     loop {
@@ -112,7 +115,8 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
             return Ok(None);
         }
         for (byte, count) in buffer.iter().zip(1..) {
-            // The first byte of the magic number does not recur in it: no other match can begin within a failed one.
+            // The first byte of the magic number does not recur in it: no other match can begin within a
+            // failed one.
             matched = if *byte == MAGIC[matched] { matched + 1 } else { usize::from(*byte == MAGIC[0]) };
             if matched == MAGIC.len() {
                 reader.consume(count);
@@ -161,8 +165,8 @@ fn read_tile(
     Ok(Some(behind_magic))
 }
 
-/// Decodes position and size of a tile, and its range of samples; `None` unless the tile lies in the window and within a chip's
-/// budget, and the range is not empty.
+/// Decodes position and size of a tile, and its range of samples; `None` unless the tile lies in the window
+/// and within a chip's budget, and the range is not empty.
 fn tile_at(bytes: &[u8], window: Window) -> Option<(Tile, SampleRange)> {
     let number = |index: usize| bytes.as_chunks().0.get(index).map(|bytes| u32::from_le_bytes(*bytes));
     let tile = Tile { id: 0, x: number(0)?, y: number(1)?, width: number(2)?, height: number(3)? };

@@ -44,7 +44,8 @@ impl<'a> KeptSamples<'a> {
         self.empty.window()
     }
 
-    /// Film of a range of samples; `None` if the picture does not have them, or there is no room for a film of them.
+    /// Film of a range of samples; `None` if the picture does not have them, or there is no room for a film
+    /// of them.
     pub(super) fn film_of(&mut self, samples: SampleRange) -> Option<&mut Film> {
         let end = samples.first.saturating_add(samples.count);
         self.most = self.most.max(end);

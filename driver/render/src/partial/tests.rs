@@ -109,7 +109,8 @@ fn damage_loses_the_tile_that_it_hits_alone() {
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
 }
 
-/// Tiles of an outvoted card: they are not taken over until another card has rendered them, and then as that card has.
+/// Tiles of an outvoted card: they are not taken over until another card has rendered them, and then as that
+/// card has.
 #[test]
 fn revoked_tiles_are_struck_out_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
@@ -396,7 +397,8 @@ fn a_file_that_is_written_over_while_tiles_are_added_gets_no_more() {
     }
 }
 
-/// A render takes settings that are not stated from the file: a damaged number in it gives a picture of two settings.
+/// A render takes settings that are not stated from the file: a damaged number in it gives a picture of two
+/// settings.
 #[test]
 fn damaged_settings_are_refused_and_stay() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,8 +1,9 @@
 //! Dealing of a picture to its parts: a fixed rule, by which renders agree without communication.
 //!
-//! The window is divided into square patches, which are numbered along a Hilbert curve. Of each run of `N` patches along it every one of
-//! `N` parts has one, so that a part has patches all over the picture and costs about what the others do. Runs deal forth and back in turn, as
-//! the curve is regular: no part has the same places in a pattern of the picture.
+//! The window is divided into square patches, which are numbered along a Hilbert curve. Of each run of `N`
+//! patches along it every one of `N` parts has one, so that a part has patches all over the picture and costs
+//! about what the others do. Runs deal forth and back in turn, as the curve is regular: no part has the same
+//! places in a pattern of the picture.
 
 use std::fmt;
 use std::str::FromStr;
@@ -15,10 +16,11 @@ use photoncard_shared::message::Tile;
 pub const MAX_PARTS: u32 = 1 << 16;
 /// Side of the patches of a picture with many for each part, pixels: the widest tile of a chip.
 const WIDEST_PATCH: u32 = 64;
-/// Side of patches that are not divided for more parts, pixels: that of the coarsest cells of irradiance records, which narrower ones would
-/// compute several times.
+/// Side of patches that are not divided for more parts, pixels: that of the coarsest cells of irradiance
+/// records, which narrower ones would compute several times.
 const NARROWEST_PATCH: u32 = 16;
-/// Minimum number of patches of a part, as far as the picture is large enough: the more, the more alike parts cost.
+/// Minimum number of patches of a part, as far as the picture is large enough: the more, the more alike parts
+/// cost.
 const PATCHES_OF_PART: u64 = 64;
 
 /// A part of a picture: the `number`-th of `count`, from 1 on.
@@ -54,7 +56,8 @@ impl Part {
         deal(window, self.count).filter(|(part, _)| *part == self).map(|(_, patch)| patch).collect()
     }
 
-    /// Tiles of the part, each of at most `side * side` pixels, numbered from 0. No tile reaches over patches.
+    /// Tiles of the part, each of at most `side * side` pixels, numbered from 0. No tile reaches over
+    /// patches.
     pub fn tiles(self, window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
         let of_patch = |Tile { x, y, width, height, .. }: Tile| {
             tiles(Window { x0: x, x1: x + width, y0: y, y1: y + height }, side, order)

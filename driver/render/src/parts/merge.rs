@@ -85,7 +85,8 @@ impl Parts {
     /// Merges the parts. Several files of a part must have equal pixels.
     ///
     /// # Errors
-    /// If parts are missing, one is damaged, two files of a part differ, or there is no memory for the picture.
+    /// If parts are missing, one is damaged, two files of a part differ, or there is no memory for the
+    /// picture.
     pub fn merge(&self) -> Result<Merged, PartError> {
         let missing = self.missing();
         let first = self.files.first().filter(|_| missing.is_empty());

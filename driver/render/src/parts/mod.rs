@@ -1,7 +1,7 @@
 //! Parts of a picture, rendered anywhere, and their merge to the picture that one render gives, to the bit.
 //!
-//! A part is a share of the picture's pixels, dealt by a fixed rule ([`Part`]). Its file has all that the picture's does, but for the other
-//! parts' pixels:
+//! A part is a share of the picture's pixels, dealt by a fixed rule ([`Part`]). Its file has all that the
+//! picture's does, but for the other parts' pixels:
 //!
 //! ```text
 //! photoncard part 1\n
@@ -10,8 +10,8 @@
 //! records of patches, as in a partial render
 //! ```
 //!
-//! Position and size of each record follow from the head, so that a file is exactly as long as its head says, and none is read that is not. Files of
-//! equal parts differ in the recorded command alone.
+//! Position and size of each record follow from the head, so that a file is exactly as long as its head says,
+//! and none is read that is not. Files of equal parts differ in the recorded command alone.
 
 mod dealing;
 mod error;

@@ -1,4 +1,5 @@
-//! Prepared scenes: files with all that pictures of a scene need, so that no render of it reads a glTF file, runs a pilot or traces photons.
+//! Prepared scenes: files with all that pictures of a scene need, so that no render of it reads a glTF file,
+//! runs a pilot or traces photons.
 //!
 //! ```text
 //! photoncard prepared scene 3\n

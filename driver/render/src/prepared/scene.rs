@@ -34,8 +34,8 @@ pub(super) struct View {
 }
 
 impl PreparedScene {
-    /// Prepares a scene: packs it, has photons and integrator chosen, and traces photons. The image must fit cards with `budgets`. `notes` are
-    /// the caller's, such as names of the inputs.
+    /// Prepares a scene: packs it, has photons and integrator chosen, and traces photons. The image must fit
+    /// cards with `budgets`. `notes` are the caller's, such as names of the inputs.
     ///
     /// # Errors
     /// As of [`Renderer::render_chosen`].
@@ -67,8 +67,8 @@ impl PreparedScene {
         Ok(Self { scene, photons, integrator, kept, frames: BTreeMap::new(), notes })
     }
 
-    /// Adds a frame, which is seen by the cameras of `scene`. Returns false, and adds none, if more than its cameras differs from the
-    /// prepared scene.
+    /// Adds a frame, which is seen by the cameras of `scene`. Returns false, and adds none, if more than its
+    /// cameras differs from the prepared scene.
     pub fn add_frame(&mut self, number: u32, scene: &FixedScene) -> bool {
         let is_same = scene.checksum_without_cameras() == self.scene.checksum_without_cameras();
         if is_same {
@@ -113,7 +113,8 @@ impl PreparedScene {
         RenderSettings { photons, integrator, ..settings }
     }
 
-    /// Renderer that has the card image: it renders [`Self::scene`] and [`Self::frame`] with [`Renderer::render_fixed`] by [`Self::settings`].
+    /// Renderer that has the card image: it renders [`Self::scene`] and [`Self::frame`] with
+    /// [`Renderer::render_fixed`] by [`Self::settings`].
     pub fn renderer(&self) -> Renderer {
         Renderer::with_image(self.kept.clone())
     }

@@ -31,8 +31,8 @@ pub struct Fit {
     pub max_irradiance_error: f32,
     /// Model's adaptive threshold per unit of sample cost, W^(1/2)/(sr^(1/2) m).
     pub unit_threshold: f64,
-    /// Adaptive threshold that gives the pilot's pixels 1.1 paths per sample, W^(1/2)/(sr^(1/2) m); `None` where these
-    /// paths lower the variance of direct light by less than half.
+    /// Adaptive threshold that gives the pilot's pixels 1.1 paths per sample, W^(1/2)/(sr^(1/2) m); `None`
+    /// where these paths lower the variance of direct light by less than half.
     pub spent_threshold: Option<f64>,
     /// Numbers that the scene would take beyond the bounds of the quality.
     pub beyond: Beyond,
@@ -77,7 +77,8 @@ impl Stated {
         adaptive: true,
     };
 
-    /// Returns whether there is a setting that only a pilot can choose. Adaptive sampling alone is none: it is off then.
+    /// Returns whether there is a setting that only a pilot can choose. Adaptive sampling alone is none: it
+    /// is off then.
     pub fn needs_fit(self) -> bool {
         Self { adaptive: true, ..self } != Self::ALL
     }
@@ -94,10 +95,11 @@ pub struct Measured {
     pub gather_ray: f64,
     /// Error of 4x4 pixels by a map of a million photons.
     pub million_photons: f64,
-    /// Squared error of a map for the camera over that of one for any camera; `None` where the camera uses most photons anyway, or the
-    /// photons are stated to be for either.
+    /// Squared error of a map for the camera over that of one for any camera; `None` where the camera uses
+    /// most photons anyway, or the photons are stated to be for either.
     pub photons_for_camera: Option<f64>,
-    /// Number of gather rays that a pixel costs for each one of its own, by irradiance records and samples without.
+    /// Number of gather rays that a pixel costs for each one of its own, by irradiance records and samples
+    /// without.
     pub gather_rays_per_ray: f64,
 }
 
@@ -111,8 +113,8 @@ impl Measured {
     }
 }
 
-/// Maximum squared error of a map for the camera, over that of one for any camera, for which photons are for the camera: the ratio of two pilots is
-/// uncertain by a third.
+/// Maximum squared error of a map for the camera, over that of one for any camera, for which photons are for
+/// the camera: the ratio of two pilots is uncertain by a third.
 const MAX_RATIO_FOR_CAMERA: f64 = 0.6;
 /// Share of samples with a Lambertian part below which nothing is interpolated.
 const FEW_LAMBERTIAN: f64 = 0.05;
@@ -126,26 +128,29 @@ const COST_OF_GATHER_RAY: f64 = 1.2;
 const COST_OF_PHOTON: f64 = 2.5;
 /// Bounds of the threshold of adaptive sampling, over that of the model.
 const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 8.0];
-/// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles may miss what gathers.
+/// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles
+/// may miss what gathers.
 const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
 /// Weight of the variance of gather rays where several records are interpolated.
 const WEIGHT_OF_RECORDS: f64 = 0.5;
 /// Weight of the squared error of the map in 4x4 pixels: it is no noise of a pixel, but a blotch.
 const WEIGHT_OF_MAP: f64 = 6.0;
-/// Error of 4x4 pixels by the photon map, as a share of the noise that a picture is rendered to. That of single pixels is up to twice as large.
+/// Error of 4x4 pixels by the photon map, as a share of the noise that a picture is rendered to. That of
+/// single pixels is up to twice as large.
 const SHARE_OF_MAP: f64 = 0.25;
 /// Error of interpolated irradiance by the rays of its records, likewise.
 const SHARE_OF_RECORDS: f64 = 0.5;
-/// Allowed error of interpolated irradiance over the noise that a picture is rendered to: the picture then errs by about half of the noise where
-/// small objects are seen with few pixels.
+/// Allowed error of interpolated irradiance over the noise that a picture is rendered to: the picture then
+/// errs by about half of the noise where small objects are seen with few pixels.
 const IRRADIANCE_ERROR_OF_NOISE: f64 = 2.5;
 /// Maximum numbers of photons, and of rays of a record, for the noise that a picture is rendered to.
 const MAX_PHOTONS: usize = 8_000_000;
 const MAX_RAYS_OF_RECORD: u32 = 8_000;
 
 impl Fit {
-    /// Settings for a picture that gets samples until their noise is `noise`, relative to the mean pixel: with more photons, and more rays of
-    /// irradiance records, where the errors that no number of samples lowers would exceed their share of it.
+    /// Settings for a picture that gets samples until their noise is `noise`, relative to the mean pixel:
+    /// with more photons, and more rays of irradiance records, where the errors that no number of samples
+    /// lowers would exceed their share of it.
     pub fn for_noise(self, noise: f64) -> Self {
         let Measured { gather_ray, million_photons, .. } = self.measured;
         let photons = 1e6 * (million_photons / (SHARE_OF_MAP * noise)).powi(2);
@@ -166,8 +171,8 @@ impl Fit {
         }
     }
 
-    /// Changes settings to these, but for the stated ones. Samples of a stated number share the shadow rays of a pixel, and without a cache
-    /// its gather rays.
+    /// Changes settings to these, but for the stated ones. Samples of a stated number share the shadow rays
+    /// of a pixel, and without a cache its gather rays.
     pub fn apply(&self, settings: &mut RenderSettings, stated: Stated) {
         let RenderSettings { photons, integrator, .. } = settings;
         if !stated.samples {
@@ -197,9 +202,10 @@ impl Fit {
         }
     }
 
-    /// Threshold of adaptive sampling: [`Self::spent_threshold`] for the picture's shadow rays, within [`FACTORS_OF_THRESHOLD`] of that by which each pixel has the
-    /// number of samples that it is worth, `n = w s sqrt(1 / c)` with `s` its deviation relative to the root of its radiance; `None` where all samples are probes,
-    /// or noise is even.
+    /// Threshold of adaptive sampling: [`Self::spent_threshold`] for the picture's shadow rays, within
+    /// [`FACTORS_OF_THRESHOLD`] of that by which each pixel has the number of samples that it is worth, `n =
+    /// w s sqrt(1 / c)` with `s` its deviation relative to the root of its radiance; `None` where all samples
+    /// are probes, or noise is even.
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
@@ -213,8 +219,9 @@ impl Fit {
 }
 
 impl Quality {
-    /// Settings of this quality that suit a scene, by pilot renders with view, filter and sampling of `settings`; `None` where no
-    /// setting depends on the scene. Seed, cards, threads and crop window have no effect.
+    /// Settings of this quality that suit a scene, by pilot renders with view, filter and sampling of
+    /// `settings`; `None` where no setting depends on the scene. Seed, cards, threads and crop window have no
+    /// effect.
     ///
     /// # Errors
     /// As [`render`](crate::render).
@@ -246,8 +253,8 @@ struct Pictured {
 impl Level {
     /// Settings for the variances of a scene in a picture: those with the least sum of time and variance.
     ///
-    /// With `n` of something, samples or rays or photons, a pixel takes the time `c n` and has the variance `v / n`. The sum of
-    /// `c n + w^2 v / n` is the least for `n = w sqrt(v / c)`, `w` the worth of accuracy.
+    /// With `n` of something, samples or rays or photons, a pixel takes the time `c n` and has the variance
+    /// `v / n`. The sum of `c n + w^2 v / n` is the least for `n = w sqrt(v / c)`, `w` the worth of accuracy.
     fn fit(&self, variances: &Variances, of: &Pictured) -> Fit {
         let Variances {
             place,

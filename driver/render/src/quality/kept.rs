@@ -8,8 +8,9 @@ use super::Stated;
 use crate::{NamedSettings, RenderSettings};
 
 impl Stated {
-    /// Takes over into `settings` what a quality may have chosen for kept samples of a picture, by the names of options, and their planned
-    /// number, but for what is stated. A value that is no such setting is left out: a render compares all settings with those of the samples.
+    /// Takes over into `settings` what a quality may have chosen for kept samples of a picture, by the names
+    /// of options, and their planned number, but for what is stated. A value that is no such setting is left
+    /// out: a render compares all settings with those of the samples.
     pub fn take_over(self, settings: &mut RenderSettings, kept: &NamedSettings) {
         let number = |name: &str| kept.get(name).and_then(Value::as_u64);
         let rays = |name: &str| number(name).and_then(|rays| u32::try_from(rays).ok());
@@ -29,7 +30,8 @@ impl Stated {
         if !self.shadow_rays {
             integrator.shadow_rays = rays("shadow-rays").unwrap_or(integrator.shadow_rays);
         }
-        // The error is the quality's own, or less for little noise; the scene decides only if irradiance is interpolated.
+        // The error is the quality's own, or less for little noise; the scene decides only if irradiance is
+        // interpolated.
         if !self.cache
             && let Some(kept) = kept.get("ic-error")
         {

@@ -30,9 +30,11 @@ choices!(Quality {
 /// Photons that a gather searches for: fewer blur less, and 24 leave the noise of gather rays as it is.
 const NEIGHBORS: u32 = 24;
 
-/// Values of a quality whose settings depend on the scene: the worth of accuracy, and bounds of what is chosen by it.
+/// Values of a quality whose settings depend on the scene: the worth of accuracy, and bounds of what is
+/// chosen by it.
 pub(super) struct Level {
-    /// Worth of accuracy, `w` in [`Self::fit`]: a relative variance of 1 in a pixel is worth the time of `w^2` samples.
+    /// Worth of accuracy, `w` in [`Self::fit`]: a relative variance of 1 in a pixel is worth the time of
+    /// `w^2` samples.
     pub(super) worth: f64,
     /// Number of samples of a pixel.
     pub(super) samples: RangeInclusive<u32>,
@@ -78,8 +80,8 @@ impl Quality {
         })
     }
 
-    /// Settings of this quality for a scene that is not known: the fewest samples, and middle numbers of rays and photons, where [`Self::fit`]
-    /// chooses.
+    /// Settings of this quality for a scene that is not known: the fewest samples, and middle numbers of rays
+    /// and photons, where [`Self::fit`] chooses.
     pub fn settings(self) -> RenderSettings {
         let Some(level) = self.level() else { return RenderSettings::default() };
         RenderSettings {

@@ -1,6 +1,7 @@
 //! Qualities of a picture: settings for what it is needed for.
 //!
-//! Settings that depend on the scene are found by a pilot render ([`Quality::fit`]): few pixels, from photon maps of few photons.
+//! Settings that depend on the scene are found by a pilot render ([`Quality::fit`]): few pixels, from photon
+//! maps of few photons.
 
 mod fit;
 mod kept;

@@ -2,18 +2,21 @@
 
 use photoncard_shared::message::MAX_PATHS;
 
-/// Mean number of paths of a later sample beyond one that adaptive sampling takes. Time times variance is about the least in rooms, halls and single objects: with
-/// two to three times as many it is 1.2 times as great in halls and Cornell boxes, and a fifth smaller where few pixels have nearly all noise.
+/// Mean number of paths of a later sample beyond one that adaptive sampling takes. Time times variance is
+/// about the least in rooms, halls and single objects: with two to three times as many it is 1.2 times as
+/// great in halls and Cornell boxes, and a fifth smaller where few pixels have nearly all noise.
 const EXTRA_PATHS: f64 = 0.1;
-/// Minimum gain by these paths, [`Deviations::gain`], for which adaptive sampling is on. Deviations by two samples make even noise seem uneven, with a gain of 1.3 to 1.5.
-/// It is 1.5 to 2.2 in Cornell boxes and halls, where time times variance hardly changes, and 2.2 to 4 in scenes where it falls to a half or less.
+/// Minimum gain by these paths, [`Deviations::gain`], for which adaptive sampling is on. Deviations by two
+/// samples make even noise seem uneven, with a gain of 1.3 to 1.5. It is 1.5 to 2.2 in Cornell boxes and
+/// halls, where time times variance hardly changes, and 2.2 to 4 in scenes where it falls to a half or less.
 const MIN_GAIN: f64 = 2.0;
 /// Thresholds among which one is chosen.
 const THRESHOLDS: [f64; 2] = [1e-9, 1e9];
 /// Halvings of the interval of the threshold's logarithm.
 const STEPS: u32 = 60;
 
-/// Deviations of a sample of some pixels: their standard deviations over the roots of their radiances, W^(1/2)/(sr^(1/2) m).
+/// Deviations of a sample of some pixels: their standard deviations over the roots of their radiances,
+/// W^(1/2)/(sr^(1/2) m).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Deviations(Vec<f64>);
 
@@ -22,7 +25,8 @@ impl Deviations {
     #[cfg(test)]
     pub(super) const NONE: Self = Self(Vec::new());
 
-    /// Deviations of pixels, by the light of several samples of each that probes would see, and the mean radiance of the pixel.
+    /// Deviations of pixels, by the light of several samples of each that probes would see, and the mean
+    /// radiance of the pixel.
     pub(super) fn new<const N: usize>(pixels: impl IntoIterator<Item = ([f64; N], f64)>) -> Self {
         let of_pixel = |(light, radiance): ([f64; N], f64)| {
             let mean = light.iter().sum::<f64>() / N as f64;
@@ -39,7 +43,8 @@ impl Deviations {
         self.0.iter().map(extra).sum::<f64>() / self.0.len().max(1) as f64
     }
 
-    /// Variance of all pixels with one path a sample, over that with the paths by a threshold; 1 without variance.
+    /// Variance of all pixels with one path a sample, over that with the paths by a threshold; 1 without
+    /// variance.
     fn gain(&self, threshold: f64) -> f64 {
         let by_one: f64 = self.0.iter().map(|deviation| deviation.powi(2)).sum();
         let by_paths: f64 =
@@ -48,7 +53,8 @@ impl Deviations {
         if gain.is_finite() { gain } else { 1.0 }
     }
 
-    /// Threshold by which later samples have [`EXTRA_PATHS`] beyond one; `None` where they gain less than [`MIN_GAIN`].
+    /// Threshold by which later samples have [`EXTRA_PATHS`] beyond one; `None` where they gain less than
+    /// [`MIN_GAIN`].
     pub(super) fn worthy_threshold(&self) -> Option<f64> {
         let threshold = self.threshold();
         (self.gain(threshold) >= MIN_GAIN).then_some(threshold)

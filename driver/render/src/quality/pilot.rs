@@ -19,16 +19,17 @@ use crate::{Observer, Phase, RenderError, RenderSettings, Sampling};
 
 /// Tiles in a grid of cells, for the noise: each at a place in its cell by a hash.
 const SPREAD: Grid = Grid { cells: 8, side: 4 };
-/// Tiles in which irradiance records are placed: large, as tiles compute records at their borders of their own.
+/// Tiles in which irradiance records are placed: large, as tiles compute records at their borders of their
+/// own.
 const SURVEYED: Grid = Grid { cells: 4, side: 32 };
-/// Maximum share of the photons that are where the picture uses any for which maps for the camera are measured: in rooms, halls and Cornell
-/// boxes, where guiding gains nothing, it is greater.
+/// Maximum share of the photons that are where the picture uses any for which maps for the camera are
+/// measured: in rooms, halls and Cornell boxes, where guiding gains nothing, it is greater.
 const MAX_USED_SHARE: f64 = 0.3;
 /// Photons of the smaller map; the larger one has four times as many.
 const FEW_PHOTONS: usize = 16_384;
 const MORE: usize = 4;
-/// Seeds of a pair of renders, and of the photons: of none of the picture's random numbers, so that pictures of all seeds have equal
-/// settings.
+/// Seeds of a pair of renders, and of the photons: of none of the picture's random numbers, so that pictures
+/// of all seeds have equal settings.
 const SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
 const PHOTON_SEED: u32 = 0x5eed_0003;
 /// Minimum side of the picture, pixels: tiles of smaller ones would overlap.
@@ -40,7 +41,8 @@ const GATHER_RAYS: [u32; 2] = [8, 32];
 /// Variances and errors that the settings follow from, relative to the radiance of the pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Variances {
-    /// Variance of a sample by its place: by edges and textures in a pixel. A lower bound: strata make that of several rays less than `v / n`.
+    /// Variance of a sample by its place: by edges and textures in a pixel. A lower bound: strata make that
+    /// of several rays less than `v / n`.
     pub(super) place: f64,
     /// Variance of a sample by one shadow ray.
     pub(super) shadow_ray: f64,
@@ -48,16 +50,18 @@ pub(super) struct Variances {
     pub(super) gather_ray: f64,
     /// Mean squared error that a map of one photon would make in the light of 4x4 pixels, by the law `1 / N`.
     pub(super) photon: f64,
-    /// Maps for the camera; `None` where the camera uses most photons anyway, or photons are stated to be for either.
+    /// Maps for the camera; `None` where the camera uses most photons anyway, or photons are stated to be for
+    /// either.
     pub(super) for_camera: Option<ForCamera>,
     /// Share of the samples that see a surface with a Lambertian part.
     pub(super) lambertian: f64,
-    /// Number of gather rays that a pixel costs for each one of its own: those of irradiance records, and of samples between which
-    /// nothing is interpolated.
+    /// Number of gather rays that a pixel costs for each one of its own: those of irradiance records, and of
+    /// samples between which nothing is interpolated.
     pub(super) gather_rays_per_ray: f64,
     /// Radiance of the median pixel, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
-    /// Deviations of the direct light of a sample with the greater numbers of [`SHADOW_RAYS`] and [`GATHER_RAYS`].
+    /// Deviations of the direct light of a sample with the greater numbers of [`SHADOW_RAYS`] and
+    /// [`GATHER_RAYS`].
     pub(super) deviations: Deviations,
 }
 
@@ -66,8 +70,9 @@ pub(super) struct Variances {
 pub(super) struct ForCamera {
     /// [`Variances::photon`] of a map for the camera.
     pub(super) photon: f64,
-    /// Squared error of a map for the camera over that of one of as many photons for any camera, blur included: where few photons are used, two
-    /// maps for any camera are blurred alike, and differ by less than they err.
+    /// Squared error of a map for the camera over that of one of as many photons for any camera, blur
+    /// included: where few photons are used, two maps for any camera are blurred alike, and differ by less
+    /// than they err.
     pub(super) ratio: f64,
 }
 
@@ -149,14 +154,16 @@ pub(super) fn measure(
     })
 }
 
-/// Variance of a sample by one ray, from a pair of renders by fewer `rays` and the best pair. The variance by `n` rays is `a + v / n`,
-/// with `a` that of the places of the samples and of other rays: two numbers of rays give `v`.
+/// Variance of a sample by one ray, from a pair of renders by fewer `rays` and the best pair. The variance by
+/// `n` rays is `a + v / n`, with `a` that of the places of the samples and of other rays: two numbers of rays
+/// give `v`.
 fn of_ray(rays: [u32; 2], noisy: &[Pixels; 2], best: &[Pixels; 2]) -> f64 {
     let [more, less] = of_pairs([noisy, best]);
     ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
 }
 
-/// Variances of a sample in pairs of renders, where all see a surface, relative to the radiance in the last pair.
+/// Variances of a sample in pairs of renders, where all see a surface, relative to the radiance in the last
+/// pair.
 fn of_pairs<const N: usize>(pairs: [&[Pixels; 2]; N]) -> [f64; N] {
     let seen: Vec<usize> = pixels_with_surfaces(&pairs).collect();
     let radiances = |pixels: &Pixels| seen.iter().map(|&pixel| pixels.radiance(pixel)).collect::<Vec<_>>();
@@ -188,7 +195,8 @@ fn deviations(pair: &[Pixels; 2]) -> Deviations {
     }))
 }
 
-/// Mean squared error of tiles by a map of one photon, from the difference of two maps of fewer and more photons whose errors are independent.
+/// Mean squared error of tiles by a map of one photon, from the difference of two maps of fewer and more
+/// photons whose errors are independent.
 fn of_photon(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     difference(best, maps) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
 }
@@ -334,7 +342,8 @@ impl Grid {
         (self.cells * self.cells) as usize
     }
 
-    /// Tiles of equal size in a window, each at a place in its cell by a hash; fewer, or of the window's size, if that is small.
+    /// Tiles of equal size in a window, each at a place in its cell by a hash; fewer, or of the window's
+    /// size, if that is small.
     fn tiles(&self, window: Window) -> Vec<Tile> {
         let side = self.side;
         let [width, height] = [window.width(), window.height()];

@@ -2,8 +2,8 @@
 
 /// Share of the greatest squares that is left out: a few bright pixels would outweigh all others.
 const LEFT_OUT: f64 = 0.02;
-/// Levels that differences are relative to: each pixel's radiance, or the median of the lit ones where it is darker, as noise in the
-/// dark is seen less.
+/// Levels that differences are relative to: each pixel's radiance, or the median of the lit ones where it is
+/// darker, as noise in the dark is seen less.
 pub(super) struct Levels {
     levels: Vec<f64>,
     median: f64,

@@ -106,7 +106,8 @@ fn operand_bytes(operands: &[f32; 3]) -> [u8; 12] {
 /// Number of cases of random operands.
 const RANDOM_CASES: u32 = 240;
 
-/// Operands of the test: those that tell a fused multiply-add, flushed denormal numbers and another rounding, and random ones.
+/// Operands of the test: those that tell a fused multiply-add, flushed denormal numbers and another rounding,
+/// and random ones.
 fn cases() -> Vec<[f32; 3]> {
     let ulp = f32::EPSILON;
     let denormal = f32::MIN_POSITIVE / 2.0;

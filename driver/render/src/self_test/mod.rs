@@ -40,7 +40,8 @@ impl SelfTest {
         self.memory_bytes() < u64::from(self.budget.dram_bytes)
     }
 
-    /// Returns whether all results are equal, all words right, and the memory is as large as the budget states.
+    /// Returns whether all results are equal, all words right, and the memory is as large as the budget
+    /// states.
     pub fn is_passed(&self) -> bool {
         self.arithmetic.wrong.is_empty()
             && self.patterns.iter().all(|pattern| pattern.wrong.count == 0)
@@ -48,11 +49,12 @@ impl SelfTest {
     }
 }
 
-/// Tests the first card at an address. The card forgets its scene. The observer receives the bytes of memory that were written or
-/// read.
+/// Tests the first card at an address. The card forgets its scene. The observer receives the bytes of memory
+/// that were written or read.
 ///
 /// # Errors
-/// If the card cannot be started or reached, its reply is invalid, it is reset, or the observer stops the test.
+/// If the card cannot be started or reached, its reply is invalid, it is reset, or the observer stops the
+/// test.
 pub fn card_self_test(address: &CardAddress, observer: &dyn Observer) -> Result<SelfTest, RenderError> {
     self_test_on(&mut open(address)?, &address.name_of(0), observer)
 }

@@ -11,8 +11,8 @@ use crate::error::RenderError;
 const VERTICAL: f64 = 1e-6;
 
 impl RenderSettings {
-    /// Camera of the picture. Each of [`Picture::camera_at`], [`Picture::look_at`] and [`Picture::fov`] replaces what the scene's
-    /// camera states, and leaves the rest as it is.
+    /// Camera of the picture. Each of [`Picture::camera_at`], [`Picture::look_at`] and [`Picture::fov`]
+    /// replaces what the scene's camera states, and leaves the rest as it is.
     ///
     /// # Errors
     /// If the scene has no camera of the name, or the values are not those of a camera.
@@ -41,8 +41,8 @@ impl RenderSettings {
     }
 }
 
-/// Right, up and forward of a camera whose up is in the plane of its direction and +y. Along +y and -y, where there is no such
-/// plane, right is +x, as of a camera that is tilted from -z, glTF's own direction.
+/// Right, up and forward of a camera whose up is in the plane of its direction and +y. Along +y and -y, where
+/// there is no such plane, right is +x, as of a camera that is tilted from -z, glTF's own direction.
 fn upright(forward: DVec3) -> [DVec3; 3] {
     let right = forward.cross(DVec3::Y);
     let right = if right.length() < VERTICAL { DVec3::X } else { right.normalize() };

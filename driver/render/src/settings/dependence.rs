@@ -1,5 +1,5 @@
-//! Settings by the names of their options, in lists: those that pixels depend on, those that only the work depends on, and
-//! those of the cards.
+//! Settings by the names of their options, in lists: those that pixels depend on, those that only the work
+//! depends on, and those of the cards.
 //!
 //! The lists destructure the groups field by field, so that a new field cannot be forgotten.
 
@@ -83,8 +83,8 @@ impl RenderSettings {
         settings
     }
 
-    /// Every setting that a chip's work and memory traffic depend on besides the kind of chip and its caches, and no pixel; for a picture of
-    /// its own.
+    /// Every setting that a chip's work and memory traffic depend on besides the kind of chip and its caches,
+    /// and no pixel; for a picture of its own.
     pub fn of_work(&self) -> NamedSettings {
         let Self { picture: _, photons, integrator: _, schedule, cards: _, outputs: _ } = self;
         let PhotonMaps {

@@ -1,4 +1,5 @@
-//! The groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated reference chip.
+//! The groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated
+//! reference chip.
 
 use photoncard_cards::link::LineFaults;
 use photoncard_cards::scheduler::GatherOrder;
@@ -40,7 +41,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Returns whether place and direction of the camera are stated, so that nothing of the file's view is left.
+    /// Returns whether place and direction of the camera are stated, so that nothing of the file's view is
+    /// left.
     pub fn states_view(&self) -> bool {
         self.camera_at.is_some() && self.look_at.is_some()
     }
@@ -76,8 +78,9 @@ pub struct PhotonMaps {
     pub neighbors: u32,
     /// Maximum distance of a gather, metres; `None` to derive it from the density of the photons.
     pub max_distance: Option<f32>,
-    /// Number of photons in the caustic map; `None` for [`DEFAULT_CAUSTIC_PHOTONS`](super::DEFAULT_CAUSTIC_PHOTONS) if the
-    /// scene has a specular surface, and no map otherwise.
+    /// Number of photons in the caustic map; `None` for
+    /// [`DEFAULT_CAUSTIC_PHOTONS`](super::DEFAULT_CAUSTIC_PHOTONS) if the scene has a specular surface, and
+    /// no map otherwise.
     pub caustic_photons: Option<usize>,
     /// Number of photons that a gather of caustics searches for.
     pub caustic_neighbors: u32,
@@ -108,10 +111,11 @@ pub struct Integrator {
     pub seed: u32,
     /// Number of samples per pixel.
     pub samples: u32,
-    /// Number of samples per pixel among which the irradiance cache divides the gather rays of a pixel; `None` for `samples`. It is
-    /// equal in all passes of a picture.
+    /// Number of samples per pixel among which the irradiance cache divides the gather rays of a pixel;
+    /// `None` for `samples`. It is equal in all passes of a picture.
     pub planned_samples: Option<u32>,
-    /// Number of final gather rays per sample; with an irradiance cache per record, and per pixel of other samples.
+    /// Number of final gather rays per sample; with an irradiance cache per record, and per pixel of other
+    /// samples.
     pub gather_rays: u32,
     /// Number of shadow rays per sample.
     pub shadow_rays: u32,
@@ -119,8 +123,8 @@ pub struct Integrator {
     pub sampling: Sampling,
     /// Maximum relative error of interpolated irradiance; `None` to interpolate none.
     pub irradiance_error: Option<f32>,
-    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m): samples of a pixel whose first ones deviate by more, over the root of their mean, are means of
-    /// several paths. `None` for one path a sample.
+    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m): samples of a pixel whose first ones deviate by
+    /// more, over the root of their mean, are means of several paths. `None` for one path a sample.
     pub adaptive_threshold: Option<f32>,
 }
 
@@ -149,22 +153,26 @@ impl Default for Integrator {
 /// Order of the work. No pixel depends on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
-    /// Side of a tile, pixels; `None` for one that suits cards and picture ([`tile_side`](super::RenderSettings::tile_side)).
+    /// Side of a tile, pixels; `None` for one that suits cards and picture
+    /// ([`tile_side`](super::RenderSettings::tile_side)).
     pub tile: Option<u32>,
     /// Order of the photon gathers.
     pub order: GatherOrder,
     /// Number of direction bins of the gather rays, for orders with bins; `None` for the default.
     pub bins: Option<u32>,
-    /// Maximum number of gathers that wait on a chip, for orders with a queue; `None` for the chip's capacity.
+    /// Maximum number of gathers that wait on a chip, for orders with a queue; `None` for the chip's
+    /// capacity.
     pub queue: Option<u32>,
     /// Maximum number of tiles in flight on a chip; `None` for the chip's own.
     pub in_flight: Option<u32>,
-    /// Pixel near which tiles are rendered first; `None` to spread them over the picture. With modelled memory it has no effect.
+    /// Pixel near which tiles are rendered first; `None` to spread them over the picture. With modelled
+    /// memory it has no effect.
     pub focus: Option<[u32; 2]>,
     /// Part of the picture to render; `None` for all of it.
     pub part: Option<Part>,
-    /// `true` for one of several pictures whose samples are added ([`Renderer::refine`](crate::Renderer::refine)): cards keep
-    /// irradiance records between them, each in its memory beyond the image. Not with `verify`, which compares the work of cards.
+    /// `true` for one of several pictures whose samples are added
+    /// ([`Renderer::refine`](crate::Renderer::refine)): cards keep irradiance records between them, each in
+    /// its memory beyond the image. Not with `verify`, which compares the work of cards.
     pub keep_records: bool,
 }
 
@@ -194,7 +202,8 @@ pub struct CardSet {
     pub verify: Option<f64>,
     /// Caches of the memory model; `None` to model none, which costs nothing.
     pub caches: Option<CacheSettings>,
-    /// Trace of every read of the chip. It takes a single chip; without `caches` the default caches are modelled.
+    /// Trace of every read of the chip. It takes a single chip; without `caches` the default caches are
+    /// modelled.
     pub trace: Option<TraceSettings>,
 }
 
@@ -238,8 +247,8 @@ impl Default for CardSet {
 /// Destinations of finished tiles besides the film. No pixel depends on them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TileOutputs {
-    /// File in which finished tiles are kept until the picture is written; `None` to keep none. Not possible with the order
-    /// [`Hilbert`](GatherOrder::Hilbert), whose tiles are finished at the end together.
+    /// File in which finished tiles are kept until the picture is written; `None` to keep none. Not possible
+    /// with the order [`Hilbert`](GatherOrder::Hilbert), whose tiles are finished at the end together.
     pub partial: Option<PartialSettings>,
     /// Viewer that shows tiles as they are finished; `None` to show none.
     pub display: Option<DisplaySettings>,

@@ -177,7 +177,8 @@ impl<'a> Elements<'a> {
         Self::decompressed(source, index, item, format, |_| Ok(None))
     }
 
-    /// Elements as [`new`](Self::new), over the bytes that `decompress` has for the accessor instead of those of its buffer view.
+    /// Elements as [`new`](Self::new), over the bytes that `decompress` has for the accessor instead of those
+    /// of its buffer view.
     pub(super) fn decompressed(
         source: &Source<'a>,
         index: usize,

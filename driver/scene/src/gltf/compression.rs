@@ -1,4 +1,5 @@
-//! Compressed buffer views (`EXT_meshopt_compression`, `KHR_meshopt_compression`), decoded when they are first read.
+//! Compressed buffer views (`EXT_meshopt_compression`, `KHR_meshopt_compression`), decoded when they are
+//! first read.
 
 use std::cell::{Cell, OnceCell};
 
@@ -10,7 +11,8 @@ use super::extensions::MESHOPT;
 use crate::error::SceneError;
 use crate::meshopt::{self, Fault, Filter, Layout, Mode};
 
-/// Maximum size of all decoded buffer views together, and of all decoded primitives, bytes: more than any scene's vertices take.
+/// Maximum size of all decoded buffer views together, and of all decoded primitives, bytes: more than any
+/// scene's vertices take.
 pub(super) const MAX_DECODED: u64 = 1 << 32;
 
 const REMEDY: &str = "compress the file again, or export it without the extension";
@@ -120,8 +122,8 @@ impl DecodedViews {
     }
 }
 
-/// Returns whether a buffer only stands for the contents of compressed views: it is marked so, or has no bytes in a file that
-/// uses the extension.
+/// Returns whether a buffer only stands for the contents of compressed views: it is marked so, or has no
+/// bytes in a file that uses the extension.
 pub(super) fn is_placeholder(document: &Document, index: usize, buffer: &json::Buffer) -> bool {
     let marked = buffer.extensions.as_ref().is_some_and(|extensions| {
         let mut marks = MESHOPT.into_iter().filter_map(|name| extensions.others.get(name));

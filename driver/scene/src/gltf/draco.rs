@@ -1,7 +1,8 @@
 //! Compressed primitives (`KHR_draco_mesh_compression`), decoded by the crate `draco-core`.
 //!
-//! A stream's length bounds nothing: values that are all equal take no bytes in it. Its counts are held against those of the primitive's
-//! accessors instead, by the decoder before it allocates for them, and again when it is done.
+//! A stream's length bounds nothing: values that are all equal take no bytes in it. Its counts are held
+//! against those of the primitive's accessors instead, by the decoder before it allocates for them, and again
+//! when it is done.
 
 use std::collections::BTreeMap;
 
@@ -162,7 +163,8 @@ impl Counts {
         attributes.saturating_add(self.triangles.saturating_mul(INDICES_BYTES))
     }
 
-    /// Checks that all decompressed primitives together are within bounds, and that the process has the memory for this one.
+    /// Checks that all decompressed primitives together are within bounds, and that the process has the
+    /// memory for this one.
     fn check_memory(&self, source: &Source<'_>, item: &str) -> Result<(), SceneError> {
         let (document, sums) = (source.document, &source.decompressed);
         let triangles = sums.triangles.get().saturating_add(self.triangles);

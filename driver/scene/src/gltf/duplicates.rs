@@ -5,7 +5,8 @@ use std::fmt::{self, Write as _};
 
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
-/// JSON path of the first key that stands twice in an object; `None` if there is none in valid JSON. Contents of `extras` are free.
+/// JSON path of the first key that stands twice in an object; `None` if there is none in valid JSON. Contents
+/// of `extras` are free.
 pub(super) fn first(text: &str) -> Option<String> {
     let mut search = Search::default();
     let mut json = serde_json::Deserializer::from_str(text);

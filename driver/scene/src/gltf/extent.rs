@@ -46,7 +46,8 @@ impl Anchor {
         Ok(Self { offset, stated })
     }
 
-    /// Local transform of a node about the scene's origin, from that about the file's. `is_posed` if an animation states its translation.
+    /// Local transform of a node about the scene's origin, from that about the file's. `is_posed` if an
+    /// animation states its translation.
     pub(super) fn placed(&self, node: usize, mut local: DMat4, is_posed: bool, is_root: bool) -> DMat4 {
         if self.offset != DVec3::ZERO {
             let stated = self.stated.get(node).copied().flatten().filter(|_| !is_posed);

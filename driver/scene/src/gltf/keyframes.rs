@@ -22,7 +22,8 @@ pub(super) struct Keyframes<'a> {
 pub(super) struct Place {
     /// The last keyframe at or before the time, or the first.
     pub(super) keyframe: u64,
-    /// Part of the interval to the next one that has passed, 0 to 1; 0 before the first keyframe and after the last.
+    /// Part of the interval to the next one that has passed, 0 to 1; 0 before the first keyframe and after
+    /// the last.
     pub(super) share: f64,
     /// Time from that keyframe to the next, seconds.
     pub(super) interval: f64,

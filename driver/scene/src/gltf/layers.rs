@@ -88,8 +88,8 @@ struct Reader<'a, 'd> {
     index: usize,
 }
 
-/// Layers of a material whose base has the F0 `specular` before its limit and without its factor; `None` without layers.
-/// `is_gltf` is false for a Phong reflection, to which the normal map alone applies.
+/// Layers of a material whose base has the F0 `specular` before its limit and without its factor; `None`
+/// without layers. `is_gltf` is false for a Phong reflection, to which the normal map alone applies.
 pub(super) fn load(
     document: &Document,
     index: usize,

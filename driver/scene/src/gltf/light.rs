@@ -10,8 +10,8 @@ use crate::error::SceneError;
 use crate::limits::EMISSION;
 use crate::{LightUnits, PunctualKind, PunctualLight, Scene, blender};
 
-/// Minimum difference of the cosines of a spot light's cones, as `KHR_lights_punctual` recommends. Exporters write equal
-/// angles for a sharp edge.
+/// Minimum difference of the cosines of a spot light's cones, as `KHR_lights_punctual` recommends. Exporters
+/// write equal angles for a sharp edge.
 const MIN_PENUMBRA: f32 = 0.001;
 
 /// Tolerance by which a rounded outer cone angle may exceed a right angle.

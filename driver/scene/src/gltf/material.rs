@@ -175,8 +175,8 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
     }
 }
 
-/// F0 of the dielectric, before its limit of 1 and without `specularFactor`: that of the index of refraction times
-/// `specularColorFactor`.
+/// F0 of the dielectric, before its limit of 1 and without `specularFactor`: that of the index of refraction
+/// times `specularColorFactor`.
 fn unlimited_f0(source: &json::Material) -> Vec3 {
     let extensions = source.extensions.as_ref();
     let ior = extensions.and_then(|extensions| extensions.ior.as_ref()).map_or(IOR, |ior| ior.ior.0);
@@ -198,8 +198,8 @@ pub(super) fn has_dark_texture(material: &json::Material) -> bool {
     material.emissive_texture.is_some() && emission(material) == Vec3::ZERO
 }
 
-/// Returns whether the material is purely diffuse: `KHR_materials_specular` with factor 0 removes the reflection of the
-/// dielectric part. A metal, which is the default metalness of glTF, keeps its reflection.
+/// Returns whether the material is purely diffuse: `KHR_materials_specular` with factor 0 removes the
+/// reflection of the dielectric part. A metal, which is the default metalness of glTF, keeps its reflection.
 fn is_lambertian(material: &json::Material) -> bool {
     let specular = material.extensions.as_ref().and_then(|extensions| extensions.specular.as_ref());
     specular.is_some_and(|specular| specular.specular_factor.0 == 0.0)

@@ -1,7 +1,9 @@
-//! Tangents by `MikkTSpace` (Mikkelsen 2008, *Simulation of wrinkled surfaces revisited*), as bakers of normal maps compute them.
+//! Tangents by `MikkTSpace` (Mikkelsen 2008, *Simulation of wrinkled surfaces revisited*), as bakers of
+//! normal maps compute them.
 //!
-//! Time is quadratic, and the stack linear, in the number of triangles that share a vertex. The triangles at a vertex of more than
-//! [`FAN`] are therefore left out, and have their own tangents: those of a flat fan are the same.
+//! Time is quadratic, and the stack linear, in the number of triangles that share a vertex. The triangles at
+//! a vertex of more than [`FAN`] are therefore left out, and have their own tangents: those of a flat fan are
+//! the same.
 
 use std::collections::HashMap;
 
@@ -32,8 +34,8 @@ impl Corner {
     }
 }
 
-/// The tangents of triangles' corners: unit vectors along which u increases, with glTF's sign of the bitangent in w; zero where the
-/// coordinates do not vary.
+/// The tangents of triangles' corners: unit vectors along which u increases, with glTF's sign of the
+/// bitangent in w; zero where the coordinates do not vary.
 pub(super) fn tangents(triangles: &[[Corner; 3]]) -> Vec<[Vec4; 3]> {
     let mut fans: HashMap<[u32; 8], u32> = HashMap::with_capacity(triangles.len());
     for corner in triangles.as_flattened() {

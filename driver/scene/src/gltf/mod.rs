@@ -1,8 +1,8 @@
 //! Scenes from glTF 2.0 files, `.gltf` and `.glb`.
 //!
-//! The `gltf` crate supplies the types of the JSON and its validation. Its readers of binary data trust the file and panic
-//! on malformed ones, so the bytes are read here: every offset, stride and count is checked before use, and nothing is
-//! allocated for a count alone.
+//! The `gltf` crate supplies the types of the JSON and its validation. Its readers of binary data trust the
+//! file and panic on malformed ones, so the bytes are read here: every offset, stride and count is checked
+//! before use, and nothing is allocated for a count alone.
 
 mod accessor;
 mod animation;
@@ -62,7 +62,8 @@ pub use self::settings::LoadSettings;
 use crate::Scene;
 use crate::error::SceneError;
 
-/// Loads the default scene of a glTF file, or its first, with the default settings: within the memory of the reference chip.
+/// Loads the default scene of a glTF file, or its first, with the default settings: within the memory of the
+/// reference chip.
 ///
 /// ```
 /// # use std::path::Path;
@@ -88,8 +89,9 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 /// [`Scene::notices`] names the features of the file that are not rendered.
 ///
 /// # Errors
-/// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory, or
-/// has no triangle with an area; or if there is no such variant. The error names the location in the file and the remedy. [`Scene::check_light`] checks for light.
+/// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory,
+/// or has no triangle with an area; or if there is no such variant. The error names the location in the file
+/// and the remedy. [`Scene::check_light`] checks for light.
 pub fn load_with(path: &Path, settings: &LoadSettings) -> Result<Scene, SceneError> {
     SceneFile::open(path, settings)?.into_rest()
 }

@@ -19,7 +19,8 @@ const DISPLACEMENTS: Format = Format {
     integers: Integers::AsStated,
 };
 
-/// Maximum number of morph targets of a primitive: each displaces all vertices, and takes a few bytes of the file.
+/// Maximum number of morph targets of a primitive: each displaces all vertices, and takes a few bytes of the
+/// file.
 const MAX_TARGETS: usize = 1024;
 
 /// Displacements of one morph target, of as many vertices as the primitive has.

@@ -24,8 +24,8 @@ use crate::{Camera, LightUnits, Scene};
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Adds the meshes, lights and cameras of the scene's nodes in their poses; the lights are stated in `units`. The anchor of the scene at
-/// rest is found once.
+/// Adds the meshes, lights and cameras of the scene's nodes in their poses; the lights are stated in `units`.
+/// The anchor of the scene at rest is found once.
 ///
 /// All triangles are counted before the first is added.
 pub(super) fn place(
@@ -184,8 +184,8 @@ impl<'a> Placer<'a> {
     }
 }
 
-/// Nodes of the default scene, or of the first, with their world transforms about the anchor or, for none, the file's origin; each parent
-/// precedes its children.
+/// Nodes of the default scene, or of the first, with their world transforms about the anchor or, for none,
+/// the file's origin; each parent precedes its children.
 fn walk(
     document: &Document,
     poses: &Poses,

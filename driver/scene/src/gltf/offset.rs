@@ -1,8 +1,8 @@
 //! Offset of a scene far from the file's origin, so that single precision resolves it.
 //!
-//! Places in a file of a building or a map may be thousands of kilometres from its origin, where single precision resolves half a
-//! metre. The scene's own origin is then a place near it, of few digits: what an exporter has added is taken off exactly, and the
-//! scene equals one that is modelled at the origin.
+//! Places in a file of a building or a map may be thousands of kilometres from its origin, where single
+//! precision resolves half a metre. The scene's own origin is then a place near it, of few digits: what an
+//! exporter has added is taken off exactly, and the scene equals one that is modelled at the origin.
 
 use glam::{DMat4, DVec3};
 
@@ -11,7 +11,8 @@ use super::vertex::MAX_COORDINATE;
 /// Distance from the origin, in sizes of the scene, up to which it stays where it is.
 const NEAR: f64 = 16.0;
 
-/// Distance, metres, beyond which a scene stays where it is only if it reaches to the origin: single precision is coarser than 60 um.
+/// Distance, metres, beyond which a scene stays where it is only if it reaches to the origin: single
+/// precision is coarser than 60 um.
 const FAR: f64 = 1000.0;
 
 /// Least power of two that a coordinate is rounded to, 2^-10 m.
@@ -46,8 +47,8 @@ impl Bounds {
         }
     }
 
-    /// Offset of a scene with these bounds; along an axis where it is near the origin, 0. `stated` are the whole coordinates that nodes
-    /// above the whole scene state.
+    /// Offset of a scene with these bounds; along an axis where it is near the origin, 0. `stated` are the
+    /// whole coordinates that nodes above the whole scene state.
     pub(super) fn offset(&self, stated: &[DVec3]) -> DVec3 {
         let size = (self.high - self.low).max_element();
         let furthest = self.low.abs().max(self.high.abs()).max_element();
@@ -68,8 +69,8 @@ impl Bounds {
     }
 }
 
-/// Number of the fewest digits from `low` to `high`, which are of one sign: decimal ones or, at about half the price, binary ones. It is the
-/// nearest to the middle among such numbers.
+/// Number of the fewest digits from `low` to `high`, which are of one sign: decimal ones or, at about half
+/// the price, binary ones. It is the nearest to the middle among such numbers.
 fn roundest(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let magnitude = |base: f64| libm::floor(libm::log2(low.abs().max(high.abs())) / libm::log2(base)) as i32;
@@ -86,7 +87,8 @@ fn roundest(low: f64, high: f64) -> f64 {
     found.min_by(is_better).map_or(0.0, |(_, number)| number)
 }
 
-/// Multiple of the first of the powers of a base of which there is one in a range, nearest to the middle, with the power.
+/// Multiple of the first of the powers of a base of which there is one in a range, nearest to the middle,
+/// with the power.
 fn multiple(
     base: f64,
     mut powers: impl Iterator<Item = i32>,
@@ -100,8 +102,8 @@ fn multiple(
     })
 }
 
-/// Translation of a node, `stated` in double precision and in a scene with an offset: small ones have single precision, as in a scene at
-/// the origin. The offset is taken off at nodes without a parent.
+/// Translation of a node, `stated` in double precision and in a scene with an offset: small ones have single
+/// precision, as in a scene at the origin. The offset is taken off at nodes without a parent.
 pub(super) fn translation(stated: DVec3, offset: DVec3, is_root: bool) -> DVec3 {
     let moved = if is_root { stated - offset } else { stated };
     let limit = 0.5 * offset.abs().max_element();

@@ -1,8 +1,8 @@
 //! Upper bound of the memory of a parsed JSON text, computed before parsing.
 //!
-//! Two characters may become a material of hundreds of bytes. The text is scanned without being stored. Each value counts
-//! as the largest value of its kind, in the types of the `gltf` crate and in the loader's, times two, as lists grow by
-//! doubling.
+//! Two characters may become a material of hundreds of bytes. The text is scanned without being stored. Each
+//! value counts as the largest value of its kind, in the types of the `gltf` crate and in the loader's, times
+//! two, as lists grow by doubling.
 
 use std::cell::{Cell, OnceCell};
 use std::fmt;
@@ -31,8 +31,8 @@ pub(super) fn limit(text: &str) -> u64 {
     BYTES_OF_ANY + BYTES_OF_A_BYTE * text.len() as u64
 }
 
-/// Estimated memory of the parsed text, bytes; `None` above [`limit`]. If the text is no JSON, only values before the first
-/// error count.
+/// Estimated memory of the parsed text, bytes; `None` above [`limit`]. If the text is no JSON, only values
+/// before the first error count.
 pub(super) fn estimate(text: &str) -> Option<u64> {
     let (count, limit) = (Cell::new(0), limit(text));
     let root = Value { kind: Kind::Root, count: &count, limit };

@@ -1,4 +1,5 @@
-//! Pose of a mesh: the transform of its node, or the joint matrices of its skin, and the weights of its morph targets.
+//! Pose of a mesh: the transform of its node, or the joint matrices of its skin, and the weights of its morph
+//! targets.
 
 use std::borrow::Cow;
 

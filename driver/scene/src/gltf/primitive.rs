@@ -148,7 +148,8 @@ impl<'a> AttributeReader<'_, 'a> {
 }
 
 impl<'a> Primitive<'a> {
-    /// Primitive `index` of a mesh, with the sets of texture coordinates that its material uses, and the one of its tangents.
+    /// Primitive `index` of a mesh, with the sets of texture coordinates that its material uses, and the one
+    /// of its tangents.
     pub(super) fn new(
         source: &Source<'a>,
         mesh: usize,
@@ -232,7 +233,8 @@ impl<'a> Primitive<'a> {
         Ok(Room::geometry(self.triangles, self.corners_in_different_places()?) + attributes)
     }
 
-    /// Number of distinct vertex positions. The memory of the set is bounded by the file's bytes, not by a count in it.
+    /// Number of distinct vertex positions. The memory of the set is bounded by the file's bytes, not by a
+    /// count in it.
     fn corners_in_different_places(&self) -> Result<u64, OutOfMemory> {
         let mut places = HashSet::new();
         for corner in (0..self.triangles).flat_map(|triangle| self.corners(triangle)) {

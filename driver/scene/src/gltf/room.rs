@@ -1,8 +1,9 @@
-//! Lower bound of the card memory that a scene takes, from accessors, instances and image headers, before anything is
-//! expanded.
+//! Lower bound of the card memory that a scene takes, from accessors, instances and image headers, before
+//! anything is expanded.
 //!
-//! A scene that is rejected here fits no card of the size; others are measured once they are packed (`pack::budget`).
-//! Triangles of a primitive are counted as in full leaves; sharing of vertices between primitives is ignored.
+//! A scene that is rejected here fits no card of the size; others are measured once they are packed
+//! (`pack::budget`). Triangles of a primitive are counted as in full leaves; sharing of vertices between
+//! primitives is ignored.
 
 use std::path::{Path, PathBuf};
 

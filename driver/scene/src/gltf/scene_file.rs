@@ -57,8 +57,9 @@ impl SceneFile {
     /// Opens a file.
     ///
     /// # Errors
-    /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, or its materials and images exceed the cards' memory;
-    /// or if there is no such variant. The error names the location in the file and the remedy.
+    /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, or its materials and
+    /// images exceed the cards' memory; or if there is no such variant. The error names the location in the
+    /// file and the remedy.
     pub fn open(path: &Path, settings: &LoadSettings) -> Result<Self, SceneError> {
         let LoadSettings { dram_bytes, variant, light_units } = settings;
         let mut document = Document::read(path)?;
@@ -91,11 +92,12 @@ impl SceneFile {
         Ok(scene)
     }
 
-    /// The scene at a moment of its animations. Before the first keyframe of a channel, and after its last, its value stays. Without
-    /// cameras in the file the scene is seen as at rest.
+    /// The scene at a moment of its animations. Before the first keyframe of a channel, and after its last,
+    /// its value stays. Without cameras in the file the scene is seen as at rest.
     ///
     /// # Errors
-    /// As [`Self::at_rest`]; if an animation is not sound or unknown, or two that play move the same part of a node.
+    /// As [`Self::at_rest`]; if an animation is not sound or unknown, or two that play move the same part of
+    /// a node.
     pub fn at(&self, moment: &Moment) -> Result<Scene, SceneError> {
         self.placed(self.bare.clone(), Some(moment))
     }
@@ -136,7 +138,8 @@ impl SceneFile {
         described.collect()
     }
 
-    /// Returns whether animations of these names, or all for none, move cameras alone: neither meshes nor lights.
+    /// Returns whether animations of these names, or all for none, move cameras alone: neither meshes nor
+    /// lights.
     ///
     /// # Errors
     /// If there is no animation of a name.

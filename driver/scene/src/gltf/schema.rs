@@ -59,7 +59,8 @@ pub(super) fn amend(document: &mut Value) -> BTreeSet<usize> {
     shortened
 }
 
-/// Removes channels whose path glTF does not know. Returns their animations, each with the number of channels.
+/// Removes channels whose path glTF does not know. Returns their animations, each with the number of
+/// channels.
 pub(super) fn remove_unknown_paths(root: &mut json::Root) -> BTreeMap<usize, usize> {
     let mut shortened = BTreeMap::new();
     for (index, animation) in root.animations.iter_mut().enumerate() {
@@ -79,7 +80,8 @@ pub(super) struct UnknownPath {
     pub(super) path: String,
 }
 
-/// Channels of a document's text whose path neither glTF nor an extension defines. The crate does not keep what their path is.
+/// Channels of a document's text whose path neither glTF nor an extension defines. The crate does not keep
+/// what their path is.
 pub(super) fn unknown_paths(text: &str) -> Vec<UnknownPath> {
     #[derive(Deserialize)]
     struct Animations {

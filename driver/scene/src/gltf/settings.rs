@@ -4,7 +4,8 @@ use photoncard_shared::budget::REFERENCE_DRAM_BYTES;
 
 use crate::LightUnits;
 
-/// Settings with which a scene is loaded. All that changes the scene is in [`Scene::checksum`](crate::Scene::checksum).
+/// Settings with which a scene is loaded. All that changes the scene is in
+/// [`Scene::checksum`](crate::Scene::checksum).
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadSettings {
     /// Memory of the cards that the scene must fit, bytes.

@@ -60,7 +60,8 @@ impl Skin {
         &self.joints
     }
 
-    /// Joint matrix of a vertex: the weighted mean of its joints. A vertex without weights follows its first joint.
+    /// Joint matrix of a vertex: the weighted mean of its joints. A vertex without weights follows its first
+    /// joint.
     pub(super) fn matrix(&self, primitive: &Primitive<'_>, vertex: u64) -> Result<DMat4, String> {
         let mut first = None;
         let (mut sum, mut total) = (DMat4::ZERO, 0.0);

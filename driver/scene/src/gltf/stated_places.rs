@@ -1,4 +1,5 @@
-//! Translations of nodes in double precision: the `gltf` crate keeps single precision, which far from the origin is too coarse.
+//! Translations of nodes in double precision: the `gltf` crate keeps single precision, which far from the
+//! origin is too coarse.
 
 use glam::DVec3;
 use photoncard_picture::foreign;

@@ -96,7 +96,8 @@ impl VertexReader<'_, '_> {
     }
 }
 
-/// A tangent in world space, perpendicular to the corner's normal. A mirror turns the cross product of the two round.
+/// A tangent in world space, perpendicular to the corner's normal. A mirror turns the cross product of the
+/// two round.
 fn world(local: Vec4, transform: &Transform, normal: DVec3) -> Vec4 {
     let along = transform.tangent(local.truncate());
     let tangent = (along - normal * normal.dot(along)).normalize_or_zero();

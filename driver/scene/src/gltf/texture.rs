@@ -169,7 +169,8 @@ fn renumbered(is_kept: &[bool]) -> Vec<Option<u32>> {
     is_kept.iter().map(|kept| kept.then(|| next.next()).flatten()).collect()
 }
 
-/// Renumbers the textures of a material, or takes them off it. No field is left out here: a new one may be a texture.
+/// Renumbers the textures of a material, or takes them off it. No field is left out here: a new one may be a
+/// texture.
 fn renumber(material: &mut Material, indices: &[Option<u32>]) {
     let Material {
         name: _,
@@ -198,9 +199,9 @@ type Affine = ([[f32; 2]; 2], [f32; 2]);
 
 const IDENTITY: Affine = ([[1.0, 0.0], [0.0, 1.0]], [0.0; 2]);
 
-/// Transform of `KHR_texture_transform`: scale, then counter-clockwise rotation, then offset. As v points down, the matrix
-/// is that of a clockwise rotation. The equations in the extension's text have the opposite sign, against its words, its
-/// example and its implementations (KhronosGroup/glTF issue 1563).
+/// Transform of `KHR_texture_transform`: scale, then counter-clockwise rotation, then offset. As v points
+/// down, the matrix is that of a clockwise rotation. The equations in the extension's text have the opposite
+/// sign, against its words, its example and its implementations (KhronosGroup/glTF issue 1563).
 fn affine(transform: &TextureTransform) -> Option<Affine> {
     let (offset, [width, height]) = (transform.offset.0, transform.scale.0);
     let angle = transform.rotation.0;

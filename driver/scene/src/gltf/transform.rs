@@ -18,7 +18,8 @@ impl Transform {
     pub(super) fn new(matrix: DMat4) -> Self {
         let is_mirror = matrix.determinant() < 0.0;
         let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(glam::DVec4::truncate);
-        // The cofactor matrix is the inverse transpose times the determinant. It exists for singular matrices as well.
+        // The cofactor matrix is the inverse transpose times the determinant. It exists for singular matrices
+        // as well.
         let sign = if is_mirror { -1.0 } else { 1.0 };
         let normals = DMat3::from_cols(y.cross(z) * sign, z.cross(x) * sign, x.cross(y) * sign);
         Self { matrix, normals, is_mirror }

@@ -1,4 +1,5 @@
-//! URIs of a scene: data URIs, and files in the scene's folder. All files besides the scene file are located here.
+//! URIs of a scene: data URIs, and files in the scene's folder. All files besides the scene file are located
+//! here.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -53,7 +54,8 @@ fn percent_decode(text: &str) -> Result<Vec<u8>, String> {
     Ok(decoded)
 }
 
-/// Path of the file that a URI names. It must be in the scene's folder, so that a downloaded scene cannot read other files.
+/// Path of the file that a URI names. It must be in the scene's folder, so that a downloaded scene cannot
+/// read other files.
 pub(super) fn locate(scene: &Path, uri: &str) -> Result<PathBuf, String> {
     let refused = |why: &str| format!("the uri {uri:?} {why}");
     let decoded = String::from_utf8(percent_decode(uri)?).map_err(|_| refused("is not UTF-8"))?;

@@ -21,7 +21,8 @@ pub(super) const MAX_COORDINATE: f32 = 1e8;
 /// Maximum texture coordinate: beyond it single precision cannot resolve texels.
 const MAX_TEXTURE_COORDINATE: f32 = 1e6;
 
-/// Maximum distance of a vertex normal from the triangle's, both unit vectors, at which they count as equal: 0.1 degrees.
+/// Maximum distance of a vertex normal from the triangle's, both unit vectors, at which they count as equal:
+/// 0.1 degrees.
 const FLAT_DISTANCE: f64 = 0.001_745;
 
 /// Corners of a triangle as it is placed.
@@ -177,8 +178,8 @@ impl VertexReader<'_, '_> {
         colour.map(|channel| if channel > 0.0 { channel.min(1.0) } else { 0.0 })
     }
 
-    /// Vertex normals of the corners; `None` if they equal the triangle's normal. The triangle's normal replaces a vertex
-    /// normal that is degenerate or on the back.
+    /// Vertex normals of the corners; `None` if they equal the triangle's normal. The triangle's normal
+    /// replaces a vertex normal that is degenerate or on the back.
     fn normals(&self, corners: &Corners<'_>, triangle: &Triangle) -> Option<[Vec3; 3]> {
         let elements = self.primitive.normals.as_ref()?;
         let [a, b, c] = triangle.vertices.map(Vec3::as_dvec3);

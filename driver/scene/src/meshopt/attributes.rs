@@ -1,4 +1,5 @@
-//! Streams of attributes, versions 0 and 1: blocks of elements, in which each byte of an element is a lane of differences.
+//! Streams of attributes, versions 0 and 1: blocks of elements, in which each byte of an element is a lane of
+//! differences.
 
 /// Number of elements whose differences are coded together.
 const GROUP: usize = 16;
@@ -15,7 +16,8 @@ const HEADERS: [u8; 2] = [0xa0, 0xa1];
 /// Minimum size of the tail in each version, bytes.
 const TAILS: [usize; 2] = [32, 24];
 
-/// Bits of a difference for each code of a group: in version 0, and in version 1 for each of the first two controls of a lane.
+/// Bits of a difference for each code of a group: in version 0, and in version 1 for each of the first two
+/// controls of a lane.
 const WIDTHS: [[u32; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
 
 /// Control of a lane in version 1.
@@ -80,14 +82,16 @@ fn read_groups(stream: &mut &[u8], widths: [u32; 4], lane: &mut [u8]) -> Option<
     Some(())
 }
 
-/// Reads a group of differences of 1, 2 or 4 bits. One with all bits set stands for a byte that follows the group.
+/// Reads a group of differences of 1, 2 or 4 bits. One with all bits set stands for a byte that follows the
+/// group.
 fn read_narrow(stream: &mut &[u8], width: u32, group: &mut [u8]) -> Option<()> {
     let each = 8 / width;
     let packed = stream.split_off(..GROUP / each as usize)?;
     let escape = (1 << width) - 1;
     for (index, difference) in (0..).zip(group) {
         let place = index % each;
-        // Single bits are stored from the least significant one on, wider differences from the most significant.
+        // Single bits are stored from the least significant one on, wider differences from the most
+        // significant.
         let shift = if width == 1 { place } else { 8 - width * (place + 1) };
         let value = packed[(index / each) as usize] >> shift & escape;
         *difference = if value == escape { *stream.split_off_first()? } else { value };
@@ -95,7 +99,8 @@ fn read_narrow(stream: &mut &[u8], width: u32, group: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// Turns the last element into the next one by differences at `index` of each lane. `channels` is empty in version 0.
+/// Turns the last element into the next one by differences at `index` of each lane. `channels` is empty in
+/// version 0.
 fn add(lanes: &[u8], lane_bytes: usize, index: usize, channels: &[u8], last: &mut [u8]) -> Option<()> {
     for (channel, word) in last.as_chunks_mut::<4>().0.iter_mut().enumerate() {
         let difference = [0, 1, 2, 3].map(|byte| lanes[(4 * channel + byte) * lane_bytes + index]);

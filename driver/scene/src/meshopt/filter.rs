@@ -1,4 +1,5 @@
-//! Filters of decoded attributes. Values that the extension leaves undefined become any number, never a panic.
+//! Filters of decoded attributes. Values that the extension leaves undefined become any number, never a
+//! panic.
 
 use serde::Deserialize;
 
@@ -82,8 +83,8 @@ fn octahedral([x, y, one]: [f32; 3], whole: f32) -> [f32; 3] {
     [x, y, z].map(|value| rounded(value * scale))
 }
 
-/// Quaternion of three of its components; the fourth value has the place of the largest one in its two lowest bits, and the
-/// scale of the others in the rest.
+/// Quaternion of three of its components; the fourth value has the place of the largest one in its two lowest
+/// bits, and the scale of the others in the rest.
 fn quaternion(code: [u16; 4]) -> [u16; 4] {
     let [x, y, z, w] = code.map(|value| value as i16);
     let scale = std::f32::consts::FRAC_1_SQRT_2 / f32::from(w | 3);
@@ -103,7 +104,8 @@ fn float(word: [u8; 4]) -> [u8; 4] {
     libm::ldexpf(mantissa as f32, word >> 24).to_le_bytes()
 }
 
-/// Colour, scaled by `whole`, of luma, its differences to orange and green, and alpha below a bit that states their scale.
+/// Colour, scaled by `whole`, of luma, its differences to orange and green, and alpha below a bit that states
+/// their scale.
 fn colour([luma, orange, green, alpha]: [i32; 4], whole: f32) -> [f32; 4] {
     let bit = alpha.checked_ilog2().unwrap_or(0);
     let one = (2 << bit) - 1;

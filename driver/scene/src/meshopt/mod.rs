@@ -1,7 +1,8 @@
 //! Decoding of buffer views compressed by meshopt (`EXT_meshopt_compression`, `KHR_meshopt_compression`).
 //!
-//! Sizes are checked against the maximum that a stream of its length can hold, before anything is allocated for them. A damaged
-//! stream ends in an error or in wrong bytes, which the accessors' readers check as they check all others.
+//! Sizes are checked against the maximum that a stream of its length can hold, before anything is allocated
+//! for them. A damaged stream ends in an error or in wrong bytes, which the accessors' readers check as they
+//! check all others.
 
 mod attributes;
 mod filter;
@@ -12,7 +13,8 @@ use serde::Deserialize;
 pub(super) use self::filter::Filter;
 use photoncard_picture::allocation::{self, OutOfMemory};
 
-/// Maximum number of decoded bytes per byte of a stream: a byte of control bits stands for four lanes of 256 elements.
+/// Maximum number of decoded bytes per byte of a stream: a byte of control bits stands for four lanes of 256
+/// elements.
 const EXPANSION: u64 = 4 * 256;
 
 /// Maximum size of an element, bytes.
@@ -44,7 +46,8 @@ pub(super) struct Layout {
 /// Error of a stream.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// Combination of sizes, mode and filter that the extension does not allow, or a damaged stream: a clause.
+    /// Combination of sizes, mode and filter that the extension does not allow, or a damaged stream: a
+    /// clause.
     Invalid(String),
     /// Memory that the process cannot have.
     Memory(OutOfMemory),

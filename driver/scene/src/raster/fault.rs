@@ -9,7 +9,8 @@ pub(crate) struct Fault {
     pub(crate) reason: String,
     /// Remedy.
     pub(crate) remedy: &'static str,
-    /// True for an image that is beyond a limit, or takes memory that the process cannot have; false for one that cannot be read.
+    /// True for an image that is beyond a limit, or takes memory that the process cannot have; false for one
+    /// that cannot be read.
     pub(crate) is_limit: bool,
 }
 

@@ -1,7 +1,8 @@
-//! Decoding of KTX2 with Basis Universal, as `KHR_texture_basisu` has it: ETC1S with `BasisLZ`, or UASTC with or without Zstandard.
+//! Decoding of KTX2 with Basis Universal, as `KHR_texture_basisu` has it: ETC1S with `BasisLZ`, or UASTC with
+//! or without Zstandard.
 //!
-//! The transcoder allocates by a file's header, and decodes more formats than glTF has. So the header is read here first, and Zstandard is
-//! decoded here, to the length that follows from the size.
+//! The transcoder allocates by a file's header, and decodes more formats than glTF has. So the header is read
+//! here first, and Zstandard is decoded here, to the length that follows from the size.
 
 use std::array;
 use std::borrow::Cow;
@@ -21,7 +22,8 @@ const SCHEME: usize = 44;
 const LEVEL_OFFSET: usize = 80;
 const LEVEL_LENGTH: usize = 88;
 
-/// Size of the descriptor of a sample at the end of the data format descriptor, and the position of the channel in it, bytes.
+/// Size of the descriptor of a sample at the end of the data format descriptor, and the position of the
+/// channel in it, bytes.
 const SAMPLE: usize = 16;
 const CHANNEL: usize = 3;
 
@@ -29,10 +31,12 @@ const CHANNEL: usize = 3;
 const BLOCK_SIDE: u32 = 4;
 const UASTC_BLOCK: u64 = 16;
 
-/// Maximum number of texels of a byte in Zstandard: four bytes repeat a byte 2^17 times, and UASTC has a byte for a texel.
+/// Maximum number of texels of a byte in Zstandard: four bytes repeat a byte 2^17 times, and UASTC has a byte
+/// for a texel.
 const ZSTANDARD_TEXELS_OF_A_BYTE: u64 = 1 << 15;
 
-/// Window that decoders of Zstandard should have (RFC 8878, 3.1.1.1.2), bytes. An encoder that knows the length takes no larger one than that.
+/// Window that decoders of Zstandard should have (RFC 8878, 3.1.1.1.2), bytes. An encoder that knows the
+/// length takes no larger one than that.
 const ZSTANDARD_WINDOW: u64 = 8 << 20;
 
 const ENCODE_AGAIN: &str = "encode the image again for glTF, or convert it to PNG, JPEG or WebP";
@@ -126,7 +130,8 @@ fn part(bytes: &[u8], offset: u64, length: u64) -> Result<&[u8], Fault> {
     part().ok_or_else(|| Fault::damaged("its header refers to bytes beyond its end"))
 }
 
-/// Checks the lengths in the supercompression global data of ETC1S: a header, a description of each level, codebooks and tables.
+/// Checks the lengths in the supercompression global data of ETC1S: a header, a description of each level,
+/// codebooks and tables.
 fn check_global(global: &[u8], levels: u32) -> Result<(), Fault> {
     let Some([_, endpoints, selectors, tables, extended, _, _, colour_length, ..]) = words::<10>(global)
     else {
@@ -142,7 +147,8 @@ fn check_global(global: &[u8], levels: u32) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Checks that the first texel is the upper left one, that channels are in order, and that there is no sequence of pictures.
+/// Checks that the first texel is the upper left one, that channels are in order, and that there is no
+/// sequence of pictures.
 fn check_metadata(metadata: &[u8]) -> Result<(), Fault> {
     for (key, required) in [("KTXorientation", "rd"), ("KTXswizzle", "rgba")] {
         if value(metadata, key).is_some_and(|value| value != required.as_bytes()) {
@@ -168,7 +174,8 @@ fn value<'a>(mut metadata: &'a [u8], key: &str) -> Option<&'a [u8]> {
     }
 }
 
-/// Width and height, and the maximum number of texels of a file of this length: without a limit for ETC1S, whose blocks may take no bits.
+/// Width and height, and the maximum number of texels of a file of this length: without a limit for ETC1S,
+/// whose blocks may take no bits.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let header = Header::read(bytes)?;
     let level = header.level.len() as u64;

@@ -1,7 +1,8 @@
 //! Decoding of PNG, JPEG, WebP and KTX2 files to 8-bit RGBA texels.
 //!
-//! Sizes are checked in the header, before anything is allocated for them: against limits, and against the maximum that a
-//! file of its length can hold at the best compression, where its format has one. A file's colour space is ignored, as glTF requires.
+//! Sizes are checked in the header, before anything is allocated for them: against limits, and against the
+//! maximum that a file of its length can hold at the best compression, where its format has one. A file's
+//! colour space is ignored, as glTF requires.
 
 mod deep;
 mod fault;
@@ -16,8 +17,8 @@ use super::texture::{MAX_SIDE, MAX_TEXELS};
 use photoncard_picture::allocation;
 use photoncard_picture::foreign;
 
-/// Bytes of memory per texel while decoding: the texel itself, and interlaced rows of 16-bit PNG or coefficients of
-/// progressive JPEG.
+/// Bytes of memory per texel while decoding: the texel itself, and interlaced rows of 16-bit PNG or
+/// coefficients of progressive JPEG.
 const DECODING_BYTES: u64 = 16;
 
 /// Runs a decoder; a panic is reported as a damaged file.
@@ -91,8 +92,8 @@ impl Kind {
         self == Self::Png && walled(|| Ok(png::is_deep(bytes))) == Ok(true)
     }
 
-    /// Texels of an image, rows from the top: of 8 bits a channel or, of an image that [is deep](Self::is_deep), in
-    /// the form that `deep` names. `size` is the result of [`Kind::size`].
+    /// Texels of an image, rows from the top: of 8 bits a channel or, of an image that [is
+    /// deep](Self::is_deep), in the form that `deep` names. `size` is the result of [`Kind::size`].
     pub(super) fn decode(
         self,
         bytes: &[u8],

@@ -9,7 +9,8 @@ use super::fault::Fault;
 
 pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Maximum number of texels per byte: Deflate expands a byte to at most 1032, and a byte holds at most 8 texels of one bit.
+/// Maximum number of texels per byte: Deflate expands a byte to at most 1032, and a byte holds at most 8
+/// texels of one bit.
 const TEXELS_OF_A_BYTE: u64 = 1032 * 8;
 
 /// Maximum memory of the decoder besides rows, bytes: chunks of text or colour profiles.
@@ -40,8 +41,8 @@ pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     Ok(([info.width, info.height], TEXELS_OF_A_BYTE * bytes.len() as u64))
 }
 
-/// Rejects a palette of other than 1 to 256 entries of three bytes, for which the decoder indexes out of bounds
-/// (image-rs/image-png issue 682).
+/// Rejects a palette of other than 1 to 256 entries of three bytes, for which the decoder indexes out of
+/// bounds (image-rs/image-png issue 682).
 fn check_palette(bytes: &[u8]) -> Result<(), Fault> {
     let palette = chunks(bytes).take_while(|(kind, _)| kind != b"IDAT").find(|(kind, _)| kind == b"PLTE");
     match palette {

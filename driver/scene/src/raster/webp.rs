@@ -26,7 +26,8 @@ fn decoder(bytes: &[u8]) -> Result<WebPDecoder<Cursor<&[u8]>>, Fault> {
     Ok(decoder)
 }
 
-/// Width and height, and the maximum number of texels of a file of this length: without a limit, as texels of one colour take no bits.
+/// Width and height, and the maximum number of texels of a file of this length: without a limit, as texels of
+/// one colour take no bits.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let size = decoder(bytes)?.dimensions().into();
     // The decoder allocates by the header of the codec before it compares that with the file's.

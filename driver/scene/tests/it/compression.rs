@@ -1,8 +1,8 @@
 //! Compressed buffer views hold what their uncompressed fallback holds; impossible ones are refused.
 //!
-//! Both files are compressed by meshoptimizer 1.3.0, in version 0 and 1 of its format, and their fallback is decoded by its
-//! reference decoder in JavaScript: a grid of several blocks, coloured, with octahedral normals; and instances of a strip with
-//! exponents and quaternions.
+//! Both files are compressed by meshoptimizer 1.3.0, in version 0 and 1 of its format, and their fallback is
+//! decoded by its reference decoder in JavaScript: a grid of several blocks, coloured, with octahedral
+//! normals; and instances of a strip with exponents and quaternions.
 
 use crate::support::{load_parts, parts};
 use miette::Diagnostic;

@@ -1,7 +1,9 @@
-//! Primitives compressed by Draco hold what the reference decoder finds in them; damaged and impossible ones are refused.
+//! Primitives compressed by Draco hold what the reference decoder finds in them; damaged and impossible ones
+//! are refused.
 //!
-//! Both files are encoded by draco3dgltf 1.5.7, one by its Edgebreaker and one sequentially. The file beside each has what the package's
-//! own decoder finds: a wave of 4 x 3 squares with a seam of texture coordinates, coloured, in two bones, with tangents.
+//! Both files are encoded by draco3dgltf 1.5.7, one by its Edgebreaker and one sequentially. The file beside
+//! each has what the package's own decoder finds: a wave of 4 x 3 squares with a seam of texture coordinates,
+//! coloured, in two bones, with tangents.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -110,8 +112,8 @@ fn strips_are_compressed_as_their_triangles() {
     }
 }
 
-/// Attributes that the extension does not name are read from their accessors, in the order of the stream's vertices; accessors of
-/// others may have an uncompressed form, which is left.
+/// Attributes that the extension does not name are read from their accessors, in the order of the stream's
+/// vertices; accessors of others may have an uncompressed form, which is left.
 #[test]
 fn attributes_beside_the_stream_are_read() {
     for [file, reference] in FILES {

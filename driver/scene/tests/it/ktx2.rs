@@ -1,5 +1,5 @@
-//! Textures in KTX2 (`KHR_texture_basisu`) hold what the reference transcoder makes of them, and others than pictures of the extension's two
-//! formats are left out.
+//! Textures in KTX2 (`KHR_texture_basisu`) hold what the reference transcoder makes of them, and others than
+//! pictures of the extension's two formats are left out.
 //!
 //! The files in `images` were encoded by Basis Universal 2.5 (ktx2-encoder 0.6 of npm).
 
@@ -84,7 +84,8 @@ fn both_codecs_are_decoded() {
     }
 }
 
-/// An image of the extension is used where the texture has none of its own, and the extension may be required.
+/// An image of the extension is used where the texture has none of its own, and the extension may be
+/// required.
 #[test]
 fn the_texture_s_own_image_comes_first() {
     let mut scene = embedded(UASTC, "image/ktx2");
@@ -181,7 +182,8 @@ fn files_that_are_not_one_picture_of_the_two_formats_are_left_out() {
     check_refused(b"sB\x13\0\x4d\0", ".basis");
 }
 
-/// The key/value data may hold the way that the picture lies, the order of its channels, and the mark of a video.
+/// The key/value data may hold the way that the picture lies, the order of its channels, and the mark of a
+/// video.
 #[test]
 fn metadata_that_change_the_picture_are_refused() {
     let with = |entry: &[u8]| {

@@ -1,4 +1,5 @@
-//! Layers of materials in glTF files: clearcoat, sheen, diffuse transmission, textures of the reflectance, partial coverage, solid glass.
+//! Layers of materials in glTF files: clearcoat, sheen, diffuse transmission, textures of the reflectance,
+//! partial coverage, solid glass.
 
 use glam::Vec3;
 use photoncard_scene::{Coat, DiffuseTransmission, Layers, Material, Reflection, Sheen};

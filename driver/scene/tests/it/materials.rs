@@ -85,8 +85,8 @@ fn the_reflectance_at_normal_incidence_follows_from_ior_and_specular() {
     close(dielectric(json!({"KHR_materials_specular": bright})), Vec3::new(0.5, 0.02, 0.02));
 }
 
-/// A specular factor of 0 removes the reflection of the dielectric part alone; without a stated metalness the material is
-/// metal.
+/// A specular factor of 0 removes the reflection of the dielectric part alone; without a stated metalness the
+/// material is metal.
 #[test]
 fn metal_reflects_whatever_the_specular_factor() {
     for (factor, metallic) in [(None, 1.0), (Some(1.0), 1.0), (Some(0.25), 0.25)] {

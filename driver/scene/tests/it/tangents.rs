@@ -9,8 +9,8 @@ use crate::support::Extended;
 
 const FRONT: [[f32; 3]; 3] = [[0.0, 0.0, 1.0]; 3];
 
-/// The triangle (0, 0), (1, 0), (0, 1) in the plane z = 0 with a normal map, and these texture coordinates. Without `normals` it
-/// has none.
+/// The triangle (0, 0), (1, 0), (0, 1) in the plane z = 0 with a normal map, and these texture coordinates.
+/// Without `normals` it has none.
 fn mapped(coordinates: [[f32; 2]; 3], normals: Option<[[f32; 3]; 3]>) -> Extended {
     let mut scene = Extended::new();
     let texel = scene.view(include_bytes!("images/texel.png"));
@@ -127,7 +127,8 @@ fn a_texture_that_does_not_vary_has_no_tangent() {
     assert_eq!(tangents(&scene).map(Vec4::truncate), [Vec3::ZERO; 3]);
 }
 
-/// The set is that of the normal texture, overridden by its transform; the transform itself does not turn tangents.
+/// The set is that of the normal texture, overridden by its transform; the transform itself does not turn
+/// tangents.
 #[test]
 fn tangents_are_those_of_the_normal_textures_set() {
     let mut scene = mapped(UPRIGHT, Some(FRONT));

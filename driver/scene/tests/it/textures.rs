@@ -1,4 +1,5 @@
-//! Textures arrive as texels, samplers and transforms; unreadable images are rejected with location and remedy.
+//! Textures arrive as texels, samplers and transforms; unreadable images are rejected with location and
+//! remedy.
 
 use std::fs;
 use std::path::Path;

@@ -156,8 +156,8 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     assert_eq!(scene.notices, Vec::<String>::new());
 }
 
-/// Many nodes may share a list of instances at almost no cost in bytes: without triangles the list is not traversed. The
-/// zero rotations of this one would be rejected.
+/// Many nodes may share a list of instances at almost no cost in bytes: without triangles the list is not
+/// traversed. The zero rotations of this one would be rejected.
 #[test]
 fn instances_of_points_are_not_looked_at() {
     let mut scene = Extended::new();

@@ -1,12 +1,12 @@
 //! Load balance of many chips: a simulation of the scheduler over the costs of a picture's tiles.
 //!
-//! Tiles are dealt by [`Scheduler`] itself, under the policy of [`photoncard_cards::session`]: one queue; when the host turns to a
-//! card, it sends as many tiles as the card has free credits; a chip renders its tiles in the order of arrival; a tile
-//! frees its credit when its result is at the host. A chip is done with a tile once it has rendered it: the time to
-//! send the result is the link's.
+//! Tiles are dealt by [`Scheduler`] itself, under the policy of [`photoncard_cards::session`]: one queue;
+//! when the host turns to a card, it sends as many tiles as the card has free credits; a chip renders its
+//! tiles in the order of arrival; a tile frees its credit when its result is at the host. A chip is done with
+//! a tile once it has rendered it: the time to send the result is the link's.
 //!
-//! Times are whole nanoseconds, and simultaneous events happen in the order of the chips, so that a simulation gives
-//! the same result on every machine.
+//! Times are whole nanoseconds, and simultaneous events happen in the order of the chips, so that a
+//! simulation gives the same result on every machine.
 
 mod order;
 
@@ -38,7 +38,8 @@ pub struct LinkModel {
 pub struct Setup {
     /// Number of chips.
     pub chips: usize,
-    /// Maximum of unanswered tile commands per chip; [`Budget::tiles`](photoncard_shared::budget::Budget::tiles).
+    /// Maximum of unanswered tile commands per chip;
+    /// [`Budget::tiles`](photoncard_shared::budget::Budget::tiles).
     pub credits: usize,
     /// Model of the links.
     pub link: LinkModel,
@@ -176,8 +177,8 @@ impl Simulation {
         for chip in 0..self.chips.len() {
             self.deal(chip);
         }
-        // A result of a tile dealt later arrives later than the result that frees its credit: the first in the heap is the
-        // next.
+        // A result of a tile dealt later arrives later than the result that frees its credit: the first in
+        // the heap is the next.
         while let Some(Reverse((arrival, chip, id))) = self.results.pop() {
             self.now = self.now.max(arrival) + self.result;
             self.busy += self.result;
@@ -187,8 +188,8 @@ impl Simulation {
         }
     }
 
-    /// Handles the arrival of a result. The scheduler's clock matters only for lost or late cards, of which there are none
-    /// here.
+    /// Handles the arrival of a result. The scheduler's clock matters only for lost or late cards, of which
+    /// there are none here.
     fn receive(&mut self, chip: usize, id: u32) {
         let finished =
             FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);

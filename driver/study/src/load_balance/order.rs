@@ -11,7 +11,8 @@ pub enum TileOrder {
     Picture,
     /// Random permutation by a seed.
     Random(u32),
-    /// Descending cost (Graham 1969). Costs are known only after the render, so this is a bound and no policy.
+    /// Descending cost (Graham 1969). Costs are known only after the render, so this is a bound and no
+    /// policy.
     LongestFirst,
 }
 

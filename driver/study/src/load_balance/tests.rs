@@ -158,8 +158,9 @@ proptest! {
         prop_assert!(dealt.most_in_flight <= (chips * credits).min(costs.len()));
     }
 
-    /// Graham 1966: no chip idles while a tile waits, so the last tile starts before an even share of the rest is done.
-    /// This requires free links and one credit: a tile that waits on a chip is not available to others.
+    /// Graham 1966: no chip idles while a tile waits, so the last tile starts before an even share of the
+    /// rest is done. This requires free links and one credit: a tile that waits on a chip is not available to
+    /// others.
     #[test]
     fn one_credit_without_links_keeps_grahams_bound(
         costs in costs(), order in orders(), chips in 1..40_usize,

@@ -54,7 +54,8 @@ pub(crate) fn figures_csv(figures: &[Figure]) -> String {
     table.to_csv()
 }
 
-/// A name as a part of a figure's: lower case, with a hyphen for each run of other characters than letters, digits and dots.
+/// A name as a part of a figure's: lower case, with a hyphen for each run of other characters than letters,
+/// digits and dots.
 pub(crate) fn slug(name: &str) -> String {
     let is_kept = |c: char| c.is_ascii_alphanumeric() || c == '.';
     let words = name.split(|c: char| !is_kept(c)).filter(|word| !word.is_empty());

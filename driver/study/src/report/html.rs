@@ -79,7 +79,8 @@ pub struct Provenance {
 }
 
 impl Report {
-    /// The report with a banner, and with titles of plots that say that they are of a trial: their files stand alone too.
+    /// The report with a banner, and with titles of plots that say that they are of a trial: their files
+    /// stand alone too.
     #[must_use]
     pub fn marked(mut self, banner: String) -> Self {
         self.banner = Some(banner);
@@ -91,8 +92,8 @@ impl Report {
         self
     }
 
-    /// The report as one self-contained HTML page, with links to the tables and plots beside it. The page is also
-    /// well-formed XML.
+    /// The report as one self-contained HTML page, with links to the tables and plots beside it. The page is
+    /// also well-formed XML.
     pub fn to_html(&self) -> String {
         let title = escape(&self.title);
         let mut html = format!(

@@ -1,6 +1,7 @@
 //! Escapes of text in HTML and SVG.
 
-/// `text` as content or as an attribute's value in double quotes. Characters that XML cannot hold become U+FFFD.
+/// `text` as content or as an attribute's value in double quotes. Characters that XML cannot hold become
+/// U+FFFD.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {

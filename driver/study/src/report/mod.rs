@@ -1,7 +1,7 @@
 //! Reports of studies: tables, plots and one page that holds them all.
 //!
-//! [`write()`] puts a [`Report`] into a folder: `index.html`, which is self-contained, every table as CSV and every
-//! plot as SVG.
+//! [`write()`] puts a [`Report`] into a folder: `index.html`, which is self-contained, every table as CSV and
+//! every plot as SVG.
 
 mod figure;
 mod html;
@@ -65,11 +65,12 @@ pub enum ReportError {
 }
 
 /// Writes `report` into `folder`, which is made if it is missing: each table as `<name>.csv`, each plot as
-/// `<name>.svg`, and `index.html` last. Files of those names are replaced, each atomically; others are left alone.
+/// `<name>.svg`, and `index.html` last. Files of those names are replaced, each atomically; others are left
+/// alone.
 ///
 /// # Errors
-/// If a name is not of letters, digits, `-` and `.`, or two files would have one name (names that differ in case alone
-/// included), before anything is written; if the folder or a file cannot be written.
+/// If a name is not of letters, digits, `-` and `.`, or two files would have one name (names that differ in
+/// case alone included), before anything is written; if the folder or a file cannot be written.
 pub fn write(folder: &Path, report: &Report) -> Result<(), ReportError> {
     let blocks = || report.sections.iter().flat_map(|section| &section.blocks);
     for block in blocks() {

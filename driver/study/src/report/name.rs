@@ -1,10 +1,11 @@
 //! Names of files that the caller chooses.
 
-/// Maximum length of a name, bytes: with an extension and a hash it stays within the 255 bytes of common file systems.
+/// Maximum length of a name, bytes: with an extension and a hash it stays within the 255 bytes of common file
+/// systems.
 const LONGEST: usize = 100;
 
-/// Returns whether `name` is a valid file name on every system: 1 to 100 letters, digits, `-` and `.`, not starting or
-/// ending with a dot.
+/// Returns whether `name` is a valid file name on every system: 1 to 100 letters, digits, `-` and `.`, not
+/// starting or ending with a dot.
 pub(crate) fn is_portable(name: &str) -> bool {
     let is_allowed = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'.';
     (1..=LONGEST).contains(&name.len())

@@ -3,8 +3,8 @@
 /// Superscript digits.
 const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
-/// `value` with at most `digits` significant digits, thousands separators and a true minus sign. Values that would
-/// need many zeros are written with a power of ten.
+/// `value` with at most `digits` significant digits, thousands separators and a true minus sign. Values that
+/// would need many zeros are written with a power of ten.
 pub fn human(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "n/a".to_owned();

@@ -1,7 +1,7 @@
 //! Plots of lines and markers, drawn as stand-alone SVG.
 //!
-//! A plot has one or several panels side by side over one legend. It is drawn without a font at hand: the room for
-//! text is sized for the widest common fonts.
+//! A plot has one or several panels side by side over one legend. It is drawn without a font at hand: the
+//! room for text is sized for the widest common fonts.
 
 mod axis;
 mod content;

@@ -173,8 +173,8 @@ impl Table {
 
     /// The table as CSV (RFC 4180), with a header `name (unit)` and numbers in full precision.
     ///
-    /// A column with half-widths is followed by a column of the half-widths. Values that are not finite are written
-    /// `NaN`, `inf` and `-inf`.
+    /// A column with half-widths is followed by a column of the half-widths. Values that are not finite are
+    /// written `NaN`, `inf` and `-inf`.
     pub fn to_csv(&self) -> String {
         let with_half_width: Vec<bool> =
             (0..self.columns.len()).map(|column| self.has_half_width(column)).collect();
@@ -200,8 +200,8 @@ impl Table {
         csv
     }
 
-    /// The table as an HTML element `table`, without its title: integers whole, other numbers with four significant
-    /// digits.
+    /// The table as an HTML element `table`, without its title: integers whole, other numbers with four
+    /// significant digits.
     pub fn to_html(&self) -> String {
         let mut html = "<table>\n<thead><tr>".to_owned();
         for (index, column) in self.columns.iter().enumerate() {

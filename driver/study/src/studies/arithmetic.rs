@@ -1,4 +1,5 @@
-//! Tables of counted arithmetic: operations of each unit for a ray and for a gather, beside Table 7.1's constants.
+//! Tables of counted arithmetic: operations of each unit for a ray and for a gather, beside Table 7.1's
+//! constants.
 
 use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::arithmetic::{Arithmetic, ChipPart, Operations, Unit, Work};
@@ -27,8 +28,8 @@ pub(super) struct CountedFrame<'a> {
     pub(super) arithmetic: &'a Arithmetic,
 }
 
-/// Operations of each unit for one piece of work of each frame: a ray in the ray caster, a gather in the gather unit, a gather ray in the
-/// controller.
+/// Operations of each unit for one piece of work of each frame: a ray in the ray caster, a gather in the
+/// gather unit, a gather ray in the controller.
 pub(super) fn operations(frames: &[CountedFrame]) -> Table {
     let heads = [
         ("frame", ""),

@@ -25,7 +25,8 @@ pub(super) fn chip_counts(most: usize) -> Vec<usize> {
     std::iter::successors(Some(1), |chips| Some(2 * chips)).take_while(|&chips| chips <= most).collect()
 }
 
-/// Simulates the dealing of tiles that take `seconds` each, with links that take no time. `None` if there are no tiles.
+/// Simulates the dealing of tiles that take `seconds` each, with links that take no time. `None` if there are
+/// no tiles.
 pub(super) fn deal(seconds: &[f64], chips: usize, (_, order, credits): Dealing) -> Option<Balance> {
     simulate(seconds, order, &Setup { chips, credits, link: LinkModel::default() }).ok()
 }

@@ -291,7 +291,8 @@ fn changed_lines(measured: &[(&Frame, &HostFrame)]) -> Vec<Block> {
     ]
 }
 
-/// Share of the photons whose lines all chips receive in a frame, if as large a share of the map's lines changes.
+/// Share of the photons whose lines all chips receive in a frame, if as large a share of the map's lines
+/// changes.
 fn fitting_share(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
     let bytes = way.bytes_within(1.0 / RATE, chips, &Symbols::NOMINAL, machine);
     (bytes / host.map.bytes.max(1) as f64).min(1.0)

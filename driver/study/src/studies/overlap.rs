@@ -1,4 +1,5 @@
-//! Times of a frame on a chip that casts rays while its queue drains, beside those of the chip as it is built.
+//! Times of a frame on a chip that casts rays while its queue drains, beside those of the chip as it is
+//! built.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;

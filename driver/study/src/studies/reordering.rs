@@ -31,8 +31,8 @@ const ORDERS: [GatherOrder; 5] = [
 const LAYOUTS: [PhotonLayout; 2] = [PhotonLayout::Jensen, PhotonLayout::Lines];
 /// Sides of tiles, pixels: the dissertation's, and what the reference chip has room for.
 const TILES: [u32; 3] = [16, 32, WIDEST_TILE];
-/// Published bytes of a frame (Graphics Interface 2005): raw in the naive order, from DRAM in the practical orders, and
-/// from DRAM along a Hilbert curve.
+/// Published bytes of a frame (Graphics Interface 2005): raw in the naive order, from DRAM in the practical
+/// orders, and from DRAM along a Hilbert curve.
 const PUBLISHED: [f64; 3] = [196e9, 24e9, 15e6];
 
 /// Orders that a chip can keep, with both layouts.

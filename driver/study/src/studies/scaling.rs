@@ -1,5 +1,5 @@
-//! Traffic over the number of photons, the side of tiles, the size of the queue and the number of tiles in flight; time over the number of
-//! chips.
+//! Traffic over the number of photons, the side of tiles, the size of the queue and the number of tiles in
+//! flight; time over the number of chips.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;

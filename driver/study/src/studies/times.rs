@@ -18,14 +18,16 @@ const FEWER_TASKS: [u32; 2] = [1, 16];
 pub(super) struct TimedFrame {
     load: FrameLoad,
     machine: Machine,
-    /// Gathers that a drain begins with, in the mean: of the drains that were counted, or as many as the chip has places for, if the order
-    /// has no queue of its own. Gathers of such an order wait for the gather unit as well, and are done in the order of arrival.
+    /// Gathers that a drain begins with, in the mean: of the drains that were counted, or as many as the chip
+    /// has places for, if the order has no queue of its own. Gathers of such an order wait for the gather
+    /// unit as well, and are done in the order of arrival.
     drained: u64,
     has_queue: bool,
 }
 
 impl TimedFrame {
-    /// Rays with their reads of the scene, and gathers with their reads of the photon map, of a point's frame.
+    /// Rays with their reads of the scene, and gathers with their reads of the photon map, of a point's
+    /// frame.
     pub(super) fn new(point: &Point, measured: &Measurement, machine: &Machine) -> Self {
         let arithmetic = arithmetic::of_frame(measured, &workload::symbols(&point.settings));
         let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
@@ -65,8 +67,8 @@ impl TimedFrame {
         self.times(tasks, self.drained, Policy::Alternate)
     }
 
-    /// Times of a chip with units of their own, and a queue in two halves. The frame must be measured with a queue of one half, if its order
-    /// has one.
+    /// Times of a chip with units of their own, and a queue in two halves. The frame must be measured with a
+    /// queue of one half, if its order has one.
     pub(super) fn overlapped(&self, shares: Shares) -> FrameTimes {
         let queue = if self.has_queue { 2 * self.drained } else { self.drained };
         self.times(self.machine.tasks, queue, Policy::Overlapped(shares))

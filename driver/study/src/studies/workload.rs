@@ -9,8 +9,8 @@ use super::super::measure::{Measurement, TileMeasurement};
 
 type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;
 
-/// Workload of one frame, estimated from its sample of tiles. Bytes on the host's link are the table's: they do not
-/// depend on the scene.
+/// Workload of one frame, estimated from its sample of tiles. Bytes on the host's link are the table's: they
+/// do not depend on the scene.
 pub(super) fn of_frame(measured: &Measurement, pixels: f64, symbols: &Symbols) -> Workload {
     let total = |count: Count| measured.total(count).value;
     // Tiles of the table's size, so that tile rates of frames in tiles of any size can be compared.
@@ -63,8 +63,8 @@ fn of(total: &dyn Fn(Count) -> f64, tiles: f64, pixels: f64, symbols: &Symbols) 
     }
 }
 
-/// Cost of a measured frame. In the naive order the whole reflection function is evaluated for every photon, as in the
-/// dissertation's naive frame.
+/// Cost of a measured frame. In the naive order the whole reflection function is evaluated for every photon,
+/// as in the dissertation's naive frame.
 pub(super) fn cost(workload: &Workload, symbols: &Symbols, order: GatherOrder) -> Cost {
     if order == GatherOrder::Naive { Cost::naive(workload, symbols) } else { Cost::new(workload, symbols) }
 }

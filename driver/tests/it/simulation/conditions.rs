@@ -20,7 +20,8 @@ pub(crate) struct Run<'a> {
     pub(crate) poison: Vec<u32>,
     /// Wrong pixels that cards send, and the share of tiles concerned: one of this number.
     pub(crate) liars: HashMap<CardNumber, (Lie, u32)>,
-    /// Slowdown of cards: a card does one of this number of steps of its work on tiles; `None` if it does none.
+    /// Slowdown of cards: a card does one of this number of steps of its work on tiles; `None` if it does
+    /// none.
     pub(crate) lazy: HashMap<CardNumber, Option<usize>>,
     /// Share of the tiles that is verified.
     pub(crate) verify: Option<f64>,

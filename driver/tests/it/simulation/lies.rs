@@ -1,4 +1,5 @@
-//! Cards with falsified pixels, and slow cards, among others: the picture is right, or an error names the card.
+//! Cards with falsified pixels, and slow cards, among others: the picture is right, or an error names the
+//! card.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -24,7 +25,8 @@ fn check_tiles(outcome: &Outcome, alone: &Outcome, seed: u32) {
     }
 }
 
-/// Checks the runs of all seeds against the run of one card without faults; each has random numbers of its own.
+/// Checks the runs of all seeds against the run of one card without faults; each has random numbers of its
+/// own.
 fn check_seeds(salt: u32, mut check: impl FnMut(&Fixture, &Outcome, u32, &mut Random)) {
     let fixture = Fixture::new();
     let alone = Run::new(&fixture, 1, 0).go();

@@ -1,8 +1,9 @@
-//! Simulation: whatever faults cards and links have, a render ends in the same picture, or in a clear error. Real sessions
-//! and cards run in one thread and in virtual time, over links whose every step and fault is determined by a seed.
+//! Simulation: whatever faults cards and links have, a render ends in the same picture, or in a clear error.
+//! Real sessions and cards run in one thread and in virtual time, over links whose every step and fault is
+//! determined by a seed.
 //!
-//! `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --test simulation` repeats the run of a failing seed alone,
-//! `PHOTONCARD_SEEDS=1..10000` runs many.
+//! `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --test simulation` repeats the run of a failing
+//! seed alone, `PHOTONCARD_SEEDS=1..10000` runs many.
 
 mod conditions;
 mod kept;

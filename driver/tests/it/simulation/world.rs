@@ -128,7 +128,8 @@ impl Fixture {
         Self::of(&scene(), settings())
     }
 
-    /// Frames whose gather queues fill within a tile: of any order with a queue, with irradiance records, with layers.
+    /// Frames whose gather queues fill within a tile: of any order with a queue, with irradiance records,
+    /// with layers.
     pub(crate) fn crowded() -> [Self; 3] {
         let frame = |order, queue, irradiance_error, layers: &str| {
             let settings = settings().with(|s| {

@@ -7,8 +7,8 @@ use crate::vector::{max, min};
 
 /// A random number in [0, 1) for several choices in a row.
 ///
-/// A choice of probability p leaves -log2(p) bits fewer. Random bits from `dither` replace them, so that choices within a small share
-/// have full resolution.
+/// A choice of probability p leaves -log2(p) bits fewer. Random bits from `dither` replace them, so that
+/// choices within a small share have full resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fraction {
     value: f32,
@@ -53,7 +53,8 @@ pub(super) struct Chosen {
 /// Denominator of the thresholds, 2^32.
 const ALL: f32 = 4_294_967_296.0;
 
-/// Chooses one of `count` by their cumulative distribution; `threshold` returns its value at an index, in units of 2^-32.
+/// Chooses one of `count` by their cumulative distribution; `threshold` returns its value at an index, in
+/// units of 2^-32.
 pub(super) fn choose(
     fraction: Fraction,
     count: u32,
@@ -100,7 +101,8 @@ mod tests {
 
     #[test]
     fn what_is_left_of_a_number_is_as_fine_as_it_was() {
-        // A share of ten steps of the initial number: the rescaled fraction takes more than ten values, uniformly.
+        // A share of ten steps of the initial number: the rescaled fraction takes more than ten values,
+        // uniformly.
         let (lower, width) = (0.5, 10.0 * STEP);
         let mut sums = [0.0_f64; 2];
         for step in 0..10 {

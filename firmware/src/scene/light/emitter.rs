@@ -40,8 +40,8 @@ pub fn read_emitter(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Emitter::read(bytes))
 }
 
-/// Maps a point of the unit square to an emissive triangle, uniformly by area and continuously; `None` if the emitter is not a
-/// triangle.
+/// Maps a point of the unit square to an emissive triangle, uniformly by area and continuously; `None` if the
+/// emitter is not a triangle.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -92,8 +92,8 @@ fn emission_at(
     Ok(emission * Vec3::new(red, green, blue))
 }
 
-/// Probability density, 1/sr, of a light sample in a direction that meets an emissive triangle at `distance`, metres, and at `cosine`
-/// to its normal.
+/// Probability density, 1/sr, of a light sample in a direction that meets an emissive triangle at `distance`,
+/// metres, and at `cosine` to its normal.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -111,7 +111,8 @@ pub fn emitter_density(
     Ok(probability * (distance * distance / (cosine * area(vertices))))
 }
 
-/// Samples an emitter by the fractions `across` and `down`. `share` is the probability of choosing the emitters at all.
+/// Samples an emitter by the fractions `across` and `down`. `share` is the probability of choosing the
+/// emitters at all.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -198,8 +199,8 @@ fn area(vertices: [[f32; 3]; 3]) -> f32 {
     0.5 * libm::sqrtf((b - a).cross(c - a).length_squared())
 }
 
-/// Area-preserving map of the unit square to the triangle `p, q >= 0, p + q <= 1` (Heitz 2019, *A low-distortion map
-/// between triangle and square*).
+/// Area-preserving map of the unit square to the triangle `p, q >= 0, p + q <= 1` (Heitz 2019, *A
+/// low-distortion map between triangle and square*).
 #[inline(always)]
 fn square_to_triangle([x, y]: [f32; 2]) -> [f32; 2] {
     if y > x {

@@ -1,6 +1,7 @@
-//! The environment: light from infinitely far, an equirectangular map. Directions are sampled by a grid of cells of equal
-//! angles: row, then column, in proportion to the light through the cell, then uniformly in solid angle within it. Cells whose light comes
-//! through small parts of them, such as a sun, are divided into parts of equal solid angle, which are chosen likewise.
+//! The environment: light from infinitely far, an equirectangular map. Directions are sampled by a grid of
+//! cells of equal angles: row, then column, in proportion to the light through the cell, then uniformly in
+//! solid angle within it. Cells whose light comes through small parts of them, such as a sun, are divided
+//! into parts of equal solid angle, which are chosen likewise.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -14,14 +15,16 @@ use crate::memory::MemoryPort;
 use crate::scene::{SceneImage, read_texture, sample_texture};
 use crate::vector::{max, min};
 
-/// Coordinates of a direction on the map, from the left and from the top, 0 to 1. The centre is -z, the top +y.
+/// Coordinates of a direction on the map, from the left and from the top, 0 to 1. The centre is -z, the top
+/// +y.
 pub fn environment_coordinates(direction: Vec3) -> [f32; 2] {
     let Vec3 { x, y, z } = direction;
     let across = libm::atan2f(x, -z) * (0.5 * FRAC_1_PI) + 0.5;
     [across, libm::atan2f(libm::sqrtf(x * x + z * z), y) * FRAC_1_PI]
 }
 
-/// Unit vector at horizontal coordinate `across` of the map, 0 to 1 from the left, and `cosine` of the angle to +y.
+/// Unit vector at horizontal coordinate `across` of the map, 0 to 1 from the left, and `cosine` of the angle
+/// to +y.
 pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
     let angle = 2.0 * PI * (across - 0.5);
     let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
@@ -153,8 +156,8 @@ struct Parts {
 }
 
 impl Parts {
-    /// Parts of a cell, if it is divided. The numbers of all divided cells, increasing, follow the thresholds of all cells, after their
-    /// number and the number of rows of each.
+    /// Parts of a cell, if it is divided. The numbers of all divided cells, increasing, follow the thresholds
+    /// of all cells, after their number and the number of rows of each.
     fn of(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,

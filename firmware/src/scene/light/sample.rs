@@ -30,9 +30,10 @@ pub struct LightSample {
     pub direction: Vec3,
     /// Distance of the light, metres; infinite for the environment and distant lights.
     pub distance: f32,
-    /// Irradiance on a surface that faces the light over the probability of the sample, W/m^2: its expectation is the irradiance by
-    /// all lights.
+    /// Irradiance on a surface that faces the light over the probability of the sample, W/m^2: its
+    /// expectation is the irradiance by all lights.
     pub irradiance: Vec3,
-    /// Probability density of the direction, 1/sr; `None` for lights without extent, which no gather ray meets.
+    /// Probability density of the direction, 1/sr; `None` for lights without extent, which no gather ray
+    /// meets.
     pub density: Option<f32>,
 }

@@ -1,11 +1,13 @@
-//! The light tree: selection of the emitter of a shadow ray (Conty Estevez, Kulla 2018, *Importance sampling of many lights with adaptive
-//! tree splitting*; the bounds are those of Pharr, Jakob, Humphreys 2023, *Physically Based Rendering*, section 12.6.3).
+//! The light tree: selection of the emitter of a shadow ray (Conty Estevez, Kulla 2018, *Importance sampling
+//! of many lights with adaptive tree splitting*; the bounds are those of Pharr, Jakob, Humphreys 2023,
+//! *Physically Based Rendering*, section 12.6.3).
 //!
-//! At each node one of up to four children is chosen by an estimate of its light: power, times cosines at receiver and emitter, over
-//! the squared distance to the centre of the child's bounding sphere, which is at least the squared radius. Each cosine is a weighted
-//! mean of that at the centre and the greatest one that the sphere and the cone of normals allow. The greatest alone, as in the
-//! papers, is that of a few points of a large lamp or of a sky, and draws rays from emitters that are worth more. A fraction
-//! [`EVEN`] of the choices is uniform, so that emitters with a low estimate are not starved; a child whose greatest cosine is
+//! At each node one of up to four children is chosen by an estimate of its light: power, times cosines at
+//! receiver and emitter, over the squared distance to the centre of the child's bounding sphere, which is at
+//! least the squared radius. Each cosine is a weighted mean of that at the centre and the greatest one that
+//! the sphere and the cone of normals allow. The greatest alone, as in the papers, is that of a few points of
+//! a large lamp or of a sky, and draws rays from emitters that are worth more. A fraction [`EVEN`] of the
+//! choices is uniform, so that emitters with a low estimate are not starved; a child whose greatest cosine is
 //! negative cannot light the receiver and is excluded.
 
 use glam::Vec3;
@@ -28,11 +30,14 @@ const _: () = assert!(1 << TRAIL_BITS == LIGHT_CHILDREN && TRAIL_BITS * LIGHT_TR
 
 /// Fraction of the choices at a node that is uniform.
 const EVEN: f32 = 1.0 / 64.0;
-/// Weight of the greatest cosine in that of an emitter, whose light comes from all of it: least noise in the atrium and the room.
+/// Weight of the greatest cosine in that of an emitter, whose light comes from all of it: least noise in the
+/// atrium and the room.
 const EMITTER_BOUND: f32 = 1.0 / 8.0;
-/// Weight of the greatest cosine in that of a node, whose nearest emitters may be anywhere in it: least noise of 10,000 emitters.
+/// Weight of the greatest cosine in that of a node, whose nearest emitters may be anywhere in it: least noise
+/// of 10,000 emitters.
 const NODE_BOUND: f32 = 1.0 / 2.0;
-/// Upper bound of a cosine below which a child is excluded: below 0 by more than the rounding error of cones' axes.
+/// Upper bound of a cosine below which a child is excluded: below 0 by more than the rounding error of cones'
+/// axes.
 const BELOW_HORIZON: f32 = -1e-3;
 
 /// Result of [`select_emitter`].
@@ -118,7 +123,8 @@ const NO_NODE: u32 = u32::MAX;
 /// Number of nodes whose choices are kept.
 const KEPT_CHOICES: usize = 4;
 
-/// A receiver, with its choices at the nodes that were read last: of the shadow rays of a point most pass the same few nodes.
+/// A receiver, with its choices at the nodes that were read last: of the shadow rays of a point most pass the
+/// same few nodes.
 pub struct LightChoices {
     pub(super) receiver: Receiver,
     /// Nodes, each at its number modulo their count, and the choices there.

@@ -4,13 +4,13 @@
 //! With `n` the normal, `o` and `i` the directions, `h` their half vector and `a = roughness^2`:
 //!
 //! - `D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)` (Walter et al. 2007; Trowbridge, Reitz 1975);
-//! - `V = 1 / (2 (n.i) L(n.o) + 2 (n.o) L(n.i))`, `L(c) = sqrt(a^2 + (1 - a^2) c^2)`: height-correlated Smith masking
-//!   (Heitz 2014);
+//! - `V = 1 / (2 (n.i) L(n.o) + 2 (n.o) L(n.i))`, `L(c) = sqrt(a^2 + (1 - a^2) c^2)`: height-correlated Smith
+//!   masking (Heitz 2014);
 //! - `F = F0 + (F90 - F0) (1 - h.o)^5` (Schlick 1994).
 //!
-//! A mixture of metal and dielectric of one roughness is one lobe, as `F` is linear in `F0` and `F90`. Directions are
-//! sampled by visible normals (Heitz 2018), as spherical caps (Dupuy, Benyoub 2023), of density
-//! `p = D / (2 (n.o + L(n.o)))`: `f cos / p` is at most `F`.
+//! A mixture of metal and dielectric of one roughness is one lobe, as `F` is linear in `F0` and `F90`.
+//! Directions are sampled by visible normals (Heitz 2018), as spherical caps (Dupuy, Benyoub 2023), of
+//! density `p = D / (2 (n.o + L(n.o)))`: `f cos / p` is at most `F`.
 
 use core::f32::consts::PI;
 
@@ -106,8 +106,9 @@ impl GgxLobe {
         Self { estimate: Estimate::RayAlone, ..self }
     }
 
-    /// The lobe with the light that its microsurface reflects several times: `f (1 + F0 (1 - E) / E)`, `E` the albedo of a lobe with
-    /// `F = 1` (Turquin 2019, *Practical multiple scattering compensation for microfacet models*).
+    /// The lobe with the light that its microsurface reflects several times: `f (1 + F0 (1 - E) / E)`, `E`
+    /// the albedo of a lobe with `F = 1` (Turquin 2019, *Practical multiple scattering compensation for
+    /// microfacet models*).
     pub(super) fn compensated(self) -> Self {
         let [of_f0, of_f90] = self.shares;
         let of_white = min(max(of_f0 + of_f90, MIN_ALBEDO), 1.0);
@@ -126,8 +127,8 @@ impl GgxLobe {
         Self { f0: self.f0 * colour, f90: self.f90 * colour, albedo: self.albedo * colour, ..self }
     }
 
-    /// `true` for a lobe that photons of lights without extent resolve, in the caustic map: it is wider than the code of their
-    /// directions, and than a disc of photons is seen from the things that reflect them.
+    /// `true` for a lobe that photons of lights without extent resolve, in the caustic map: it is wider than
+    /// the code of their directions, and than a disc of photons is seen from the things that reflect them.
     pub(super) fn gathers_caustics(&self) -> bool {
         self.alpha >= MIN_CAUSTIC_ALPHA && self.estimate != Estimate::RayAlone
     }
@@ -172,8 +173,8 @@ impl GgxLobe {
         max_component(self.fresnel(geometry)) * visible / albedo
     }
 
-    /// The colour of [`Kernel`](super::ggx_kernel::Kernel)s: the albedo over that of a lobe with `F = 1`. The mean of `F` over all directions, so that the
-    /// reflection of even light is exact.
+    /// The colour of [`Kernel`](super::ggx_kernel::Kernel)s: the albedo over that of a lobe with `F = 1`. The
+    /// mean of `F` over all directions, so that the reflection of even light is exact.
     pub(super) fn colour(&self) -> Vec3 {
         let [of_f0, of_f90] = self.shares;
         self.albedo * (1.0 / max(of_f0 + of_f90, f32::MIN_POSITIVE))
@@ -281,7 +282,8 @@ mod tests {
         (sum / f64::from(side * side)) as f32
     }
 
-    /// Integrals of `f cos` by quadrature over half vectors: roughness, cosine, a metal of F0 = 0.8, a dielectric of 0.04.
+    /// Integrals of `f cos` by quadrature over half vectors: roughness, cosine, a metal of F0 = 0.8, a
+    /// dielectric of 0.04.
     const ALBEDOS: [(f32, f32, f32, f32); 20] = [
         (0.1, 0.15, 0.8854, 0.4608),
         (0.1, 0.4, 0.8152, 0.1147),
@@ -354,7 +356,8 @@ mod tests {
         }
     }
 
-    /// Pearson's test of sampled directions in 8 x 16 bins of cosine and azimuth against the integral of the density.
+    /// Pearson's test of sampled directions in 8 x 16 bins of cosine and azimuth against the integral of the
+    /// density.
     #[test]
     fn directions_are_distributed_as_the_density_says() {
         const ROWS: usize = 8;

@@ -1,8 +1,8 @@
 //! Directional albedo of the GGX lobe, `E = F0 A + F90 B`, with `A` and `B` in tables of (roughness, cosine).
 //!
-//! `A` and `B` are the integrals of `f cos` of a lobe with `F = 1 - s` and `F = s`, `s = (1 - cos)^5` Schlick's share, by the
-//! quasi-Monte Carlo method with 2^17 directions of visible normals. Between the entries they are interpolated: to 0.004 for
-//! cosines above 0.2, to 0.02 below.
+//! `A` and `B` are the integrals of `f cos` of a lobe with `F = 1 - s` and `F = s`, `s = (1 - cos)^5`
+//! Schlick's share, by the quasi-Monte Carlo method with 2^17 directions of visible normals. Between the
+//! entries they are interpolated: to 0.004 for cosines above 0.2, to 0.02 below.
 
 /// Entries along each axis: roughness 0 to 1, square root of the cosine 0 to 1.
 pub(super) const SIDE: usize = 16;

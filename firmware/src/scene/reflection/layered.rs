@@ -1,9 +1,11 @@
-//! Surfaces of several layers: coat, sheen, base, and the reflection of the other side that diffuse or rough transmission shows.
+//! Surfaces of several layers: coat, sheen, base, and the reflection of the other side that diffuse or rough
+//! transmission shows.
 //!
-//! A path takes one layer at random, in proportion to its share of the light, and the reflection of that layer over the probability:
-//! the samples of a pixel cover all of them. So a surface has one lobe whatever its layers, in registers and in the record of a
-//! waiting gather. Light that reaches a layer is dimmed by the directional albedo of those above it. Coat, sheen and transmission are
-//! followed by rays, and photons light the base alone.
+//! A path takes one layer at random, in proportion to its share of the light, and the reflection of that
+//! layer over the probability: the samples of a pixel cover all of them. So a surface has one lobe whatever
+//! its layers, in registers and in the record of a waiting gather. Light that reaches a layer is dimmed by
+//! the directional albedo of those above it. Coat, sheen and transmission are followed by rays, and photons
+//! light the base alone.
 
 use glam::Vec3;
 use photoncard_shared::layout::{COMPENSATED, Layers, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
@@ -82,8 +84,9 @@ struct Stack {
     coat: Scattering,
 }
 
-/// Takes a layer of a material at a point. `coat_normal` is the coat's shading normal. Of `random`, numbers in [0, 1), 0 chooses the
-/// layer, 1 and 2 the microfacet of rough glass. The first layer of the lowest number is the base.
+/// Takes a layer of a material at a point. `coat_normal` is the coat's shading normal. Of `random`, numbers
+/// in [0, 1), 0 chooses the layer, 1 and 2 the microfacet of rough glass. The first layer of the lowest
+/// number is the base.
 #[inline(never)]
 pub(in crate::scene) fn take(
     (material, layers): (&Material, &Layers),
@@ -175,7 +178,8 @@ fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material 
     material
 }
 
-/// The coat's lobe, or mirror at roughness 0, seen at a cosine, and its `F(n.o)`, by which glTF dims all below it.
+/// The coat's lobe, or mirror at roughness 0, seen at a cosine, and its `F(n.o)`, by which glTF dims all
+/// below it.
 fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
     let factor = layers.coat * texel.coat;
     if factor <= 0.0 {
@@ -243,8 +247,9 @@ fn base(
     (base, Reflection::lambertian(white.reflection.diffuse * colour * share))
 }
 
-/// Rough glass. A thin wall shows the reflection of its other side, by the lobe of the microfacets. The surface of a volume is a
-/// perfectly specular one at a microfacet of visible normals (Walter et al. 2007), but for the reflection outside, which is a lobe.
+/// Rough glass. A thin wall shows the reflection of its other side, by the lobe of the microfacets. The
+/// surface of a volume is a perfectly specular one at a microfacet of visible normals (Walter et al. 2007),
+/// but for the reflection outside, which is a lobe.
 fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2]) -> (Scattering, Reflection) {
     let View { outgoing, normals, is_front } = *view;
     let [normal, geometric_normal] = normals;

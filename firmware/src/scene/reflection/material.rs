@@ -1,4 +1,5 @@
-//! Materials as reflections: the factors of a record times those of textures and corners, seen from one direction.
+//! Materials as reflections: the factors of a record times those of textures and corners, seen from one
+//! direction.
 
 use glam::Vec3;
 use photoncard_shared::layout::{COMPENSATED, Material, NARROW_LOBE, Reflectance};
@@ -33,7 +34,8 @@ pub(in crate::scene) struct View {
 }
 
 impl View {
-    /// Cosine of the view to the normal by which a lobe or a mirror reflects: to the shading normal, [`bent`].
+    /// Cosine of the view to the normal by which a lobe or a mirror reflects: to the shading normal,
+    /// [`bent`].
     #[inline(always)]
     pub(super) fn glossy_cosine(&self) -> f32 {
         let [normal, geometric_normal] = self.normals;

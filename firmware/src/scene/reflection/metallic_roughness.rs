@@ -1,9 +1,11 @@
 //! glTF's metallic-roughness model (glTF 2.0, appendix B): a GGX lobe over a Lambertian base.
 //!
-//! - The lobe is [`GgxLobe`]: `F0` is the dielectric's with the share `1 - metallic`, the base colour with the share `metallic`;
-//!   `F90` is the factor of `KHR_materials_specular` with the share `1 - metallic`, 1 with the share `metallic`.
-//! - The Lambertian albedo is `base (1 - metallic) (1 - max(F, E))`: `F` the mean of the dielectric's `F(h.o)` over even light, by
-//!   which appendix B weights the base, and `E` the greatest channel of the lobe's albedo towards `o`, greater at grazing views.
+//! - The lobe is [`GgxLobe`]: `F0` is the dielectric's with the share `1 - metallic`, the base colour with
+//!   the share `metallic`; `F90` is the factor of `KHR_materials_specular` with the share `1 - metallic`, 1
+//!   with the share `metallic`.
+//! - The Lambertian albedo is `base (1 - metallic) (1 - max(F, E))`: `F` the mean of the dielectric's
+//!   `F(h.o)` over even light, by which appendix B weights the base, and `E` the greatest channel of the
+//!   lobe's albedo towards `o`, greater at grazing views.
 //! - Of roughness 0 the coat is perfectly specular, with Schlick's reflectance at the angle.
 
 use glam::Vec3;
@@ -67,8 +69,9 @@ impl MetallicRoughness {
         (Reflection::lambertian(diffuse), Specular::mirror(towards(f0, f90, share)))
     }
 
-    /// The dielectric's `F(h.o)` at a cosine between normal and `o`, the mean over the directions of even light: its base is
-    /// dimmed by `1 - F` (glTF 2.0, appendix B.2.4), and by the lobe's albedo where that is more.
+    /// The dielectric's `F(h.o)` at a cosine between normal and `o`, the mean over the directions of even
+    /// light: its base is dimmed by `1 - F` (glTF 2.0, appendix B.2.4), and by the lobe's albedo where that
+    /// is more.
     fn mean_fresnel(&self, cosine: f32) -> f32 {
         let f0 = max_component(self.dielectric);
         f0 + (self.grazing - f0) * mean_schlick(cosine)
@@ -81,7 +84,8 @@ impl MetallicRoughness {
     }
 }
 
-/// Mean of `(1 - h.o)^5` over directions `i` of even light, `h` the half vector of `i` and `o`, at the cosine of `o`: a fit to 0.0001.
+/// Mean of `(1 - h.o)^5` over directions `i` of even light, `h` the half vector of `i` and `o`, at the cosine
+/// of `o`: a fit to 0.0001.
 fn mean_schlick(cosine: f32) -> f32 {
     let rest = 1.0 - min(max(cosine, 0.0), 1.0);
     rest * (0.0045 + rest * (rest * 0.0257 - 0.0021))

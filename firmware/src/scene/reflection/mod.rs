@@ -1,5 +1,5 @@
-//! Reflection, without perfectly specular parts ([`super::Specular`]): one room for values, densities, samples, and the records
-//! of gathers.
+//! Reflection, without perfectly specular parts ([`super::Specular`]): one room for values, densities,
+//! samples, and the records of gathers.
 //!
 //! | question | face |
 //! |---|---|
@@ -8,8 +8,9 @@
 //! | materials that photons are stored on | [`keeps_photons`] |
 //! | the record of a waiting gather, and its sums over photons | [`PartialReflection`] |
 //!
-//! A reflection is a Lambertian part and one lobe. Callers name neither the lobe's model nor its parameters: a model is a file
-//! here, as `phong` and `ggx` are, and a case in `lobe`, [`Reflector`] and [`PartialReflection`].
+//! A reflection is a Lambertian part and one lobe. Callers name neither the lobe's model nor its parameters:
+//! a model is a file here, as `phong` and `ggx` are, and a case in `lobe`, [`Reflector`] and
+//! [`PartialReflection`].
 
 mod ggx;
 mod ggx_albedo;
@@ -56,8 +57,8 @@ impl Reflection {
         Self { diffuse: albedo, lobe: Lobe::BLACK }
     }
 
-    /// A Lambertian reflection with one Phong lobe: `f = diffuse / pi + specular (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha
-    /// measured from the mirror direction, `n` the exponent.
+    /// A Lambertian reflection with one Phong lobe: `f = diffuse / pi + specular (n + 2) / (2 pi) max(0, cos
+    /// alpha)^n`, alpha measured from the mirror direction, `n` the exponent.
     pub const fn phong(diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
         Self { diffuse, lobe: Lobe::Phong(PhongLobe { albedo: specular, exponent }) }
     }
@@ -80,8 +81,9 @@ impl Reflection {
         !self.lobe.reflects()
     }
 
-    /// `true` with a lobe that photons cannot resolve: an estimate by the k nearest would be a few of them, or none. Such a
-    /// lobe is followed by a ray, as perfectly specular surfaces are, but where the eye sees it.
+    /// `true` with a lobe that photons cannot resolve: an estimate by the k nearest would be a few of them,
+    /// or none. Such a lobe is followed by a ray, as perfectly specular surfaces are, but where the eye sees
+    /// it.
     #[inline(always)]
     pub fn has_narrow_lobe(&self) -> bool {
         match &self.lobe {
@@ -110,8 +112,8 @@ impl Reflection {
         if self.has_narrow_lobe() { Self::lambertian(self.diffuse) } else { self }
     }
 
-    /// `true` with a narrow lobe that the caustic map lights, with photons of lights without extent: a gather ray of the lobe rarely meets
-    /// their highlights.
+    /// `true` with a narrow lobe that the caustic map lights, with photons of lights without extent: a gather
+    /// ray of the lobe rarely meets their highlights.
     #[inline(always)]
     pub fn gathers_caustics(&self) -> bool {
         match &self.lobe {

@@ -1,10 +1,10 @@
-//! Phong's cosine lobe, normalised (Lafortune, Willems 1994, *Using the modified Phong reflectance model for physically based
-//! rendering*): `f = ks (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha measured from the mirror direction. Its directions are
-//! sampled with the density `p = (n + 1) / (2 pi) max(0, cos alpha)^n`.
+//! Phong's cosine lobe, normalised (Lafortune, Willems 1994, *Using the modified Phong reflectance model for
+//! physically based rendering*): `f = ks (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha measured from the
+//! mirror direction. Its directions are sampled with the density `p = (n + 1) / (2 pi) max(0, cos alpha)^n`.
 //!
 //! `1 / (2 pi)` is a quotient in [`PhongLobe::evaluate`] and [`PhongLobe::density`], a product in
-//! [`PhongLobe::sampled_value`], [`PhongLobe::sampled_density`] and [`PhongLobe::factor`]: the two may differ by one unit in the
-//! last place, and pictures depend on either.
+//! [`PhongLobe::sampled_value`], [`PhongLobe::sampled_density`] and [`PhongLobe::factor`]: the two may differ
+//! by one unit in the last place, and pictures depend on either.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -73,8 +73,8 @@ impl PhongLobe {
         (self.exponent + 2.0) / (self.exponent + 1.0)
     }
 
-    /// A direction of density `p` about the mirror direction: the inverse of the cumulative distribution, at a point of the unit
-    /// square.
+    /// A direction of density `p` about the mirror direction: the inverse of the cumulative distribution, at
+    /// a point of the unit square.
     #[inline(always)]
     pub(super) fn direction(&self, mirror: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let cosine = libm::powf(1.0 - v, 1.0 / (self.exponent + 1.0));

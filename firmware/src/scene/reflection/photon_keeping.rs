@@ -10,7 +10,8 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::scene::texture::{channel_ranges, read_texture};
 
-/// `true` for a material on whose surfaces photons are stored: at some texel its base reflects without a narrow lobe.
+/// `true` for a material on whose surfaces photons are stored: at some texel its base reflects without a
+/// narrow lobe.
 ///
 /// # Errors
 /// If the image is not sound.
@@ -29,9 +30,9 @@ pub fn keeps_photons(
     Ok(metallic.into_iter().any(|metallic| keeps(material, metallic)))
 }
 
-/// `true` if photons are stored at a texel of a metalness, white besides: its reflection without a narrow lobe is not black. The
-/// light comes along the normal, where smooth coats reflect the least and leave the most. Of a range of metalness, one end keeps
-/// photons if any value does.
+/// `true` if photons are stored at a texel of a metalness, white besides: its reflection without a narrow
+/// lobe is not black. The light comes along the normal, where smooth coats reflect the least and leave the
+/// most. Of a range of metalness, one end keeps photons if any value does.
 fn keeps(material: &Material, metallic: f32) -> bool {
     let texel = Texel { metallic, ..Texel::WHITE };
     let view = View { outgoing: Vec3::Y, normals: [Vec3::Y; 2], is_front: true };

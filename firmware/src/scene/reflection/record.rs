@@ -11,10 +11,12 @@ use super::phong::{self, PhongLobe};
 use crate::fixed_point::ColourSum;
 use crate::vector::{from_upper_half, max, mirror, unit, upper_half};
 
-/// A reflection function, evaluated but for what depends on a photon: 13 bytes, the dissertation's `S_B` (section 7.4).
+/// A reflection function, evaluated but for what depends on a photon: 13 bytes, the dissertation's `S_B`
+/// (section 7.4).
 ///
-/// Stage one, [`Self::encode`], is done once a query: albedos, weight, units and the lobe's factor become two colours.
-/// Stage two is done once a photon: [`Self::lobe_factor`]. Colours are rounded to a shared exponent, in every order alike.
+/// Stage one, [`Self::encode`], is done once a query: albedos, weight, units and the lobe's factor become two
+/// colours. Stage two is done once a photon: [`Self::lobe_factor`]. Colours are rounded to a shared exponent,
+/// in every order alike.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PartialReflection {
     diffuse: Rgbe,
@@ -26,8 +28,8 @@ pub struct PartialReflection {
 const _: () = assert!(size_of::<PartialReflection>() == 13);
 
 impl PartialReflection {
-    /// The record of a reflector's `f` towards its outgoing direction, times `weight`. Random bits in `dither` make the rounding
-    /// unbiased.
+    /// The record of a reflector's `f` towards its outgoing direction, times `weight`. Random bits in
+    /// `dither` make the rounding unbiased.
     // One copy for final gathers and caustics: code is memory on a chip.
     #[inline(never)]
     pub fn encode(reflector: &Reflector, weight: Vec3, dither: u32) -> Self {
@@ -67,7 +69,8 @@ impl PartialReflection {
         Self { normal, ..self }
     }
 
-    /// The record of a white diffuser of factor 1, which reflects the irradiance itself. `normal` is its surface normal's code.
+    /// The record of a white diffuser of factor 1, which reflects the irradiance itself. `normal` is its
+    /// surface normal's code.
     pub fn diffuser(normal: u8) -> Self {
         // 1 is a power of two: nothing is rounded.
         let diffuse = Rgbe::encode([1.0; 3], 0);
@@ -112,7 +115,8 @@ impl PartialReflection {
         })
     }
 
-    /// The reflected power of photons, in the units of `weight`, from the sum of their powers and the lobe's sum.
+    /// The reflected power of photons, in the units of `weight`, from the sum of their powers and the lobe's
+    /// sum.
     #[inline(always)]
     pub fn reflected(&self, power: &ColourSum, lobe: &ColourSum) -> Vec3 {
         self.lambertian() * power.value() + Vec3::from_array(self.lobe.decode()) * lobe.value()
@@ -142,8 +146,9 @@ pub enum DecodedLobe {
 /// The parameters of a lobe but its colour, of a model that the first bit of the third byte tells.
 ///
 /// - Phong, bit 0: two bytes of the mirror direction, a bfloat16 of the exponent, which is not negative.
-/// - GGX, bit 1: 12 bits of the outgoing direction, 12 of the normal, 7 of the roughness. Narrow lobes are not gathered
-///   ([`super::Reflection::has_narrow_lobe`]): a lobe here is ten times as wide as the steps of the directions.
+/// - GGX, bit 1: 12 bits of the outgoing direction, 12 of the normal, 7 of the roughness. Narrow lobes are
+///   not gathered ([`super::Reflection::has_narrow_lobe`]): a lobe here is ten times as wide as the steps of
+///   the directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Shape([u8; 4]);
 
@@ -163,7 +168,8 @@ impl Shape {
     fn ggx(reflector: &Reflector, lobe: &GgxLobe) -> Self {
         let [a, b] = encode_direction(reflector.outgoing.to_array()).map(coarse);
         let [c, d] = encode_direction(reflector.normal.to_array()).map(coarse);
-        // The third byte has the roughness; two bits of each of the others' have the fourth direction coordinate.
+        // The third byte has the roughness; two bits of each of the others' have the fourth direction
+        // coordinate.
         let roughness = (lobe.roughness() * ROUGHNESS_STEPS + 0.5) as u8;
         Self([a | d >> 4 << 6, b | (d >> 2 & 3) << 6, GGX | roughness, c | (d & 3) << 6])
     }

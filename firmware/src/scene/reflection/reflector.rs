@@ -1,9 +1,9 @@
 //! A reflection seen from one direction: its values, densities and samples.
 //!
-//! A sample's point of the unit square becomes a direction by a map that keeps neighbours together, so that a stratified pattern
-//! stays stratified on the hemisphere. The Lambertian part and the lobe share the samples by their albedos, and the density of the
-//! mixture weights either's (the balance heuristic: Veach, Guibas 1995), which bounds the weight by the sum of the albedos: no
-//! fireflies.
+//! A sample's point of the unit square becomes a direction by a map that keeps neighbours together, so that a
+//! stratified pattern stays stratified on the hemisphere. The Lambertian part and the lobe share the samples
+//! by their albedos, and the density of the mixture weights either's (the balance heuristic: Veach, Guibas
+//! 1995), which bounds the weight by the sum of the albedos: no fireflies.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -89,8 +89,8 @@ impl Reflector {
         if lobe > 0.0 { lobe / (diffuse + lobe) } else { 0.0 }
     }
 
-    /// The lobe's sharpness: the exponent `n` of the lobe `cos^n alpha` that is as wide; `1 / (2 a^2)` of a GGX lobe (Walter et
-    /// al. 2007).
+    /// The lobe's sharpness: the exponent `n` of the lobe `cos^n alpha` that is as wide; `1 / (2 a^2)` of a
+    /// GGX lobe (Walter et al. 2007).
     #[inline(always)]
     pub fn lobe_sharpness(&self) -> f32 {
         match &self.reflection.lobe {
@@ -110,7 +110,8 @@ impl Reflector {
         }
     }
 
-    /// The lobe's `f cos(theta) / p`, without unit, at a direction of [`Self::sample_lobe`]; zero below the surface.
+    /// The lobe's `f cos(theta) / p`, without unit, at a direction of [`Self::sample_lobe`]; zero below the
+    /// surface.
     pub fn lobe_weight(&self, direction: Vec3) -> Vec3 {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.albedo * (lobe.gain() * max(self.normal.dot(direction), 0.0)),
@@ -122,7 +123,8 @@ impl Reflector {
         }
     }
 
-    /// The lobe's `f / p` over its albedo, without unit, at a direction of [`Self::sample_lobe`] above the surface.
+    /// The lobe's `f / p` over its albedo, without unit, at a direction of [`Self::sample_lobe`] above the
+    /// surface.
     #[inline(always)]
     pub fn lobe_gain(&self, direction: Vec3) -> f32 {
         match &self.reflection.lobe {
@@ -203,8 +205,8 @@ impl Reflector {
     }
 }
 
-/// A direction of density `cos(theta) / pi`: the square on the disc (Shirley, Chiu 1997), the disc lifted to the
-/// hemisphere.
+/// A direction of density `cos(theta) / pi`: the square on the disc (Shirley, Chiu 1997), the disc lifted to
+/// the hemisphere.
 #[inline(always)]
 fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     let [a, b] = [2.0 * u - 1.0, 2.0 * v - 1.0];

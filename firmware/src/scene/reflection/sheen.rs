@@ -1,11 +1,12 @@
-//! Lobe of fibres (`KHR_materials_sheen`): `f = colour D G / (4 (n.i) (n.o))` (Estevez, Kulla 2017, *Production friendly microfacet
-//! sheen BRDF*), with `a = roughness^2`:
+//! Lobe of fibres (`KHR_materials_sheen`): `f = colour D G / (4 (n.i) (n.o))` (Estevez, Kulla 2017,
+//! *Production friendly microfacet sheen BRDF*), with `a = roughness^2`:
 //!
 //! - `D = (2 + 1/a) sin^(1/a)(n, h) / (2 pi)`;
 //! - `G = 1 / (1 + l(n.o) + l(n.i))`, `l` the fit of that paper.
 //!
-//! Directions are sampled evenly over the hemisphere: the lobe is wide, and strongest at grazing angles. `E`, the directional albedo
-//! of a white lobe, is in a table. A roughness below 0.25 counts as 0.25: `E` would exceed 1 at grazing angles.
+//! Directions are sampled evenly over the hemisphere: the lobe is wide, and strongest at grazing angles. `E`,
+//! the directional albedo of a white lobe, is in a table. A roughness below 0.25 counts as 0.25: `E` would
+//! exceed 1 at grazing angles.
 
 use core::f32::consts::PI;
 
@@ -91,7 +92,8 @@ fn shadowing(cosine: f32, alpha: f32) -> f32 {
     libm::expf(if cosine < 0.5 { fit(cosine) } else { 2.0 * fit(0.5) - fit(1.0 - cosine) })
 }
 
-/// The logarithm of `l` below a cosine of 0.5: `a / (1 + b x^c) + d x + e`, its coefficients between those of `alpha` 0 and 1.
+/// The logarithm of `l` below a cosine of 0.5: `a / (1 + b x^c) + d x + e`, its coefficients between those of
+/// `alpha` 0 and 1.
 fn logarithm(x: f32, alpha: f32) -> f32 {
     const ROUGH: [f32; 5] = [21.5473, 3.829_87, 0.198_23, -1.977_6, -4.320_54];
     const SMOOTH: [f32; 5] = [25.3245, 3.324_35, 0.168_01, -1.273_93, -4.859_67];
@@ -103,8 +105,8 @@ fn logarithm(x: f32, alpha: f32) -> f32 {
     at(0) / (1.0 + at(1) * libm::powf(max(x, 0.0), at(2))) + at(3) * x + at(4)
 }
 
-/// `E`, in steps of 1/255, by the midpoint rule over 512^2 directions: rows of the roughness 0 to 1, columns of the square root of
-/// the cosine.
+/// `E`, in steps of 1/255, by the midpoint rule over 512^2 directions: rows of the roughness 0 to 1, columns
+/// of the square root of the cosine.
 const ALBEDOS: [[u8; SIDE]; SIDE] = [
     [255, 255, 255, 255, 76, 12, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0],
     [255, 255, 255, 255, 180, 81, 29, 8, 2, 0, 0, 0, 0, 0, 0, 0],

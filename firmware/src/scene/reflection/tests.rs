@@ -1,4 +1,5 @@
-//! Properties that every lobe has: samples follow the density, weights are `f cos / p`, light may go either way.
+//! Properties that every lobe has: samples follow the density, weights are `f cos / p`, light may go either
+//! way.
 
 use core::f32::consts::TAU;
 use std::{vec, vec::Vec};
@@ -69,8 +70,8 @@ fn probabilities(reflector: &Reflector) -> Vec<f64> {
     sums
 }
 
-/// Pearson's test: of `n` cells with 8 expected samples or more, the sum of `(found - expected)^2 / expected` has the mean `n` and the
-/// variance `2 n`. Density and samples are of single precision.
+/// Pearson's test: of `n` cells with 8 expected samples or more, the sum of `(found - expected)^2 / expected`
+/// has the mean `n` and the variance `2 n`. Density and samples are of single precision.
 #[test]
 fn samples_follow_their_density() {
     const SAMPLES: u32 = 40_000;

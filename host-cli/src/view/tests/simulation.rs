@@ -1,4 +1,5 @@
-//! Random actions of pages and cards: the view is never stuck, holds bounded memory, and settles to the picture that was wished for last.
+//! Random actions of pages and cards: the view is never stuck, holds bounded memory, and settles to the
+//! picture that was wished for last.
 
 use std::time::Duration;
 

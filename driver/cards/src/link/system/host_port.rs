@@ -12,15 +12,17 @@ use super::Listener;
 
 /// The card's end of the links to consecutive hosts.
 ///
-/// To the card this is one link that never closes. Its output is lost while no host is connected, as on an unplugged cable.
-/// Between two hosts the link is cut at the end of a frame in both directions. A host receives nothing before it has sent a
-/// byte. A second host is refused while one is served: its connection is closed at once. A socket connection that has sent
-/// no whole frame within 10 s is no host, and is closed; after its first frame a host may be silent, as it packs a scene.
+/// To the card this is one link that never closes. Its output is lost while no host is connected, as on an
+/// unplugged cable. Between two hosts the link is cut at the end of a frame in both directions. A host
+/// receives nothing before it has sent a byte. A second host is refused while one is served: its connection
+/// is closed at once. A socket connection that has sent no whole frame within 10 s is no host, and is closed;
+/// after its first frame a host may be silent, as it packs a scene.
 pub struct HostPort {
     listener: Listener,
     stop: Arc<AtomicBool>,
     host: Option<Host>,
-    /// Another host that has connected. It is refused as soon as the present one is known to be connected still.
+    /// Another host that has connected. It is refused as soon as the present one is known to be connected
+    /// still.
     next: Option<Box<dyn Port + Send>>,
     /// Time of the last poll of the host and of the listener.
     looked: Instant,
@@ -40,8 +42,8 @@ struct Host {
     skips_frame: bool,
 }
 
-/// Minimum time between two polls: a busy card reads its port after every short step, and a system call each time would
-/// slow it down.
+/// Minimum time between two polls: a busy card reads its port after every short step, and a system call each
+/// time would slow it down.
 const LOOK_INTERVAL: Duration = Duration::from_micros(200);
 /// Time limit of a host's first whole frame.
 const FIRST_FRAME: Duration = Duration::from_secs(10);
@@ -49,8 +51,8 @@ const FIRST_FRAME: Duration = Duration::from_secs(10);
 const FRAME_END: u8 = 0;
 
 impl HostPort {
-    /// Port for the hosts that connect to `listener`, until `stop` is set. `say` receives messages about closed
-    /// connections.
+    /// Port for the hosts that connect to `listener`, until `stop` is set. `say` receives messages about
+    /// closed connections.
     pub fn new(listener: Listener, stop: Arc<AtomicBool>, say: fn(fmt::Arguments)) -> Self {
         Self { listener, stop, host: None, next: None, looked: Instant::now(), in_frame: false, say }
     }
@@ -66,9 +68,9 @@ impl HostPort {
         }
     }
 
-    /// Accepts another host, to be refused or served next. The system delivers a link's data before later events on other
-    /// links: a host that was accepted before the present one was found silent, but connected, came too early and is
-    /// refused.
+    /// Accepts another host, to be refused or served next. The system delivers a link's data before later
+    /// events on other links: a host that was accepted before the present one was found silent, but
+    /// connected, came too early and is refused.
     fn look_for_others(&mut self, is_silent: bool) {
         if is_silent {
             self.next = None;
@@ -78,7 +80,8 @@ impl HostPort {
         }
     }
 
-    /// Accepts the next host. Returns the byte that ends a frame that the previous host may have left unfinished.
+    /// Accepts the next host. Returns the byte that ends a frame that the previous host may have left
+    /// unfinished.
     fn welcome(&mut self, buffer: &mut [u8], wait: Duration) -> usize {
         let Some(byte) = buffer.first_mut() else { return 0 };
         let Some(port) = self.next.take().or_else(|| self.listener.accept(wait)) else { return 0 };

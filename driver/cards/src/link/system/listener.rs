@@ -165,8 +165,8 @@ impl Listener {
         }
     }
 
-    /// The next host, if one connects within `wait`; `None` also if it is gone already or the system has no resources for
-    /// it.
+    /// The next host, if one connects within `wait`; `None` also if it is gone already or the system has no
+    /// resources for it.
     pub(super) fn accept(&mut self, wait: Duration) -> Option<Box<dyn Port + Send>> {
         match &mut self.kind {
             Kind::Tcp(listener) => {
@@ -190,7 +190,8 @@ impl Listener {
         }
     }
 
-    /// Another host that connects while one is served, if any. Hosts on a terminal exclude each other by its lock.
+    /// Another host that connects while one is served, if any. Hosts on a terminal exclude each other by its
+    /// lock.
     pub(super) fn accept_other(&mut self) -> Option<Box<dyn Port + Send>> {
         match self.kind {
             Kind::Tcp(_) => self.accept(Duration::ZERO),

@@ -24,14 +24,15 @@ const SPEED_TOLERANCE: u32 = 50;
 /// Minimum timeout: Windows treats 0 as infinite.
 const MIN_WAIT: Duration = if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };
 
-/// Link over a serial port or a pseudo terminal. Every call is bounded: by `poll` before a non-blocking read or write, on
-/// Windows by the driver's timeouts, whose minimum is a millisecond.
+/// Link over a serial port or a pseudo terminal. Every call is bounded: by `poll` before a non-blocking read
+/// or write, on Windows by the driver's timeouts, whose minimum is a millisecond.
 pub struct SerialLink {
     port: SystemPort,
 }
 
-/// Opens a serial port, or a pseudo terminal, for a new session: 8 bits, no parity, one stop bit, no flow control. Stale
-/// bytes of an earlier session are dropped. The port is locked against other photoncard processes.
+/// Opens a serial port, or a pseudo terminal, for a new session: 8 bits, no parity, one stop bit, no flow
+/// control. Stale bytes of an earlier session are dropped. The port is locked against other photoncard
+/// processes.
 ///
 /// # Errors
 /// If the device does not exist, is no serial port, cannot be used, is in use, or does not support the speed.
@@ -59,11 +60,12 @@ fn open(path: &Path, baud: u32) -> io::Result<SerialLink> {
     Ok(link)
 }
 
-/// Opens a port, locks it for this process and sets `O_NONBLOCK`: `serialport` leaves the port blocking, and a write would
-/// wait for as long as the line is full.
+/// Opens a port, locks it for this process and sets `O_NONBLOCK`: `serialport` leaves the port blocking, and
+/// a write would wait for as long as the line is full.
 ///
-/// `serialport` takes a shared lock before it configures the port, and fails if another session has the exclusive lock. Its
-/// exclusive mode, TIOCEXCL, is not used: on a pseudo terminal it would outlive a killed host, and exclude the next one.
+/// `serialport` takes a shared lock before it configures the port, and fails if another session has the
+/// exclusive lock. Its exclusive mode, TIOCEXCL, is not used: on a pseudo terminal it would outlive a killed
+/// host, and exclude the next one.
 #[cfg(unix)]
 fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     use std::os::fd::AsRawFd;
@@ -84,7 +86,8 @@ fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     settings.open_native().map_err(device_error)
 }
 
-/// Returns whether a path names a pseudo terminal of macOS, which rejects any speed; `serialport` sets none if it is 0.
+/// Returns whether a path names a pseudo terminal of macOS, which rejects any speed; `serialport` sets none
+/// if it is 0.
 fn is_without_speed(path: &Path) -> bool {
     let is_terminal = |path: &Path| path.to_str().is_some_and(|name| name.starts_with("/dev/ttys"));
     cfg!(target_os = "macos") && path.canonicalize().is_ok_and(|path| is_terminal(&path))
@@ -93,15 +96,16 @@ fn is_without_speed(path: &Path) -> bool {
 /// Converts an error of `serialport` to the system's kind of error.
 fn device_error(error: serialport::Error) -> io::Error {
     match error.kind() {
-        // On Unix `NoDevice` always means a locked port; on Windows only its message distinguishes the causes.
+        // On Unix `NoDevice` always means a locked port; on Windows only its message distinguishes the
+        // causes.
         serialport::ErrorKind::NoDevice if cfg!(unix) => ErrorKind::ResourceBusy.into(),
         serialport::ErrorKind::NoDevice => io::Error::other(error),
         _ => error.into(),
     }
 }
 
-/// Ends a frame that an earlier session may have left unfinished, and drops stale bytes: until the line is quiet or, from a
-/// busy card, up to the end of a frame.
+/// Ends a frame that an earlier session may have left unfinished, and drops stale bytes: until the line is
+/// quiet or, from a busy card, up to the end of a frame.
 fn begin(port: &mut impl Port) -> Result<(), PortError> {
     port.write(&[0], QUIET)?;
     let start = Instant::now();

@@ -58,8 +58,8 @@ pub(super) fn tcp_port(stream: TcpStream) -> io::Result<StreamPort<TcpStream>> {
     Ok(StreamPort::new(stream))
 }
 
-/// Enables keep-alive: a connection ends after a minute of silence without an answer to probes. On other systems their
-/// default of hours holds.
+/// Enables keep-alive: a connection ends after a minute of silence without an answer to probes. On other
+/// systems their default of hours holds.
 #[cfg(target_os = "linux")]
 fn probe_soon(stream: &TcpStream) -> io::Result<()> {
     sockopt::set_tcp_keepidle(stream, Duration::from_secs(30))?;

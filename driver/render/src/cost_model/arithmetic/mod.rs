@@ -1,8 +1,10 @@
-//! Arithmetic of a frame, counted: the steps of each unit of the chip, times the floating-point operations of a step.
+//! Arithmetic of a frame, counted: the steps of each unit of the chip, times the floating-point operations of
+//! a step.
 //!
-//! Counters and the contents of the lines that a chip reads give the number of each [`Step`]. Its operations are constants of the firmware
-//! ([`OPERATIONS`]), counted where the firmware runs without floating-point instructions, so that each operation is a call
-//! (`tests/operations.sh`). `tests/tests/operations.rs` counts them again. A lane of a vector counts only where it is used.
+//! Counters and the contents of the lines that a chip reads give the number of each [`Step`]. Its operations
+//! are constants of the firmware ([`OPERATIONS`]), counted where the firmware runs without floating-point
+//! instructions, so that each operation is a call (`tests/operations.sh`). `tests/tests/operations.rs` counts
+//! them again. A lane of a vector counts only where it is used.
 
 mod operations;
 mod step;
@@ -65,7 +67,8 @@ mod tests {
 
     #[test]
     fn a_box_of_a_node_costs_what_its_slab_test_says() {
-        // For each of six planes a product and a sum; six comparisons of planes, of near with far, and with 0 or the limit.
+        // For each of six planes a product and a sum; six comparisons of planes, of near with far, and with 0
+        // or the limit.
         let boxes = Contents { boxes: 1, ..Contents::ZERO };
         let work = Work::new(&Counters::ZERO, &boxes, 100.0);
         let traversal = *Arithmetic::of(&work).unit(Unit::Traversal);

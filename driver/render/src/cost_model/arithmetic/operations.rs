@@ -15,7 +15,8 @@ pub struct Operations {
     pub square_root: f64,
     /// Comparisons, minima and maxima; squared distances that are compared by their bits included.
     pub compare: f64,
-    /// Conversions between integers and floating point, and roundings to whole numbers: not in [`Self::flops`].
+    /// Conversions between integers and floating point, and roundings to whole numbers: not in
+    /// [`Self::flops`].
     pub convert: f64,
 }
 

@@ -1,10 +1,12 @@
-//! Time of a chip whose reads take their time: three units, the queue of gathers between two of them, and the DRAM that they share.
+//! Time of a chip whose reads take their time: three units, the queue of gathers between two of them, and the
+//! DRAM that they share.
 //!
-//! A task, a ray or a gather, is a chain of steps: a read of a line and the arithmetic on it. Each unit has as many tasks in flight as the
-//! [`Machine`] states, each at one step. A read that misses the cache waits for the DRAM's bus, then for its latency; arithmetic waits for the
-//! unit. Both serve in the order of arrival. A ray passes from the ray caster to the controller; if it hits, its gather enters the queue, where
-//! a place was kept for it when the ray began. A [`Policy`] says when the queue is drained. What a DRAM does with rows and banks is left to its
-//! simulators (`tests/peers/dram.sh`).
+//! A task, a ray or a gather, is a chain of steps: a read of a line and the arithmetic on it. Each unit has
+//! as many tasks in flight as the [`Machine`] states, each at one step. A read that misses the cache waits
+//! for the DRAM's bus, then for its latency; arithmetic waits for the unit. Both serve in the order of
+//! arrival. A ray passes from the ray caster to the controller; if it hits, its gather enters the queue,
+//! where a place was kept for it when the ray began. A [`Policy`] says when the queue is drained. What a DRAM
+//! does with rows and banks is left to its simulators (`tests/peers/dram.sh`).
 
 mod quantities;
 mod simulation;
@@ -20,8 +22,8 @@ use super::{Cost, Machine};
 pub enum Policy {
     /// Nothing is cast while the queue drains: each unit has all of the chip's arithmetic while it works.
     Alternate,
-    /// The ray caster fills one half of the queue while the gather unit drains the other, each with its share of the arithmetic. A queue
-    /// of one entry has no halves: it is filled and drained in turn.
+    /// The ray caster fills one half of the queue while the gather unit drains the other, each with its share
+    /// of the arithmetic. A queue of one entry has no halves: it is filled and drained in turn.
     Overlapped(Shares),
 }
 
@@ -71,11 +73,13 @@ pub struct FrameLoad {
     pub gathers: Load,
 }
 
-/// Minimum number of drains that are simulated. The frame's time is linear in its number of drains, from the first on.
+/// Minimum number of drains that are simulated. The frame's time is linear in its number of drains, from the
+/// first on.
 const MIN_DRAINS: f64 = 4.0;
 /// Number of steps that are simulated as far as drains are short: each drain more takes a few.
 const STEPS: f64 = 65_536.0;
-/// Maximum number of entries of a queue that is simulated: what a longer one saves a gather is less than the tasks in flight over it.
+/// Maximum number of entries of a queue that is simulated: what a longer one saves a gather is less than the
+/// tasks in flight over it.
 const MAX_QUEUE: u64 = 32_768;
 
 impl FrameLoad {
@@ -86,8 +90,8 @@ impl FrameLoad {
         (bytes / machine.bandwidth).max(flops / machine.flops)
     }
 
-    /// Seconds of the frame on a chip, in reads of `line_bytes`. Simulated are as many drains as make a sample; the rest takes what the
-    /// second half of these does, drain by drain.
+    /// Seconds of the frame on a chip, in reads of `line_bytes`. Simulated are as many drains as make a
+    /// sample; the rest takes what the second half of these does, drain by drain.
     pub fn times(&self, chip: &TimedChip, line_bytes: f64) -> FrameTimes {
         // Pieces of the rays' work, of which each leads to one gather or none.
         let pieces = self.rays.tasks.max(self.gathers.tasks);

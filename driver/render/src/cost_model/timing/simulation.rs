@@ -1,4 +1,5 @@
-//! Simulation of a frame by discrete events: the ends of reads, of arithmetic, and of the controller's work on a ray.
+//! Simulation of a frame by discrete events: the ends of reads, of arithmetic, and of the controller's work
+//! on a ray.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -8,8 +9,8 @@ use super::quantities::{FrameTimes, Load, UnitTimes};
 
 /// Ticks of the simulation in a second.
 const TICKS: f64 = 1e14;
-/// Maximum number of steps of a task. A task of more is simulated in as many, each with the arithmetic, the bus and the latencies of several:
-/// neither its waits nor its use of each resource change in sum.
+/// Maximum number of steps of a task. A task of more is simulated in as many, each with the arithmetic, the
+/// bus and the latencies of several: neither its waits nor its use of each resource change in sum.
 const MAX_STEPS: f64 = 4.0;
 
 /// Whole numbers with a real number as their mean, as evenly spread as they can be.

@@ -49,7 +49,8 @@ fn one_task_waits_for_everything_in_turn() {
 
 #[test]
 fn tasks_share_what_one_waits_until_a_resource_is_busy() {
-    // Where every step misses the queues are deterministic: max(arithmetic, bus, (arithmetic + bus + latency) / tasks).
+    // Where every step misses the queues are deterministic: max(arithmetic, bus, (arithmetic + bus + latency)
+    // / tasks).
     for (tasks, flops, nanoseconds) in
         [(4, 500.0, 26.75), (16, 500.0, 6.6875), (64, 500.0, 5.0), (500, 100.0, 2.0)]
     {
@@ -84,7 +85,8 @@ fn overlapped_parts_take_the_longer_and_a_fill_or_a_drain_of_one_half() {
 
 #[test]
 fn a_queue_of_one_entry_is_serial() {
-    // Every second ray hits, whatever is in flight: 2 rays of 100 + 2 + 3 ns, and a gather of 2 steps of 100 + 2 + 7 ns.
+    // Every second ray hits, whatever is in flight: 2 rays of 100 + 2 + 3 ns, and a gather of 2 steps of 100
+    // + 2 + 7 ns.
     let both = frame(load(2e5, 1.0, 1.0, 300.0), load(1e5, 2.0, 1.0, 700.0));
     for policy in [Policy::Alternate, Policy::Overlapped(WHOLE)] {
         assert_near(
@@ -110,7 +112,8 @@ fn a_bus_that_both_units_fill_takes_the_sum_of_their_bytes() {
 
 #[test]
 fn units_with_shares_of_the_arithmetic_take_as_long_as_their_slowest() {
-    // By their work all three units need as long as the chip does for the sum; by equal shares the gather unit is the slowest.
+    // By their work all three units need as long as the chip does for the sum; by equal shares the gather
+    // unit is the slowest.
     let work = FrameLoad {
         rays: load(1e6, 1.0, 0.0, 200.0),
         controller_flops: 1e6 * 100.0,

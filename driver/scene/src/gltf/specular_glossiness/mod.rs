@@ -1,5 +1,5 @@
-//! Specular-glossiness materials (`KHR_materials_pbrSpecularGlossiness`), which become metallic-roughness ones before anything else
-//! reads them: their factors, and their textures as new images.
+//! Specular-glossiness materials (`KHR_materials_pbrSpecularGlossiness`), which become metallic-roughness
+//! ones before anything else reads them: their factors, and their textures as new images.
 
 mod formula;
 mod texels;

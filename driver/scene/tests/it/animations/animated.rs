@@ -24,7 +24,8 @@ impl Animated {
         push(&mut self.0.json, "animations", json!({"name": name, "channels": [], "samplers": []}))
     }
 
-    /// Adds a channel that moves the property `path` of a node: accessors of times and of values, and the interpolation.
+    /// Adds a channel that moves the property `path` of a node: accessors of times and of values, and the
+    /// interpolation.
     pub(crate) fn channel(
         &mut self,
         animation: usize,

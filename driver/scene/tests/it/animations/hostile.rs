@@ -53,7 +53,8 @@ fn changed(change: impl FnOnce(&mut Value)) -> Result<(), SceneError> {
     both(&scene)
 }
 
-/// Result of the scene at a moment; the list of animations is refused alike, unless it is the value that is unsound.
+/// Result of the scene at a moment; the list of animations is refused alike, unless it is the value that is
+/// unsound.
 fn both(scene: &Animated) -> Result<(), SceneError> {
     let file = scene.file()?;
     let listed = file.animations().map(drop);

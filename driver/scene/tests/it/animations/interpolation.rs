@@ -121,7 +121,8 @@ fn vector(index: u32) -> [f32; 3] {
     [0, 1, 2].map(|axis| random(3 * index + axis) as f32)
 }
 
-/// Cubic Bezier curve by de Casteljau's subdivision, whose inner control points are a third of the tangents away.
+/// Cubic Bezier curve by de Casteljau's subdivision, whose inner control points are a third of the tangents
+/// away.
 fn bezier(points: [DVec3; 2], tangents: [DVec3; 2], interval: f64, share: f64) -> DVec3 {
     let [from, to] = points;
     let mut points =

@@ -1,4 +1,5 @@
-//! Each part of a scene that animations move: meshes by morph targets and joints, cameras, lights, and nodes that others hang on.
+//! Each part of a scene that animations move: meshes by morph targets and joints, cameras, lights, and nodes
+//! that others hang on.
 
 use glam::{DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
 use photoncard_scene::{PunctualKind, Scene};

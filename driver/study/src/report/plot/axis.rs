@@ -6,7 +6,8 @@ use super::super::number;
 const INTERVALS: f64 = 10.0;
 /// Maximum number of tick labels of an axis.
 const MAX_TICKS: usize = 12;
-/// Maximum length, in steps of 1-2-5, of a logarithmic axis that ends at any step; a longer one ends at whole decades.
+/// Maximum length, in steps of 1-2-5, of a logarithmic axis that ends at any step; a longer one ends at whole
+/// decades.
 const MAX_STEPS: i32 = 9;
 /// Bound below which a linear axis takes its values for zeros, if the magnitudes of all are below it.
 const SMALLEST: f64 = 1e-290;
@@ -93,7 +94,8 @@ impl Axis {
         Self { kind: Kind::Log2, low: low - widen, high: high + widen }
     }
 
-    /// A logarithmic axis over the positive values from `low` to `high`, extended to 1, 2 or 5 times a power of ten.
+    /// A logarithmic axis over the positive values from `low` to `high`, extended to 1, 2 or 5 times a power
+    /// of ten.
     pub(super) fn log10(low: f64, high: f64) -> Self {
         let (mut low_step, mut high_step) = (Step::at_least(low), Step::at_least(high));
         if low_step.value() > low * (1.0 + WHOLE) || low_step.0 == high_step.0 {

@@ -70,8 +70,8 @@ pub struct Series {
     pub points: Vec<Point>,
 }
 
-/// Point in the units of the axes. Values that are not finite, and on a logarithmic axis values of zero or less, are not
-/// drawn; a note below the plot reports them.
+/// Point in the units of the axes. Values that are not finite, and on a logarithmic axis values of zero or
+/// less, are not drawn; a note below the plot reports them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Horizontal value.

@@ -38,7 +38,8 @@ pub(super) struct LeftOut<'a> {
     pub(super) count: usize,
 }
 
-/// Separates the points of a panel that can be drawn from those that cannot; the latter interrupt their lines.
+/// Separates the points of a panel that can be drawn from those that cannot; the latter interrupt their
+/// lines.
 pub(super) fn clean(panel: &Panel) -> (Vec<Drawable<'_>>, Vec<LeftOut<'_>>) {
     let mut left_out: Vec<LeftOut> = Vec::new();
     let mut drawable = Vec::new();

@@ -207,7 +207,8 @@ impl<'a> Drawing<'a> {
 
     fn draw_series(&self, frame: &Frame, series: &Drawable, style: &Style) -> String {
         let place = |mark: &Mark| [frame.x(self.x.place(mark.x)), frame.y(self.y.place(mark.y))];
-        // Categories have no order, so the slope of a line means nothing: the line is thin, a guide for the eye.
+        // Categories have no order, so the slope of a line means nothing: the line is thin, a guide for the
+        // eye.
         let width = if matches!(self.panel.x.scale, XScale::Categories(_)) { 1.0 } else { 1.75 };
         let mut drawn = "<g class=\"series\">\n".to_owned();
         for run in &series.runs {

@@ -26,8 +26,8 @@ const MARKERS: [(Shape, bool); 12] = [
     (Shape::Star, false),
 ];
 
-/// Colours whose lightness differs pairwise by at least 5 of 100, the first six by 11, and that stay apart for
-/// protanopes, deuteranopes and tritanopes (CIE76 difference above 20 after Machado et al. 2009).
+/// Colours whose lightness differs pairwise by at least 5 of 100, the first six by 11, and that stay apart
+/// for protanopes, deuteranopes and tritanopes (CIE76 difference above 20 after Machado et al. 2009).
 const COLOURS: [&str; 12] = [
     "#000000", "#EB676C", "#4D1055", "#CAAE30", "#6C6DB6", "#873000", "#0046E1", "#7F5C71", "#507BEB",
     "#54079A", "#002900", "#76A8B0",
@@ -45,7 +45,8 @@ enum Shape {
     Star,
 }
 
-/// Style of one series. Dash and marker together are unique among the first 84 series, the marker among the first 12.
+/// Style of one series. Dash and marker together are unique among the first 84 series, the marker among the
+/// first 12.
 #[derive(Clone, Copy)]
 pub(super) struct Style {
     dash: &'static str,

@@ -134,8 +134,8 @@ fn traffic(scale: &Scale, results: &Results) -> Table {
     table
 }
 
-/// Decrease of the bytes from DRAM from the first to the last exponent. Both renders have equal tiles, so it is estimated
-/// from the differences of each tile (paired samples): the variance between tiles cancels.
+/// Decrease of the bytes from DRAM from the first to the last exponent. Both renders have equal tiles, so it
+/// is estimated from the differences of each tile (paired samples): the variance between tiles cancels.
 fn fall(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Estimate {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
     let exponents = exponents(scale);

@@ -22,7 +22,8 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// The sweep over `axes`. `point` makes the point of names and values, one of each axis; its task must be [`Task::Traffic`].
+    /// The sweep over `axes`. `point` makes the point of names and values, one of each axis; its task must be
+    /// [`Task::Traffic`].
     ///
     /// # Errors
     /// If the axes make no sweep, or `point` fails.

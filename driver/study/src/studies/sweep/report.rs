@@ -146,8 +146,8 @@ impl Swept<'_> {
         table
     }
 
-    /// Plot over an axis, of photon map and scene, with a line for each combination of the other axes: as many of them as make at
-    /// most [`MAX_LINES`] lines; the others keep their first value.
+    /// Plot over an axis, of photon map and scene, with a line for each combination of the other axes: as
+    /// many of them as make at most [`MAX_LINES`] lines; the others keep their first value.
     fn plot(&self, axis: usize) -> Block {
         let (varied, kept) = self.other_axes(axis);
         let lines: Vec<Vec<usize>> = (self.axes.combinations())
@@ -243,7 +243,8 @@ fn scale(axis: &Axis) -> XScale {
     }
 }
 
-/// The values as positive numbers, if all of them are; K and M stand for 2^10 and 2^20, as in sizes of caches.
+/// The values as positive numbers, if all of them are; K and M stand for 2^10 and 2^20, as in sizes of
+/// caches.
 fn numbers(axis: &Axis) -> Option<Vec<f64>> {
     let number = |text: &String| {
         let (digits, unit) = match text.strip_suffix('K') {

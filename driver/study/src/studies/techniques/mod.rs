@@ -1,4 +1,5 @@
-//! Each technique alone and all together: rays, traffic and error, at equal numbers of rays and at equal quality.
+//! Each technique alone and all together: rays, traffic and error, at equal numbers of rays and at equal
+//! quality.
 
 mod technique;
 mod worth;
@@ -180,7 +181,8 @@ fn curves(file: &str, measured: &Measured, name: &str) -> Block {
     plot(file, &format!("{name}: error of indirect light by traffic"), caption, vec![axes])
 }
 
-/// Exact reordering and all techniques together, on the reference chip and on the large one with tiles in flight, in all scenes.
+/// Exact reordering and all techniques together, on the reference chip and on the large one with tiles in
+/// flight, in all scenes.
 fn together(scenes: &[(Measured, &str)]) -> Table {
     let heads = [
         ("scene", ""),

@@ -1,5 +1,5 @@
-//! Worth of techniques at equal quality: rays and bytes that reach an error, factors between techniques with their intervals, and what
-//! follows from them.
+//! Worth of techniques at equal quality: rays and bytes that reach an error, factors between techniques with
+//! their intervals, and what follows from them.
 
 use super::super::super::laboratory::Results;
 use super::super::super::measure::Measurement;
@@ -27,8 +27,8 @@ impl AtQuality {
     }
 }
 
-/// First crossing of an error by a curve of rays and errors in ascending order of rays, interpolated linearly in the logarithms; `None` for
-/// an empty curve.
+/// First crossing of an error by a curve of rays and errors in ascending order of rays, interpolated linearly
+/// in the logarithms; `None` for an empty curve.
 fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
     let &[rays, first] = curve.first()?;
     if first <= rmse {
@@ -44,7 +44,8 @@ fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
     curve.last().map(|&[rays, _]| AtQuality::Missed(rays))
 }
 
-/// Bytes at a number of rays, linear in the logarithms between the numbers that were measured, and beyond them.
+/// Bytes at a number of rays, linear in the logarithms between the numbers that were measured, and beyond
+/// them.
 fn bytes_at(curve: &[(f64, Estimate)], rays: f64) -> Estimate {
     let after = curve.iter().position(|(more, _)| *more >= rays).unwrap_or(curve.len());
     let after = after.clamp(1, curve.len().saturating_sub(1).max(1));
@@ -63,7 +64,8 @@ pub(super) struct Worth {
     pub(super) at: AtQuality,
     /// Bytes from DRAM.
     pub(super) bytes: Estimate,
-    /// Half the width of the 95 % interval of the bytes' logarithm, by the tiles in which errors were measured.
+    /// Half the width of the 95 % interval of the bytes' logarithm, by the tiles in which errors were
+    /// measured.
     spread: f64,
 }
 
@@ -128,7 +130,8 @@ impl Measured<'_> {
         Ratio::new(base.bytes, worth.bytes, base.spread.hypot(worth.spread))
     }
 
-    /// Ratio of the naive render's bytes to those of a technique at the naive render's error; `None` if that is not reached.
+    /// Ratio of the naive render's bytes to those of a technique at the naive render's error; `None` if that
+    /// is not reached.
     pub(super) fn factor_at_quality(&self, technique: &Technique) -> Option<Ratio> {
         let is_reached = !matches!(self.worth(technique).at, AtQuality::Missed(_));
         is_reached.then(|| self.factor(&NAIVE, technique))
@@ -175,8 +178,8 @@ enum Verdict {
 }
 
 impl Verdict {
-    /// The verdict on a technique that reaches the error `at` some rays and reads `factor` times less there: with the fewest rays the factor
-    /// is a lower bound, with the most an upper one.
+    /// The verdict on a technique that reaches the error `at` some rays and reads `factor` times less there:
+    /// with the fewest rays the factor is a lower bound, with the most an upper one.
     fn new(at: AtQuality, factor: Ratio) -> Self {
         match at {
             AtQuality::Met(_) | AtQuality::AtMost(_) if factor.lower > 1.0 => Self::Pays,
