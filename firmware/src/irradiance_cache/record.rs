@@ -153,8 +153,8 @@ impl Record {
     }
 
     /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, with `radius` R. It is of second
-    /// order in distance and angle, as gradients remove the first-order error of Ward, Rubinstein, Clear
-    /// 1988. Infinite off the record's tangent plane, by less the nearer its surroundings are, and for
+    /// order in distance and angle, as gradients remove the first-order error of Ward, Rubinstein,
+    /// Clear 1988. Infinite off the record's tangent plane, by less the nearer its surroundings are, and for
     /// normals 90 degrees or more apart.
     pub(super) fn error(&self, radius: f32, allowed: f32, position: Vec3, normal: Vec3) -> f32 {
         let way = position - self.position;

@@ -212,8 +212,8 @@ impl Photon {
     }
 }
 
-/// RGBE (Ward 1991): three non-negative components of 8 bits with a shared exponent, `mantissa * 2^(exponent
-/// - 136)`.
+/// RGBE (Ward 1991): three non-negative components of 8 bits with a shared exponent,
+/// `mantissa * 2^(exponent - 136)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rgbe(pub [u8; 4]);
 
