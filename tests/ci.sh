@@ -111,6 +111,7 @@ long=$(find shared firmware driver host-cli scenes tests -name '*.rs' -not -path
 
 step "lints"
 cargo clippy --workspace --all-targets --features photoncard/study --locked -- -D warnings
+cargo clippy -p photoncard --all-targets --locked -- -D warnings
 
 # A path takes more bytes on Windows, and so do errors that hold one.
 unchecked=()

@@ -81,9 +81,8 @@ impl Layout {
             let start = before.rfind('\n').map_or(0, |end| end + 1);
             let indent = before[start..].chars().count();
             let line = contents.line() + before.matches('\n').count() + 1;
-            let column = indent + 1 + if start == 0 { contents.column() } else { 0 };
             let mark = self.coloured(AnsiColor::Magenta.on_default(), "╰── ");
-            writeln!(f, "   ╭─[{}:{line}:{column}]", contents.name().unwrap_or_default())?;
+            writeln!(f, "   ╭─[{}:{line}]", contents.name().unwrap_or_default())?;
             writeln!(f, "   │ {}", text[start..].lines().next().unwrap_or_default())?;
             writeln!(f, "   · {:indent$}{mark}{}", "", label.label().unwrap_or_default())?;
         }
@@ -161,7 +160,7 @@ mod tests {
         let expected = [
             "scene::json\n",
             "  × no\\u{1b}[31m number",
-            "   ╭─[a.gltf:2:2]",
+            "   ╭─[a.gltf:2]",
             "   │  x}",
             "   ·  ╰── here",
             "  help: correct it\n",

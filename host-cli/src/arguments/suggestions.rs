@@ -3,6 +3,8 @@
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
+use crate::shell;
+
 /// Commands that render a scene, with any cards.
 const RENDER: &[&str] = &["render", "view", "farm"];
 /// Commands that take the settings of a picture.
@@ -115,8 +117,15 @@ pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[Strin
     let Some(ContextValue::String(argument)) = error.get(ContextKind::InvalidArg) else { return error };
     let Some(remedy) = remedy(argument, &command_of(program, given)) else { return error };
     error.remove(ContextKind::SuggestedArg);
+    // It would show the option that is suggested no more.
+    error.remove(ContextKind::Usage);
     error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![remedy.into()]));
     error
+}
+
+/// Those of some commands that this program was built with.
+pub(super) fn built(commands: &'static [&'static str]) -> impl Iterator<Item = &'static str> {
+    commands.iter().copied().filter(|command| cfg!(feature = "study") || !command.starts_with("study"))
 }
 
 /// Name of the command, without the program's: `render`, `study sweep`.
@@ -145,7 +154,7 @@ impl Word {
         if self.is_of(command) {
             return self.remedy.to_owned();
         }
-        let commands: Vec<_> = self.commands.iter().map(|of| format!("photoncard {of}")).collect();
+        let commands: Vec<_> = built(self.commands).map(|of| format!("photoncard {of}")).collect();
         format!("of {}: {}", commands.join(", "), self.remedy)
     }
 }
@@ -165,7 +174,7 @@ fn remedy(argument: &str, command: &str) -> Option<String> {
     };
     let is_picture =
         !name.starts_with('-') && endings.iter().any(|ending| name.to_lowercase().ends_with(ending));
-    is_picture.then(|| format!("a picture to write is stated by -o {name}"))
+    is_picture.then(|| format!("a picture to write is stated by -o {}", shell::quoted(name)))
 }
 
 #[cfg(test)]
