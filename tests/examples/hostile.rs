@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use photoncard_tests::hostile::{Kind, Report, Settings, read_batch, supervise};
+use photoncard_tests::hostile::{Kind, Report, Settings, read_batch, supervise, supervise_kept};
 
 fn defaults(kind: Kind) -> Settings {
     Settings {
@@ -84,7 +84,10 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
     let settings = settings(&arguments)?;
     let begun = Instant::now();
     let tell = |report: &Report| eprintln!("{}", line(settings.kind, report, begun));
-    let report = supervise(&std::env::current_exe()?, &settings, &tell)?;
+    let report = match settings.kind {
+        Kind::Kept(files) => supervise_kept(&settings, files, &tell)?,
+        _ => supervise(&std::env::current_exe()?, &settings, &tell)?,
+    };
     println!("{}", line(settings.kind, &report, begun));
     for finding in &report.findings {
         println!("{}: input {} FAILS: {}", settings.kind.name(), finding.number, finding.what);

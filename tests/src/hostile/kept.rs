@@ -44,7 +44,7 @@ struct Bench<'s> {
     program: &'s Path,
     folder: PathBuf,
     works: Vec<Work>,
-    /// Pictures of undamaged files, and of none.
+    /// Pictures by each of the command lines of undamaged files, and of none.
     right: Vec<Files>,
 }
 
@@ -100,7 +100,8 @@ impl Kept {
 ///
 /// # Errors
 /// If no command is named, it cannot be started, it fails without damage, or a file cannot be written.
-pub(super) fn supervise(settings: &Settings, kind: Kept, tell: &dyn Fn(&Report)) -> io::Result<Report> {
+pub fn supervise(settings: &Settings, kind: Kept, tell: &dyn Fn(&Report)) -> io::Result<Report> {
+    fs::create_dir_all(&settings.folder)?;
     let bench = Bench::new(settings, kind)?;
     let mut report = Report::default();
     for number in settings.first..settings.first + settings.inputs {
@@ -130,10 +131,21 @@ impl<'s> Bench<'s> {
         for seed in [0, 1] {
             this.add(kind, seed)?;
         }
+        // A damaged file may be that of the other work, whole.
+        let none = Files::new();
+        for work in &this.works {
+            for kept in this.works.iter().map(|work| &work.kept).chain([&none]) {
+                this.fill(kept)?;
+                let slow = || io::Error::other(format!("{} takes too long", work.arguments));
+                if this.finish(this.start(&work.arguments)?)?.ok_or_else(slow)?.success() {
+                    this.right.push(this.pictures()?);
+                }
+            }
+        }
         Ok(this)
     }
 
-    /// Makes the files of a work, and the pictures of these files and of none.
+    /// Makes the files of a work.
     fn add(&mut self, kind: Kept, seed: u32) -> io::Result<()> {
         self.fill(&Files::new())?;
         let mut commands = kind.commands(seed);
@@ -143,15 +155,10 @@ impl<'s> Bench<'s> {
         }
         let mut kept = self.files()?;
         kept.retain(|name, _| kind.endings().iter().any(|ending| name.ends_with(ending)));
-        self.fill(&Files::new())?;
-        if self.finish(self.start(&arguments)?)?.is_some_and(|status| status.success()) {
-            self.right.push(self.pictures()?);
-        }
         self.fill(&kept)?;
         let begun = Instant::now();
         self.done(&arguments)?;
         self.works.push(Work { arguments, kept, usual: begun.elapsed() });
-        self.right.push(self.pictures()?);
         Ok(())
     }
 

@@ -16,6 +16,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 pub use self::inputs::Inputs;
+pub use self::kept::supervise as supervise_kept;
 pub use self::reader::read_batch;
 pub use self::supervisor::{Finding, Report, supervise};
 

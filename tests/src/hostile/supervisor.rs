@@ -10,7 +10,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::inputs::as_file;
-use super::{Inputs, Kind, Settings, kept};
+use super::{Inputs, Kind, Settings};
 
 /// Interval at which a running command is polled.
 const GLANCE: Duration = Duration::from_millis(2);
@@ -40,16 +40,13 @@ pub struct Report {
 }
 
 /// Reads inputs in processes of limited memory. `reader` is the program that calls
-/// [`read_batch`](super::read_batch) for the arguments `read KIND SEED FIRST INPUTS FOLDER`; it reads no kept
-/// files.
+/// [`read_batch`](super::read_batch) for the arguments `read KIND SEED FIRST INPUTS FOLDER`; it reads no
+/// [kept](super::supervise_kept) files.
 ///
 /// # Errors
 /// If a process cannot be started or a file cannot be written.
 pub fn supervise(reader: &Path, settings: &Settings, tell: &dyn Fn(&Report)) -> io::Result<Report> {
     fs::create_dir_all(&settings.folder)?;
-    if let Kind::Kept(files) = settings.kind {
-        return kept::supervise(settings, files, tell);
-    }
     let mut report = Report::default();
     let inputs = Inputs::new(settings.kind);
     let end = settings.first + settings.inputs;
