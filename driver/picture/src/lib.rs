@@ -4,11 +4,13 @@
 //! one: a [`Film`](film::Film), which [`exr`] and [`tone_mapping`] write, or a sink of another crate. A film
 //! is equal for every order of its tiles, since sums are integers.
 //!
-//! | modules | contents |
-//! |---|---|
-//! | [`output`], [`printable`], [`choice`], [`allocation`], [`foreign`], [`heading`], [`intact`] | output files; escaping of foreign text; names of enumerations; memory limits; decoders that panic; headings of files; checks that finished files are whole |
-//! | [`sums`], [`sink`], [`viewer`] | format of pixels' sums, and their values; traits of what takes tiles, and of what shows them |
-//! | [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`] | pixels of a picture; its layers; files; comparison |
+//! - [`output`], [`heading`], [`intact`]: output files; their headings; checks that finished files are whole.
+//! - [`printable`], [`choice`]: escaping of foreign text; names of enumerations.
+//! - [`allocation`], [`foreign`]: memory limits; decoders that panic.
+//! - [`sums`], [`sink`], [`viewer`]: format of pixels' sums, and their values; traits of what takes tiles,
+//!   and of what shows them.
+//! - [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`]: pixels of a picture; its layers; files;
+//!   comparison.
 //!
 //! This is the lowest crate of the host: scenes read environments by [`exr`], and all crates write by
 //! [`output`].

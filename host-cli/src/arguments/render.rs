@@ -145,7 +145,7 @@ impl RenderOptions {
         self.photons_for() == PhotonsFor::Auto
     }
 
-    /// What guides the photons: the scene, where several pictures share them.
+    /// Guiding of the photons: by the scene, where several pictures share them.
     fn photons_for(&self) -> PhotonsFor {
         let is_shared = self.frames.numbers().is_some() || self.prepared.prepared;
         if is_shared { PhotonsFor::Scene } else { self.photons_for }

@@ -190,7 +190,7 @@ fn dazzling_light_is_verified_where_there_is_another_card() {
         assert_eq!((answered.found, answered.liars), (Some(lit(0, end)), liars));
         scheduler.complete(0);
         assert!(scheduler.is_complete());
-        // What two cards say is no one's word alone.
+        // A tile on which two cards agree counts for neither.
         let of_cards: usize = (0..cards).map(|card| scheduler.dazzling_of(card)).sum();
         assert_eq!(of_cards, usize::from(cards == 1));
     }

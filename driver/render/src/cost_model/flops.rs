@@ -6,7 +6,7 @@ use serde::Serialize;
 use super::{Cost, Symbols, Workload};
 
 /// Floating-point operations of each unit of the chip, on all chips together, by the constants of Table 7.1.
-/// Those that the firmware does are [`Arithmetic`](super::arithmetic::Arithmetic).
+/// The firmware's own operations are [`Arithmetic`](super::arithmetic::Arithmetic).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Flops {
     /// All rays.

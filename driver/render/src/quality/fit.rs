@@ -19,7 +19,7 @@ pub struct Fit {
     pub samples: u32,
     /// Number of photons in the map.
     pub photons: usize,
-    /// What guides the photons: never [`PhotonsFor::Auto`].
+    /// Guiding of the photons: never [`PhotonsFor::Auto`].
     pub photons_for: PhotonsFor,
     /// Number of gather rays of a pixel, and of an irradiance record.
     pub gather_rays: u32,

@@ -70,7 +70,7 @@ impl Default for Picture {
 pub struct PhotonMaps {
     /// Number of photons in the map.
     pub count: usize,
-    /// What guides the photons: the scene, or the picture's camera.
+    /// Guiding of the photons, by the scene or by the picture's camera.
     pub photons_for: PhotonsFor,
     /// Layout of the photon map in card memory; no pixel depends on it.
     pub layout: PhotonLayout,

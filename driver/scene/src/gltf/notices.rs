@@ -85,7 +85,7 @@ fn meshes(root: &json::Root, holds: impl Fn(&json::mesh::Primitive) -> bool) -> 
 pub(super) struct Sentences {
     /// Contents that are not used, or that are missing.
     pub(super) ignored: Vec<String>,
-    /// Those of them that do not concern every picture, by their index.
+    /// Ignored contents that do not concern every picture, by index.
     pub(super) concerns: Vec<(usize, Concern)>,
     /// Contents that are used in another way than they are stated.
     pub(super) remarks: Vec<String>,
@@ -237,7 +237,7 @@ impl Notices {
     }
 }
 
-/// What an unsupported extension is about, of which not every picture has need.
+/// Concern of an unsupported extension; `None` if every picture has need of it.
 fn concern_of(extension: &str) -> Option<Concern> {
     match extension {
         "KHR_animation_pointer" => Some(Concern::Animations),

@@ -19,7 +19,7 @@ use crate::{Encoding, Material, Scene, Texture, Wrap};
 /// Maximum absolute value in a texture transform: beyond it single precision cannot resolve texels.
 const MAX_TRANSFORM: f32 = 1e6;
 
-/// What a material takes from a texture.
+/// Channels that a material takes from a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Use {
     /// Colour, alpha or both.

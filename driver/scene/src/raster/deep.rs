@@ -2,7 +2,7 @@
 
 use crate::texture::{Encoding, shared_exponent};
 
-/// What is taken from an image of 16 bits a channel, and keeps more than 8 of them.
+/// Channels that keep more than 8 bits of an image of 16 bits a channel, and their texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Deep {
     /// Colour in sRGB, as [`Encoding::SharedExponent`].
