@@ -18,6 +18,11 @@ pub(crate) fn say_failure(failure: &Failure) {
     let _ = writeln!(stderr(), "{failure}");
 }
 
+/// A number with its noun.
+pub(crate) fn counted(count: usize, noun: &str) -> String {
+    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
 /// Writes lines to standard output.
 pub(crate) fn print(lines: &[String]) -> Result<(), Failure> {
     write_out(&lines.iter().map(|line| printable(line) + "\n").collect::<String>())

@@ -33,8 +33,8 @@ pub(crate) struct Input {
     pub(crate) file: SceneFile,
     /// Environment, and the notice on its texels.
     environment: Option<(Environment, Option<String>)>,
-    /// Rotation of the environment, degrees.
-    rotation: f32,
+    /// Stated rotation of the environment, degrees.
+    rotation: Option<f32>,
     compensates_energy: bool,
 }
 
@@ -46,7 +46,7 @@ impl Input {
         Ok(Self {
             file: SceneFile::open(&options.path, &load).map_err(Failure::input)?,
             environment: options.environment.as_ref().map(EnvironmentOption::load).transpose()?,
-            rotation: options.environment_rotation.unwrap_or_default(),
+            rotation: options.environment_rotation,
             compensates_energy: options.energy_compensation,
         })
     }
@@ -71,7 +71,7 @@ impl Input {
 /// The scene with an environment and its notice.
 fn completed(
     mut scene: Scene,
-    (environment, rotation): (Option<(Environment, Option<String>)>, f32),
+    (environment, rotation): (Option<(Environment, Option<String>)>, Option<f32>),
     compensates_energy: bool,
 ) -> Scene {
     if compensates_energy {
@@ -79,10 +79,16 @@ fn completed(
     }
     let (environment, notice) = environment.unzip();
     let turn = scene.environment_turn();
-    if turn != 0.0 && environment.as_ref().is_some_and(|map| map.width > 1) {
+    let is_turned = environment.as_ref().is_some_and(|map| !map.is_equal_around());
+    if turn != 0.0 && is_turned {
         scene.remarks.push("the middle of the environment map is +x, as in Blender".to_owned());
     }
-    scene.environment = environment.map(|environment| environment.turned(turn + rotation));
+    if rotation.is_some() && environment.is_some() && !is_turned {
+        let notice = "--environment-rotation has no effect with an environment that is equal all around";
+        scene.remarks.push(notice.to_owned());
+    }
+    let turn = turn + rotation.unwrap_or_default();
+    scene.environment = environment.map(|environment| environment.turned(turn));
     scene.notices.extend(notice.flatten());
     scene
 }

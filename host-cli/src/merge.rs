@@ -2,10 +2,11 @@
 
 use std::path::Path;
 
+use photoncard_driver::film::Film;
 use photoncard_driver::parts::{Part, PartError, Parts};
 
 use crate::arguments::{MergeOptions, PictureFormat, PictureOutput};
-use crate::console::{printable_json, say};
+use crate::console::{counted, printable_json, say};
 use crate::failure::Failure;
 use crate::outputs;
 use crate::render::files::{Form, check_standard_output, write_picture};
@@ -30,6 +31,7 @@ pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
     let parts = Parts::open(paths).map_err(Failure::input)?;
     say_missing(&parts);
     let merged = parts.merge().map_err(failure)?;
+    say_dazzling(&merged.film);
     let provenance =
         serde_json::to_string(&merged.provenance).map_err(|error| Failure::work_error(&error))?;
     let form = Form { layers: merged.layers, sample_type: *sample_type, tone: tone.mapping(), part: None };
@@ -45,6 +47,18 @@ fn say_missing(parts: &Parts) {
     let Some(head) = parts.any() else { return };
     let command = |part: &Part| part::command(head, *part);
     missing.iter().take(MAX_COMMANDS).for_each(|part| say(format_args!("{}", command(part))));
+}
+
+/// Prints that pixels have light as that of a faulty card.
+fn say_dazzling(film: &Film) {
+    let pixels = film.dazzling_pixels();
+    if pixels > 0 {
+        say(format_args!(
+            "photoncard: the light of {} is far beyond that of the surfaces: a lamp without extent that nearly touches a surface makes \
+             such light, and so does a faulty card (verified if each part is rendered with a second --card)",
+            counted(pixels, "pixel")
+        ));
+    }
 }
 
 /// Failure of a merge: that of its input, but for a disk or memory that is full.

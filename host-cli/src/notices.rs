@@ -48,7 +48,7 @@ pub(crate) fn say_ignored(options: &SceneOptions, scene: &Scene, uses: &Uses) ->
     let notices = scene.notices_on(|concern| uses.uses(concern));
     let Some(line) = first(&options.path, &notices) else { return Ok(()) };
     if !options.strict {
-        say(format_args!("photoncard: ignored: {line}"));
+        say(format_args!("photoncard: ignored or missing: {line}"));
         return Ok(());
     }
     let report = MietteDiagnostic::new(format!("--strict: {}", notices.join("; ")));

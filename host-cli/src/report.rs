@@ -9,6 +9,9 @@ use clap::builder::styling::{AnsiColor, Style};
 use miette::{Diagnostic, ReportHandler};
 use photoncard_driver::printable::printable;
 
+/// Columns before an excerpt.
+const EXCERPT_MARK: usize = 5;
+
 /// Installs the layout. Lines are broken on a terminal only: elsewhere a path in a message stays in one
 /// piece.
 pub(crate) fn lay_out_errors() {
@@ -82,8 +85,10 @@ impl Layout {
             let indent = before[start..].chars().count();
             let line = contents.line() + before.matches('\n').count() + 1;
             let mark = self.coloured(AnsiColor::Magenta.on_default(), "╰── ");
+            let shown = text[start..].lines().next().unwrap_or_default();
+            let (shown, indent) = around(shown, indent, self.width.saturating_sub(EXCERPT_MARK));
             writeln!(f, "   ╭─[{}:{line}]", contents.name().unwrap_or_default())?;
-            writeln!(f, "   │ {}", text[start..].lines().next().unwrap_or_default())?;
+            writeln!(f, "   │ {shown}")?;
             writeln!(f, "   · {:indent$}{mark}{}", "", label.label().unwrap_or_default())?;
         }
         Ok(())
@@ -129,6 +134,24 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
+/// The part of a line around column `at` that has at most `width` characters, and the column of `at` in it.
+/// Ellipses stand for what is left out.
+fn around(line: &str, at: usize, width: usize) -> (String, usize) {
+    let count = line.chars().count();
+    if count <= width {
+        return (line.to_owned(), at);
+    }
+    let start = at.saturating_sub(width / 2).min(count - width);
+    let [is_cut_before, is_cut_after] = [start > 0, start + width < count];
+    let part = line.chars().skip(start).take(width).enumerate();
+    let shown = part.map(|(column, character)| match column {
+        0 if is_cut_before => '…',
+        last if is_cut_after && last + 1 == width => '…',
+        _ => character,
+    });
+    (shown.collect(), at - start)
+}
+
 fn escaped(text: impl Display) -> String {
     printable(&text.to_string()).into_owned()
 }
@@ -166,6 +189,21 @@ mod tests {
             "  help: correct it\n",
         ];
         assert_eq!(printed(&report, usize::MAX), expected.join("\n"));
+    }
+
+    #[test]
+    fn an_excerpt_fits_the_terminal() {
+        for (at, expected) in [(0, ("012345678…", 0)), (9, ("…56789abc…", 5)), (19, ("…bcdefghij", 9))]
+        {
+            let (shown, column) = around("0123456789abcdefghij", at, 10);
+            assert_eq!((&*shown, column), expected);
+        }
+        assert_eq!(around("0123", 3, 4), ("0123".to_owned(), 3));
+        let error = MietteDiagnostic::new("no number").with_label(LabeledSpan::at(60..61, "here"));
+        let source = NamedSource::new("a.gltf", "1".repeat(60) + "x" + &"2".repeat(60));
+        let report = Report::new(error).with_source_code(source);
+        let expected = "   │ …1111111x222222…\n   ·         ╰── here\n";
+        assert!(printed(&report, 21).ends_with(expected), "{}", printed(&report, 21));
     }
 
     #[test]

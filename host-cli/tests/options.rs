@@ -56,6 +56,8 @@ fn options_without_effect_are_said_to_have_none() {
     let outcome = room.rendered("scene.gltf", &sky);
     let said = "--environment-rotation has no effect with an environment that is equal all around";
     assert!(outcome.stderr.contains(said), "{}", outcome.stderr);
+    let prepared = [&["prepare", "scene.gltf", "-o", "a.card"][..], &sky[2..]].concat();
+    assert!(room.run(&prepared).stderr.contains(said));
     let alone = room.render("scene.gltf", &["-o", "a.exr", "--environment-rotation=90"]);
     assert!(alone.status == Some(2) && alone.stderr.contains("--environment <"), "{}", alone.stderr);
     for option in ["--irradiance-cache=on", "--radiance=precomputed"] {

@@ -82,4 +82,11 @@ fn dazzling_light_of_a_card_alone_is_told() {
         );
         assert_eq!(statistics(&room)["dazzling_tiles"].as_u64().unwrap() > 0, is_told);
     }
+    // Parts do not state which cards have rendered them.
+    for number in ["1", "2"] {
+        let part = [&format!("--part={number}/2"), "-o", &format!("{number}.part"), "--quiet"];
+        room.rendered("scene.gltf", &[&part[..], &view[..6]].concat());
+    }
+    let merged = room.run(&["merge", "1.part", "2.part", "-o", "b.exr"]);
+    assert!(merged.status == Some(0) && merged.stderr.contains("far beyond"), "{}", merged.stderr);
 }

@@ -310,6 +310,13 @@ impl Film {
         self.missing
     }
 
+    /// Number of written pixels that are dazzling ([`SumFormat::is_dazzling`]).
+    pub fn dazzling_pixels(&self) -> usize {
+        let Window { x0, y0, x1, y1 } = self.window;
+        let places = (y0..y1).flat_map(|y| (x0..x1).map(move |x| (x, y)));
+        places.filter_map(|(x, y)| self.sums_at(x, y)).filter(|sums| self.format.is_dazzling(sums)).count()
+    }
+
     /// Returns whether every pixel of the crop window was written.
     pub fn is_complete(&self) -> bool {
         self.missing == 0

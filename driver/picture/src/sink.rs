@@ -5,11 +5,6 @@ use photoncard_shared::message::{PixelSums, Tile};
 
 use crate::sums::{FilmPixel, SumFormat};
 
-/// Logarithm of the light of a sample, 2^-40 radiance units, beyond which a pixel is dazzling.
-const DAZZLING_SAMPLE: u32 = 40 + 16;
-/// Light beyond which a pixel is dazzling whatever its number of samples: a fourth of the range of sums.
-const DAZZLING: i64 = 1 << 61;
-
 /// Tile with all its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FinishedTile {
@@ -61,12 +56,9 @@ impl FinishedTile {
         pixel_positions(&self.tile).zip(records.map(|record| PixelSums::read(record).unwrap_or_default()))
     }
 
-    /// Returns whether the light of a pixel is far beyond that of its scene: its samples have more than 2^16
-    /// radiance units in the mean, where the brightest surface has at most 2^7. A lamp without extent that
-    /// touches a surface makes such pixels, and they are rare.
+    /// Returns whether a pixel is dazzling ([`SumFormat::is_dazzling`]).
     pub fn is_dazzling(&self) -> bool {
-        let most = (i64::from(self.format.samples) << DAZZLING_SAMPLE).min(DAZZLING);
-        self.sums().any(|(_, sums)| sums.light.into_iter().any(|light| light > most))
+        self.sums().any(|(_, sums)| self.format.is_dazzling(&sums))
     }
 
     /// Column, row and values of each pixel.

@@ -5,6 +5,11 @@ use photoncard_shared::message::{
     FrameParameters, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, record_bytes,
 };
 
+/// Logarithm of the light of a sample, 2^-40 radiance units, beyond which a pixel is dazzling.
+const DAZZLING_SAMPLE: u32 = 40 + 16;
+/// Light beyond which a pixel is dazzling whatever its number of samples: a fourth of the range of sums.
+const DAZZLING: i64 = 1 << 61;
+
 /// Format of the sums of a tile or a film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SumFormat {
@@ -65,6 +70,14 @@ impl SumFormat {
             pixel: sums.pixel(self.count(), &self.scale),
             layers: sums.pixel_layers(self.count(), &self.scale).unwrap_or_default(),
         }
+    }
+
+    /// Returns whether the light of a pixel is far beyond that of its scene: its samples have more than 2^16
+    /// radiance units in the mean, where the brightest surface has at most 2^7. A lamp without extent that
+    /// touches a surface makes such pixels, and they are rare.
+    pub fn is_dazzling(&self, sums: &PixelSums) -> bool {
+        let most = (i64::from(self.samples) << DAZZLING_SAMPLE).min(DAZZLING);
+        sums.light.into_iter().any(|light| light > most)
     }
 
     /// Sums whose values are nearest to `pixel`.

@@ -191,9 +191,10 @@ impl Cards {
         };
         let dazzling = names.iter().cloned().enumerate();
         let dazzling = dazzling.map(|(card, name)| (name, scheduler.dazzling_of(card)));
+        let kept = ("an earlier render".to_owned(), scheduler.counts().kept_dazzling);
         let outcome = Outcome {
             counters: scheduler.counters(),
-            dazzling: dazzling.filter(|(_, tiles)| *tiles > 0).collect(),
+            dazzling: dazzling.chain([kept]).filter(|(_, tiles)| *tiles > 0).collect(),
             links,
             traffic: None,
             cards: count + self.lost,

@@ -86,7 +86,7 @@ pub(super) struct Outcome {
     /// Numbers of tiles that were rendered more than once or taken over.
     pub(super) tiles: TileCounts,
     /// Names of cards that alone have rendered dazzling tiles, which no other has verified, with their
-    /// number.
+    /// number. Tiles that were kept count for `an earlier render`.
     pub(super) dazzling: Vec<(String, usize)>,
     /// Error that has ended the work; the rest is what was done until then.
     pub(super) failure: Option<RenderError>,

@@ -43,9 +43,9 @@ pub struct Statistics {
     /// included in the other counts.
     pub repeated_tiles: usize,
     /// Number of tiles with light far beyond that of the scene's surfaces for which there was no second card
-    /// to verify them.
+    /// to verify them, and of such tiles that were kept.
     pub dazzling_tiles: usize,
-    /// Names of the cards that have rendered these.
+    /// Names of the cards that have rendered these; `an earlier render` for kept tiles.
     #[serde(skip)]
     pub dazzling_cards: Vec<String>,
     /// Number of tiles rendered again because their card was outvoted. The other counts include each once.

@@ -50,7 +50,8 @@ impl Environment {
     ///
     /// # Errors
     /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged,
-    /// or larger than [`MAX_SIDE`] texels a side or [`MAX_ENVIRONMENT_TEXELS`] in all.
+    /// has infinite channels and no finite one above 0, or is larger than [`MAX_SIDE`] texels a side or
+    /// [`MAX_ENVIRONMENT_TEXELS`] in all.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
         Self::load_with_notice(path).map(|(environment, _)| environment)
     }
@@ -79,7 +80,10 @@ impl Environment {
         let fault =
             |Fault { reason, remedy, .. }| SceneError::Environment { file: path.to_owned(), reason, remedy };
         let mut environment = read.map_err(fault)?;
-        let clamped = environment.clamp();
+        let clamped = environment.clamp().ok_or_else(|| {
+            let reason = "it has infinite texels, and no finite one that is bright says how bright they are";
+            fault(Fault::unreadable(reason, "write the picture with finite radiance"))
+        })?;
         let notice = (clamped > 0).then(|| {
             format!(
                 "{clamped} of {} texels of the environment are clamped: negative channels and NaN count as 0, infinite ones as the \
@@ -94,18 +98,22 @@ impl Environment {
         Self { width, height, texels, strength: 1.0 }
     }
 
-    /// Clamps channels that are no radiance. Returns the number of texels that have any.
-    fn clamp(&mut self) -> usize {
+    /// Clamps channels that are no radiance. Returns the number of texels that have any; `None` if channels
+    /// are infinite, and no finite one is above 0.
+    fn clamp(&mut self) -> Option<usize> {
         let is_bad = |texel: &&mut [f32; 3]| !texel.iter().all(|value| (0.0..=BRIGHTEST).contains(value));
         let finite = self.texels.iter().flatten().filter(|value| value.is_finite());
         let brightest = finite.fold(0.0_f32, |brightest, value| brightest.max(*value)).min(BRIGHTEST);
+        if brightest == 0.0 && self.texels.iter().flatten().any(|value| *value == f32::INFINITY) {
+            return None;
+        }
         let mut clamped = 0;
         for texel in self.texels.iter_mut().filter(is_bad) {
             clamped += 1;
             // The maximum of 0 and NaN is 0.
             *texel = texel.map(|value| value.max(0.0).min(brightest));
         }
-        clamped
+        Some(clamped)
     }
 
     /// The environment turned about +y, counter-clockwise seen from above. By fractions of a column texels
@@ -130,6 +138,12 @@ impl Environment {
             }
         }
         self
+    }
+
+    /// Returns whether each row has one radiance, so that turning changes nothing.
+    pub fn is_equal_around(&self) -> bool {
+        let rows = self.texels.chunks_exact((self.width as usize).max(1));
+        rows.into_iter().all(|row| row.iter().all(|texel| Some(texel) == row.first()))
     }
 
     /// Returns whether any texel emits light.

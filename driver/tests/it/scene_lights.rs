@@ -278,6 +278,11 @@ fn texels_that_are_no_radiance_are_clamped_and_counted() {
     let (sky, notice) = Environment::load_with_notice(&path).unwrap();
     assert_eq!(sky.texels, [&good[..], &[[0.0, 0.25, 3.0], [0.0, 1.0, 3.0], [1.0, 0.0, 0.0]]].concat());
     assert!(notice.is_some_and(|notice| notice.starts_with("3 of 5 texels")));
+    for dark in [f32::INFINITY, f32::NAN, -1.0, 0.0] {
+        exr(&path, &[[0.0, f32::INFINITY, dark]; 2]);
+        let error = Environment::load(&path).unwrap_err();
+        assert!(error.to_string().contains("infinite texels"), "{error}");
+    }
     exr(&path, &good);
     assert_eq!(Environment::load_with_notice(&path).unwrap().1, None);
     exr(&path, &[[1e30, 1.0, 0.0]]);
@@ -297,6 +302,9 @@ fn environments_are_turned_counter_clockwise_seen_from_above() {
     // The east, +x, which is three quarters to the right, comes to the middle, the north.
     assert_eq!(red(90.0), [1.0, 2.0, 3.0, 0.0, 5.0, 6.0, 7.0, 4.0]);
     assert_eq!((red(-270.0), red(450.0)), (red(90.0), red(90.0)));
+    let rows = vec![[1.0; 3], [1.0; 3], [2.0; 3], [2.0; 3]];
+    let even = Environment { width: 2, height: 2, texels: rows, strength: 1.0 };
+    assert_eq!([sky.is_equal_around(), even.is_equal_around()], [false, true]);
     assert_eq!(red(45.0), [0.5, 1.5, 2.5, 1.5, 4.5, 5.5, 6.5, 5.5]);
     assert_eq!(Environment::constant(Vec3::ONE).turned(33.0), Environment::constant(Vec3::ONE));
     let turn = |generator: &str| lit_by(generator).environment_turn();

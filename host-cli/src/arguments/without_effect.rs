@@ -35,12 +35,6 @@ impl RenderOptions {
                 "without a metallic-roughness material".to_owned(),
             ),
             (
-                self.scene.environment_rotation.is_some()
-                    && scene.environment.as_ref().is_some_and(|map| map.width < 2),
-                "--environment-rotation",
-                "with an environment that is equal all around".to_owned(),
-            ),
-            (
                 self.photons.radiance == Radiance::Precomputed && settings.integrator.gather_rays == 0,
                 "--radiance precomputed",
                 "with --gather-rays 0".to_owned(),

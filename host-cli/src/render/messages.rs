@@ -12,7 +12,7 @@ use photoncard_driver::scene::{Camera, Scene};
 use serde_json::Value;
 
 use crate::arguments::{OutputOptions, PictureOutput, RenderOptions};
-use crate::console::say;
+use crate::console::{counted, say};
 use crate::failure::Failure;
 use crate::notices::{self, Uses};
 use crate::progress::duration;
@@ -249,11 +249,6 @@ fn say_memory(memory: &MemoryStatistics, statistics: &Statistics) {
     let of_ray = each(memory.scene.dram_bytes, rays);
     say(format_args!("photoncard: {of_gather:.1} DRAM bytes of the photon map a gather, of {gathers}"));
     say(format_args!("photoncard: {of_ray:.1} DRAM bytes of the scene a ray, of {rays}"));
-}
-
-/// A number with its noun.
-fn counted(count: usize, noun: &str) -> String {
-    format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
 #[cfg(test)]

@@ -84,6 +84,8 @@ pub struct Scheduler {
 pub struct TileCounts {
     /// Tiles taken over from an earlier render, without those to be verified.
     pub kept: usize,
+    /// Dazzling tiles among these.
+    pub kept_dazzling: usize,
     /// Tiles on which two cards agree.
     pub verified: usize,
     /// Tiles rendered once more, for verification or by an idle card.
@@ -153,6 +155,7 @@ impl Scheduler {
                 entry.progress = Progress::Done(None);
                 self.done += 1;
                 self.counts.kept += 1;
+                self.counts.kept_dazzling += usize::from(tile.is_dazzling());
             }
         }
         let entries = &self.entries;

@@ -295,6 +295,12 @@ fn kept_tiles_are_verified_by_one_card() {
     film.write(0, 0, &photoncard_picture::film::PixelSums::default()).unwrap();
     film.write(1, 0, &photoncard_picture::film::PixelSums::default()).unwrap();
     assert!(scheduler(2, 1).with_kept(&film).is_complete());
+    assert_eq!(scheduler(2, 1).with_kept(&film).counts().kept_dazzling, 0);
+    let dazzling = PixelSums { light: [1 << 57, 0, 0], ..PixelSums::default() };
+    let mut bright = film.clone();
+    bright.write(1, 0, &dazzling).unwrap();
+    let counts = scheduler(2, 1).with_kept(&bright).counts();
+    assert_eq!((counts.kept, counts.kept_dazzling, bright.dazzling_pixels()), (2, 1, 1));
     for (values, end) in [([0, 0], None), ([1, 1], Some(SchedulerError::KeptDiffers { tile: tile(0) }))] {
         let mut scheduler = Scheduler::new(vec![tile(0)], 2).verifying(1.0, 0).with_kept(&film);
         let mut fault = None;

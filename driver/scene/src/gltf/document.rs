@@ -1,6 +1,5 @@
 //! A glTF file: the chunks of a GLB, the parsed JSON, and its validation.
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,12 +14,11 @@ use photoncard_picture::foreign;
 use photoncard_picture::printable::printable;
 use serde::Deserialize as _;
 
-use super::duplicates;
 use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use super::files::{Files, read_file};
+use super::json_scan;
 use super::other_kinds;
-use super::parse_cost;
-use super::schema::{self, UnknownPath};
+use super::schema::{self, Shortened, UnknownPath};
 use super::specular_glossiness::{self, Conversions};
 use crate::blender;
 use crate::error::{Excerpt, Location, SceneError};
@@ -43,8 +41,8 @@ pub(super) struct Document {
     blob: Option<Range<usize>>,
     /// Materials and images that were converted from another model.
     pub(super) conversions: Conversions,
-    /// Animations with channels that extensions define, which were removed.
-    pub(super) shortened: BTreeSet<usize>,
+    /// Animations with channels that move no node, which were removed.
+    pub(super) shortened: Shortened,
     /// Channels that were removed because nothing defines their path.
     pub(super) unknown_paths: Vec<UnknownPath>,
     /// Files in its folder that were read.
@@ -79,7 +77,7 @@ impl Document {
             let unknown = unknown_paths.iter().filter(|unknown| unknown.animation == index).count();
             (unknown < count).then_some(index)
         };
-        shortened.extend(removed.iter().filter_map(of_extensions));
+        shortened.by_extensions.extend(removed.iter().filter_map(of_extensions));
         let (path, conversions, files) = (path.to_owned(), Conversions::default(), Files::default());
         let mut document =
             Self { path, root, bytes, text, blob, conversions, shortened, unknown_paths, files };
@@ -290,28 +288,36 @@ fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<us
 }
 
 /// The parsed JSON, and the animations from which channels were removed.
-fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, BTreeSet<usize>), SceneError> {
+fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneError> {
     let not_gltf = |reason: &str| SceneError::NotGltf { file: path.to_owned(), reason: reason.to_owned() };
     let text = str::from_utf8(bytes).map_err(|_| not_gltf("it is neither a GLB nor UTF-8 text"))?;
     let text = without_padding(text);
     if text.trim().is_empty() {
         return Err(not_gltf("it is empty"));
     }
-    let bytes = parse_cost::estimate(text).ok_or_else(|| SceneError::Invalid {
-        location: Location::new(path, ""),
-        reason: format!(
-            "its {} bytes of JSON would take more than {} bytes of memory",
-            text.len(),
-            parse_cost::limit(text)
-        ),
-        remedy: "leave out what is empty: most of its nodes, materials, meshes or extras say nothing",
-    })?;
+    let json_scan::Scanned { bytes, repeated_key } =
+        json_scan::scan(text).ok_or_else(|| SceneError::Invalid {
+            location: Location::new(path, ""),
+            reason: format!(
+                "its {} bytes of JSON would take more than {} bytes of memory",
+                text.len(),
+                json_scan::limit(text)
+            ),
+            remedy: "leave out what is empty: most of its nodes, materials, meshes or extras say nothing",
+        })?;
     let check =
         |bytes| allocation::check(bytes).map_err(|error| SceneError::memory(path, "reading its JSON", error));
     check(bytes)?;
+    if let Some(item) = repeated_key {
+        return Err(SceneError::Invalid {
+            location: Location::new(path, item),
+            reason: "the key stands twice in its object, and readers take either of its values".to_owned(),
+            remedy: "leave one of the two out, or export the scene again: in glTF each key stands once",
+        });
+    }
     let strict = foreign::decode(|| Ok(serde_json::from_str(text)), || not_gltf(CONTRADICTION))?;
     match strict {
-        Ok(root) => Ok((root, BTreeSet::new())),
+        Ok(root) => Ok((root, Shortened::default())),
         Err(error) if error.is_data() => {
             // The document as values, and as the crate's types.
             check(bytes.saturating_mul(2))?;
@@ -322,15 +328,8 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, BTreeSet<usize>), Sce
 }
 
 /// [`parse`] of a text that is JSON and not in the form of the `gltf` crate.
-fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, BTreeSet<usize>), SceneError> {
+fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, Shortened), SceneError> {
     let mut document = serde_json::from_str(text).map_err(|error| json_error(path, text, &error))?;
-    if let Some(item) = duplicates::first(text) {
-        return Err(SceneError::Invalid {
-            location: Location::new(path, item),
-            reason: "the key stands twice in its object, and readers take either of its values".to_owned(),
-            remedy: "leave one of the two out, or export the scene again: in glTF each key stands once",
-        });
-    }
     if schema::is_of_version_1(&document) {
         return Err(other_kinds::version_1(path));
     }

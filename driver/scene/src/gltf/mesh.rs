@@ -27,6 +27,8 @@ pub(super) struct MeshPlacer<'a> {
     work: u64,
     /// Meshes with normals or colours that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
+    /// Meshes with vertices that make no whole triangle.
+    pub(super) incomplete: BTreeSet<usize>,
 }
 
 impl<'a> MeshPlacer<'a> {
@@ -37,6 +39,7 @@ impl<'a> MeshPlacer<'a> {
             placed: BTreeMap::new(),
             work: 0,
             not_finite: NotFinite::default(),
+            incomplete: BTreeSet::new(),
         }
     }
 
@@ -112,6 +115,9 @@ impl<'a> MeshPlacer<'a> {
             return Ok(Rc::clone(primitives));
         }
         let primitives = Rc::new(self.prepare(index, scene)?);
+        if primitives.iter().any(|primitive| primitive.has_incomplete) {
+            self.incomplete.insert(index);
+        }
         self.prepared.insert(index, Rc::clone(&primitives));
         Ok(primitives)
     }

@@ -55,6 +55,7 @@ pub(super) fn place(
     nodes.iter().for_each(|&(index, world)| placer.worlds[index] = Some(world));
     nodes.into_iter().try_for_each(|(index, world)| placer.place(index, world, scene, notices))?;
     notices.not_finite = placer.meshes.not_finite;
+    notices.incomplete = placer.meshes.incomplete;
     Ok(())
 }
 

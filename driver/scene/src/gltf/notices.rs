@@ -13,7 +13,7 @@ use super::inside::Framed;
 use super::material::has_dark_texture;
 use super::names::{mesh_name, node_name};
 use super::not_finite::NotFinite;
-use super::schema::UnknownPath;
+use super::schema::{Shortened, UnknownPath};
 use super::solid_glass::Resolved;
 use super::topology::{Topology, has_positions};
 use crate::{Concern, LightUnits, blender};
@@ -44,6 +44,8 @@ pub(super) struct Notices {
     pub(super) framed: Option<Framed>,
     /// Meshes with normals or colours that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
+    /// Meshes with vertices that make no whole triangle.
+    pub(super) incomplete: BTreeSet<usize>,
 }
 
 /// Formats `kind 'a', 'b' and 3 more`.
@@ -140,6 +142,8 @@ impl Notices {
         let meshes_of = |indices: &BTreeSet<usize>| -> Vec<String> {
             indices.iter().map(|&index| mesh_name(root, index)).collect()
         };
+        let incomplete = "the last vertices of primitives are ignored, which make no whole triangle";
+        note(incomplete, "mesh", &meshes_of(&self.incomplete));
         let NotFinite { normals, colours, tangents } = &self.not_finite;
         note(
             "normals that are not finite are ignored, the triangles' own count",
@@ -163,16 +167,24 @@ impl Notices {
     /// Sentences that do not concern every picture, and those on extensions.
     fn of_some_pictures(&self, document: &Document) -> Vec<(Option<Concern>, String)> {
         let root = &document.root;
-        let shortened = document.shortened.iter();
-        let shortened: Vec<_> =
-            shortened.map(|&index| animation::name(index, &root.animations[index])).collect();
+        let Shortened { by_extensions, without_target } = &document.shortened;
+        let [by_extensions, without_target] = [by_extensions, without_target].map(|animations| {
+            let name = |&index: &usize| animation::name(index, &root.animations[index]);
+            Vec::from_iter(animations.iter().map(name))
+        });
         let mut sentences = Vec::new();
         for (concern, sentence, kind, names) in [
             (
                 Concern::Animations,
                 "channels of animations that extensions define are ignored",
                 "animation",
-                &shortened,
+                &by_extensions,
+            ),
+            (
+                Concern::Animations,
+                "channels of animations whose target is no node are ignored",
+                "animation",
+                &without_target,
             ),
             (Concern::OtherCameras, "orthographic cameras are not rendered", "camera", &self.orthographic),
         ] {

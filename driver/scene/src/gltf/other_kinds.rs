@@ -15,8 +15,8 @@ type Signs = (&'static [&'static [u8]], &'static [&'static str]);
 
 /// Kinds of other files, by their signs.
 const KINDS: [(Signs, Kind); 15] = [
-    ((&[b"photoncard partial render "], &["partial"]), Kind::Partial),
-    ((&[b"photoncard part "], &["part"]), Kind::Part),
+    ((&[b"photoncard partial render "], &[]), Kind::Partial),
+    ((&[b"photoncard part "], &[]), Kind::Part),
     ((&[b"BLENDER"], &["blend", "blend1"]), Kind::Blender),
     ((&[b"Kaydara FBX Binary", b"; FBX"], &["fbx"]), Kind::Imported("an FBX file", "import_scene.fbx")),
     (
@@ -108,7 +108,9 @@ pub(super) fn refused_file(path: &Path, bytes: &[u8]) -> Option<SceneError> {
         }
         Kind::ByHand(what) => (*what, BY_HAND.to_owned()),
         Kind::Partial => {
-            let picture = path.with_extension("").to_string_lossy().into_owned();
+            let is_beside_picture = ending.as_deref() == Some("partial");
+            let picture = if is_beside_picture { path.with_extension("") } else { PathBuf::from("OUT.exr") };
+            let picture = picture.to_string_lossy();
             let remedy = format!(
                 "give the scene of that render, which goes on from them: photoncard render SCENE.glb -o {} --resume",
                 shell_word(&picture)

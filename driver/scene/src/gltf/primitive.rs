@@ -74,6 +74,8 @@ pub(super) struct Primitive<'a> {
     pub(super) index: usize,
     /// Number of triangles.
     pub(super) triangles: u64,
+    /// True if its last vertices make no whole triangle.
+    pub(super) has_incomplete: bool,
     topology: Topology,
     pub(super) positions: Elements<'a>,
     pub(super) indices: Option<Elements<'a>>,
@@ -183,10 +185,7 @@ impl<'a> Primitive<'a> {
         }
         let indices = attributes.indices()?;
         let count = indices.as_ref().map_or(positions.count, |indices| indices.count);
-        let triangles = topology.triangles(count).ok_or_else(|| {
-            let reason = format!("{count} vertices do not make whole triangles");
-            document.invalid(&item, reason, "export the mesh again, triangulated")
-        })?;
+        let (triangles, has_incomplete) = topology.triangles(count);
         let normals = of_count(Semantic::Normals, &normals(is_quantized))?;
         // Without normals tangents are ignored (glTF 2.0, 3.7.2.1).
         let tangents = match tangent_set {
@@ -196,6 +195,7 @@ impl<'a> Primitive<'a> {
         Ok(Self {
             index,
             triangles,
+            has_incomplete,
             topology,
             normals,
             tangents,

@@ -41,20 +41,36 @@ pub(super) fn is_of_version_1(document: &Value) -> bool {
     ["accessors", "meshes", "nodes", "scenes"].iter().any(|list| document[list].is_object())
 }
 
+/// Animations from which channels were removed that move no node.
+#[derive(Default)]
+pub(super) struct Shortened {
+    /// Animations with channels whose target an extension defines.
+    pub(super) by_extensions: BTreeSet<usize>,
+    /// Animations with channels whose target nothing defines.
+    pub(super) without_target: BTreeSet<usize>,
+}
+
 /// Brings a document into the crate's form. Returns the animations from which channels were removed.
-pub(super) fn amend(document: &mut Value) -> BTreeSet<usize> {
+pub(super) fn amend(document: &mut Value) -> Shortened {
     simplify(document);
-    let Some(root) = document.as_object_mut() else { return BTreeSet::new() };
+    let mut shortened = Shortened::default();
+    let Some(root) = document.as_object_mut() else { return shortened };
     for scene in list(root, "scenes").filter_map(Value::as_object_mut) {
         scene.entry("nodes").or_insert_with(|| json!([]));
     }
-    let mut shortened = BTreeSet::new();
     for (index, animation) in list(root, "animations").enumerate() {
         let channels = animation.get_mut("channels").and_then(Value::as_array_mut);
-        let Some(channels) = channels else { continue };
-        let count = channels.len();
-        channels.retain(|channel| !is_of_extension(channel));
-        shortened.extend((channels.len() < count).then_some(index));
+        channels.into_iter().for_each(|channels| {
+            channels.retain(|channel| {
+                let Some(target) = target_without_node(channel) else { return true };
+                let of_this_kind = match target.get("extensions") {
+                    Some(Value::Object(_)) => &mut shortened.by_extensions,
+                    _ => &mut shortened.without_target,
+                };
+                of_this_kind.insert(index);
+                false
+            });
+        });
     }
     shortened
 }
@@ -124,9 +140,9 @@ fn list<'a>(root: &'a mut Map<String, Value>, name: &str) -> impl Iterator<Item 
     root.get_mut(name).and_then(Value::as_array_mut).into_iter().flatten()
 }
 
-/// Returns whether the target of an animation's channel is no node.
-fn is_of_extension(channel: &Value) -> bool {
-    channel.get("target").and_then(Value::as_object).is_some_and(|target| !target.contains_key("node"))
+/// Target of an animation's channel, if it is no node.
+fn target_without_node(channel: &Value) -> Option<&Map<String, Value>> {
+    channel.get("target").and_then(Value::as_object).filter(|target| !target.contains_key("node"))
 }
 
 /// Removes members that are `null`, and writes whole numbers as integers, except in `extras`.

@@ -28,12 +28,11 @@ impl Topology {
         Self::of(primitive).filter(|_| has_positions(primitive))
     }
 
-    /// Number of triangles of `vertices` vertices; `None` if some are left over.
-    pub(super) fn triangles(self, vertices: u64) -> Option<u64> {
+    /// Number of whole triangles of `vertices` vertices, and whether vertices are left over.
+    pub(super) fn triangles(self, vertices: u64) -> (u64, bool) {
         match self {
-            Self::List => vertices.is_multiple_of(3).then_some(vertices / 3),
-            Self::Strip | Self::Fan if vertices == 0 => Some(0),
-            Self::Strip | Self::Fan => vertices.checked_sub(2).filter(|triangles| *triangles > 0),
+            Self::List => (vertices / 3, !vertices.is_multiple_of(3)),
+            Self::Strip | Self::Fan => (vertices.saturating_sub(2), matches!(vertices, 1 | 2)),
         }
     }
 
@@ -68,8 +67,8 @@ mod tests {
     #[test]
     fn vertices_make_whole_triangles() {
         let counts = |topology: Topology| [0, 1, 2, 3, 4].map(|count| topology.triangles(count));
-        assert_eq!(counts(Topology::List), [Some(0), None, None, Some(1), None]);
-        assert_eq!(counts(Topology::Strip), [Some(0), None, None, Some(1), Some(2)]);
+        assert_eq!(counts(Topology::List), [(0, false), (0, true), (0, true), (1, false), (1, true)]);
+        assert_eq!(counts(Topology::Strip), [(0, false), (0, true), (0, true), (1, false), (2, false)]);
         assert_eq!(counts(Topology::Fan), counts(Topology::Strip));
     }
 }

@@ -46,7 +46,8 @@ fn linear(code: u16) -> f32 {
     linear as f32
 }
 
-/// Red and green of a normal once it has unit length. One that is not on the front lies in the surface.
+/// Red and green of a normal once it has unit length. A normal with z < 0 is moved into the surface (z = 0),
+/// as z is not stored; images of 8 bits a channel keep it.
 fn normal(codes: [u16; 3]) -> [u8; 4] {
     const HALF: f64 = u16::MAX as f64 / 2.0;
     let [x, y, z] = codes.map(|code| f64::from(code) - HALF);

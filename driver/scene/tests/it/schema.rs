@@ -93,6 +93,17 @@ fn channels_of_extensions_are_left_out_and_the_others_stay() {
     let said = mistaken.notices.join("; ");
     let parts = ["none of glTF 2.0", "'rotaton' of node 'lid' (animations[0].channels[1])", "'animation 0'"];
     assert!(mistaken.notices.len() == 2 && parts.iter().all(|part| said.contains(part)), "{said}");
+    // So is a target that is no node and of no extension.
+    let aimless = loaded(|json| {
+        let channel = json!({"sampler": 0, "target": {"path": "translation"}});
+        let samplers = json!([{"input": 0, "output": 0}]);
+        json["animations"] = json!([{"name": "lost", "channels": [channel], "samplers": samplers}]);
+    });
+    let said = aimless.notices.join("; ");
+    assert!(
+        aimless.notices.len() == 1 && said.contains("is no node are ignored: animation 'lost'"),
+        "{said}"
+    );
     let required = load_changed(|json| json["extensionsRequired"] = json!(["KHR_animation_pointer"]));
     assert!(matches!(required, Err(SceneError::RequiredExtension { .. })));
 }
@@ -125,6 +136,14 @@ fn json_that_violates_the_schema_is_named_by_its_place() {
             r#"{"asset": {"version": "2.0"}, "scene": 0.0, "nodes": [{"mesh": 0, "mesh": 1}]}"#,
             "nodes[0].mesh",
         ),
+        (
+            r#"{"asset": {"version": "2.0"}, "meshes": [{"primitives": [{"attributes": {"A": 0, "A": 1}}]}]}"#,
+            "meshes[0].primitives[0].attributes.A",
+        ),
+        (
+            r#"{"asset": {"version": "2.0"}, "materials": [{"extensions": {"E": {}, "E": {"a": 1}}}]}"#,
+            "materials[0].extensions.E",
+        ),
     ] {
         match load_bytes("scene.gltf", text.as_bytes()) {
             Err(SceneError::Invalid { location, reason, .. }) => {
@@ -153,7 +172,7 @@ fn files_of_other_kinds_are_recognised_with_a_command() {
     refused("a.card", b"\x89CARD", &["prepared", "--prepared"]);
     refused("a.glb", b"photoncard prepared scene 9\n{}", &["prepared", "--prepared", "/a.glb"]);
     refused("a.bin", b"photoncard part 2\n{}\n", &["part of a picture", "photoncard merge", "/a.bin"]);
-    refused("a.part", b"", &["part of a picture", "/a.exr"]);
+    refused("a.data", b"photoncard partial render 5\n{}\n", &["finished tiles", " OUT.exr --resume"]);
     refused("a.exr.partial", b"photoncard partial render 5\n{}\n", &["finished tiles", "/a.exr --resume"]);
     refused(
         "a.gltf",

@@ -302,7 +302,7 @@ fn quantised_attributes_mean_what_their_type_says() {
 #[test]
 fn attributes_that_do_not_fit_are_refused() {
     type Change = fn(&mut Extended);
-    let cases: [(&str, Change); 4] = [
+    let cases: [(&str, Change); 3] = [
         ("attributes.NORMAL: there are 2", |scene| {
             let accessor = scene.floats("VEC3", &[[0.0, 0.0, 1.0]; 2]);
             scene.primitive()["attributes"]["NORMAL"] = json!(accessor);
@@ -310,10 +310,6 @@ fn attributes_that_do_not_fit_are_refused() {
         ("attributes.COLOR_0", |scene| {
             let accessor = scene.floats("VEC2", &[[0.0; 2]; 3]);
             scene.primitive()["attributes"]["COLOR_0"] = json!(accessor);
-        }),
-        ("whole triangles", |scene| {
-            let accessor = scene.floats("VEC3", &[[0.0; 3], [1.0; 3]]);
-            *scene.primitive() = json!({"attributes": {"POSITION": accessor}, "mode": 5});
         }),
         ("EXT_mesh_gpu_instancing", |scene| {
             let (one, two) = (scene.floats("VEC3", &[[0.0; 3]]), scene.floats("VEC3", &[[1.0; 3]; 2]));
@@ -327,6 +323,23 @@ fn attributes_that_do_not_fit_are_refused() {
         let error = scene.load().unwrap_err();
         assert!(error.to_string().contains(part), "{part}: {error}");
         assert!(error.help().is_some());
+    }
+}
+
+#[test]
+fn vertices_that_make_no_whole_triangle_are_ignored() {
+    let corners = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [2.0; 3], [3.0; 3]];
+    for (mode, count, triangles) in
+        [(4, 5, Some(1)), (4, 3, Some(1)), (5, 4, Some(2)), (4, 2, None), (6, 2, None)]
+    {
+        let mut scene = Extended::new();
+        let accessor = scene.floats("VEC3", &corners[..count]);
+        *scene.primitive() = json!({"attributes": {"POSITION": accessor}, "mode": mode});
+        let loaded = scene.load();
+        let found = loaded.as_ref().ok().map(|scene| scene.triangles.len());
+        assert_eq!(found, triangles, "{mode}, {count}");
+        let is_told = loaded.is_ok_and(|scene| scene.notices.concat().contains("no whole triangle"));
+        assert_eq!(is_told, (mode, count) == (4, 5), "{mode}, {count}");
     }
 }
 
