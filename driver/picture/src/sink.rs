@@ -5,16 +5,19 @@ use photoncard_shared::message::{PixelSums, Tile};
 
 use crate::sums::{FilmPixel, SumFormat};
 
-/// Logarithm of the light of a sample, 2^-40 radiance units, beyond which a pixel is dazzling.
+/// Binary logarithm of the light per sample, in units of 2^-40 radiance units, above which a pixel is
+/// dazzling.
 const DAZZLING_SAMPLE: u32 = 40 + 16;
-/// Light beyond which a pixel is dazzling whatever its number of samples: a fourth of the range of sums.
+/// Sum of light above which a pixel is dazzling whatever its number of samples: a fourth of the range of
+/// sums.
 const DAZZLING: i64 = 1 << 61;
 
-/// Tile with all its pixels.
+/// A tile with all its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FinishedTile {
     tile: Tile,
-    /// [`PixelSums`] in the format of the wire, row by row: equal bytes are equal pixels, bit for bit.
+    /// Encoded [`PixelSums`] in the wire format, row by row. Equal bytes are pixels that are equal bit for
+    /// bit.
     records: Vec<u8>,
     format: SumFormat,
     /// Work counters of the chip.
@@ -22,14 +25,14 @@ pub struct FinishedTile {
 }
 
 impl FinishedTile {
-    /// Tile from encoded sums; `None` unless there are those of each pixel.
+    /// Creates a tile from encoded sums; `None` unless there is one for each pixel.
     pub fn new(tile: Tile, records: Vec<u8>, format: SumFormat, counters: Counters) -> Option<Self> {
         let bytes = tile.pixels().checked_mul(format.record_bytes() as u64)?;
         (records.len() as u64 == bytes).then_some(Self { tile, records, format, counters })
     }
 
-    /// Tile from the sums of its pixels, row by row, with zero counters; `None` unless there are those of
-    /// each pixel.
+    /// Creates a tile from the sums of its pixels, row by row, with zero counters; `None` unless there is one
+    /// for each pixel.
     pub fn of_pixels(
         tile: Tile,
         pixels: impl IntoIterator<Item = PixelSums>,
@@ -61,9 +64,9 @@ impl FinishedTile {
         pixel_positions(&self.tile).zip(records.map(|record| PixelSums::read(record).unwrap_or_default()))
     }
 
-    /// Returns whether the light of a pixel is far beyond that of its scene: its samples have more than 2^16
-    /// radiance units in the mean, where the brightest surface has at most 2^7. A lamp without extent that
-    /// touches a surface makes such pixels, and they are rare.
+    /// Returns whether the light of a pixel is far above that of its scene: its samples have more than 2^16
+    /// radiance units on average, whereas the brightest surface has at most 2^7. Such pixels are rare. They
+    /// occur where a lamp without an area touches a surface.
     pub fn is_dazzling(&self) -> bool {
         let most = (i64::from(self.format.samples) << DAZZLING_SAMPLE).min(DAZZLING);
         self.sums().any(|(_, sums)| sums.light.into_iter().any(|light| light > most))
@@ -87,7 +90,7 @@ pub trait TileSink: Sync {
     /// Stores a finished tile.
     fn put(&self, tile: &FinishedTile);
 
-    /// Revokes a stored tile, whose card sent wrong pixels. The tile is stored again once another card has
+    /// Revokes a stored tile whose card sent wrong pixels. The tile is stored again after another card has
     /// rendered it, unless the render ends before.
     fn revoke(&self, tile: &Tile);
 }
