@@ -1,10 +1,10 @@
-//! Hands the linker the memory map of the board whose image is built; without a board's feature it does
-//! nothing.
+//! Passes the memory map of a board to the linker when that board's image is built. Without a board's feature
+//! it does nothing.
 
 use std::env;
 use std::path::{Path, PathBuf};
 
-/// A board: the feature that chooses it, its image, its directory under `boards`, the processor it has.
+/// A board: the feature that selects it, its image, its directory under `boards`, and its processor.
 struct Board {
     feature: &'static str,
     image: &'static str,

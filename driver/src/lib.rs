@@ -4,7 +4,7 @@
 //! photoncard is photon mapping (Jensen 2001) on *rendering chips*: small processors with a fixed amount of
 //! on-chip memory, a private DRAM and one link to a host. A chip runs `photoncard_firmware`. This crate is
 //! what runs on the host: it loads a scene, traces photons, packs scene and photon map into a *card image*,
-//! sends the image to each card, deals tiles to the cards and assembles the picture. The picture is equal,
+//! sends the image to each card, assigns tiles to the cards and assembles the picture. The picture is equal,
 //! bit for bit, for any number and kind of cards.
 //!
 //! # First steps
@@ -23,7 +23,7 @@
 //! let scene = gltf::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf")))?;
 //! let settings = Quality::Good.settings().with(|settings| {
 //!     (settings.picture.width, settings.picture.height) = (16, 16);
-//!     // Less than the quality's half a million: an example is to take no time.
+//!     // Fewer than the quality's half a million, so that the example is fast.
 //!     settings.photons.count = 5_000;
 //! });
 //! let rendering = render(&scene, &settings, &Unobserved)?;
@@ -40,19 +40,20 @@
 //! ```
 //!
 //! [`RenderSettings`](render::RenderSettings) has the options of `photoncard render` in groups.
-//! [`Quality::settings`](quality::Quality::settings) has cache and filter of a `--quality`, with the fewest
-//! samples and middle numbers of rays and photons, which [`Quality::fit`](quality::Quality::fit) chooses for
-//! a scene, within [`render_chosen`](render::render_chosen). `RenderSettings::default()` is
-//! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All are for one emulated
-//! reference chip. [`Rendering`](render::Rendering) holds the [`Film`](film::Film) and the
+//! [`Quality::settings`](quality::Quality::settings) returns the settings of a `--quality` for an unknown
+//! scene, with the fewest samples and medium numbers of rays and photons.
+//! [`Quality::fit`](quality::Quality::fit) chooses these numbers for a scene;
+//! [`render_chosen`](render::render_chosen) lets it do so during a render. `RenderSettings::default()` is
+//! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All of them are for one
+//! emulated reference chip. [`Rendering`](render::Rendering) holds the [`Film`](film::Film) and the
 //! [`Statistics`](render::Statistics). A [`Renderer`](render::Renderer) renders further pictures on cards
-//! that stay open. A tone-mapped PNG is written by [`tone_mapping::write_png`], and two pictures are compared
-//! by [`difference`].
+//! that stay open. [`tone_mapping::write_png`] writes a tone-mapped PNG; [`difference`] compares two
+//! pictures.
 //!
 //! # Cards
 //!
-//! [`CardAddress`](render::CardAddress) names cards as `--card` does. Emulated and remote cards may be mixed
-//! in one render:
+//! [`CardAddress`](render::CardAddress) names cards as `--card` does. One render can use both emulated and
+//! remote cards:
 //!
 //! ```
 //! use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
@@ -97,24 +98,24 @@
 //! assert!(progress.is_stopped());
 //! ```
 //!
-//! # Rooms
+//! # Crates
 //!
-//! Six crates, whose modules this one re-exports. Each imports those of rows above it, but
-//! `photoncard_cards`, which takes `photoncard_picture` alone.
+//! This crate re-exports the modules of six crates. Each of them imports crates in rows above it;
+//! `photoncard_cards` imports only `photoncard_picture`.
 //!
 //! | crate | modules | contents |
 //! |---|---|---|
-//! | [`photoncard_picture`] | [`film`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`], [`tone_mapping`], [`difference`], [`output`], [`printable`], [`choice`] | pixels of a picture and what takes them; its files; names of enumerations |
-//! | [`photoncard_scene`] | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; what can be wrong with one |
+//! | [`photoncard_picture`] | [`film`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`], [`tone_mapping`], [`difference`], [`output`], [`printable`], [`choice`] | pixels of a picture and their destinations; its files; names of enumerations |
+//! | [`photoncard_scene`] | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; its errors |
 //! | [`photoncard_map`] | [`bvh`], [`pack`], [`photon`], [`photon_map`] | bounding volume hierarchy, light tree, photon pass and photon map: the sections of the card image |
-//! | [`photoncard_cards`] | [`link`], [`session`], [`scheduler`], [`dispatcher`] | ports of bytes; the host's end of the protocol, without I/O; which card renders which tile |
-//! | [`photoncard_render`] | [`render`], [`emulator`], [`quality`], [`partial`], [`parts`], [`display`], [`cost_model`] | one render from a scene to a complete film; chips on threads of this process; settings by pilot renders; the file of finished tiles; parts and their merge; the client of a display server; FLOPs and DRAM bytes by Table 7.1 |
+//! | [`photoncard_cards`] | [`link`], [`session`], [`scheduler`], [`dispatcher`] | ports of bytes; the host's end of the protocol, without I/O; assignment of tiles to cards |
+//! | [`photoncard_render`] | [`render`], [`emulator`], [`quality`], [`partial`], [`parts`], [`display`], [`cost_model`] | a render from a scene to a complete film; emulated chips on threads of this process; settings from pilot renders; the file of finished tiles; parts of a picture and their merge; the client of a display server; FLOPs and DRAM bytes by Table 7.1 |
 //! | [`photoncard_study`] | [`study`] | measurements of shipped scenes, and reports |
 //!
-//! Below all of them are `photoncard_shared` (formats of memory and wire) and `photoncard_firmware`, with
-//! which the map traces photons: photons, chords and irradiance points are computed by the chip's own code.
+//! Below all of them are `photoncard_shared` (formats of memory and wire) and `photoncard_firmware`, whose
+//! code `photoncard_map` uses to compute photons, disc fractions and irradiance points.
 //!
-//! # Way of the data
+//! # Data flow
 //!
 //! ```text
 //! scene::gltf -> Scene -> pack -> photon -> photon_map (with density) -> CardImage

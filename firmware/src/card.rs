@@ -1,9 +1,10 @@
-//! A card: commands in, replies out. A state machine without I/O, fed with bytes and giving bytes.
+//! A card executes commands and sends replies. It is a state machine without I/O that consumes and produces
+//! bytes.
 //!
-//! Its runner ([`crate::serve`], or a simulator) calls [`Card::feed`] with received bytes, sends the bytes of
+//! Its caller ([`crate::serve`], or a simulator) calls [`Card::feed`] with received bytes, sends the bytes of
 //! [`Card::outgoing`], calls [`Card::work`] while [`Card::is_busy`] (and may at any time), and
 //! [`Card::acknowledge`] when the line is quiet. A call takes at most the time of some rays or gathers, or of
-//! the checksum of a few lines; none blocks, and no input makes one panic.
+//! the checksum of a few lines. No call blocks or panics, whatever the input.
 
 mod engine;
 mod frame;
@@ -19,7 +20,7 @@ use crate::chip::Chip;
 use crate::kind::{ChipKind, Micro, Reference, cache_bytes};
 use crate::memory::{CardMemory, Dram};
 
-/// A card of one chip: its memory, its chip and both directions of its link.
+/// A card with one chip: its memory, the chip, and both directions of its link.
 pub struct Card<K: ChipKind, M> {
     memory: M,
     transport: Transport,
@@ -27,38 +28,39 @@ pub struct Card<K: ChipKind, M> {
 }
 
 impl<K: ChipKind, M: CardMemory> Card<K, M> {
-    /// A card that has seen no host yet.
+    /// Creates a card that has had no session.
     pub const fn new(memory: M) -> Self {
         const { check::<K>() };
         Self { memory, transport: Transport::card(), engine: Engine::new() }
     }
 
-    /// The card's memory, with its counters if it counts.
+    /// Memory of the card, including its counters if it counts.
     pub fn memory(&mut self) -> &mut M {
         &mut self.memory
     }
 
-    /// Sets the measurement of on-chip memory that the hello reports; without one it reports none.
+    /// Sets the function that measures on-chip memory. [`Reply::Hello`] reports its result; without a
+    /// function it reports none.
     pub fn measure_memory_by(&mut self, measure: fn() -> MemoryUse) {
         self.engine.measure = Some(measure);
     }
 
-    /// True while there is work to do without a byte from the host.
+    /// Returns true while there is work that needs no further byte from the host.
     pub fn is_busy(&self) -> bool {
         self.engine.has_work() && self.transport.can_send()
     }
 
-    /// The bytes to be sent now.
+    /// Bytes to be sent now.
     pub fn outgoing(&mut self) -> &[u8] {
         self.transport.outgoing()
     }
 
-    /// Removes the first `bytes` of [`Self::outgoing`], which are sent.
+    /// Removes the first `bytes` bytes of [`Self::outgoing`] after they were sent.
     pub fn sent(&mut self, bytes: usize) {
         self.transport.sent(bytes);
     }
 
-    /// Takes bytes from the host, and carries out complete commands; long work is left to [`Self::work`].
+    /// Consumes bytes from the host and executes complete commands. Long work is left to [`Self::work`].
     pub fn feed(&mut self, bytes: &[u8]) {
         let mut rest = bytes;
         while !rest.is_empty() {
@@ -68,7 +70,7 @@ impl<K: ChipKind, M: CardMemory> Card<K, M> {
         }
     }
 
-    /// Carries out the received commands while there is room for a reply to each.
+    /// Executes the received commands as long as there is room for a reply to each.
     fn execute(&mut self) {
         let Self { memory, transport, engine } = self;
         while transport.can_send() {
@@ -85,7 +87,7 @@ impl<K: ChipKind, M: CardMemory> Card<K, M> {
         }
     }
 
-    /// Acknowledges received frames: to be called before a wait, when the line is quiet.
+    /// Acknowledges received frames. To be called when the line is quiet, before a wait.
     pub fn acknowledge(&mut self) {
         self.transport.acknowledge();
     }
@@ -101,17 +103,17 @@ impl<K: ChipKind, M: CardMemory> Card<K, M> {
     }
 }
 
-/// The card of the reference chip.
+/// Card with a reference chip.
 pub type ReferenceCard<M> = Card<Reference, M>;
-/// The card of the micro chip.
+/// Card with a micro chip.
 pub type MicroCard<M> = Card<Micro, M>;
 
-/// On-chip memory of a card, bytes: its buffers, and the budget's caches and stack.
+/// On-chip memory of a card, bytes: its buffers, and caches and stack of the budget.
 pub const fn sram_bytes<K: ChipKind>() -> usize {
     size_of::<Card<K, Dram<'static>>>() + cache_bytes(&K::BUDGET) + K::BUDGET.stack_bytes as usize
 }
 
-/// Compile-time check that a card of a kind fits its budget.
+/// Checks at compile time that a card of a kind fits its budget.
 const fn check<K: ChipKind>() {
     assert!(
         sram_bytes::<K>() <= K::BUDGET.sram_bytes as usize,

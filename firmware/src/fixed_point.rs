@@ -1,34 +1,35 @@
-//! Sums in fixed point, whose bits do not depend on the order of the terms.
+//! Fixed-point sums, whose bits do not depend on the order of the terms.
 //!
-//! A term is rounded once to 2^-40 of a unit, a power of two near the largest term that the host chooses for
-//! each scene, and added as an integer: unlike floating-point addition, integer addition is associative.
+//! A term is rounded once to 2^-40 of a unit and added as an integer. Integer addition is associative, unlike
+//! floating-point addition. The unit is a power of two near the largest term, chosen by the host for each
+//! scene.
 
 use fixed::types::I24F40;
 use glam::Vec3;
 use photoncard_shared::layout::Rgbe;
 
-/// 2^40: exact in `f32`, and so are products with it.
+/// Scale 2^40. The number is exact in `f32`, and so are products with it.
 const SCALE: f32 = (1_u64 << 40) as f32;
 
-/// Fixed-point sum of numbers, exact but for the rounding of each term.
+/// Fixed-point sum of numbers, exact except for the rounding of each term.
 ///
 /// Its range is -2^23 to 2^23 units; [`Self::add`] wraps beyond.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sum(I24F40);
 
 impl Sum {
-    /// The empty sum.
+    /// Sum without terms.
     pub const ZERO: Self = Self(I24F40::ZERO);
 
-    /// Adds a term, in units, rounded towards zero to a multiple of 2^-40; NaN counts as 0, and terms out of
+    /// Adds a term, in units, rounded towards zero to a multiple of 2^-40. NaN counts as 0; terms out of
     /// range are clamped.
     #[inline(always)]
     pub fn add(&mut self, term: f32) {
         self.add_bits((term * SCALE) as i64);
     }
 
-    /// Adds a non-negative term, in units, with saturation. The order does not matter here either: a sum that
-    /// only grows saturates in every order or in none.
+    /// Adds a non-negative term, in units, and saturates. The order does not matter, because a sum that only
+    /// grows saturates in every order or in none.
     #[inline(always)]
     fn add_up_to_greatest(&mut self, term: f32) {
         let bits = ((term * SCALE) as i64).max(0);
@@ -47,15 +48,15 @@ impl Sum {
     }
 }
 
-/// Fixed-point sum of colours, exact but for the rounding of each term.
+/// Fixed-point sum of colours, exact except for the rounding of each term.
 ///
-/// Each component is a [`Sum`]: k photons of one power unit each, times a reflectance of at most a few
-/// thousand, stay far below its limit.
+/// Each component is a [`Sum`]. The sum of k photons of one power unit each, times a reflectance of at most a
+/// few thousand, is far below its limit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ColourSum([Sum; 3]);
 
 impl ColourSum {
-    /// The empty sum.
+    /// Sum without terms.
     pub const ZERO: Self = Self([Sum::ZERO; 3]);
 
     /// Adds a colour, in units ([`Sum::add`]).
@@ -74,7 +75,7 @@ impl ColourSum {
         }
     }
 
-    /// Adds a sum of light, saturating at 2^23 units: the result is the sum of all terms of both.
+    /// Adds a sum of light, and saturates at 2^23 units. The result equals the sum of all terms of both.
     #[inline(always)]
     pub fn add_sum(&mut self, light: &Self) {
         for (sum, more) in self.0.iter_mut().zip(light.0) {
@@ -82,13 +83,14 @@ impl ColourSum {
         }
     }
 
-    /// Adds an [`Rgbe`] colour in integer arithmetic, with the bits of [`Self::add`] of the decoded colour.
+    /// Adds an [`Rgbe`] colour in integer arithmetic. The result has the same bits as [`Self::add`] of the
+    /// decoded colour.
     #[inline(always)]
     pub fn add_rgbe(&mut self, power: Rgbe) {
         self.add_powers(&[u32::from_le_bytes(power.0).into()]);
     }
 
-    /// Adds the [`Rgbe`] colours in the low four bytes of photons' contents.
+    /// Adds the [`Rgbe`] colours in the low four bytes of photon contents.
     #[inline(always)]
     pub(crate) fn add_powers(&mut self, photons: &[u64]) {
         let mut sums = [0_u64; 3];
@@ -104,7 +106,7 @@ impl ColourSum {
         }
     }
 
-    /// Subtracts a colour that [`Self::add_powers`] added.
+    /// Subtracts a colour that was added by [`Self::add_powers`].
     #[inline(always)]
     pub(crate) fn subtract_power(&mut self, photon: u64) {
         for (sum, bits) in self.0.iter_mut().zip(bits_of_power(photon)) {
@@ -112,7 +114,7 @@ impl ColourSum {
         }
     }
 
-    /// The sum of each channel, 2^-40 units.
+    /// Sum of each channel, in units of 2^-40.
     #[inline(always)]
     pub fn bits(&self) -> [i64; 3] {
         self.0.map(|Sum(sum)| sum.to_bits())
@@ -125,7 +127,7 @@ impl ColourSum {
     }
 }
 
-/// Fixed-point components of the [`Rgbe`] colour in the low four bytes of a photon's content.
+/// Fixed-point components of the [`Rgbe`] colour in the low four bytes of a photon content.
 #[inline(always)]
 fn bits_of_power(photon: u64) -> [u64; 3] {
     // The exponent byte of a mantissa in units of 2^-40.
@@ -142,7 +144,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn light_beyond_the_greatest_sum_stays_there_in_any_order() {
+    fn light_sums_saturate_in_any_order() {
         let terms = [8e6, 3.0, 7e6, f32::INFINITY, 1e30, 0.5].map(Vec3::splat);
         let sum = |order: [usize; 6]| {
             let mut sum = ColourSum::ZERO;
@@ -194,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_number_adds_nothing() {
+    fn nan_adds_nothing_to_a_sum() {
         let mut sum = ColourSum::ZERO;
         sum.add(Vec3::new(f32::NAN, 0.5, 0.0));
         assert_eq!(sum.value(), Vec3::new(0.0, 0.5, 0.0));

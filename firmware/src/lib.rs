@@ -1,12 +1,12 @@
-//! The photon mapping renderer of one rendering chip.
+//! Photon mapping renderer of one rendering chip.
 //!
-//! No allocator, no I/O, every buffer sized at compile time by a [`kind`] of chip. An emulated card, a
-//! machine of QEMU and a board run the same code. Terms are defined in `docs/glossary.md`.
+//! It has no allocator and no I/O. A [`kind`] of chip fixes the size of every buffer at compile time.
+//! Emulated cards, QEMU and boards run the same code. Terms are defined in `docs/glossary.md`.
 //!
 //! # Example
 //!
-//! A card is its firmware and its DRAM. Here it answers a host's first message; on a port [`serve::serve`]
-//! moves the bytes:
+//! A card consists of its firmware and its DRAM. In this example it answers a host's first message. On a
+//! port, [`serve::serve`] moves the bytes:
 //!
 //! ```
 //! use photoncard_firmware::card::MicroCard;
@@ -54,28 +54,29 @@
 //! | [`card`] | protocol of a card: commands in, replies out |
 //! | [`serve`] | main loop of a card on a port |
 //!
-//! [`card::Card`] is the whole firmware: it is fed with bytes, works in small steps, and returns bytes.
-//! `boards/` has the images for boards, which add registers and a memory map.
+//! [`card::Card`] is the whole firmware: it consumes bytes, works in small steps, and produces bytes.
+//! `boards/` contains the images of boards, which add registers and a memory map.
 //!
 //! # Light paths
 //!
-//! Every path is counted once. In Heckbert's notation, with L a light, E the eye, D a reflection by the
-//! Lambertian part or a wide lobe of a surface, and S a perfectly specular reflection, a refraction, or a
-//! reflection by a narrow lobe ([`scene::Reflection::has_narrow_lobe`]) that the eye does not see itself:
+//! Every path is counted once. In Heckbert's notation, L is a light and E the eye. D is a reflection by the
+//! Lambertian part or a wide lobe of a surface. S is a perfectly specular reflection, a refraction, or a
+//! reflection by a narrow lobe ([`scene::Reflection::has_narrow_lobe`]) that the eye does not see directly:
 //!
 //! - `L S* E`, visible emission: the eye path, followed through S ([`render::eye`]).
 //! - `L D S* E`, direct light: shadow rays, and final gather rays that meet a light, combined by multiple
 //!   importance sampling ([`render::direct`]).
 //! - `L S+ D S* E`, caustics: the caustic map ([`render::caustic`]).
 //! - `L (S|D)* D S* D S* E`, indirect light: final gather rays alone, followed through S
-//!   ([`render::final_gather`]). At their ends the photon map gives all reflected light, direct light
-//!   included, as no shadow rays start there.
+//!   ([`render::final_gather`]). At their ends the photon map gives all reflected light, including direct
+//!   light, because no shadow rays start there.
 //!
 //! # Exactness
 //!
 //! Random numbers are functions of (seed, pixel, sample, dimension). Sums over photons and over gather rays
-//! are in fixed point ([`fixed_point`]), so that their order does not matter. All processors give equal bits:
-//! `f32` add, multiply, divide and square root, `libm`, integer arithmetic, and never a fused multiply-add.
+//! are in fixed point ([`fixed_point`]), so that their order does not matter. All processors give equal bits,
+//! because the code uses only integer arithmetic, `libm`, and `f32` addition, multiplication, division and
+//! square root, never a fused multiply-add.
 // `simd` alone is exempt, for its vector instructions.
 #![deny(unsafe_code)]
 #![no_std]

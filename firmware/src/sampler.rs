@@ -1,26 +1,26 @@
 //! Random numbers as functions of (seed, pixel, sample, dimension), independent of chip, thread and order of
 //! execution.
 //!
-//! Points in a pixel, on emitters and of choices are the first points of a sequence, not a set of a stated
-//! size: samples can be added to a picture, and any number of them is stratified. The sequence is the first
-//! two dimensions of Sobol' (1967) with Owen's (1995) nested uniform scrambling, and in an order that is
-//! scrambled likewise, so that patterns of different dimensions are independent (Burley 2020, *Practical
-//! hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has one in every box
-//! of area 2^-m with sides of powers of two.
+//! Points in a pixel, points on emitters and choices are the first points of a sequence, not a set of a fixed
+//! size, so that samples can be added to a picture and any number of them is stratified. The sequence is the
+//! first two dimensions of Sobol' (1967) with Owen's (1995) nested uniform scrambling. Its order is scrambled
+//! in the same way, so that patterns of different dimensions are independent (Burley 2020, *Practical
+//! hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has one point in
+//! every box of area 2^-m whose sides are powers of two.
 //!
-//! The two coordinates of a final gather ray are a jittered one ([`Pattern::jitter`]), which selects a cell
-//! of the direction table ([`crate::importance::DirectionTable`]), and a radical inverse: any run of
+//! A final gather ray has two coordinates. The first is jittered ([`Pattern::jitter`]) and selects a cell of
+//! the direction table ([`crate::importance::DirectionTable`]); the second is a radical inverse. Any run of
 //! consecutive rays, such as those of one cell of the table, is stratified in both.
 
 pub use photoncard_shared::hash::hash;
 
-/// Dimension of a random number: its purpose. Patterns of different dimensions are independent.
+/// Dimension of a random number, which states its purpose. Patterns of different dimensions are independent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Dimension {
     /// Position in the pixel.
     Pixel = 1,
-    /// Light, and point on it, of a shadow ray.
+    /// Choice of a shadow ray's light, and of a point on it.
     Emitter = 2,
     /// Directions of a sample's final gather rays.
     Gather = 3,
@@ -28,35 +28,37 @@ pub enum Dimension {
     Irradiance = 4,
     /// Directions of an irradiance record's survey rays.
     Survey = 5,
-    /// Choice between reflection, transmission and absorption at perfectly specular surfaces on an eye path.
+    /// Choices on an eye path, at perfectly specular surfaces, between reflection, transmission and
+    /// absorption.
     Specular = 6,
 }
 
-/// Random pattern of points of one pixel, sample and dimension.
+/// Random pattern of points for one pixel, sample and dimension.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pattern(u32);
 
 impl Pattern {
-    /// The pattern of a pixel, sample and dimension; a pattern shared by all samples of a pixel has sample 0.
+    /// Creates the pattern of a pixel, sample and dimension. A pattern that all samples of a pixel share has
+    /// sample 0.
     #[inline(always)]
     pub fn new(seed: u32, x: u32, y: u32, sample: u32, dimension: Dimension) -> Self {
         let pixel = hash(hash(seed ^ 0x9e37_79b9).wrapping_add(x)).wrapping_add(y);
         Self(hash(hash(hash(pixel).wrapping_add(sample)).wrapping_add(dimension as u32)))
     }
 
-    /// Random bits of point `index`, independent of its coordinates.
+    /// Random bits for point `index`, independent of the point's coordinates.
     #[inline(always)]
     pub fn dither(self, index: u32) -> u32 {
         self.bits(index, 0x2545_f491)
     }
 
-    /// Random number in [0, 1) for the choice of this number on the path that starts with point `index`.
+    /// Random number in [0, 1) for choice number `choice` on the path that starts with point `index`.
     #[inline(always)]
     pub fn choice(self, index: u32, choice: u32) -> f32 {
         unit_interval(hash(self.bits(index, 0x1656_67b1).wrapping_add(choice)))
     }
 
-    /// Random bits for the position of point `index` in its stratum of [0, 1).
+    /// Random bits for the position of point `index` within its stratum of [0, 1).
     #[inline(always)]
     pub fn jitter(self, index: u32) -> u32 {
         self.bits(index, 0x967a_889b)
@@ -85,17 +87,17 @@ impl Pattern {
     }
 }
 
-/// Digits of the second dimension of Sobol' at `index`, least significant bit first: bit `i` is the sum of
-/// bits `j` of the index with an odd binomial coefficient (j, i), where `i` is a subset of `j` bit by bit
-/// (Lucas).
+/// Digits of Sobol's second dimension at `index`, least significant bit first. Bit `i` is the sum modulo 2 of
+/// the bits `j` of the index for which the binomial coefficient (j, i) is odd; by Lucas's theorem, these are
+/// the `j` that contain all bits of `i`.
 #[inline(always)]
 fn second_dimension(index: u32) -> u32 {
     let steps = [(1, 0x5555_5555), (2, 0x3333_3333), (4, 0x0f0f_0f0f), (8, 0x00ff_00ff), (16, 0x0000_ffff)];
     steps.into_iter().fold(index, |digits, (distance, mask)| digits ^ (digits >> distance & mask))
 }
 
-/// Nested uniform scrambling of digits, least significant bit first: a bijection in which each bit depends on
-/// itself and those below alone (Laine, Karras 2011, with Vegdahl's constants of 2021).
+/// Nested uniform scrambling of digits, least significant bit first: a bijection in which each bit depends
+/// only on itself and lower bits (Laine, Karras 2011, with Vegdahl's constants of 2021).
 #[inline(always)]
 fn scramble(mut digits: u32, seed: u32) -> u32 {
     digits ^= digits.wrapping_mul(0x3d20_adea);
@@ -166,8 +168,8 @@ mod tests {
         }
     }
 
-    /// Of points of equal index in two dimensions, strata are paired at random: each pair of halves has a
-    /// fourth of the pixels' points.
+    /// For points of equal index in two dimensions, strata must be paired at random: each pair of halves has
+    /// a fourth of the pixels' points.
     #[test]
     fn patterns_of_two_dimensions_are_independent() {
         let half = |x, index, dimension| {

@@ -1,4 +1,4 @@
-//! Main loop of a card on a port: the same for boards and the emulated card.
+//! Main loop of a card on a port, for boards and for the emulated card.
 
 use core::time::Duration;
 
@@ -8,10 +8,10 @@ use crate::card::Card;
 use crate::kind::ChipKind;
 use crate::memory::CardMemory;
 
-/// Maximum wait of an idle card for a byte.
+/// Maximum time that an idle card waits for a byte.
 const IDLE_WAIT: Duration = Duration::from_millis(20);
 
-/// Serves a card on a port until the port fails: bytes in, work, bytes out.
+/// Serves a card on a port until the port fails: receives bytes, works, and sends bytes.
 ///
 /// At most one call of [`Card::work`] lies between two reads of the port.
 ///

@@ -1,4 +1,4 @@
-//! Vector and float functions that glam lacks, with the same bits on every processor.
+//! Functions of vectors and floats that glam lacks. They give the same bits on every processor.
 
 use glam::Vec3;
 
@@ -14,7 +14,7 @@ pub(crate) fn max(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// The mirror direction of a unit vector about a unit normal.
+/// Mirrors a unit vector about a unit normal.
 #[inline(always)]
 pub(crate) fn mirror(direction: Vec3, normal: Vec3) -> Vec3 {
     normal * (2.0 * normal.dot(direction)) - direction
@@ -32,22 +32,22 @@ pub(crate) fn tangents(normal: Vec3) -> (Vec3, Vec3) {
     (tangent, bitangent)
 }
 
-/// The vector with these coordinates in the frame of [`tangents`], whose z axis is `normal`.
+/// Vector with the coordinates `x`, `y`, `z` in the frame of [`tangents`], whose z axis is `normal`.
 #[inline(always)]
 pub(crate) fn from_frame(normal: Vec3, x: f32, y: f32, z: f32) -> Vec3 {
     let (tangent, bitangent) = tangents(normal);
     tangent * x + bitangent * y + normal * z
 }
 
-/// The vector `radius` away from an axis, at an azimuth in radians, and `height` along it, in the frame of
-/// [`tangents`].
+/// Vector with cylindrical coordinates about `axis`, in the frame of [`tangents`]: azimuth in radians,
+/// radius, and height along the axis.
 #[inline(always)]
 pub(crate) fn about(axis: Vec3, azimuth: f32, radius: f32, height: f32) -> Vec3 {
     let (y, x) = libm::sincosf(azimuth);
     from_frame(axis, radius * x, radius * y, height)
 }
 
-/// `vector / |vector|`, or zero for a zero vector.
+/// Normalised vector `vector / |vector|`; zero for a zero vector.
 #[inline(always)]
 pub(crate) fn unit(vector: Vec3) -> Vec3 {
     let length_squared = vector.length_squared();
@@ -60,14 +60,14 @@ pub(crate) fn max_component(v: Vec3) -> f32 {
     max(max(v.x, v.y), v.z)
 }
 
-/// bfloat16 of an `f32`, rounded to nearest, ties away from zero. Finite numbers above the largest bfloat16
-/// become infinite; a NaN may become any number.
+/// Converts an `f32` to bfloat16, rounded to nearest, ties away from zero. Finite numbers above the largest
+/// bfloat16 become infinite; a NaN may become any number.
 #[inline(always)]
 pub(crate) fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16
 }
 
-/// `f32` of a bfloat16.
+/// Converts a bfloat16 to `f32`.
 #[inline(always)]
 pub(crate) fn from_upper_half(half: u16) -> f32 {
     f32::from_bits((half as u32) << 16)
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn upper_halves_keep_eight_bits_and_the_sign() {
+    fn bfloat16_keeps_eight_bits_and_the_sign() {
         for value in [1.0_f32, -1.0, 0.3, -7.7e-12, 1e18, 3.1e38] {
             let found = from_upper_half(upper_half(value));
             assert!((found / value - 1.0).abs() <= 1.0 / 256.0, "{value} {found}");

@@ -1,7 +1,7 @@
-//! Traversal of a tree of wide nodes: the bounding volume hierarchy, or a photon map in leaves.
+//! Traversal of a tree with wide nodes: the bounding volume hierarchy, or a photon map with leaves.
 //!
 //! A visit of a node computes the distances to the boxes of all its children at once. Children within the
-//! limit are pushed onto a stack, the nearest on top.
+//! limit are pushed onto a stack, with the nearest on top.
 
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
@@ -15,15 +15,15 @@ use crate::simd::{Isa, LANES};
 
 const _: () = assert!(NODE_CHILDREN == LANES);
 
-/// Distance bits of a child to be skipped.
+/// Distance bits of a child that is skipped.
 pub(crate) const BEYOND: u32 = u32::MAX;
 
-/// A subtree on the stack: the bits of a lower bound of its distance in the upper half, its leaf or node in
-/// the lower half.
+/// Stack entry of a subtree: bits of a lower bound of its distance in the upper half, index of its leaf or
+/// node in the lower half.
 #[derive(Clone, Copy)]
 struct Deferred(u64);
 
-/// Flag of a leaf in the lower half of a [`Deferred`].
+/// Flag in the lower half of a [`Deferred`] that marks a leaf.
 const LEAF: u32 = 1 << 31;
 
 impl Deferred {
@@ -39,16 +39,16 @@ impl Deferred {
     }
 }
 
-/// Stack of [`Deferred`] subtrees, the next on top. `ENTRIES` is the tree's maximum plus [`LANES`], as all
-/// lanes of a node are written at once.
+/// Stack of [`Deferred`] subtrees with the next one on top. `ENTRIES` is the tree's maximum plus [`LANES`],
+/// because all lanes of a node are written at once.
 pub(crate) type Stack<const ENTRIES: usize> = Vec<u64, ENTRIES>;
 
-/// Order of the visits to a node's children.
+/// Order in which a node's children are visited.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Order {
-    /// Nearest first: hits or photons found there shrink the limit for the others.
+    /// Nearest first. Hits or photons found in a child shrink the limit for the others.
     NearestFirst,
-    /// Unsorted, for searches that end with the first hit: sorting costs more than it saves.
+    /// Unsorted, for searches that end with the first hit. Sorting would cost more than it saves.
     Any,
 }
 
@@ -57,13 +57,13 @@ pub(crate) struct Descent<'s, const ENTRIES: usize> {
     scene: &'s SceneImage,
     nodes: SectionKind,
     leaves: SectionKind,
-    /// By reference, as a stack is too large to be moved.
+    /// Stack of the traversal. It is borrowed because it is too large to be moved.
     stack: &'s mut Stack<ENTRIES>,
     visits_left: u64,
 }
 
 impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
-    /// A traversal from the root of the tree in two sections; `stack` is emptied.
+    /// Creates a traversal from the root of the tree in two sections. `stack` is emptied.
     #[inline(always)]
     pub(crate) fn new(
         scene: &'s SceneImage,
@@ -74,7 +74,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Self::with_root(scene, [nodes, leaves], stack, 0)
     }
 
-    /// [`Self::new`], with the bits of the root in place of its distance.
+    /// Does [`Self::new`] with `bits` in place of the root's distance bits.
     #[inline(always)]
     pub(crate) fn with_root(
         scene: &'s SceneImage,
@@ -90,10 +90,11 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Self { scene, nodes, leaves, stack, visits_left: parts.into_iter().sum() }
     }
 
-    /// The next leaf or node at a distance of at most `limit`, as bits; `None` at the end of the traversal.
+    /// Returns the next leaf or node whose distance is at most `limit`, given as bits; `None` at the end of
+    /// the traversal.
     ///
     /// # Errors
-    /// [`FaultCode::Depth`] if the image is not sound: the tree has a cycle.
+    /// [`FaultCode::Depth`] if the image is invalid: the tree has a cycle.
     #[inline(always)]
     pub(crate) fn next(&mut self, limit: u32) -> Result<Option<Child>, Fault> {
         // Entries below were pushed earlier, and may be nearer: the loop goes on.
@@ -105,7 +106,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(None)
     }
 
-    /// The next leaf or node, with the bits that it was pushed with; `None` at the end of the traversal.
+    /// Returns the next leaf or node, and the bits it was pushed with; `None` at the end of the traversal.
     ///
     /// # Errors
     /// As [`Self::next`].
@@ -117,7 +118,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(Some((part.distance(), part.child())))
     }
 
-    /// Line of a leaf.
+    /// Reads the line of a leaf.
     #[inline(always)]
     pub(crate) fn leaf<'m>(
         &self,
@@ -128,7 +129,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
     }
 
     /// Visits a node: pushes its children and prefetches their lines. `distances` maps the node's line to the
-    /// bits of a lower bound of each child's distance, or [`BEYOND`] for a child to be skipped.
+    /// bits of a lower bound of each child's distance, or to [`BEYOND`] for a child to be skipped.
     ///
     /// # Errors
     /// [`FaultCode::Depth`] if the stack overflows; [`FaultCode::Record`] or [`FaultCode::LineRange`] if
@@ -164,7 +165,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(())
     }
 
-    /// Pushes the lanes of `parts` in `mask`; `None` if the stack overflows.
+    /// Pushes the lanes of `parts` that are in `mask`; `None` if the stack overflows.
     #[inline(always)]
     fn push(&mut self, isa: impl Isa, parts: &[u64; LANES], mask: u32) -> Option<()> {
         let bottom = self.stack.len();
@@ -176,7 +177,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
     }
 }
 
-/// The [`Deferred`] entry of each child of a node.
+/// [`Deferred`] entry of each child of a node.
 #[inline(always)]
 fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES] {
     let Links { leaves, first_leaf, first_node } = node.links();
@@ -193,7 +194,7 @@ fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES
     parts
 }
 
-/// Insertion sort of a few entries, in descending order.
+/// Sorts a few entries by insertion, in descending order.
 #[inline(always)]
 fn sort(parts: &mut [u64]) {
     for sorted in 1..parts.len() {

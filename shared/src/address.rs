@@ -1,4 +1,5 @@
-//! Addresses in a card's memory: 128-byte lines, the dissertation's cache line (chapter 7).
+//! Addresses in a card's memory. The unit is the 128-byte line, the cache line of the dissertation (chapter
+//! 7).
 
 /// Bytes of one line.
 pub const LINE_BYTES: usize = 128;
@@ -12,8 +13,8 @@ impl Line {
     /// A line of zero bytes.
     pub const ZERO: Self = Self([0; LINE_BYTES]);
 
-    /// The `slot`-th record of `N` bytes, records packed from the start of the line; `None` past the last
-    /// whole one.
+    /// Record number `slot` of the line: `N` bytes, packed from the start of the line. `None` past the last
+    /// whole record.
     #[inline(always)]
     pub fn record<const N: usize>(&self, slot: usize) -> Option<&[u8; N]> {
         self.0.as_chunks::<N>().0.get(slot)
@@ -29,7 +30,7 @@ impl Line {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LineAddress(pub u32);
 
-/// The data structure that a line belongs to: memory traffic is counted, and cached, by structure.
+/// Data structure that a line belongs to. Memory traffic is counted and cached by structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Structure {
@@ -44,7 +45,7 @@ pub enum Structure {
     /// Lights and the distributions that sample them: emitters, the light tree, distant lights, the
     /// environment's cells.
     Emitters = 4,
-    /// Inner nodes of a photon map in leaves.
+    /// Inner nodes of a photon map whose photons are stored in leaves ([`crate::layout::PhotonNode`]).
     PhotonNodes = 5,
     /// Photons.
     Photons = 6,
@@ -86,8 +87,7 @@ impl Structure {
         Self::IrradianceRecords,
     ];
 
-    /// True if the structure belongs to a photon map or to the irradiance points, false if it belongs to the
-    /// scene.
+    /// Returns true for structures of a photon map or of the irradiance points, false for those of the scene.
     #[inline(always)]
     pub const fn is_photon_map(self) -> bool {
         matches!(
@@ -102,7 +102,7 @@ impl Structure {
     }
 }
 
-/// Stage of rendering that reads memory.
+/// Stage of rendering during which memory is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Stage {

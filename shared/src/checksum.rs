@@ -1,9 +1,9 @@
-//! The checksums of frames and of images: two polynomials, so that an error that one misses is caught by the
-//! other.
+//! Checksums of frames and of images. Their polynomials differ, so that an error that one of them misses is
+//! detected by the other.
 //!
-//! [`Checksum`], of frames, is CRC-32C (Castagnoli) by slicing-by-16 (Kounavis, Berry 2005): sixteen bytes at
-//! a time, with a table for each of the sixteen byte positions. [`ImageChecksum`], of chunks and of the whole
-//! image, is CRC-64/XZ (ECMA-182) by slicing-by-8.
+//! Frames have [`Checksum`]: CRC-32C (Castagnoli) by slicing-by-16 (Kounavis, Berry 2005), which takes
+//! sixteen bytes at a time with one table per byte position. Chunks and the whole image have
+//! [`ImageChecksum`]: CRC-64/XZ (ECMA-182) by slicing-by-8.
 
 use crate::address::Line;
 
@@ -17,8 +17,8 @@ static TABLES: [[u32; 256]; 16] = narrowed(tables(POLYNOMIAL as u64));
 /// `IMAGE_TABLES[n][b]`: the CRC-64/XZ remainder of byte `b` followed by `n` zero bytes.
 static IMAGE_TABLES: [[u64; 256]; 8] = tables(IMAGE_POLYNOMIAL);
 
-/// Remainders by a bit-reversed polynomial of up to 64 bits: `[n][b]` is that of byte `b` followed by `n`
-/// zero bytes.
+/// Slicing tables of a bit-reversed polynomial of degree at most 64: entry `[n][b]` is the remainder of byte
+/// `b` followed by `n` zero bytes.
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
 const fn tables<const PLACES: usize>(polynomial: u64) -> [[u64; 256]; PLACES] {
     let mut tables = [[0; 256]; PLACES];
@@ -45,7 +45,7 @@ const fn tables<const PLACES: usize>(polynomial: u64) -> [[u64; 256]; PLACES] {
     tables
 }
 
-/// Remainders of a polynomial of 32 bits, in as many.
+/// Converts the tables of a polynomial of degree 32, whose entries fit in 32 bits, to `u32`.
 #[expect(clippy::indexing_slicing, reason = "the compiler runs it")]
 const fn narrowed<const PLACES: usize>(wide: [[u64; 256]; PLACES]) -> [[u32; 256]; PLACES] {
     let mut tables = [[0; 256]; PLACES];
@@ -57,7 +57,7 @@ const fn narrowed<const PLACES: usize>(wide: [[u64; 256]; PLACES]) -> [[u32; 256
     tables
 }
 
-/// The table entry of a byte.
+/// Entry `byte` of a table.
 #[expect(clippy::indexing_slicing, reason = "a byte is below 256: the compiler drops the check")]
 #[inline(always)]
 fn look_up<T: Copy>(table: &[T; 256], byte: u8) -> T {
@@ -71,7 +71,7 @@ pub fn checksum(bytes: &[u8]) -> u32 {
     sum.value()
 }
 
-/// A CRC-32C over bytes that come in pieces.
+/// CRC-32C of bytes that arrive in pieces.
 #[derive(Clone, Debug)]
 pub struct Checksum(u32);
 
@@ -115,7 +115,7 @@ pub fn image_checksum(lines: &[Line]) -> u64 {
     sum.value()
 }
 
-/// A CRC-64/XZ over lines that come in pieces.
+/// CRC-64/XZ of lines that arrive in pieces.
 #[derive(Clone)]
 pub struct ImageChecksum(u64);
 

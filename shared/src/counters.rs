@@ -1,15 +1,15 @@
-//! Counters of a chip's work.
+//! Counters of the work that a chip does.
 
 use serde::{Deserialize, Serialize};
 
-/// Work done on a tile. Sums over all tiles do not depend on which chip rendered which tile, unless chips
+/// Work done on a tile. The sums over all tiles do not depend on which chip rendered which tile, unless chips
 /// keep irradiance records
 /// ([`FrameParameters::keep_records`](crate::message::FrameParameters::keep_records)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
-    /// Eye rays: 2 a sample, for its light and for its other channels; another for each later piece of work
-    /// on a sample that sees its surface by way of specular ones; and 1 for each lookup of a point of the
-    /// irradiance cache's lattice.
+    /// Eye rays. A sample takes two: one for its light, one for its other channels. A sample that sees its
+    /// surface through specular surfaces takes another eye ray for each later piece of work. A lookup of a
+    /// lattice point of the irradiance cache takes one.
     pub eye_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,
@@ -19,18 +19,18 @@ pub struct Counters {
     pub survey_rays: u64,
     /// Rays from specular surfaces, which continue eye and gather rays.
     pub specular_rays: u64,
-    /// Paths that ended black: after [`crate::budget::SPECULAR_BOUNCES`] specular surfaces, or at one that
-    /// absorbs all.
+    /// Paths that contributed nothing because they reached [`crate::budget::SPECULAR_BOUNCES`] specular
+    /// surfaces, or one that absorbs everything.
     pub lost_paths: u64,
     /// Searches for the k nearest photons in the caustic map.
     pub caustic_gathers: u64,
     /// Searches for the k nearest photons in the photon map.
     pub gathers: u64,
-    /// Searches in [`Self::gathers`] that built a table of directions for importance sampling.
+    /// Searches for the direction tables of importance sampling. [`Self::gathers`] includes them.
     pub tables: u64,
-    /// Irradiance records gathered.
+    /// Irradiance records computed by a final gather.
     pub records: u64,
-    /// Irradiance records of an earlier frame that were read back instead.
+    /// Irradiance records read back from an earlier frame instead of being gathered.
     pub kept_records: u64,
     /// Samples of a frame with final gather rays that see a surface with a Lambertian part.
     pub lambertian_samples: u64,
@@ -38,20 +38,20 @@ pub struct Counters {
     pub interpolated_samples: u64,
     /// Photons whose distance was computed.
     pub photons_tested: u64,
-    /// Photons within the search radius of the moment, which became candidates.
+    /// Photons within the search radius at the time of their test. They became candidates.
     pub photons_taken: u64,
-    /// Candidates read by selections of the k nearest.
+    /// Candidates read while the k nearest were selected.
     pub photons_selected: u64,
-    /// Comparisons of distances in these selections, but for candidates of equal distances.
+    /// Comparisons of distances while the k nearest were selected, without comparisons of equal distances.
     pub distances_compared: u64,
     /// Photons returned by searches.
     pub photons_found: u64,
-    /// Photons whose power was reflected by a lobe as well, each by its direction; those of the caustic map
-    /// included.
+    /// Photons whose power was also reflected by a lobe, evaluated for the photon's direction. Photons of the
+    /// caustic map are included.
     pub photons_reflected: u64,
-    /// Photons of [`Self::photons_reflected`] whose lobe is a microfacet model.
+    /// Photons of [`Self::photons_reflected`] whose lobe is a microfacet model (GGX).
     pub photons_on_microfacets: u64,
-    /// Normals of photons that were decoded, to find those of the surface.
+    /// Photon normals decoded in order to reject photons of other surfaces.
     pub normals_decoded: u64,
     /// Searches for the nearest irradiance point.
     pub lookups: u64,
@@ -59,12 +59,12 @@ pub struct Counters {
     pub points_tested: u64,
     /// Drains of the gather queue.
     pub drains: u64,
-    /// Maximum number of gathers that waited at once on one chip.
+    /// Maximum number of gathers that waited at the same time on one chip.
     pub most_waiting: u64,
 }
 
 impl Counters {
-    /// All zero.
+    /// Counters that are all zero.
     pub const ZERO: Self = Self {
         eye_rays: 0,
         shadow_rays: 0,
@@ -93,8 +93,9 @@ impl Counters {
         most_waiting: 0,
     };
 
-    /// Counts a search for the k nearest photons: photons tested, photons that became candidates, candidates
-    /// read by selections and their comparisons, photons found.
+    /// Counts one search for the k nearest photons. The arguments are the numbers of photons tested, of
+    /// photons that became candidates, of candidates read by selections, of their comparisons, and of photons
+    /// found.
     #[inline(always)]
     pub fn count_gather(&mut self, tested: u32, taken: u32, [selected, compared]: [u32; 2], found: u32) {
         self.gathers += 1;

@@ -1,12 +1,12 @@
-//! Frames: units of bytes with a checksum, on a line that damages, loses or repeats bytes.
+//! Frames: byte sequences with a checksum, for a line that damages, loses or repeats bytes.
 //!
 //! ```text
 //! COBS( kind: u8 | session: u32 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
 //! ```
 //!
-//! Numbers are little-endian. Stuffing ([`crate::stuffing`]) leaves no zero byte inside a frame, so that a
-//! receiver finds the next frame after any damage. [`crate::transport`] gives the header's numbers their
-//! meaning.
+//! Numbers are little-endian. A frame contains no zero byte, by byte stuffing ([`crate::stuffing`]), so that
+//! a receiver finds the next frame after any damage. [`crate::transport`] defines the meaning of the numbers
+//! in the header.
 
 use heapless::Vec;
 use memchr::memchr;
@@ -14,7 +14,7 @@ use memchr::memchr;
 use crate::checksum::{Checksum, checksum};
 use crate::stuffing::{max_stuffed_bytes, stuff, unstuff};
 
-/// Maximum payload, bytes: eight lines and the other fields of their message.
+/// Maximum length of a payload, bytes: eight lines and the other fields of their message.
 pub const MAX_PAYLOAD: usize = 8 * crate::address::LINE_BYTES + 32;
 /// Bytes of a frame's header.
 pub const HEADER_BYTES: usize = 10;
@@ -23,7 +23,7 @@ const MAX_PLAIN: usize = HEADER_BYTES + MAX_PAYLOAD + CHECKSUM_BYTES;
 /// Maximum length of a frame on the wire, bytes, its terminating zero included.
 pub const MAX_FRAME: usize = max_stuffed_bytes(MAX_PLAIN) + 1;
 
-/// Defect of received bytes, which are no frame.
+/// Reason why received bytes are not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
     /// No zero byte within [`MAX_FRAME`] bytes, or a payload above [`MAX_PAYLOAD`].
@@ -48,12 +48,12 @@ pub enum FrameKind {
     Open = 1,
     /// An acknowledgement alone.
     Acknowledge = 2,
-    /// A request for an [`Self::Answer`]; frames below its sequence number that are not acknowledged are
-    /// lost.
+    /// A request for an [`Self::Answer`]. Its sequence number is that of the next frame: lower frames that
+    /// are not acknowledged are lost.
     Probe = 3,
-    /// Reply to a probe: an acknowledgement, and the number of the sender's next frame.
+    /// Reply to a probe. It acknowledges frames and states the number of the sender's next frame.
     Answer = 4,
-    /// Reply to a frame of an unknown session.
+    /// Reply to a frame whose session the card does not know.
     Unknown = 5,
 }
 
@@ -71,9 +71,10 @@ pub struct FrameHeader {
     pub kind: FrameKind,
     /// Number of the frame's session.
     pub session: u32,
-    /// Number of the frame in its direction; see [`FrameKind`].
+    /// Number of the frame among those sent in its direction. Probes and answers define it differently
+    /// ([`FrameKind`]).
     pub sequence: u16,
-    /// All frames of the other direction below this number have been received.
+    /// Number of the first frame from the other direction that has not been received.
     pub acknowledged: u16,
     /// Bit `i` is set if frame `acknowledged + i` of the other direction has been received.
     pub held: u8,
@@ -93,8 +94,8 @@ impl FrameHeader {
     }
 }
 
-/// Appends a frame to `wire`, or nothing if there is no room: [`MAX_FRAME`] bytes suffice for a payload of
-/// [`MAX_PAYLOAD`].
+/// Appends a frame to `wire`. Appends nothing if there is no room; [`MAX_FRAME`] bytes suffice for a payload
+/// of [`MAX_PAYLOAD`].
 pub fn write_frame<const N: usize>(header: &FrameHeader, payload: &[u8], wire: &mut Vec<u8, N>) {
     let begin = wire.len();
     let header = header.to_bytes();
@@ -110,17 +111,17 @@ pub fn write_frame<const N: usize>(header: &FrameHeader, payload: &[u8], wire: &
 /// A received frame with a valid checksum.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Frame<'a> {
-    /// Header.
+    /// Header of the frame.
     pub header: FrameHeader,
-    /// Payload, at most [`MAX_PAYLOAD`] bytes.
+    /// Payload of the frame, at most [`MAX_PAYLOAD`] bytes.
     pub payload: &'a [u8],
 }
 
-/// Reader of the frames of one direction.
+/// Reader of the frames that arrive from one direction.
 pub struct FrameReader {
     /// Bytes of the current frame, without its terminating zero.
     wire: Vec<u8, { MAX_FRAME - 1 }>,
-    /// True if the current frame is too long: its bytes are dropped up to the next zero byte.
+    /// True if the current frame is too long. Its bytes are dropped up to the next zero byte.
     overrun: bool,
     complete: bool,
 }
@@ -132,13 +133,13 @@ impl Default for FrameReader {
 }
 
 impl FrameReader {
-    /// A reader at the start of a frame.
+    /// Creates a reader at the start of a frame.
     pub const fn new() -> Self {
         Self { wire: Vec::new(), overrun: false, complete: false }
     }
 
     /// Consumes bytes up to the end of the next frame. Returns the number of bytes consumed and, if a frame
-    /// ended, the frame or its defect. Two zero bytes in a row are no frame and no error.
+    /// ended, the frame or its defect. Two zero bytes in a row are neither a frame nor an error.
     pub fn read(&mut self, bytes: &[u8]) -> (usize, Option<Result<Frame<'_>, FrameError>>) {
         if core::mem::take(&mut self.complete) {
             self.wire.clear();

@@ -1,4 +1,4 @@
-//! The hash of which random numbers are made, on chips and hosts alike.
+//! Integer hash from which all random numbers are made, on chips and on hosts.
 
 /// 32-bit integer hash (Wellons, `lowbias32`).
 #[inline(always)]
@@ -14,14 +14,15 @@ pub fn hash(mut x: u32) -> u32 {
 mod tests {
     use super::*;
 
-    /// Wellons publishes the constants; any other changes every picture.
+    /// The expected values follow from the constants that Wellons published. Other constants would change
+    /// every picture.
     #[test]
-    fn golden_values() {
+    fn hash_has_its_golden_values() {
         assert_eq!([0, 1, 2, u32::MAX].map(hash), [0, 0x6889_90c0, 0xd113_2181, 0x6768_824a]);
     }
 
     #[test]
-    fn a_bit_of_the_number_changes_half_of_the_bits() {
+    fn an_input_bit_changes_half_of_the_hash_bits() {
         let mut changed = 0;
         for number in 0..1_000_u32 {
             for bit in 0..32 {

@@ -1,12 +1,12 @@
-//! The card image: the lines that hold everything a chip needs of a scene.
+//! The card image: lines of memory with everything that a chip needs of a scene.
 //!
 //! The first lines are the header: magic, layout version, number of lines, units, lights, and a table of
-//! sections. A section is a run of lines that holds records of one kind ([`crate::layout`]), as many whole
-//! ones as fit in each line; unused bytes are zero.
+//! sections. A section is a run of lines with records of one kind ([`crate::layout`]). Each line holds as
+//! many whole records as fit; unused bytes are zero.
 //!
-//! The photon map has one of two layouts, and the sections of the other are empty: [`SectionKind::Photons`],
-//! or [`SectionKind::PhotonNodes`] and [`SectionKind::PhotonLeaves`]. Sections of irradiance points, the
-//! caustic map, textures and vertex attributes are empty in an image without them.
+//! The photon map has one of two layouts: [`SectionKind::Photons`], or [`SectionKind::PhotonNodes`] with
+//! [`SectionKind::PhotonLeaves`]. The sections of the other layout are empty. Sections of irradiance points,
+//! the caustic map, textures and vertex attributes are empty if the scene has none.
 
 use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
 use crate::layout::{
@@ -20,31 +20,31 @@ pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 pub const LAYOUT_VERSION: u16 = 12;
 /// Lines of the header.
 pub const HEADER_LINES: usize = 2;
-/// Entries of [`SectionKind::LeafAttributes`] in one line.
+/// Number of entries of [`SectionKind::LeafAttributes`] per line.
 pub const LEAF_ATTRIBUTES_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
-/// Thresholds of [`SectionKind::EnvironmentCells`] in one line.
+/// Number of thresholds of [`SectionKind::EnvironmentCells`] per line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
-/// The sections of an image, in the order of the table and of the image.
+/// Sections of an image, in the order of the section table and of the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SectionKind {
     /// [`crate::layout::BvhNode`]s, the root first.
     Nodes = 0,
-    /// [`crate::layout::BvhLeaf`]s, of triangles.
+    /// [`crate::layout::BvhLeaf`]s: the leaves of triangles.
     Triangles = 1,
     /// [`crate::layout::LeafAttributes`], one `u32` for each leaf of triangles. Empty if no triangle has
     /// attributes.
     LeafAttributes = 2,
-    /// [`Attributes`] of triangles, those of a leaf after its [`crate::layout::Tangents`] if it has any.
+    /// [`Attributes`] of triangles. If a leaf has [`crate::layout::Tangents`], they precede its attributes.
     Attributes = 3,
     /// [`Material`]s.
     Materials = 4,
-    /// [`Layers`] of materials that have any.
+    /// [`Layers`] of the materials that have layers.
     Layers = 5,
     /// [`Texture`]s.
     Textures = 6,
-    /// Lines of texels, see [`Texture`].
+    /// Lines of texels; [`Texture`] describes their order.
     Texels = 7,
     /// [`Emitter`]s.
     Emitters = 8,
@@ -52,13 +52,16 @@ pub enum SectionKind {
     LightNodes = 9,
     /// [`DistantLight`]s.
     DistantLights = 10,
-    /// Distribution of the environment's cells: `u32` thresholds of the cumulative distribution function, in
-    /// units of 2^-32. First the marginal one of the rows, then for each row the conditional one of its
-    /// cells; each ends with 2^32 - 1. If cells are divided there follow their count, the number n of rows
-    /// and of columns of their parts, the numbers of the divided cells (row by row), increasing, and for each
-    /// of them the like distributions of n rows and n x n parts.
+    /// Distribution from which directions of the environment are sampled: `u32` thresholds of cumulative
+    /// distribution functions, in units of 2^-32. The marginal distribution of the rows comes first, then the
+    /// conditional distribution of the cells in each row; each ends with 2^32 - 1.
+    ///
+    /// If cells are subdivided, four further parts follow: the number of subdivided cells; the number n of
+    /// rows and columns that each is divided into; the row-major numbers of these cells, in increasing order;
+    /// and for each cell the distributions of its n rows and n x n parts, in the same form.
     EnvironmentCells = 11,
-    /// [`Photon`]s, a left-balanced kd-tree: the children of `i` are `2 i + 1` and `2 i + 2`.
+    /// [`Photon`]s as a left-balanced kd-tree: the children of photon `i` are photons `2 i + 1` and
+    /// `2 i + 2`.
     Photons = 12,
     /// [`crate::layout::PhotonNode`]s, the root first.
     PhotonNodes = 13,
@@ -66,12 +69,12 @@ pub enum SectionKind {
     PhotonLeaves = 14,
     /// [`crate::layout::PhotonNode`]s of the caustic map, the root first.
     CausticNodes = 15,
-    /// [`crate::layout::PhotonLeaf`]s of the caustic map: photons whose bounces, one at least, were all
-    /// specular.
+    /// [`crate::layout::PhotonLeaf`]s of the caustic map. Its photons have at least one bounce, and all their
+    /// bounces were specular.
     CausticLeaves = 16,
     /// [`crate::layout::PhotonNode`]s above irradiance points, the root first.
     IrradianceNodes = 17,
-    /// [`crate::layout::PhotonLeaf`]s of [`crate::layout::IrradiancePoint`]s instead of photons' contents.
+    /// [`crate::layout::PhotonLeaf`]s that hold [`crate::layout::IrradiancePoint`]s in place of photons.
     IrradianceLeaves = 18,
 }
 
@@ -102,7 +105,7 @@ impl SectionKind {
         Self::IrradianceLeaves,
     ];
 
-    /// Records in one line.
+    /// Number of records per line.
     pub const fn records_per_line(self) -> u32 {
         match self {
             Self::LeafAttributes => LEAF_ATTRIBUTES_PER_LINE,
@@ -127,7 +130,7 @@ impl SectionKind {
         }
     }
 
-    /// Structure as which the section's lines are counted and cached.
+    /// Structure under which the section's lines are counted and cached.
     #[inline(always)]
     pub const fn structure(self) -> Structure {
         match self {
@@ -159,7 +162,8 @@ pub struct Section {
 }
 
 impl Section {
-    /// The line of record `index` and its slot in that line; `None` past the last record.
+    /// Returns the line that holds record `index`, and the record's slot in that line; `None` past the last
+    /// record.
     #[inline(always)]
     pub fn locate<const PER_LINE: u32>(self, index: u32) -> Option<(LineAddress, usize)> {
         (index < self.records).then(|| {
@@ -173,17 +177,17 @@ impl Section {
 /// Header of an image, in its first [`HEADER_LINES`] lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
-    /// Lines of the whole image, the header's own among them.
+    /// Number of lines of the whole image, the header included.
     pub lines: u32,
     /// Photon power unit of the photon map, W.
     pub photon_power_unit: f32,
     /// Photon power unit of the caustic map, W.
     pub caustic_power_unit: f32,
-    /// Unit of the fixed-point sums of pixels, W/(sr m^2): a power of two.
+    /// Unit of the fixed-point sums in pixels, W/(sr m^2): a power of two.
     pub radiance_unit: f32,
-    /// Grid of the photons' positions.
+    /// Grid on which the photons' positions lie.
     pub photon_grid: PhotonGrid,
-    /// Probabilities of the kinds of lights, and the environment.
+    /// Probabilities of the kinds of lights, and the environment light.
     pub lights: Lights,
     /// Sections, indexed by [`SectionKind`].
     pub sections: [Section; SECTIONS],
@@ -192,23 +196,23 @@ pub struct Header {
 /// Probabilities with which a light sample chooses a kind of light, and the environment light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lights {
-    /// Probability that a light sample is taken of an emitter, by the light tree.
+    /// Probability that a light sample chooses an emitter through the light tree.
     pub emitters: f32,
-    /// Probability that a light sample is taken of the environment.
+    /// Probability that a light sample chooses the environment.
     pub environment: f32,
-    /// Probability that a light sample is taken of a distant light.
+    /// Probability that a light sample chooses a distant light.
     pub distant: f32,
-    /// Scale of the environment's texels, W/(sr m^2) a channel.
+    /// Scale of the environment's texels, W/(sr m^2) per channel.
     pub radiance: [f32; 3],
     /// Index of the environment's texture; `None` without an environment.
     pub texture: Option<u32>,
-    /// Columns and rows of the cells in which the environment is sampled, equal steps of the two angles: 1 to
-    /// 65535.
+    /// Number of columns and rows, 1 to 65535, of the grid of cells from which the environment is sampled.
+    /// Columns are equal steps of azimuth, rows of polar angle.
     pub cells: [u16; 2],
 }
 
 impl Lights {
-    /// A scene without lights.
+    /// Lights of a scene that has none.
     pub const NONE: Self = Self {
         emitters: 0.0,
         environment: 0.0,
@@ -225,31 +229,32 @@ impl Lights {
     }
 }
 
-/// Defect of a header.
+/// Reason why a header is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeaderError {
     /// The image does not begin with [`MAGIC`].
     Magic,
-    /// The image has this layout version instead of [`LAYOUT_VERSION`].
+    /// The image has this layout version, which is not [`LAYOUT_VERSION`].
     Version(u16),
-    /// A unit or the grid's cell is not a positive normal number, a probability is not in [0, 1], or the
-    /// environment's radiance is negative or not finite.
+    /// A number is out of range: a unit or the grid's cell is not a positive normal number, a probability is
+    /// not in [0, 1], or the environment's radiance is negative or not finite.
     Unit,
-    /// The section of this index reaches past the image's last line.
+    /// The section with this index extends past the image's last line.
     Section(u8),
 }
 
 const PHOTON_GRID: usize = 32;
 const SECTION_TABLE: usize = 64;
 const HEADER_BYTES: usize = HEADER_LINES * LINE_BYTES;
-/// Offset of [`Lights`], at the header's end: the section table may grow towards it.
+/// Offset of [`Lights`] in the header, bytes. They are at its end, so that the section table can grow towards
+/// them.
 const LIGHTS: usize = HEADER_BYTES - 32;
 const _: () = assert!(SECTION_TABLE + 8 * SECTIONS <= LIGHTS);
-/// Code of the environment texture's index in an image without an environment.
+/// Value that replaces the texture index in an image without an environment.
 const NO_ENVIRONMENT: u32 = u32::MAX;
 
 impl Header {
-    /// Header of an image without lines, sections and lights, all units 1.
+    /// Header of an empty image: no lines, sections or lights; all units are 1.
     pub const EMPTY: Self = Self {
         lines: 0,
         photon_power_unit: 1.0,
@@ -260,13 +265,13 @@ impl Header {
         sections: [Section { first_line: 0, records: 0 }; SECTIONS],
     };
 
-    /// The section of this kind.
+    /// Section of the kind `kind`.
     #[expect(clippy::indexing_slicing, reason = "a kind is below SECTIONS")]
     pub fn section(&self, kind: SectionKind) -> Section {
         self.sections[kind as usize]
     }
 
-    /// The lines of the header.
+    /// Encodes the header.
     #[expect(clippy::indexing_slicing, reason = "constant places within the lines")]
     pub fn to_lines(&self) -> [Line; HEADER_LINES] {
         let mut bytes = [0; HEADER_BYTES];
@@ -299,7 +304,7 @@ impl Header {
         lines
     }
 
-    /// Reads and checks a header: no section of the result reaches past [`Self::lines`].
+    /// Reads and checks a header. No section of the result extends past [`Self::lines`].
     pub fn read(lines: &[Line; HEADER_LINES]) -> Result<Self, HeaderError> {
         let word = |offset: usize| {
             let bytes = lines.get(offset / LINE_BYTES).map(|line| line.0.as_chunks().0);
@@ -346,7 +351,7 @@ impl Header {
         }
     }
 
-    /// Units of the sums of pixels: the radiance unit, and for depths a cell of the photon grid.
+    /// Units of the sums in pixels: the radiance unit, and a photon grid cell as the unit of depth.
     pub fn sum_scale(&self) -> SumScale {
         SumScale { radiance: self.radiance_unit, depth: self.photon_grid.cell }
     }
@@ -413,7 +418,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_an_image_is_refused() {
+    fn bytes_that_are_not_an_image_are_refused() {
         assert_eq!(Header::read(&[Line::ZERO; HEADER_LINES]), Err(HeaderError::Magic));
         let mut other = header().to_lines();
         other[0].0[8] = 77;

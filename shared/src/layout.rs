@@ -1,4 +1,4 @@
-//! The records of card memory: little-endian, and none straddles a line.
+//! Formats of the records in card memory. Numbers are little-endian, and no record straddles a line.
 //!
 //! | record | bytes | records in a line |
 //! |---|---|---|

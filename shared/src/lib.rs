@@ -6,7 +6,7 @@
 //!
 //! # Example
 //!
-//! The first message of a host reaches a card; what carries the bytes is the caller's:
+//! A host sends its first message to a card. The caller transports the bytes:
 //!
 //! ```
 //! use photoncard_shared::image::LAYOUT_VERSION;
@@ -49,9 +49,9 @@
 //! | [`message`] | message | commands of the host, replies of a card, faults |
 //! | [`counters`] | | work of a tile, which a card reports with it |
 //!
-//! [`hash`] is that of all random numbers.
+//! [`hash`] is the hash from which all random numbers are made.
 //!
-//! No function allocates, and no input makes one panic. `docs/protocol.md` describes the protocol for other
+//! No function allocates or panics, whatever the input. `docs/protocol.md` describes the protocol for other
 //! implementations, `docs/glossary.md` defines the terms.
 #![forbid(unsafe_code)]
 #![no_std]

@@ -1,4 +1,4 @@
-//! A port: the bytes of one end of a link.
+//! A port: one end of a byte link.
 
 use core::time::Duration;
 
@@ -7,21 +7,21 @@ use core::time::Duration;
 pub enum PortError {
     /// The other end is gone.
     Closed,
-    /// The device failed; the number is the device's own error code.
+    /// The device failed with this error code of its own.
     Device(u32),
 }
 
-/// One end of a byte link. Every call returns within `wait`, whether or not a byte has moved.
+/// One end of a byte link. Every call returns within the time `wait`, whether or not bytes were moved.
 pub trait Port {
-    /// Reads 1 to `buffer.len()` bytes as soon as any are there and returns their number; 0 if none came
-    /// within `wait`.
+    /// Reads 1 to `buffer.len()` bytes as soon as any have arrived, and returns their number. Returns 0 if
+    /// none arrived within `wait`.
     ///
     /// # Errors
-    /// If no more bytes can come.
+    /// If no more bytes can arrive.
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError>;
 
-    /// Writes as many of the first `bytes` as there is room for and returns their number; 0 if no room came
-    /// within `wait`.
+    /// Writes the first bytes of `bytes`, as many as there is room for, and returns their number. Returns 0
+    /// if there was no room within `wait`.
     ///
     /// # Errors
     /// If no more bytes can be sent.

@@ -1,6 +1,6 @@
-//! Messages of host and card, in postcard's encoding. Each is the payload of one frame.
+//! Messages between host and card, in postcard's encoding. Each message is the payload of one frame.
 //!
-//! The host sends the first message. The course of a session:
+//! The host sends the first message. A session proceeds as follows:
 //!
 //! ```text
 //! Hello           -> Hello                       versions, budget, build, written lines, use of on-chip memory
@@ -10,11 +10,11 @@
 //! EndImage        -> ImageAccepted               after the check of the checksum and the header
 //! BeginFrame      -> FrameAccepted
 //! RenderTile ...  -> Pixels ..., TileDone        at most the budget's `tiles` unanswered, in any order
-//! Flush           -> (nothing)                   no tile follows for now: gathers that wait are done
+//! Flush           -> (nothing)                   no tile follows for now: waiting gathers are done
 //! ```
 //!
-//! A self-test takes the place of the image: `Compute -> Computed`, any number, then `TestMemory ->
-//! MemoryTested ...`.
+//! A self-test takes the place of the image: `Compute -> Computed`, any number, then
+//! `TestMemory -> MemoryTested ...`.
 //!
 //! A command that the card cannot execute is answered with [`Reply::Fault`]; the card stays ready for the
 //! next one.
@@ -38,109 +38,109 @@ use serde::{Deserialize, Serialize};
 use crate::budget::Budget;
 use crate::counters::Counters;
 
-/// Version of the protocol: this module, [`crate::transport`] and [`crate::frame`].
+/// Version of the protocol that this module, [`crate::transport`] and [`crate::frame`] define.
 pub const PROTOCOL_VERSION: u16 = 17;
 
-/// Maximum number of lines of one [`Command::WriteLines`].
+/// Maximum number of lines in one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
 
-/// Number of lines of a chunk, the unit of [`Reply::Checksums`].
+/// Number of lines of a chunk, the unit of which [`Reply::Checksums`] reports checksums.
 pub const CHUNK_LINES: u32 = 64;
 
-/// On-chip memory that a firmware uses, as its board measures it.
+/// On-chip memory that a firmware uses, measured by its board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MemoryUse {
     /// Static data, initialised and zeroed, bytes.
     pub static_bytes: u32,
     /// Size of the stack, bytes.
     pub stack_bytes: u32,
-    /// Maximum of the stack in use since the chip was switched on, bytes.
+    /// Maximum use of the stack since the chip was switched on, bytes.
     pub stack_used: u32,
 }
 
-/// Maximum number of checksums of one [`Reply::Checksums`].
+/// Maximum number of checksums in one [`Reply::Checksums`].
 pub const CHECKSUMS_PER_REPLY: u32 = 64;
 
-/// A pinhole camera. The ray through the picture's point `(u, v)`, both from 0 to 1, v downwards, has the
-/// direction `forward + (2 u - 1) right + (1 - 2 v) up`.
+/// A pinhole camera. The point `(u, v)` of the picture, `u` from 0 to 1 to the right and `v` from 0 to 1
+/// downwards, is seen in the direction `forward + (2 u - 1) right + (1 - 2 v) up`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// The pinhole, metres.
+    /// Position of the pinhole, metres.
     pub origin: [f32; 3],
-    /// Unit vector of the view.
+    /// Unit vector of the view direction.
     pub forward: [f32; 3],
-    /// To the right edge of the picture, at distance 1.
+    /// Vector to the right edge of the picture, at distance 1 from the pinhole.
     pub right: [f32; 3],
-    /// To the upper edge of the picture, at distance 1.
+    /// Vector to the upper edge of the picture, at distance 1 from the pinhole.
     pub up: [f32; 3],
 }
 
-/// Parameters of a frame: everything besides the card image that its pixels depend on, and its order of work.
+/// Parameters of a frame: order of work, and everything but the card image that the pixels depend on.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FrameParameters {
     /// Width of the whole picture, pixels.
     pub width: u32,
     /// Height of the whole picture, pixels.
     pub height: u32,
-    /// The view.
+    /// Camera of the picture.
     pub camera: Camera,
     /// Seed of all random numbers.
     pub seed: u32,
-    /// Number of the first sample of a pixel: 0, or the number of those that other frames of the picture
-    /// have.
+    /// Number of the first sample of each pixel. It is above 0 if other frames of the picture have the
+    /// samples before it.
     pub first_sample: u32,
-    /// Samples a pixel, from the first on.
+    /// Number of samples per pixel in this frame.
     pub samples: u32,
-    /// Samples a pixel of the whole picture as planned: with the irradiance cache, rays are divided among so
-    /// many.
+    /// Planned number of samples per pixel of the whole picture. The irradiance cache divides gather rays
+    /// among them.
     pub planned_samples: u32,
-    /// Final gather rays a sample.
+    /// Final gather rays per sample.
     pub gather_rays: u32,
-    /// Shadow rays a sample.
+    /// Shadow rays per sample.
     pub shadow_rays: u32,
-    /// Number k of photons of a gather, at least 2: the k-th only determines the radius.
+    /// Number k of photons of a gather, at least 2. The k-th photon only determines the radius.
     pub neighbors: u32,
     /// Maximum radius of a gather, metres.
     pub max_distance: f32,
-    /// Importance sampling of gather rays.
+    /// Importance sampling of final gather rays.
     pub sampling: Sampling,
     /// Relative error bound of interpolated irradiance, above 0 and at most 1; `None` turns the irradiance
     /// cache off.
     pub irradiance_error: Option<f32>,
-    /// Number of direction bins of gather rays, at least 1: the rays of one bin are cast for all pixels of a
-    /// tile before those of the next bin. With one bin, all rays of a pixel are cast before those of the next
-    /// pixel.
+    /// Number of direction bins of gather rays, at least 1. The rays of one bin are cast for all pixels of a
+    /// tile before the rays of the next bin; with one bin, all rays of a pixel are cast before those of the
+    /// next pixel.
     pub bins: u32,
-    /// Time and order of gathers.
+    /// Time and order of photon gathers.
     pub drain: Drain,
-    /// Maximum number of waiting gathers, at least 1; a chip limits it to the capacity of its queue.
+    /// Maximum number of waiting gathers, at least 1. A chip limits it to the capacity of its queue.
     pub queue: u32,
-    /// Source of the radiance at the end of a gather ray.
+    /// Source of the reflected radiance at the end of a gather ray.
     pub radiance: Radiance,
-    /// Gathers in the caustic map; with `None`, emission that gather rays meet through specular surfaces
-    /// counts.
+    /// Parameters of gathers in the caustic map. With `None`, a gather ray that reaches an emitter through
+    /// specular surfaces counts its emission.
     pub caustics: Option<CausticGather>,
-    /// `true` for pixels with [`LayerSums`]. Their light does not change; tiles have fewer pixels
+    /// True if pixels have [`LayerSums`]. Their radiance does not change; tiles have fewer pixels
     /// ([`Budget::pixels_of_tile`]).
     pub layers: bool,
     /// Pixel filter.
     pub filter: Filter,
-    /// Maximum number of tiles in flight, at least 1; a chip limits it to [`Budget::in_flight`].
+    /// Maximum number of tiles in flight, at least 1. A chip limits it to [`Budget::in_flight`].
     pub in_flight: u32,
-    /// `true` for one of several frames of a picture: irradiance records of a tile are kept in card memory,
-    /// where there is room beyond the image, for a frame of other samples.
+    /// True if the picture has several frames. Irradiance records of a tile are then kept in card memory
+    /// beyond the image, as far as there is room, and reused by frames with other samples.
     pub keep_records: bool,
-    /// Adaptive sampling: threshold of the deviation of a pixel's samples over the root of their mean,
-    /// W^(1/2)/(sr^(1/2) m), finite and above 0, above which samples after the first [`PROBES`] are means of
-    /// several paths. `None` for one path a sample.
+    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m), finite and above 0; `None` for one path per
+    /// sample. Samples after the first [`PROBES`] are means of several paths if the standard deviation of the
+    /// pixel's samples over the square root of their mean exceeds it.
     pub adaptive_threshold: Option<f32>,
 }
 
-/// Maximum number of paths of a sample by adaptive sampling.
+/// Maximum number of paths per sample in adaptive sampling.
 pub const MAX_PATHS: u32 = 16;
 
 impl FrameParameters {
-    /// Maximum number of paths that a pixel has, probes of earlier samples included.
+    /// Maximum number of paths per pixel, including probes of earlier samples.
     pub fn max_paths(&self) -> u64 {
         let (of_sample, probes) =
             if self.adaptive_threshold.is_some() { (MAX_PATHS, PROBES) } else { (1, 0) };
@@ -148,71 +148,74 @@ impl FrameParameters {
     }
 }
 
-/// Pixel filter: the density of a pixel's samples around its centre, in both directions alike. Samples are
-/// drawn from the filter and count equally (Ernst, Stamminger, Greiner 2006, *Filter importance sampling*),
-/// so that no pixel needs those of its neighbours.
+/// Pixel filter: the density of a pixel's samples around its centre, on either axis. Samples are drawn from
+/// the filter and have equal weights (Ernst, Stamminger, Greiner 2006, *Filter importance sampling*), so that
+/// a pixel needs no samples of its neighbours.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Filter {
-    /// The pixel's square.
+    /// A box filter, 1 pixel wide.
     #[default]
     Box,
-    /// A Gaussian of the standard deviation 1/2 pixel, cut off at 3/2 pixels.
+    /// A Gaussian with standard deviation 1/2 pixel, cut off at 3/2 pixels.
     Gaussian,
     /// A Blackman-Harris window of four terms, 3/2 pixels wide.
     BlackmanHarris,
 }
 
-/// Parameters of gathers in the caustic map.
+/// Parameters of photon gathers in the caustic map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CausticGather {
-    /// Number k of photons, at least 2: the k-th only determines the radius.
+    /// Number k of photons, at least 2. The k-th photon only determines the radius.
     pub neighbors: u32,
-    /// Maximum radius, metres.
+    /// Maximum radius of a gather, metres.
     pub max_distance: f32,
 }
 
-/// Importance sampling of final gather rays. The expectation of the picture does not depend on it. Points of
-/// fewer than eight rays have that of the reflection.
+/// Importance sampling of final gather rays. It does not change the expectation of the picture. Points with
+/// fewer than eight rays use [`Self::Reflection`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sampling {
-    /// By the reflection function and the cosine.
+    /// In proportion to the BRDF times the cosine.
     #[default]
     Reflection,
-    /// By the flux of the photons at the point.
+    /// In proportion to the flux of the photons at the point.
     Photon,
-    /// By the product of reflection and flux.
+    /// In proportion to the product of BRDF and flux.
     Product,
-    /// By the mean of reflection and flux.
+    /// In proportion to the mean of the densities of BRDF and flux.
     Mixture,
 }
 
 /// Source of the reflected radiance at the end of a gather ray.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Radiance {
-    /// Density of the nearest photons.
+    /// Density estimate from the nearest photons.
     #[default]
     Density,
-    /// Nearest irradiance point, which the image must have (Christensen 1999, *Faster photon map global
-    /// illumination*), for Lambertian surfaces; density of photons for surfaces with a lobe.
+    /// Irradiance of the nearest irradiance point (Christensen 1999, *Faster photon map global illumination*)
+    /// for Lambertian surfaces, density estimate for surfaces with a lobe. The image must have irradiance
+    /// points.
     Precomputed,
 }
 
-/// Time and order of gathers. The picture does not depend on it.
+/// Time and order of photon gathers. The picture does not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Drain {
-    /// At the end of their ray, without a queue.
+    /// A gather is done at the end of its ray, without a queue.
     #[default]
     Immediate,
-    /// By a spatial hash of their position, when the queue is full or no other work is left.
+    /// Gathers are queued, and done in the order of a spatial hash when the queue is full or no other work is
+    /// left.
     Hash,
-    /// Along a Hilbert curve, when the queue is full or no other work is left.
+    /// Gathers are queued, and done in the order of a Hilbert curve when the queue is full or no other work
+    /// is left.
     Sort,
 }
 
 /// A rectangle of the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Tile {
-    /// Number of the tile, chosen by the host.
+    /// Number of the tile, which the host chooses.
     pub id: u32,
     /// First column.
     pub x: u32,
@@ -234,8 +237,8 @@ impl Tile {
 /// Message from the host to a card.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
-    /// Begins a session, at any time. The card forgets frame, tiles, and whether it has an image; written
-    /// lines stay. Its encoding is equal in all versions of the protocol.
+    /// Begins a session, at any time. The card forgets its frame, its tiles and whether it has an image, but
+    /// keeps the written lines. The encoding is equal in all versions of the protocol.
     Hello {
         /// The host's [`PROTOCOL_VERSION`].
         protocol: u16,
@@ -244,17 +247,17 @@ pub enum Command<'a> {
     },
     /// Requests the checksums of up to [`CHECKSUMS_PER_REPLY`] chunks.
     ReadChecksums {
-        /// The first chunk.
+        /// Number of the first chunk.
         first: u32,
         /// Number of chunks.
         count: u32,
     },
-    /// Announces an image: number of lines, and checksum of all its bytes. Written lines stay, so that only
-    /// those need be written in which the image differs from the one before.
+    /// Announces an image. Lines written earlier are kept, so that only lines that differ from the previous
+    /// image need be written.
     BeginImage {
-        /// Lines.
+        /// Number of lines of the image.
         lines: u32,
-        /// [`crate::checksum::image_checksum`] of the lines.
+        /// [`crate::checksum::image_checksum`] of all lines.
         checksum: u64,
     },
     /// Writes lines of the image.
@@ -265,22 +268,23 @@ pub enum Command<'a> {
         #[serde(borrow)]
         data: &'a [u8],
     },
-    /// Ends the image, which is then checked.
+    /// Ends the image. The card then checks it.
     EndImage,
-    /// Sets the parameters of the tiles that follow. Tiles of an earlier frame are dropped; messages about
-    /// them may still come before the answer.
+    /// Sets the parameters of the tiles that follow. Tiles of an earlier frame are dropped, but messages
+    /// about them may arrive before the answer.
     BeginFrame(FrameParameters),
     /// Renders a tile.
     RenderTile(Tile),
-    /// Computes fixed operations on operands.
+    /// Computes the fixed operations of a self-test on operands.
     Compute {
         /// Up to [`CASES_PER_COMMAND`] triples of `f32`, [`OPERAND_BYTES`] each.
         #[serde(borrow)]
         operands: &'a [u8],
     },
-    /// Tests the whole memory. The card forgets what it forgets at a hello, and all written lines.
+    /// Tests the whole memory. The card forgets everything that [`Command::Hello`] makes it forget, and all
+    /// written lines.
     TestMemory,
-    /// Ends the wait for further tiles: gathers that wait are done when no other work is left. The next
+    /// Announces that no tile follows for now: waiting gathers are done once no other work is left. The next
     /// [`Command::RenderTile`] revokes it.
     Flush,
 }
@@ -288,8 +292,8 @@ pub enum Command<'a> {
 /// Message from a card to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply<'a> {
-    /// Answer to [`Command::Hello`]. The versions are first in all versions of the protocol:
-    /// [`hello_versions`].
+    /// Answer to [`Command::Hello`]. Its first fields are the versions, in all versions of the protocol
+    /// ([`hello_versions`]).
     Hello {
         /// The card's [`PROTOCOL_VERSION`].
         protocol: u16,
@@ -297,9 +301,10 @@ pub enum Reply<'a> {
         layout: u16,
         /// Capacities of the chip.
         budget: Budget,
-        /// Number of lines of card memory, from the first, that were written since the card was switched on.
+        /// Number of lines, from the first line of card memory, that were written since the card was switched
+        /// on.
         written_lines: u32,
-        /// On-chip memory that the firmware uses; `None` on cards that do not measure it, such as emulated
+        /// On-chip memory that the firmware uses. `None` on cards that do not measure it, such as emulated
         /// ones.
         memory_use: Option<MemoryUse>,
         /// Name and version of the firmware.
@@ -308,43 +313,43 @@ pub enum Reply<'a> {
     },
     /// Answer to [`Command::ReadChecksums`].
     Checksums {
-        /// The first chunk.
+        /// Number of the first chunk.
         first: u32,
-        /// The [`crate::checksum::image_checksum`] of each, eight bytes, little-endian.
+        /// [`crate::checksum::image_checksum`] of each chunk: eight bytes, little-endian.
         #[serde(borrow)]
         data: &'a [u8],
     },
-    /// Answer to [`Command::EndImage`]: the checksum agrees, and the header is sound.
+    /// Answer to [`Command::EndImage`]: the checksum is right and the header is valid.
     ImageAccepted,
-    /// Answer to [`Command::BeginFrame`]: the card can render it.
+    /// Answer to [`Command::BeginFrame`]: the card can render the frame.
     FrameAccepted,
     /// Consecutive pixels of a tile in row-major order, [`record_bytes`] each. Every pixel of a tile is sent
-    /// once; parts of a tile may come in any order.
+    /// once. Several such replies make up a tile, in any order.
     Pixels {
-        /// The tile's number.
+        /// Number of the tile.
         tile: u32,
-        /// Index of the first of these pixels, row-major.
+        /// Row-major index in the tile of the first of these pixels.
         first: u32,
-        /// [`PixelSums`].
+        /// [`PixelSums`] of the pixels.
         #[serde(borrow)]
         data: &'a [u8],
     },
-    /// End of a tile, after all its pixels.
+    /// End of a tile, sent after all its pixels.
     TileDone {
-        /// The tile's number.
+        /// Number of the tile.
         tile: u32,
-        /// Work on the tile.
+        /// Counters of the work on the tile.
         counters: Counters,
     },
     /// Answer to a command that the card cannot execute.
     Fault(Fault),
     /// Answer to [`Command::Compute`].
     Computed {
-        /// The results of each triple, [`RESULT_BYTES`] each.
+        /// Results of each triple of operands, [`RESULT_BYTES`] each.
         #[serde(borrow)]
         results: &'a [u8],
     },
-    /// Answer to [`Command::TestMemory`], repeatedly until the end of the test.
+    /// Answer to [`Command::TestMemory`], sent repeatedly until the test ends.
     MemoryTested(MemoryTest),
 }
 
@@ -358,7 +363,7 @@ pub fn decode<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
     postcard::take_from_bytes(bytes).ok().filter(|(_, rest)| rest.is_empty()).map(|(message, _)| message)
 }
 
-/// Versions in a hello.
+/// Protocol and layout version of a card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Versions {
     /// Version of the protocol.
@@ -367,8 +372,8 @@ pub struct Versions {
     pub layout: u16,
 }
 
-/// Reads the versions of a [`Reply::Hello`] of any version of the protocol, in which they are first; `None`
-/// for other replies.
+/// Reads the versions from the first fields of a [`Reply::Hello`] in any version of the protocol; `None` for
+/// other replies.
 pub fn hello_versions(bytes: &[u8]) -> Option<Versions> {
     let (opcode, rest) = postcard::take_from_bytes::<u32>(bytes).ok()?;
     let (versions, _) = postcard::take_from_bytes(rest).ok()?;

@@ -1,21 +1,21 @@
 //! Consistent overhead byte stuffing (COBS; Cheshire, Baker 1999): an encoding without zero bytes.
 //!
-//! The plain bytes are cut at every zero byte, which is left out, and after 254 non-zero bytes in a row. Each
-//! piece follows a code byte, its length plus one. A code below 255 stands for a zero byte after its piece,
-//! but for the last piece.
+//! The plain bytes are cut into pieces at every zero byte, which is dropped, and after 254 non-zero bytes in
+//! a row. A code byte, the piece's length plus one, precedes each piece. A code below 255 stands for a zero
+//! byte after its piece, except after the last piece.
 
 use heapless::Vec;
 
-/// Code of a piece of 254 bytes, the longest: no zero byte follows it.
+/// Code of a piece of 254 bytes, the longest. No zero byte follows such a piece.
 const FULL: u8 = 0xff;
 
-/// Maximum stuffed length of `plain` bytes.
+/// Maximum length of `plain` bytes after stuffing.
 pub const fn max_stuffed_bytes(plain: usize) -> usize {
     plain + plain.div_ceil(FULL as usize - 1) + (plain == 0) as usize
 }
 
-/// Appends the stuffed bytes of `parts`, one after the other, to `wire`, or nothing if there is no room.
-/// Returns whether there was.
+/// Stuffs the concatenation of `parts` and appends the result to `wire`. Returns false, and appends nothing,
+/// if there is no room.
 pub fn stuff<const N: usize>(parts: &[&[u8]], wire: &mut Vec<u8, N>) -> bool {
     let begin = wire.len();
     let plain = parts.iter().map(|part| part.len()).sum();
@@ -26,7 +26,7 @@ pub fn stuff<const N: usize>(parts: &[&[u8]], wire: &mut Vec<u8, N>) -> bool {
     written.is_some()
 }
 
-/// Writes the stuffed bytes to the front of `room`: their number, or `None` if there are too many.
+/// Writes the stuffed bytes to the front of `room`. Returns their number; `None` if there is no room.
 fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
     let (mut code, mut place) = (0, 1);
     for &part in parts {

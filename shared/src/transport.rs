@@ -1,7 +1,7 @@
 //! The transport: delivers messages once, whole and in order, over a link that damages, loses or repeats
 //! bytes.
 //!
-//! Each end of a link has a [`Transport`], which does no I/O and has no clock: it takes bytes and returns
+//! Each end of a link has a [`Transport`]. It does no I/O and has no clock: it consumes bytes and produces
 //! bytes.
 //!
 //! - The host begins a session with an [`FrameKind::Open`] frame of number 0 and a random session number of
@@ -12,7 +12,7 @@
 //! - Every frame carries the number of messages of the other direction that were taken (`acknowledged`), and
 //!   which of the next ones have arrived (`held`). A link keeps the order of its bytes: a message is lost if
 //!   one that was sent after it has arrived. Only lost messages are repeated.
-//! - A loss of the last messages needs a clock to be noticed, which the host has: after some silence it sends
+//! - Only a clock reveals that the last messages were lost. The host has one: after some silence it sends
 //!   a [`FrameKind::Probe`] with the number of its transmission. The card's [`FrameKind::Answer`] returns
 //!   that number: host messages sent before the probe that have not arrived are lost. The answer also carries
 //!   the number of messages that the card has sent; missing ones are lost, as the host's next probe states.
@@ -31,7 +31,7 @@ use crate::frame::{FrameReader, MAX_FRAME};
 pub struct Transport {
     reader: FrameReader,
     wire: Vec<u8, MAX_FRAME>,
-    /// Number of bytes of `wire` that are sent.
+    /// Number of bytes of `wire` that were sent.
     sent: usize,
     session: LinkSession,
 }
@@ -41,17 +41,17 @@ impl Transport {
         Self { reader: FrameReader::new(), wire: Vec::new(), sent: 0, session: LinkSession::new(end) }
     }
 
-    /// The host's end, without a session.
+    /// Creates the host's end, without a session.
     pub const fn host() -> Self {
         Self::new(End::Host)
     }
 
-    /// A card's end, without a session.
+    /// Creates a card's end, without a session.
     pub const fn card() -> Self {
         Self::new(End::Card)
     }
 
-    /// Begins a session, with the next message that is sent. Messages in flight of an earlier session are
+    /// Begins a session with the next message sent. Unacknowledged messages of an earlier session are
     /// dropped.
     pub fn open(&mut self, number: u32) {
         self.session.begin(number);
@@ -67,20 +67,20 @@ impl Transport {
         self.session.on_their_way() == 0
     }
 
-    /// Counter of progress, modulo 2^16: messages that were taken here, plus messages that the other end
-    /// acknowledged.
+    /// Number of messages delivered, modulo 2^16: messages taken at this end plus messages acknowledged by
+    /// the other end. It changes with every progress.
     pub fn passed(&self) -> u16 {
         self.session.passed()
     }
 
-    /// Sends the message that `fill` writes into a slice of [`MAX_PAYLOAD`] bytes, of the length that it
-    /// returns. Returns `false`, and sends nothing, if the window is full or `fill` returns `None` or more
-    /// than the slice's length.
+    /// Sends the message that `fill` writes into a slice of [`MAX_PAYLOAD`] bytes; `fill` returns its length.
+    /// Returns false, and sends nothing, if the window is full or `fill` returns `None` or a length beyond
+    /// the slice.
     pub fn send(&mut self, fill: impl FnOnce(&mut [u8]) -> Option<usize>) -> bool {
         self.can_send() && self.session.send(fill)
     }
 
-    /// Bytes to send now.
+    /// Bytes to be sent now.
     pub fn outgoing(&mut self) -> &[u8] {
         if self.sent >= self.wire.len() {
             self.wire.clear();
@@ -90,13 +90,13 @@ impl Transport {
         self.wire.get(self.sent..).unwrap_or(&[])
     }
 
-    /// Removes the first `bytes` of [`Self::outgoing`], which were sent.
+    /// Removes the first `bytes` bytes of [`Self::outgoing`] after they were sent.
     pub fn sent(&mut self, bytes: usize) {
         self.sent = self.sent.saturating_add(bytes);
     }
 
-    /// Takes bytes from the link, up to the end of the next frame. Returns their number, and the frame's
-    /// event.
+    /// Consumes bytes from the link, up to the end of the next frame. Returns the number of bytes consumed,
+    /// and the event of the frame, if any.
     pub fn receive(&mut self, bytes: &[u8]) -> (usize, Option<Event>) {
         let (taken, frame) = self.reader.read(bytes);
         let event = match frame {
@@ -115,9 +115,10 @@ impl Transport {
         self.session.take()
     }
 
-    /// Acknowledges messages that were taken since the last frame. To be called before an end waits or works.
+    /// Acknowledges the messages taken since the last frame was sent. To be called before an end waits or
+    /// works.
     pub fn acknowledge(&mut self) {
-        if self.session.has_untold() {
+        if self.session.has_unacknowledged() {
             self.session.ask_for(Control::Acknowledge);
         }
     }
@@ -127,12 +128,12 @@ impl Transport {
         self.session.ask_for(Control::Probe);
     }
 
-    /// Repeats all messages in flight.
+    /// Repeats all unacknowledged messages.
     pub fn send_again(&mut self) {
         self.session.lose(|_, _| true);
     }
 
-    /// Counts of damage and repetition so far.
+    /// Number of damaged and repeated frames so far.
     pub fn statistics(&self) -> LineStatistics {
         self.session.statistics()
     }

@@ -1,4 +1,4 @@
-//! Stuffing and checksum are those of everyone else.
+//! Stuffing and checksums agree with independent implementations.
 
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::checksum::{Checksum, ImageChecksum, checksum, image_checksum};
@@ -7,7 +7,7 @@ use proptest::collection::vec;
 use proptest::prelude::*;
 use proptest::sample::Index;
 
-/// Bytes with runs on both sides of a piece's 254.
+/// Bytes with runs of non-zero bytes shorter and longer than a piece of 254.
 fn plain() -> impl Strategy<Value = Vec<u8>> {
     let run = (0_u8..4, prop_oneof![0_usize..4, 252_usize..258, 505_usize..512]);
     let runs = vec(run, 0..6).prop_map(|runs| runs.iter().flat_map(|&(b, n)| vec![b; n]).collect());
@@ -27,7 +27,7 @@ fn stuffed(parts: [&[u8]; 2]) -> Vec<u8> {
 
 proptest! {
     #[test]
-    fn stuffing_is_that_of_cobs(plain in plain(), at: Index) {
+    fn stuffing_agrees_with_the_cobs_crate(plain in plain(), at: Index) {
         let mut expected = vec![0; cobs::max_encoding_length(plain.len())];
         let length = cobs::encode(&plain, &mut expected);
         expected.truncate(length);
@@ -38,7 +38,7 @@ proptest! {
     }
 
     #[test]
-    fn what_cobs_refuses_is_refused(wire in vec(prop_oneof![1_u8..8, 1_u8..=255], 1..600)) {
+    fn invalid_cobs_is_refused(wire in vec(prop_oneof![1_u8..8, 1_u8..=255], 1..600)) {
         let mut expected = wire.clone();
         let length = cobs::decode_in_place(&mut expected).ok();
         let mut unstuffed = wire.clone();
@@ -47,7 +47,7 @@ proptest! {
     }
 
     #[test]
-    fn no_room_is_told(plain in plain(), at: Index) {
+    fn stuffing_without_room_is_refused(plain in plain(), at: Index) {
         let mut wire = heapless::Vec::<u8, 300>::new();
         let fits = 6 + stuffed(cut(&plain, at)).len() <= 300;
         let before = b"before";
@@ -57,12 +57,12 @@ proptest! {
     }
 
     #[test]
-    fn no_bytes_make_it_panic(mut wire in vec(any::<u8>(), 0..600)) {
+    fn unstuffing_arbitrary_bytes_does_not_panic(mut wire in vec(any::<u8>(), 0..600)) {
         let _ = unstuff(&mut wire);
     }
 
     #[test]
-    fn the_image_checksum_is_that_of_crc(bytes in vec(any::<u8>(), 0..10 * LINE_BYTES), cut in 0_usize..10) {
+    fn the_image_checksum_agrees_with_the_crc_crate(bytes in vec(any::<u8>(), 0..10 * LINE_BYTES), cut in 0_usize..10) {
         let lines: Vec<Line> = bytes.as_chunks().0.iter().map(|&line| Line(line)).collect();
         let whole = &bytes[..lines.len() * LINE_BYTES];
         let expected = crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(whole);
@@ -75,7 +75,7 @@ proptest! {
     }
 
     #[test]
-    fn the_checksum_is_that_of_crc(bytes in vec(any::<u8>(), 0..600), cuts in vec(1_usize..40, 1..40)) {
+    fn the_frame_checksum_agrees_with_the_crc_crate(bytes in vec(any::<u8>(), 0..600), cuts in vec(1_usize..40, 1..40)) {
         let expected = crc::Crc::<u32>::new(&crc::CRC_32_ISCSI).checksum(&bytes);
         prop_assert_eq!(checksum(&bytes), expected);
         let (mut sum, mut rest) = (Checksum::default(), &bytes[..]);
@@ -89,9 +89,9 @@ proptest! {
     }
 }
 
-/// An error that a frame's checksum does not show: the polynomial itself, laid over the bytes.
+/// The polynomial of the frame checksum, added to the bytes, is an error that this checksum cannot detect.
 #[test]
-fn what_a_frames_checksum_misses_an_images_shows() {
+fn the_image_checksum_detects_an_error_that_the_frame_checksum_misses() {
     // The polynomial of CRC-32C has 33 bits. The first on the wire, a byte's lowest, is the highest
     // coefficient.
     let multiple = 1 | u64::from(0x82f6_3b78_u32) << 1;

@@ -1,4 +1,4 @@
-//! Wire formats: frames come back whole or not at all, opcodes stay what they are.
+//! Wire formats: frames arrive whole or not at all, and opcodes are pinned.
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::checksum::checksum;
@@ -9,7 +9,7 @@ use photoncard_shared::frame::{
 use photoncard_shared::message::*;
 use proptest::prelude::*;
 
-/// A budget of distinct values, as large as those of cards.
+/// Budget of distinct values, as large as those of real cards.
 const BUDGET: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: 512 << 20,
@@ -36,7 +36,7 @@ fn frame(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {
     wire.to_vec()
 }
 
-/// All frames and errors of `bytes`, given to a reader in pieces of `piece`.
+/// Returns all frames and errors of `bytes`, read in pieces of `piece` bytes.
 fn read_all(bytes: &[u8], piece: usize) -> Vec<Result<(FrameHeader, Vec<u8>), FrameError>> {
     let mut reader = FrameReader::new();
     let mut found = Vec::new();
@@ -52,7 +52,7 @@ fn read_all(bytes: &[u8], piece: usize) -> Vec<Result<(FrameHeader, Vec<u8>), Fr
 
 proptest! {
     #[test]
-    fn a_payload_comes_back_whatever_the_pieces(
+    fn a_payload_is_read_back_from_pieces_of_any_size(
         payload in proptest::collection::vec(any::<u8>(), 0..=MAX_PAYLOAD),
         piece in 1_usize..3000,
     ) {
@@ -85,15 +85,15 @@ proptest! {
     }
 
     #[test]
-    fn no_bytes_make_a_message_reader_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
+    fn decoding_arbitrary_bytes_does_not_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300)) {
         let _ = decode::<Command>(&bytes);
         let _ = decode::<Reply>(&bytes);
     }
 }
 
-/// The bytes on the wire are part of the protocol.
+/// Pins the bytes of frames on the wire.
 #[test]
-fn golden_frames() {
+fn frames_have_their_golden_bytes() {
     let header =
         |kind| FrameHeader { kind, session: 0x0102_0304, sequence: 3, acknowledged: 0x0405, held: 6 };
     let golden: [(FrameKind, &[u8], &[u8]); 6] = [
@@ -140,7 +140,7 @@ fn golden_frames() {
     }
 }
 
-/// The numbers of `docs/protocol.md`.
+/// Pins the numbers in `docs/protocol.md`.
 #[test]
 fn the_longest_frame_is_pinned() {
     assert_eq!((MAX_PAYLOAD, MAX_FRAME), (1056, 1076));
@@ -150,7 +150,7 @@ fn the_longest_frame_is_pinned() {
 }
 
 #[test]
-fn what_is_longer_than_the_longest_frame_is_told() {
+fn a_frame_longer_than_the_maximum_is_an_error() {
     let mut longer = vec![2; MAX_FRAME];
     longer.push(0);
     assert_eq!(read_all(&longer, 100), [Err(FrameError::TooLong)]);
@@ -168,7 +168,7 @@ fn a_frame_that_does_not_fit_is_not_written() {
 }
 
 #[test]
-fn the_checksum_is_castagnolis() {
+fn the_frame_checksum_is_crc32c() {
     assert_eq!(checksum(b"123456789"), 0xe306_9283);
 }
 
@@ -231,17 +231,18 @@ fn opcodes_are_pinned() {
     assert!(encoded(&hello(Some(memory_use))).ends_with(&[0, 1, 3, 5, 4, 1, b'x']));
 }
 
-/// The page that other implementations are written from is that of this version.
+/// Compares the version in `docs/protocol.md`, from which other implementations are written, with that of the
+/// code.
 #[test]
-fn the_page_is_of_this_version() {
+fn the_protocol_document_states_this_version() {
     let page = include_str!("../../docs/protocol.md");
     assert!(page.contains(&format!("The version is {PROTOCOL_VERSION}\n")));
 }
 
-/// Structures whose every field has a number of its own: bytes that change are another version of the
-/// protocol.
+/// Pins the bytes of structures whose fields all have distinct values. A change of these bytes needs a new
+/// protocol version.
 #[test]
-fn golden_structures() {
+fn structures_have_their_golden_bytes() {
     assert_eq!(PROTOCOL_VERSION, 17);
     let budget = Budget {
         sram_bytes: 1,
@@ -348,7 +349,7 @@ fn golden_structures() {
 
 /// Progress of a memory test with a wrong word, and without one.
 #[test]
-fn golden_self_test() {
+fn self_test_messages_have_their_golden_bytes() {
     for (number, pattern) in (0..).zip(MemoryPattern::ALL) {
         let first = Some(WrongWord { index: 5, expected: 6, found: 300 });
         let wrong = WrongWords { count: 3, bits: 4, first };
@@ -427,7 +428,7 @@ fn sums_of_a_pixel_survive_their_record() {
 }
 
 #[test]
-fn faults_are_words_that_name_the_parameter() {
+fn texts_of_faults_name_the_parameter() {
     for parameter in Parameter::ALL {
         let words = parameter.fault().to_string();
         assert!(words.contains(&format!("`{}`", parameter.name())), "{words}");

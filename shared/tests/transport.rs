@@ -1,10 +1,10 @@
-//! Whatever a line does to bytes, messages come once, whole and in order.
+//! Messages arrive once, whole and in order, whatever the line does to bytes.
 
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
 use photoncard_shared::transport::{Event, LineStatistics, Transport};
 use proptest::prelude::*;
 
-/// Numbers that a seed decides.
+/// Random numbers of a seed.
 struct Random(u64);
 
 impl Random {
@@ -18,7 +18,7 @@ impl Random {
     }
 }
 
-/// Faults of a line per million bytes.
+/// Probabilities of a line's faults, per million bytes.
 #[derive(Clone, Copy, Debug)]
 struct Faults {
     flips: u64,
@@ -28,7 +28,7 @@ struct Faults {
 
 const NONE: Faults = Faults { flips: 0, drops: 0, repeats: 0 };
 
-/// Sends what an end has over a line, in pieces.
+/// Sends the pending bytes of one end over a faulty line, in pieces.
 fn deliver(
     from: &mut Transport,
     to: &mut Transport,
@@ -67,13 +67,13 @@ fn fill(message: &[u8]) -> impl FnOnce(&mut [u8]) -> Option<usize> {
     }
 }
 
-/// The message of a number: of any length.
+/// Message number `number`; its length varies.
 fn message(number: usize, salt: usize) -> Vec<u8> {
     let length = (number * 389 + salt * 7) % (MAX_PAYLOAD + 1);
     (0..length).map(|index| (index * 31 + number * 7 + salt) as u8).collect()
 }
 
-/// Sends `count` messages each way. Returns what the host and the card saw of the line.
+/// Sends `count` messages in each direction. Returns the line statistics of host and card.
 fn converse(count: usize, faults: Faults, seed: u64) -> [LineStatistics; 2] {
     let mut random = Random(seed);
     let (mut host, mut card) = (Transport::host(), Transport::card());
@@ -118,7 +118,7 @@ fn converse(count: usize, faults: Faults, seed: u64) -> [LineStatistics; 2] {
 }
 
 #[test]
-fn a_sound_line_repeats_nothing() {
+fn a_faultless_line_repeats_no_message() {
     for seed in 0..50 {
         for statistics in converse(40, NONE, seed) {
             assert_eq!((statistics.damaged, statistics.repeated, statistics.duplicates), (0, 0, 0));
@@ -127,7 +127,7 @@ fn a_sound_line_repeats_nothing() {
 }
 
 #[test]
-fn more_messages_than_numbers_come_in_order() {
+fn more_messages_than_sequence_numbers_arrive_in_order() {
     let (mut host, mut card) = (Transport::host(), Transport::card());
     host.open(1);
     let mut random = Random(5);
@@ -159,7 +159,7 @@ fn a_message_of_the_greatest_length_fits_a_frame() {
 }
 
 #[test]
-fn a_card_that_was_reset_says_so_and_a_new_session_forgets_the_old() {
+fn a_reset_card_reports_an_unknown_session_and_a_new_session_replaces_the_old() {
     let mut random = Random(3);
     let (mut host, mut card) = (Transport::host(), Transport::card());
     host.open(7);
@@ -188,7 +188,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
 
     #[test]
-    fn messages_come_once_whole_and_in_order(
+    fn messages_arrive_once_whole_and_in_order(
         seed in any::<u64>(),
         flips in 0_u64..1000,
         drops in 0_u64..1000,
@@ -200,7 +200,7 @@ proptest! {
     }
 
     #[test]
-    fn no_bytes_stop_an_end(garbage in proptest::collection::vec(any::<u8>(), 0..4000), is_card in any::<bool>()) {
+    fn arbitrary_bytes_do_not_stop_an_end(garbage in proptest::collection::vec(any::<u8>(), 0..4000), is_card in any::<bool>()) {
         let mut end = if is_card { Transport::card() } else { Transport::host() };
         end.open(0);
         let mut rest = &garbage[..];
@@ -215,10 +215,10 @@ proptest! {
     }
 }
 
-/// A card in the middle of a session with another host takes a new host's first message, unless the 32 bits
-/// of both numbers are equal.
+/// A card in a session with one host accepts the first message of another host, unless all 32 bits of the
+/// session numbers are equal.
 #[test]
-fn sessions_are_told_apart_by_all_bits_of_their_numbers() {
+fn sessions_are_distinguished_by_all_bits_of_their_numbers() {
     for (bit, is_new) in (0..32).map(|bit| (1 << bit, true)).chain([(0, false)]) {
         let mut card = Transport::card();
         for (number, expected) in [(77, true), (77 ^ bit, is_new)] {

@@ -1,5 +1,5 @@
-//! Bounding volume hierarchy: built by obvhs as a binary tree, folded into wide nodes for the chip by the
-//! surface area heuristic.
+//! Bounding volume hierarchy. The builder obvhs makes a binary tree, which is folded into the chip's wide
+//! nodes by the surface area heuristic.
 
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
@@ -17,7 +17,7 @@ mod reinsertion;
 /// A bounding volume hierarchy in the chip's records.
 #[derive(Debug)]
 pub struct Hierarchy {
-    /// Nodes, the root first.
+    /// Nodes; the root is the first.
     pub nodes: Vec<[u8; LINE_BYTES]>,
     /// Leaves of triangles.
     pub leaves: Vec<[u8; LINE_BYTES]>,
@@ -28,8 +28,7 @@ pub struct Hierarchy {
 /// Indices of the triangles of a leaf, in the leaf's order.
 pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
 
-/// Properties of materials that leaves hold for their triangles. Materials beyond the end of a list have
-/// none.
+/// Properties of materials that leaves store for their triangles. Materials past the end of a list have none.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Finishes<'a> {
     /// True for materials whose triangles may have cut-outs.
@@ -47,21 +46,21 @@ struct Mesh<'a> {
 /// Error of [`build`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum HierarchyError {
-    /// Error of a descent that could overflow the chip's stack.
+    /// A traversal could overflow the chip's stack.
     #[error(
         "a descent in the bounding volume hierarchy may put off {entries} parts; the chip's stack holds {BVH_STACK}"
     )]
     TooDeep {
-        /// Maximum number of stack entries that a descent needs.
+        /// Maximum number of stack entries that a traversal needs.
         entries: usize,
     },
-    /// Error of more triangles than a card can index.
+    /// There are more triangles than a card can index.
     #[error("the scene has {triangles} triangles; a card image can index at most {MAX_TRIANGLES}")]
     TooMany {
         /// Number of triangles of the scene.
         triangles: usize,
     },
-    /// Error of a material index above the maximum that a card can index.
+    /// A material index exceeds the maximum that a card can index.
     #[error(
         "a triangle has the material of index {material}; a card image can index at most {MAX_MATERIALS} materials"
     )]
@@ -69,34 +68,33 @@ pub enum HierarchyError {
         /// Index of the material.
         material: u32,
     },
-    /// Error of a corner that is not finite, or so far away that the area of the scene's bounding box is not.
+    /// A corner is not finite, or so far away that the area of the scene's bounding box is not finite.
     #[error("a triangle has a corner whose position is not finite, or too far from the origin")]
     NotFinite,
 }
 
-/// Maximum number of triangles. Each may have a leaf of its own, and a triangle's index in the card image is
+/// Maximum number of triangles. Each triangle can have a leaf of its own, and its index in the card image is
 /// `leaf * LEAF_TRIANGLES + slot`.
 const MAX_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 
-/// Cost of a visit of a leaf, relative to a visit of a node.
+/// Cost of a visit of a leaf relative to a visit of a node.
 const LEAF_COST: f32 = 1.0;
 
-/// Number of a depth's nodes that one thread converts at once.
+/// Number of nodes at a depth that one thread converts at once.
 const SEQUENTIAL: usize = 256;
 
-/// Maximum number of concentric boxes that the builder receives one by one.
+/// Maximum number of concentric boxes that the builder receives individually.
 const MAX_CONCENTRIC: usize = 64;
 
-/// Shares of the nodes that the two optimizations of the binary tree reinsert.
+/// Fractions of the nodes that the two passes of [`reinsertion`] reinsert.
 const REINSERTED: [f32; 2] = [0.2, 0.4];
-/// Depth of the binary tree above which its builder searches for partners next to each part alone.
+/// Depth of the binary tree above which the builder searches for partners only among adjacent parts.
 const SEARCH_DEPTH: usize = 2;
 
-/// Builds the hierarchy of `triangles`, at least one. The result does not depend on the machine or on
-/// threads.
+/// Builds the hierarchy of at least one triangle. The result depends neither on the machine nor on threads.
 ///
 /// # Errors
-/// If the triangles or materials are too many, a corner is not finite or too far away, or a descent could
+/// If there are too many triangles or materials, a corner is not finite or too far away, or a traversal could
 /// overflow the chip's stack.
 pub fn build(triangles: &[Triangle], finishes: Finishes) -> Result<Hierarchy, HierarchyError> {
     if triangles.len() > MAX_TRIANGLES {
@@ -134,7 +132,8 @@ pub fn build(triangles: &[Triangle], finishes: Finishes) -> Result<Hierarchy, Hi
     Ok(Hierarchy { nodes, leaves: lines.collect(), leaf_triangles: leaves })
 }
 
-/// The builder's tree of boxes, each in a leaf of its own: leaves are made when the tree is folded.
+/// Builder's tree of boxes. Each box has a leaf of its own; leaves of several triangles are made when the
+/// tree is folded.
 fn binary(boxes: &[Aabb]) -> Bvh2 {
     let (distance, precision) = (PlocSearchDistance::High, SortPrecision::U128);
     let indices = (0..boxes.len() as u32).collect();
@@ -144,11 +143,11 @@ fn binary(boxes: &[Aabb]) -> Bvh2 {
     tree
 }
 
-/// Input of the builder: one box for many triangles whose boxes have a common centre, one for each other
-/// triangle.
+/// Input of the builder: one box for many triangles whose boxes have a common centre, and one box for each
+/// other triangle.
 ///
-/// Concentric boxes, each in the next, are all at one distance from the smallest: hardly two of them are each
-/// other's nearest, and the builder would search all of them for each pair that it joins.
+/// Concentric boxes, each inside the next, are all at one distance from the smallest box. Hardly two of them
+/// are each other's nearest, so that the builder would search all of them for each pair that it joins.
 struct Parts {
     crowds: Vec<Vec<u32>>,
     singles: Vec<u32>,
@@ -166,12 +165,11 @@ impl Parts {
         Self { crowds, singles: (0..).zip(is_single).filter_map(|(index, is)| is.then_some(index)).collect() }
     }
 
-    /// The triangles of each part.
+    /// Triangles of each part.
     fn iter(&self) -> impl Iterator<Item = &[u32]> {
         self.crowds.iter().map(Vec::as_slice).chain(self.singles.chunks(1))
     }
 
-    /// The triangles of a part.
     fn triangles(&self, part: u32) -> &[u32] {
         let part = part as usize;
         match part.checked_sub(self.crowds.len()) {
@@ -199,7 +197,7 @@ impl Mesh<'_> {
         layout::Triangle { vertices, material, cut_out, flat_glass }
     }
 
-    /// Encodes a leaf of the triangles `indices`; `None` if they exceed one line.
+    /// Encodes a leaf with the triangles `indices`; `None` if they exceed one line.
     fn encode(&self, indices: &[u32]) -> Option<[u8; LINE_BYTES]> {
         let records: heapless::Vec<_, LEAF_TRIANGLES> =
             indices.iter().map(|&index| self.record(&self.triangles[index as usize])).collect();
@@ -207,7 +205,7 @@ impl Mesh<'_> {
     }
 }
 
-/// Converts the builder's tree for folding. Every subtree whose triangles fit in one leaf may become one.
+/// Converts the builder's tree for folding. Every subtree whose triangles fit in one leaf can become a leaf.
 fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
     let missing = || unreachable!("a part is made before its parent");
     let mut below = Vec::new();
@@ -232,7 +230,7 @@ fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafT
     below.pop().unwrap_or_else(missing)
 }
 
-/// Nodes by depth, the root first. The children of a depth's nodes follow each other in the next.
+/// Nodes by depth, from the root. Nodes with one parent are adjacent.
 fn depths(binary: &Bvh2) -> Vec<Vec<&Bvh2Node>> {
     let mut depths = Vec::new();
     let mut nodes = vec![&binary.nodes[0]];
@@ -244,7 +242,7 @@ fn depths(binary: &Bvh2) -> Vec<Vec<&Bvh2Node>> {
     depths
 }
 
-/// A tree of median splits along the longest axis.
+/// Builds a tree by median splits along the longest axis.
 fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangles, NodeBox> {
     let bounds = around(indices, boxes);
     let area = bounds.half_area();
@@ -262,7 +260,7 @@ fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangle
     Tree::node(parts, node_box, area, None)
 }
 
-/// Triangles of two leaves together, if one leaf holds them.
+/// Triangles of two leaves together, if they fit in one leaf.
 fn both(parts: &[Tree<LeafTriangles, NodeBox>; 2], mesh: &Mesh) -> Option<LeafTriangles> {
     let mut indices = LeafTriangles::new();
     for part in parts {
@@ -287,7 +285,7 @@ mod tests {
         (0..count).map(|i| Triangle::new(corners(i), i)).collect()
     }
 
-    /// Collects the triangles below a child; asserts that each lies within the boxes of all nodes above.
+    /// Collects the triangles below a child. Asserts that each lies within the boxes of all nodes above it.
     fn walk(hierarchy: &Hierarchy, child: Child, room: NodeBox, found: &mut Vec<u32>) {
         let node = match child {
             Child::Leaf(leaf) => {
@@ -316,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn every_triangle_is_in_one_leaf_and_in_its_boxes() {
+    fn every_triangle_is_in_one_leaf_and_within_the_boxes_above_it() {
         for count in [1, 2, 3, 4, 17, 1000, 20_000] {
             let hierarchy = build(&triangles(count), Finishes::default()).expect("builds");
             let everywhere = NodeBox { lower: [-9.0; 3], upper: [9.0; 3] };
@@ -366,7 +364,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_place_is_refused() {
+    fn corners_that_are_not_finite_are_refused() {
         for coordinate in [f32::NAN, f32::INFINITY, 1e30] {
             let mut triangles = triangles(20);
             triangles[7].vertices[1] = Vec3::splat(coordinate);
@@ -377,9 +375,9 @@ mod tests {
         }
     }
 
-    /// Coincident or concentric squares, of which the builder would join two at a time.
+    /// Coincident or concentric squares are the hard case: the builder would join only two of them at a time.
     #[test]
-    fn crowds_of_triangles_are_built_in_no_time_to_speak_of() {
+    fn concentric_triangles_are_built_quickly() {
         for step in [0.0, 1e-5] {
             let squares = (0..50_000).map(|i| {
                 let side = 1.0 + step * i as f32;
@@ -397,7 +395,7 @@ mod tests {
     }
 
     #[test]
-    fn triangles_in_one_place_are_no_trouble() {
+    fn coincident_triangles_are_built() {
         let [triangle] = triangles(1)[..] else { unreachable!() };
         let hierarchy = build(&vec![triangle; 5000], Finishes::default()).expect("builds");
         assert!((5000 / LEAF_TRIANGLES..5000 / 3).contains(&hierarchy.leaves.len()));

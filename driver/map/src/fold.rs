@@ -1,4 +1,4 @@
-//! Binary trees, folded into wide nodes of minimum expected cost and numbered as in a card image (Ylitie,
+//! Folding of binary trees into wide nodes with minimum expected cost, numbered as in a card image (Ylitie,
 //! Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide BVHs*, section
 //! 3.1).
 
@@ -9,30 +9,31 @@ use photoncard_shared::layout::{Links, NODE_CHILDREN};
 /// A binary tree with the costs of its optimal folding.
 pub(crate) struct Tree<L, B> {
     part: Part<L, B>,
-    /// `costs[i]`: expected cost of a descent in the tree as at most `i + 1` children of one node.
+    /// Expected costs of a traversal. `costs[i]` is the cost if the tree becomes at most `i + 1` children of
+    /// one node.
     costs: [f32; NODE_CHILDREN],
 }
 
-/// A node of a binary tree: the leaf that it may become, and its two children, if any. Its costs are in
-/// [`Tree`], as only its parent needs them.
+/// A node of a binary tree: the leaf that it can become, and its two children, if any. Its costs are in
+/// [`Tree`], because only its parent needs them.
 struct Part<L, B> {
     bounds: B,
     leaf: Option<L>,
     parts: Option<Box<[Self; 2]>>,
-    /// `first[i]`: of at most `i + 1` children of a wide node, the number that the first part contributes; 0
-    /// if the whole part is one child.
+    /// Distribution of children. If the part becomes at most `i + 1` children of a wide node, `first[i]` of
+    /// them come from its first child; 0 if the whole part is one child.
     first: [u8; NODE_CHILDREN],
 }
 
 impl<L, B: Copy> Tree<L, B> {
-    /// A leaf with the cost of a visit.
+    /// Leaf whose visit has the cost `cost`.
     pub(crate) fn leaf(leaf: L, bounds: B, cost: f32) -> Self {
         let part = Part { bounds, leaf: Some(leaf), parts: None, first: [0; NODE_CHILDREN] };
         Self { part, costs: [cost; NODE_CHILDREN] }
     }
 
-    /// A node of two parts. `node`: cost of a visit as a wide node. `leaf`: the leaf that it may become, with
-    /// the cost of a visit.
+    /// Node with two children. `node` is the cost of visiting it as a wide node; `leaf` is the leaf that it
+    /// can become, with the cost of its visit.
     pub(crate) fn node(parts: [Self; 2], bounds: B, node: f32, leaf: Option<(L, f32)>) -> Self {
         let mut costs = [f32::INFINITY; NODE_CHILDREN];
         let mut first = [0; NODE_CHILDREN];
@@ -65,14 +66,14 @@ impl<L, B: Copy> Tree<L, B> {
         self.part.bounds
     }
 
-    /// The leaf that the tree may become, if any.
+    /// Leaf that the tree can become, if any.
     pub(crate) fn as_leaf(&self) -> Option<&L> {
         self.part.leaf.as_ref()
     }
 }
 
 impl<L, B: Copy> Part<L, B> {
-    /// Appends the node to the children of a wide node, as at most `most` children.
+    /// Appends the part to the children of a wide node, as at most `most` children.
     fn unfold(self, most: usize, children: &mut Vec<Self>) {
         let first = self.first[most - 1] as usize;
         match self.parts {
@@ -86,7 +87,7 @@ impl<L, B: Copy> Part<L, B> {
     }
 }
 
-/// A wide node; `B` bounds a child.
+/// A wide node. `B` is the type of a child's bounds.
 pub(crate) struct WideNode<B> {
     pub(crate) children: Vec<B>,
     pub(crate) links: Links,
@@ -94,16 +95,16 @@ pub(crate) struct WideNode<B> {
 
 /// A folded tree, in the order of a card image.
 pub(crate) struct Folded<L, B> {
-    /// Nodes in breadth-first order, the root first.
+    /// Nodes in breadth-first order, from the root.
     pub(crate) nodes: Vec<WideNode<B>>,
-    /// Leaves; the leaves of a node follow each other.
+    /// Leaves. The leaves of a node are adjacent.
     pub(crate) leaves: Vec<L>,
-    /// Maximum number of stack entries that a descent needs.
+    /// Maximum number of stack entries that a traversal needs.
     pub(crate) stack: usize,
 }
 
 impl<L, B: Copy> Folded<L, B> {
-    /// Folds a tree. The root is always a node, if only of one leaf.
+    /// Folds a tree. The root is always a node, even if it has only one leaf.
     pub(crate) fn new(tree: Tree<L, B>) -> Self {
         let mut folded = Self { nodes: Vec::new(), leaves: Vec::new(), stack: 1 };
         // Queue of nodes, each with the number of stack entries that its ancestors leave.

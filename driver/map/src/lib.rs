@@ -1,8 +1,9 @@
-//! Card images: what a host computes of a scene once, before any tile is rendered.
+//! Creates card images: everything that a host computes from a scene once, before any tile is rendered.
 //!
-//! A [`PackedScene`](pack::PackedScene) has the scene's sections, [`map_photons`](photon_map::map_photons)
-//! traces photons in it and adds theirs; the result is a [`CardImage`](pack::CardImage). Photons are traced
-//! by the chip's own ray caster, in the packed lines, and lie on exactly the surfaces that gather rays meet.
+//! A [`PackedScene`](pack::PackedScene) has the sections of the scene.
+//! [`map_photons`](photon_map::map_photons) traces photons in it and adds the sections of the photon map. The
+//! result is a [`CardImage`](pack::CardImage). Photons are traced by the chip's ray caster, in the packed
+//! lines, and lie on exactly the surfaces that gather rays hit.
 //!
 //! - [`bvh`], `fold`, `light`: bounding volume hierarchy; folding of binary trees into wide nodes; light tree
 //!   and environment.
@@ -10,7 +11,7 @@
 //! - [`photon`], `density`, [`photon_map`]: photon pass; area corrections of the density estimate; the photon
 //!   map's sections.
 //!
-//! Photon, density and pack are one crate: inlining across them is worth a third of the photon pass.
+//! These modules are one crate because inlining across them saves a third of the photon pass's time.
 #![forbid(unsafe_code)]
 
 pub mod bvh;

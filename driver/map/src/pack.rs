@@ -1,8 +1,8 @@
-//! Packing: conversion of a scene to the sections of a card image, in lines.
+//! Packing: converts a scene to the sections of a card image.
 //!
-//! A [`PackedScene`] holds hierarchy, triangles, materials and lights. The photon pass ([`crate::photon`])
-//! traces in it with the chip's own ray caster, so that photons lie on exactly the surfaces that gather rays
-//! meet. [`crate::photon_map`] adds the sections of the photon map.
+//! A [`PackedScene`] holds the hierarchy, triangles, materials and lights. The photon pass
+//! ([`crate::photon`]) traces in it with the chip's ray caster, so that photons lie on exactly the surfaces
+//! that gather rays hit. [`crate::photon_map`] adds the sections of the photon map.
 
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
@@ -31,10 +31,10 @@ pub use self::error::PackError;
 use self::flat_glass::Glazing;
 pub(crate) use self::writer::ImageWriter;
 
-/// Bytes of memory that packing takes per triangle beside the scene, mainly for binary trees.
+/// Memory that packing takes per triangle, in addition to the scene, mainly for binary trees, bytes.
 const BYTES_OF_A_TRIANGLE: u64 = 700;
 
-/// The card image of a scene without photons, and the sources that light it.
+/// Card image of a scene without photons, and the sources of photons.
 #[derive(Clone)]
 pub struct PackedScene {
     image: CardImage,
@@ -68,44 +68,44 @@ impl PackedScene {
         })
     }
 
-    /// The scene as a chip sees it, without photons.
+    /// Views the scene as a chip does, without photons.
     pub fn view(&self) -> (SceneImage, Lines<'_>) {
         self.image.view()
     }
 
-    /// The card image, without photons.
+    /// Card image without photons.
     pub(crate) fn image(&self) -> &CardImage {
         &self.image
     }
 
-    /// The card image, to be completed.
+    /// Converts to the card image, to which the photon map's sections can be added.
     pub(crate) fn into_image(self) -> CardImage {
         self.image
     }
 
-    /// Grid of photon positions: the finest that covers the scene.
+    /// Grid of photon positions: the finest grid that covers the scene.
     pub fn photon_grid(&self) -> PhotonGrid {
         self.image
             .bounds()
             .map_or(PhotonGrid::UNIT, |NodeBox { lower, upper }| PhotonGrid::around(lower, upper))
     }
 
-    /// Units of the sums of pixels.
+    /// Units of the sums in pixels.
     pub fn sum_scale(&self) -> SumScale {
         SumScale { depth: self.photon_grid().cell, ..self.view().0.header.sum_scale() }
     }
 
-    /// The sources of photons.
+    /// Sources of photons that are not aimed.
     pub(crate) fn sources(&self) -> &Sources {
         &self.sources
     }
 
-    /// The sources of photons that are aimed at surfaces; `None` if there are none.
+    /// Sources of photons that are aimed at surfaces; `None` if there are none.
     pub(crate) fn aimed_sources(&self) -> Option<&Sources> {
         self.aimed_sources.as_ref()
     }
 
-    /// The sources of caustic photons, aimed at specular surfaces; `None` if there are none.
+    /// Sources of caustic photons, which are aimed at specular surfaces; `None` if there are none.
     pub(crate) fn caustic_sources(&self) -> Option<&Sources> {
         self.caustic_sources.as_ref()
     }
@@ -115,8 +115,8 @@ impl PackedScene {
         self.keeps_photons
     }
 
-    /// Returns whether there are narrow lobes and lights without extent: the caustic map brings the one's
-    /// light to the other.
+    /// Returns whether there are both narrow lobes and lights without an area. The caustic map brings the
+    /// light of the latter to the former.
     pub(crate) fn has_lobes_under_punctual_lights(&self) -> bool {
         self.has_lobes_under_punctual_lights
     }
@@ -151,7 +151,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     Ok(image.finish())
 }
 
-/// Header of a scene without photons: units and lights. The writer sets lines and sections.
+/// Header of a scene without photons: units and lights. [`ImageWriter`] sets lines and sections.
 fn header(scene: &Scene, lights: &Lights) -> Header {
     Header {
         radiance_unit: radiance_unit(scene, lights),
@@ -160,7 +160,7 @@ fn header(scene: &Scene, lights: &Lights) -> Header {
     }
 }
 
-/// Index of each triangle of the scene in the card image, from the triangles of the image's leaves.
+/// Index in the card image of each triangle of the scene, from the triangles of the image's leaves.
 fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
     let mut indices = vec![0; scene.triangles.len()];
     for (leaf, triangles) in leaves.iter().enumerate() {
@@ -172,13 +172,13 @@ fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
     indices
 }
 
-/// Unit of the chips' fixed-point sums of radiance, which hold 23 bits above the unit and 40 below.
+/// Unit of the chips' fixed-point sums of radiance, which have 23 bits above the unit and 40 below.
 ///
-/// The unit is 2^4 times a typical radiance: that of all surfaces if the emitted power were spread over them
-/// and reflected once by white. A much brighter emitter or texel of the environment raises it, so that its
-/// own radiance is within 2^7 units. The sums of 2^12 samples, the maximum of a pixel, then hold 2^15 times
-/// the typical radiance and 2^4 times the brightest one on average: shadow rays next to an emitter may
-/// contribute a thousand times as much.
+/// The unit is 2^4 times a typical radiance: the radiance of all surfaces if the emitted power were spread
+/// over them and reflected once by white. A much brighter emitter or environment texel raises the unit, such
+/// that its own radiance is within 2^7 units. Sums of 2^12 samples, the maximum of a pixel, can then hold
+/// 2^15 times the typical radiance, and 2^4 times the brightest radiance on average: shadow rays next to an
+/// emitter can contribute a thousand times as much.
 fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
     let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
     let typical = lights.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));

@@ -1,31 +1,34 @@
-//! Check of available memory before work of a known size: memory that the process cannot have is an error,
-//! whereas an allocation that fails in the middle of the work would abort the process.
+//! Checks available memory before work of a known size. Memory that the process cannot have is then an error,
+//! whereas an allocation that fails during the work would abort the process.
 
 use std::hint::black_box;
 
-/// Error of an allocation that the process cannot have.
+/// Error: the process cannot allocate memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{bytes} bytes of memory are needed, which the system does not give")]
 pub struct OutOfMemory {
-    /// Requested bytes.
+    /// Size of the requested memory, bytes.
     pub bytes: u64,
 }
 
 impl OutOfMemory {
-    /// Error of a list of `elements` elements that cannot grow to twice that number.
+    /// Error of a list with `elements` elements that cannot grow to twice that number.
     pub fn doubling<T>(elements: usize) -> Self {
         Self { bytes: 2 * (elements * size_of::<T>()) as u64 }
     }
 }
 
-/// Appends to a list if there is memory for it.
+/// Appends to a list.
+///
+/// # Errors
+/// If there is no memory for it.
 pub fn push<T>(list: &mut Vec<T>, element: T) -> Result<(), OutOfMemory> {
     list.try_reserve(1).map_err(|_| OutOfMemory::doubling::<T>(list.len()))?;
     list.push(element);
     Ok(())
 }
 
-/// Remedy for memory that the system refuses.
+/// Remedy to suggest when the system refuses memory.
 pub const REMEDY: &str =
     "close other programs, raise the process's limit (`ulimit -v`), or use a machine with more memory";
 
@@ -42,8 +45,8 @@ pub fn check(bytes: u64) -> Result<(), OutOfMemory> {
     Ok(())
 }
 
-/// Zeros. The system gives their memory when it is first written, so that a film of which a part is rendered
-/// takes that part's.
+/// Allocates zeroed bytes. The system provides their memory when it is first written, so that a film of which
+/// a part is rendered takes only that part's memory.
 ///
 /// # Errors
 /// If the allocation fails.
@@ -57,7 +60,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_no_machine_has_is_refused() {
+    fn an_impossible_allocation_is_refused() {
         assert_eq!(check(1 << 20), Ok(()));
         for bytes in [1 << 60, u64::MAX] {
             assert_eq!(check(bytes), Err(OutOfMemory { bytes }));

@@ -1,4 +1,4 @@
-//! Choices: enumerations whose values have names, by which options, files and reports refer to them.
+//! Enumerations whose values have names, which options, files and reports use.
 
 use photoncard_shared::address::{Stage, Structure};
 use photoncard_shared::message::{Filter, Radiance, Sampling};
@@ -8,16 +8,16 @@ pub trait Choice: Copy + Send + Sync + 'static {
     /// All values, in the order in which they are presented.
     const ALL: &'static [Self];
 
-    /// Name of the value: the argument of its option.
+    /// Name of the value, as in the argument of its option.
     fn name(self) -> &'static str;
 
-    /// Explanation of the value in a line of help; empty where the name says it all.
+    /// Explanation of the value in a line of help; empty if the name suffices.
     fn about(self) -> &'static str;
 
-    /// Value with the name `name`.
+    /// Finds the value named `name`.
     ///
     /// # Errors
-    /// If no value has the name; the text lists all names.
+    /// If no value has this name. The text lists all names.
     fn of_name(name: &str) -> Result<Self, String> {
         let found = Self::ALL.iter().find(|value| value.name() == name);
         found.copied().ok_or_else(|| {
@@ -27,8 +27,8 @@ pub trait Choice: Copy + Send + Sync + 'static {
     }
 }
 
-/// Implements [`Choice`] by a table of variants, names and explanations. A variant that the table lacks is an
-/// error of the compiler.
+/// Implements [`Choice`] by a table of variants, names and explanations. A variant that is missing in the
+/// table is a compile error.
 #[macro_export]
 macro_rules! choices {
     ($choice:ty { $($variant:ident = $name:literal $(: $about:literal)?),+ $(,)? }) => {

@@ -1,7 +1,7 @@
-//! Difference of a picture from a reference: errors of pixels, and of the means of blocks of pixels.
+//! Difference of a picture from a reference, as errors of pixels and of block means.
 //!
-//! Block means average the noise of both pictures away and show bias. Everything is computed in double
-//! precision over all three channels; the *mean* of a pixel or a block is the mean of its channels R, G and
+//! Block means average out the noise of both pictures and reveal bias. Everything is computed in double
+//! precision over all three channels. The *mean* of a pixel or a block is the mean of its channels R, G and
 //! B.
 
 use serde::Serialize;
@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use crate::exr::RgbImage;
 
-/// Term in the denominator of relative squared errors, which keeps errors of black pixels finite.
+/// Constant in the denominator of relative squared errors, which keeps errors of black pixels finite.
 const RELATIVE_FLOOR: f64 = 0.01;
 
 /// Difference of a picture from a reference. The JSON keys are stable.
@@ -21,7 +21,7 @@ pub struct Difference {
     pub width: usize,
     /// Rows of both pictures.
     pub height: usize,
-    /// Pixels that were compared.
+    /// Number of pixels that were compared.
     pub pixel_count: usize,
     /// Errors of the pixels' channels.
     pub pixels: Errors,
@@ -46,23 +46,24 @@ pub struct Errors {
     pub relmse: f64,
 }
 
-/// Errors of block means. A block at the right or lower border that is cut off counts as any other.
+/// Errors of block means. A truncated block at the right or lower border counts like any other.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BlockErrors {
     /// Side of a block, pixels.
     pub size: usize,
-    /// Blocks that were compared.
+    /// Number of blocks that were compared.
     pub count: usize,
-    /// Blocks that were left out because the reference exceeds the radiance limit in them.
+    /// Number of blocks that were excluded because the reference exceeds the radiance limit in them.
     pub excluded: usize,
-    /// Compared blocks whose reference is black; the relative errors leave them out.
+    /// Number of compared blocks whose reference is black. They have no relative errors.
     pub black: usize,
     /// Errors of the channel means of the blocks.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Median of the relative errors `|a - b| / b` of the blocks' means; `None` (JSON `null`) without any.
+    /// Median of the relative errors `|a - b| / b` of the block means; `None` (JSON `null`) if there are
+    /// none.
     pub relative_median: Option<f64>,
-    /// 95th percentile of the relative errors: the smallest that 95 % of the blocks do not exceed.
+    /// 95th percentile of the relative errors: the smallest error that 95 % of the blocks do not exceed.
     pub relative_p95: Option<f64>,
     /// Maximum of the relative errors.
     pub relative_max: Option<f64>,
@@ -72,7 +73,7 @@ pub struct BlockErrors {
 #[derive(Clone, Debug, Error, PartialEq)]
 #[non_exhaustive]
 pub enum DifferenceError {
-    /// Error of pictures of different sizes.
+    /// The pictures have different sizes.
     #[error(
         "the reference has {} x {} pixels and the image {} x {}; render the image in the reference's size or crop both \
          alike", reference[0], reference[1], image[0], image[1]
@@ -83,28 +84,28 @@ pub enum DifferenceError {
         /// Width and height of the image.
         image: [usize; 2],
     },
-    /// Error of a block without pixels.
+    /// The block size is 0.
     #[error("a block of 0 x 0 pixels is not possible; choose a side of at least 1")]
     EmptyBlock,
-    /// Error of a radiance that is infinite or not a number.
+    /// A radiance is infinite or not a number.
     #[error("pixel ({x}, {y}) of the {which} is {value:?}, not a finite radiance; render it again")]
     NotFinite {
-        /// `reference` or `image`.
+        /// Name of the picture: `reference` or `image`.
         which: &'static str,
-        /// The pixel's column.
+        /// Column of the pixel.
         x: usize,
-        /// The pixel's row.
+        /// Row of the pixel.
         y: usize,
         /// Red, green and blue of the pixel.
         value: [f32; 3],
     },
-    /// Error of a limit that leaves nothing to compare.
+    /// The radiance limit excludes all blocks.
     #[error("every block of the reference exceeds {limit} somewhere; exclude less")]
     AllExcluded {
         /// Radiance limit.
         limit: f32,
     },
-    /// Error of a limit that is not a number.
+    /// The radiance limit is not a number.
     #[error("blocks cannot be excluded by a radiance of {limit}; state a number")]
     BadLimit {
         /// Radiance limit.
@@ -114,9 +115,9 @@ pub enum DifferenceError {
 
 /// Compares `image` with `reference` in blocks of `block` x `block` pixels.
 ///
-/// With `exclude`, blocks in which any channel of any pixel of the reference exceeds that radiance are left
-/// out of everything: they see an emitter, whose radiance would outweigh all else. The positions of the data
-/// windows do not matter, only their sizes.
+/// With `exclude`, a block is excluded from all results if any channel of any of its reference pixels exceeds
+/// that radiance: it sees an emitter, whose radiance would outweigh everything else. Only the sizes of the
+/// data windows matter, not their positions.
 ///
 /// # Errors
 /// If the sizes differ, a pixel is not finite, `block` is 0, or nothing is left to compare.
@@ -301,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scaled_picture_differs_by_the_scale() {
+    fn errors_of_a_scaled_picture_follow_from_the_scale() {
         let reference = picture(40, 40, |_, _| [2.0, 4.0, 6.0]);
         let image = picture(40, 40, |_, _| [2.2, 4.4, 6.6]);
         let difference = compare(&reference, &image, 16, None).unwrap();
@@ -319,9 +320,10 @@ mod tests {
         }
     }
 
-    /// Noise whose mean over each block is zero shows in the errors of pixels, not of blocks.
+    /// Noise whose mean over each block is zero must appear in the errors of pixels, but not in those of
+    /// blocks.
     #[test]
-    fn blocks_average_noise_away() {
+    fn block_means_average_noise_out() {
         let reference = picture(8, 8, |_, _| [1.0; 3]);
         let image = picture(8, 8, |x, y| [if (x + y) % 2 == 0 { 1.5 } else { 0.5 }; 3]);
         let difference = compare(&reference, &image, 4, None).unwrap();
@@ -330,7 +332,7 @@ mod tests {
     }
 
     #[test]
-    fn the_percentiles_are_those_of_the_blocks() {
+    fn percentiles_are_taken_over_blocks() {
         let reference = picture(100, 1, |_, _| [1.0; 3]);
         let image = picture(100, 1, |x, _| [1.0 + (x + 1) as f32; 3]);
         let blocks = compare(&reference, &image, 1, None).unwrap().blocks;
@@ -340,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_that_see_the_emitter_are_left_out_of_everything() {
+    fn blocks_that_see_an_emitter_are_excluded_from_all_values() {
         let reference = picture(8, 4, |x, y| if (x, y) == (5, 1) { [0.0, 10.0, 0.0] } else { [1.0; 3] });
         let image = picture(8, 4, |x, _| if x >= 4 { [100.0; 3] } else { [2.0; 3] });
         let difference = compare(&reference, &image, 4, Some(5.0)).unwrap();
@@ -378,7 +380,7 @@ mod tests {
     }
 
     #[test]
-    fn the_keys_are_stable() {
+    fn keys_of_the_json_are_stable() {
         let a = picture(4, 2, |_, _| [1.0; 3]);
         let json = serde_json::to_value(compare(&a, &a, 2, None).unwrap()).unwrap();
         let keys = |value: &serde_json::Value| {

@@ -1,11 +1,11 @@
-//! `OpenEXR` files: writing of films, and reading of radiance for comparisons.
+//! `OpenEXR` files: writes films, and reads radiance for comparisons.
 //!
-//! A file holds one part. Radiance is in the plain channels `R G B`, so that every viewer shows it; layers
-//! are in channels like `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The data
-//! window is the film's crop window, the display window the full picture. The picture's provenance is JSON in
-//! the one attribute `photoncard`: the `exr` crate keeps attributes in a hash map, so several would change
-//! the file's bytes from run to run. The standard attribute `comments` has the file's checksum, by which
-//! [`is_intact`] knows a file that was cut off or damaged.
+//! A file has one part. Radiance is in the unnamed layer, in the channels `R G B`, which every viewer shows.
+//! Layers are in channels such as `albedo.R albedo.G albedo.B`, `N.X N.Y N.Z` and `Z` ([`crate::layer`]). The
+//! data window is the film's crop window, the display window the full picture. The picture's provenance is
+//! JSON in the single attribute `photoncard`: the `exr` crate keeps attributes in a hash map, so that several
+//! would change the file's bytes from run to run. The standard attribute `comments` contains the file's
+//! checksum, by which [`is_intact`] recognises a truncated or damaged file.
 
 mod dwa;
 
@@ -36,10 +36,10 @@ pub const PROVENANCE: &str = "photoncard";
 /// Maximum number of pixels of a picture that is read.
 pub const MAX_READ_PIXELS: u64 = 1 << 28;
 
-/// Pixel type of the stored samples. Depth and gathers are always [`SampleFormat::Float`].
+/// Pixel type of the stored samples. The layers `Z` and `gathers` are always [`SampleFormat::Float`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SampleFormat {
-    /// `HALF`, 16 bits: three digits, up to 65504; larger finite values are stored as 65504.
+    /// `HALF`, 16 bits: three decimal digits, up to 65504. Larger finite values are stored as 65504.
     #[default]
     Half,
     /// `FLOAT`, 32 bits: exactly as rendered.
@@ -55,14 +55,14 @@ pub struct RgbImage {
     pub width: usize,
     /// Rows of the data window.
     pub height: usize,
-    /// The data window's first column and row in the full picture.
+    /// First column and row of the data window in the full picture.
     pub data_window_origin: [i32; 2],
     /// The pixels, row by row from the top.
     pub pixels: Vec<[f32; 3]>,
 }
 
 impl RgbImage {
-    /// Columns and rows of the data window; each is at most [`MAX_READ_PIXELS`].
+    /// Columns and rows of the data window, each at most [`MAX_READ_PIXELS`].
     pub fn size(&self) -> [u32; 2] {
         [self.width, self.height].map(|side| side as u32)
     }
@@ -79,7 +79,7 @@ pub enum ExrError {
     /// The encoder refused the picture.
     #[error("cannot encode {} as OpenEXR: {reason}", path.display())]
     Encode {
-        /// The output file.
+        /// Path of the output file.
         path: PathBuf,
         /// The encoder's error.
         reason: String,
@@ -87,7 +87,7 @@ pub enum ExrError {
     /// The file cannot be read.
     #[error("cannot read {}; check that the path names a file and that it may be read", path.display())]
     Unreadable {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The operating system's error.
         #[source]
@@ -96,39 +96,39 @@ pub enum ExrError {
     /// The file is not an `OpenEXR` picture, or it is damaged.
     #[error("{} is not a readable OpenEXR picture: {reason}; render or copy it again", path.display())]
     Malformed {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The decoder's error, or a contradiction in the file.
+        /// Error of the decoder, or a contradiction in the file.
         reason: String,
     },
-    /// The picture has no plain colour channels.
+    /// The picture has no channels `R G B` in the unnamed layer.
     #[error("{} has no channels R, G and B, only {channels}; write the picture as plain RGB", path.display())]
     NoColour {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Names of the file's channels.
         channels: String,
     },
-    /// The file's compression cannot be read safely.
+    /// The file has a compression that cannot be read safely.
     #[error("{} has {compression}, which is not read; store the picture with ZIP compression", path.display())]
     Compression {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Name of the compression.
         compression: String,
     },
-    /// The process cannot have the memory that reading takes.
+    /// The process cannot allocate the memory for reading.
     #[error("reading {} takes {bytes} bytes of memory, which the system does not give; {}", path.display(), allocation::REMEDY)]
     Memory {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Bytes of memory.
+        /// Size of the memory, bytes.
         bytes: u64,
     },
     /// The picture is too large to be read at once.
     #[error("{} has {width} x {height} pixels, more than {MAX_READ_PIXELS}; take crops of it", path.display())]
     TooLarge {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Width of the data window, pixels.
         width: usize,
@@ -137,7 +137,7 @@ pub enum ExrError {
     },
 }
 
-/// Writes the film to `path`, whole or not at all, as [`bytes`] has it.
+/// Writes the film to `path` in the format of [`bytes`], whole or not at all.
 ///
 /// # Errors
 /// If the file cannot be written, or the provenance is empty.
@@ -152,13 +152,13 @@ pub fn write(
     Ok(output::write(path, &bytes(path, film, layers, provenance_json, format)?)?)
 }
 
-/// The film as `OpenEXR`: equal films give equal bytes. `path` is the file's name in errors.
+/// Encodes the film as `OpenEXR`. Equal films give equal bytes. `path` is the file's name in errors.
 ///
 /// Pixels that were never written are zero, and so are layers that the film does not have. `provenance_json`
-/// is stored in the attribute [`PROVENANCE`]; characters beyond ASCII are stored as JSON's `\u` escapes.
+/// is stored in the attribute [`PROVENANCE`], with characters beyond ASCII as JSON `\u` escapes.
 ///
 /// # Errors
-/// If the provenance is empty, or no text.
+/// If the provenance is empty or cannot be stored as text.
 pub fn bytes(
     path: &Path,
     film: &Film,
@@ -219,13 +219,13 @@ fn channels(film: &Film, layers: &Layers, format: SampleFormat) -> AnyChannels<F
     AnyChannels::sort(list)
 }
 
-/// The nearest half; finite values beyond its range become plus or minus 65504.
+/// Nearest half. Finite values beyond its range become plus or minus 65504.
 fn to_half(value: f32) -> f16 {
     let half = f16::from_f32(value);
     if half.is_infinite() && value.is_finite() { f16::MAX.copysign(half) } else { half }
 }
 
-/// JSON with every character beyond ASCII escaped: the attribute is ASCII, and only strings of JSON hold
+/// Escapes every character beyond ASCII in JSON. The attribute is ASCII, and in JSON only strings contain
 /// other characters.
 pub(crate) fn ascii(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
@@ -244,7 +244,8 @@ pub(crate) fn ascii(json: &str) -> String {
     text
 }
 
-/// Reads the plain colour channels `R G B` (half, float or unsigned) of the first part that has them.
+/// Reads the channels `R G B` of the unnamed layer (half, float or unsigned) from the first part that has
+/// them.
 ///
 /// # Errors
 /// As [`read_with_provenance`].
@@ -252,12 +253,12 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
     read_with_provenance(path).map(|(picture, _)| picture)
 }
 
-/// Reads a picture as [`read_rgb`], and the JSON of its attribute [`PROVENANCE`]; `None` if the file has
-/// none, or it is not JSON.
+/// Reads a picture like [`read_rgb`], and the JSON of its attribute [`PROVENANCE`]; `None` if the file has no
+/// such attribute, or it is not JSON.
 ///
 /// # Errors
-/// If the file cannot be read, is malformed, has no such channels, or has more than [`MAX_READ_PIXELS`]. A
-/// file that states a size its length cannot hold is refused before anything is allocated.
+/// If the file cannot be read, is malformed, lacks the channels, or has more than [`MAX_READ_PIXELS`]. A file
+/// whose stated size its length cannot hold is refused before anything is allocated.
 pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), ExrError> {
     let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
     let found = std::fs::metadata(path).map_err(unreadable)?;
@@ -268,8 +269,8 @@ pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), E
     decode_walled(path, &bytes, MAX_READ_PIXELS)
 }
 
-/// Reads the provenance of a picture of this program and the type of its samples, without its pixels; `None`
-/// if the file is none.
+/// Reads the provenance of a picture and the type of its samples, without its pixels; `None` if this program
+/// did not write the file.
 pub fn read_form(path: &Path) -> Option<(String, SampleFormat)> {
     let meta = || MetaData::read_from_file(path, false).map_err(drop);
     let meta = foreign::decode(meta, || ()).ok()?;
@@ -285,12 +286,12 @@ pub fn read_form(path: &Path) -> Option<(String, SampleFormat)> {
     Some((provenance(&header.own_attributes)?, format))
 }
 
-/// Returns whether a file is, to the byte, one that [`write()`] has written; an unreadable one is not.
+/// Returns whether a file has exactly the bytes that [`write()`] wrote. An unreadable file has not.
 pub fn is_intact(path: &Path) -> bool {
     std::fs::read(path).is_ok_and(|bytes| intact::is_intact_exr(&bytes))
 }
 
-/// [`read_rgb`] from the bytes of a file, with at most `most_pixels` pixels.
+/// Reads a picture like [`read_rgb`], from the bytes of a file, with at most `most_pixels` pixels.
 pub fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
     decode_walled(path, bytes, most_pixels).map(|(picture, _)| picture)
 }
@@ -351,7 +352,7 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<(RgbImage, Opti
     Ok((picture, provenance))
 }
 
-/// The attribute [`PROVENANCE`], if it is JSON.
+/// Value of the attribute [`PROVENANCE`], if it is JSON.
 fn provenance(attributes: &LayerAttributes) -> Option<String> {
     let AttributeValue::Text(text) = attributes.other.get(&Text::new_or_none(PROVENANCE)?)? else {
         return None;
@@ -365,7 +366,7 @@ fn has_colour(header: &Header) -> bool {
     has("R") && has("G") && has("B")
 }
 
-/// Refuses sizes that are too large, or that a file of `length` bytes cannot hold at any compression.
+/// Refuses sizes that are too large, or that a file of `length` bytes cannot hold at any compression ratio.
 fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Result<(), ExrError> {
     const CHUNK_OVERHEAD: u64 = 16;
     let Vec2(width, height) = header.layer_size;
@@ -402,7 +403,7 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
     Ok(())
 }
 
-/// Upper bound of the compression ratio; `None` for compressions that are not read.
+/// Upper bound of the compression ratio; `None` for compressions that are not supported.
 fn most_compressed(compression: Compression) -> Option<u64> {
     match compression {
         Compression::Uncompressed => Some(1),

@@ -1,4 +1,4 @@
-//! Film: the pixels of a picture's crop window, as far as they are rendered.
+//! Film: the pixels of a picture's crop window that were rendered so far.
 //!
 //! ```
 //! use photoncard_picture::film::{Film, PixelSums, SumFormat, Window};
@@ -24,27 +24,27 @@ use crate::allocation;
 use crate::sink::{FinishedTile, TileSink, pixel_positions};
 pub use crate::sums::{FilmPixel, SumFormat};
 
-/// Maximum number of pixels of a film: 2^28, 15 GiB, or 28 GiB with layers.
+/// Maximum number of pixels of a film, 2^28. They take 15 GiB, or 28 GiB with layers.
 pub const MAX_PIXELS: u64 = 1 << 28;
 
 /// Maximum width and height of a picture, pixels.
 pub const MAX_SIDE: u32 = 1 << 20;
 
-/// A rectangle of pixels, ends exclusive, in coordinates of the full picture: x to the right, y down.
+/// A rectangle of pixels with exclusive ends, in coordinates of the full picture: x to the right, y down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
     /// First column.
     pub x0: u32,
-    /// One past the last column.
+    /// Column after the last.
     pub x1: u32,
     /// First row.
     pub y0: u32,
-    /// One past the last row.
+    /// Row after the last.
     pub y1: u32,
 }
 
 impl Window {
-    /// The window of a whole picture.
+    /// Window of a whole picture.
     pub const fn full(width: u32, height: u32) -> Self {
         Self { x0: 0, x1: width, y0: 0, y1: height }
     }
@@ -65,7 +65,7 @@ impl Window {
     }
 }
 
-/// Error of making a [`Film`] or writing its pixels.
+/// Error of creating a [`Film`] or writing its pixels.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum FilmError {
@@ -79,7 +79,7 @@ pub enum FilmError {
         /// Requested height.
         height: u32,
     },
-    /// The crop window is empty or not inside the picture.
+    /// The crop window is empty, or not inside the picture.
     #[error(
         "the crop window {},{},{},{} is empty or not inside the picture of {width} x {height}; X0 < X1 <= width and \
          Y0 < Y1 <= height must hold", window.x0, window.x1, window.y0, window.y1
@@ -87,12 +87,12 @@ pub enum FilmError {
     Window {
         /// The crop window.
         window: Window,
-        /// The picture's width.
+        /// Width of the picture.
         width: u32,
-        /// The picture's height.
+        /// Height of the picture.
         height: u32,
     },
-    /// The crop window has more than [`MAX_PIXELS`], or more than memory can hold.
+    /// The crop window has more than [`MAX_PIXELS`] pixels, or more than memory can hold.
     #[error("a film of {width} x {height} pixels does not fit in memory; render it in several crops")]
     Memory {
         /// Columns of the crop window.
@@ -100,49 +100,49 @@ pub enum FilmError {
         /// Rows of the crop window.
         height: u32,
     },
-    /// The films are of other windows, layers or units.
+    /// The films have different windows, layers or units.
     #[error(
         "the samples of a film of another window, other layers or other units cannot be added; render all with equal settings"
     )]
     Other,
-    /// The film has as many samples as the picture, or is not complete.
+    /// The film already has as many samples as the picture, or it is not complete.
     #[error("a complete film of {samples} samples a pixel is no part of a picture of {asked}")]
     NoMore {
-        /// Samples of the film.
+        /// Number of samples of the film.
         samples: u32,
-        /// Samples of the picture.
+        /// Number of samples of the picture.
         asked: u32,
     },
     /// The pixel lies outside the crop window.
     #[error("pixel ({x}, {y}) lies outside the crop window {},{},{},{}", window.x0, window.x1, window.y0, window.y1)]
     Outside {
-        /// The pixel's column.
+        /// Column of the pixel.
         x: u32,
-        /// The pixel's row.
+        /// Row of the pixel.
         y: u32,
         /// The crop window.
         window: Window,
     },
 }
 
-/// The pixels of a crop window of a picture: sums of samples, and the values that they stand for.
+/// The pixels of a picture's crop window: sums over samples, and their mean values.
 #[derive(Clone, Debug)]
 pub struct Film {
     width: u32,
     height: u32,
     window: Window,
     format: SumFormat,
-    /// Records of the pixels' sums, row by row.
+    /// Encoded sums of the pixels, row by row.
     records: Vec<u8>,
     written: Vec<bool>,
     missing: usize,
 }
 
 impl Film {
-    /// An empty film for the crop window `window` of a picture of `width` x `height` pixels.
+    /// Creates an empty film for the crop window `window` of a picture of `width` x `height` pixels.
     ///
     /// # Errors
-    /// If the picture or the window has no pixels or too many, or the window leaves the picture.
+    /// If the picture or the window has no pixels or too many, or the window extends beyond the picture.
     pub fn new(width: u32, height: u32, window: Window, format: SumFormat) -> Result<Self, FilmError> {
         let count = Self::check(width, height, window)?;
         let too_large = FilmError::Memory { width: window.width(), height: window.height() };
@@ -153,8 +153,7 @@ impl Film {
         Ok(Self { width, height, window, format, records, written, missing: count })
     }
 
-    /// Checks that a film can be made, as far as that is known before its memory is asked for. Returns its
-    /// pixels.
+    /// Checks that a film can be created, before its memory is allocated. Returns its number of pixels.
     pub fn check(width: u32, height: u32, window: Window) -> Result<usize, FilmError> {
         if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
             return Err(FilmError::Size { width, height });
@@ -173,10 +172,11 @@ impl Film {
         &self.format
     }
 
-    /// Leaves the samples of `base` out of an empty film: the others are to be rendered.
+    /// Excludes the samples of `base` from an empty film, so that only the others are rendered.
     ///
     /// # Errors
-    /// [`FilmError::Other`] if windows, layers or units differ, [`FilmError::NoMore`] if there are no others.
+    /// [`FilmError::Other`] if windows, layers or units differ, [`FilmError::NoMore`] if there are no other
+    /// samples.
     pub fn begin_after(&mut self, base: &Self) -> Result<(), FilmError> {
         let more = self.format.samples.saturating_sub(base.format.samples);
         let others = self.format.of_part(base.format.samples, more);
@@ -191,7 +191,8 @@ impl Film {
         Ok(())
     }
 
-    /// An empty film of the window, with sums of `samples` of the picture's samples from `first` on.
+    /// Creates an empty film with the same window, for `samples` of the picture's samples from number `first`
+    /// on.
     ///
     /// # Errors
     /// [`FilmError::Memory`].
@@ -199,7 +200,7 @@ impl Film {
         Self::new(self.width, self.height, self.window, self.format.of_part(first, samples))
     }
 
-    /// Leaves the first samples out of an empty film.
+    /// Excludes samples before number `first` from an empty film.
     pub fn set_first_sample(&mut self, first: u32) {
         self.format = self.format.of_part(first, self.format.samples.saturating_sub(first));
     }
@@ -214,7 +215,7 @@ impl Film {
         self.height
     }
 
-    /// The crop window: the part of the picture that this film holds.
+    /// Crop window: the part of the picture that this film has.
     pub fn window(&self) -> Window {
         self.window
     }
@@ -225,39 +226,38 @@ impl Film {
         records.map(|record| PixelSums::read(record).unwrap_or_default())
     }
 
-    /// Values of the pixels of the crop window, row by row from the top.
+    /// Values of the pixels in the crop window, row by row from the top.
     pub fn pixels(&self) -> impl ExactSizeIterator<Item = PixelValue> + Clone {
         self.all().map(|all| all.pixel)
     }
 
-    /// Values of the pixels of the crop window with their layers, row by row from the top.
+    /// Values of the pixels in the crop window including layers, row by row from the top.
     pub fn all(&self) -> impl ExactSizeIterator<Item = FilmPixel> + Clone {
         self.sums().map(|sums| self.format.values(&sums))
     }
 
-    /// Values of the pixel at `(x, y)` of the full picture, or `None` outside the crop window.
+    /// Values of the pixel at `(x, y)` of the full picture; `None` outside the crop window.
     pub fn pixel(&self, x: u32, y: u32) -> Option<PixelValue> {
         self.all_at(x, y).map(|all| all.pixel)
     }
 
-    /// Values of the pixel at `(x, y)` of the full picture with its layers, or `None` outside the crop
-    /// window.
+    /// Values of the pixel at `(x, y)` of the full picture including layers; `None` outside the crop window.
     pub fn all_at(&self, x: u32, y: u32) -> Option<FilmPixel> {
         self.sums_at(x, y).map(|sums| self.format.values(&sums))
     }
 
-    /// Sums of the pixel at `(x, y)` of the full picture, or `None` outside the crop window.
+    /// Sums of the pixel at `(x, y)` of the full picture; `None` outside the crop window.
     pub fn sums_at(&self, x: u32, y: u32) -> Option<PixelSums> {
         let bytes = self.format.record_bytes();
         let index = self.index(x, y)?;
         PixelSums::read(&self.records[index * bytes..(index + 1) * bytes])
     }
 
-    /// Writes the sums of the pixel at `(x, y)` of the full picture; writing them again replaces them. Layers
-    /// that the film lacks are left out, and those that the sums lack are zero.
+    /// Writes the sums of the pixel at `(x, y)` of the full picture, replacing earlier ones. Layers that the
+    /// film lacks are dropped; layers that the sums lack become zero.
     ///
     /// # Errors
-    /// [`FilmError::Outside`] if the pixel is not in the crop window; the film stays as it was.
+    /// [`FilmError::Outside`] if the pixel is not in the crop window. The film does not change then.
     pub fn write(&mut self, x: u32, y: u32, sums: &PixelSums) -> Result<(), FilmError> {
         let index = self.index(x, y).ok_or(FilmError::Outside { x, y, window: self.window })?;
         let sums = match (self.format.layers, sums.layers) {
@@ -272,11 +272,11 @@ impl Film {
         Ok(())
     }
 
-    /// Adds the sums of the samples of a film of equal window, layers and units. Pixels that either lacks are
-    /// missing.
+    /// Adds the samples of another film with equal window, layers and units. A pixel that is missing in
+    /// either film becomes missing.
     ///
     /// # Errors
-    /// [`FilmError::Other`] if the films differ in these; the film stays as it was.
+    /// [`FilmError::Other`] if the films differ in these. The film does not change then.
     pub fn add(&mut self, more: &Self) -> Result<(), FilmError> {
         let format = self.format.plus(&more.format).filter(|_| self.window == more.window);
         self.format = format.ok_or(FilmError::Other)?;
@@ -292,8 +292,8 @@ impl Film {
         Ok(())
     }
 
-    /// Returns `tile` with this film's samples added, and with its own counters; `None` if the film lacks one
-    /// of its pixels, or its units or layers differ.
+    /// Returns `tile` with this film's samples added; its counters do not change. `None` if the film lacks a
+    /// pixel of the tile, or has other units or layers.
     pub fn added_to(&self, tile: &FinishedTile) -> Option<FinishedTile> {
         let format = self.format.plus(tile.format())?;
         if !self.has(tile.tile()) {
@@ -305,7 +305,7 @@ impl Film {
         Some(added)
     }
 
-    /// Number of pixels of the crop window that were never written.
+    /// Number of pixels in the crop window that were never written.
     pub fn missing(&self) -> usize {
         self.missing
     }
@@ -317,7 +317,7 @@ impl Film {
         places.filter_map(|(x, y)| self.sums_at(x, y)).filter(|sums| self.format.is_dazzling(sums)).count()
     }
 
-    /// Returns whether every pixel of the crop window was written.
+    /// Returns whether every pixel in the crop window was written.
     pub fn is_complete(&self) -> bool {
         self.missing == 0
     }
@@ -330,7 +330,7 @@ impl Film {
         })
     }
 
-    /// The pixels of a tile; `None` unless all were written.
+    /// Returns the pixels of a tile; `None` unless all were written.
     pub fn finished(&self, tile: &Tile) -> Option<FinishedTile> {
         if !self.has(tile) {
             return None;
@@ -354,7 +354,7 @@ impl Film {
     }
 }
 
-/// Writes sums over a record of their format.
+/// Encodes sums into a record.
 fn store(sums: &PixelSums, record: &mut [u8]) {
     let mut at = 0;
     sums.write(&mut |bytes| {
@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn sums_of_films_are_those_of_all_samples_where_both_have_pixels() {
+    fn added_films_have_the_sums_of_all_samples_where_both_have_pixels() {
         let window = Window::full(3, 1);
         let film = |samples, lights: &[u32]| {
             let mut film = Film::new(3, 1, window, SumFormat { samples, ..SumFormat::ONE }).unwrap();

@@ -1,5 +1,5 @@
-//! Isolation of decoders of untrusted bytes: a decoder that panics returns an error, without a message and
-//! without ending the process.
+//! Isolates decoders of untrusted bytes. A decoder that panics returns an error; it neither prints a message
+//! nor ends the process.
 //!
 //! Decoders are written not to panic, but some do on malformed input. A build with `panic = "abort"` has no
 //! isolation.
@@ -13,7 +13,7 @@ thread_local! {
     static WALLS: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Runs a decoder; `panicked` makes the error if it panics. State outside of the decoder that it changes must
+/// Runs a decoder. `panicked` creates the error if it panics. State outside the decoder that it changes must
 /// not be used after an error.
 pub fn decode<T, E>(decoder: impl FnOnce() -> Result<T, E>, panicked: impl FnOnce() -> E) -> Result<T, E> {
     silence_walled_panics();
@@ -23,7 +23,7 @@ pub fn decode<T, E>(decoder: impl FnOnce() -> Result<T, E>, panicked: impl FnOnc
     result.unwrap_or_else(|_| Err(panicked()))
 }
 
-/// Installs a panic hook that suppresses the messages of isolated decoders and passes other panics on.
+/// Installs a panic hook that suppresses the messages of isolated decoders and passes on other panics.
 fn silence_walled_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -49,9 +49,9 @@ mod tests {
         assert_eq!(WALLS.get(), 0);
     }
 
-    /// Runs the other test in a process of its own, whose output is not captured.
+    /// Runs the other test in a separate process, whose output is not captured.
     #[test]
-    fn nothing_is_said_of_a_panic_behind_a_wall() {
+    fn a_panic_of_an_isolated_decoder_prints_nothing() {
         let test = "foreign::tests::a_decoder_that_panics_ends_in_an_error";
         let program = std::env::current_exe().expect("a program runs");
         let output = std::process::Command::new(program).args([test, "--exact", "--nocapture"]).output();

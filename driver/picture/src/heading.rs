@@ -1,4 +1,4 @@
-//! Headings of files: a line with the file's kind and version, a line of JSON, and the CRC-32C of both.
+//! Headings of files: a line with the file's kind and version, a line of JSON, and the CRC-32C of both lines.
 
 use std::io::{self, BufRead, ErrorKind, Read};
 
@@ -12,31 +12,31 @@ const MAX_HEAD: u64 = 1 << 24;
 /// Kind and version of a file.
 #[derive(Clone, Copy, Debug)]
 pub struct Kind {
-    /// Name of the kind, which begins the first line in all versions.
+    /// Name of the kind. It begins the first line in all versions.
     pub name: &'static str,
     /// Version of the format.
     pub version: u32,
 }
 
-/// Heading that was read.
+/// A heading read from a file.
 #[derive(Debug)]
 pub struct Heading<T> {
-    /// The JSON.
+    /// Contents of the JSON.
     pub head: T,
-    /// Size, bytes.
+    /// Size of the heading, bytes.
     pub bytes: u64,
     /// CRC-32C of both lines.
     pub checksum: u32,
 }
 
-/// Fault of a heading.
+/// Reason why a heading cannot be read.
 #[derive(Debug)]
 pub enum HeadingFault {
-    /// The file is of no version of the kind.
+    /// The file is not of this kind, in any version.
     Foreign,
-    /// The file is of this version of the kind.
+    /// The file is of this kind, but of another version: the given one.
     Version(u32),
-    /// The heading is cut off or damaged, in words.
+    /// The heading is truncated or damaged. The text describes how.
     Damaged(&'static str),
     /// The file cannot be read.
     Unreadable(io::Error),
@@ -49,10 +49,10 @@ impl From<io::Error> for HeadingFault {
 }
 
 impl Kind {
-    /// The heading of a file, with `head` as JSON, and the CRC-32C of both lines.
+    /// Encodes the heading of a file with `head` as JSON. Returns it and the CRC-32C of both lines.
     ///
     /// # Errors
-    /// If it is no JSON.
+    /// If `head` cannot be encoded as JSON.
     pub fn heading(self, head: &impl Serialize) -> serde_json::Result<(Vec<u8>, u32)> {
         let Self { name, version } = self;
         let mut bytes = format!("{name} {version}\n{}\n", serde_json::to_string(head)?).into_bytes();
@@ -64,7 +64,7 @@ impl Kind {
     /// Reads the heading of a file.
     ///
     /// # Errors
-    /// If the file is of another kind or version, damaged or unreadable.
+    /// If the file is of another kind or version, damaged, or unreadable.
     pub fn read<T: DeserializeOwned>(self, reader: &mut impl BufRead) -> Result<Heading<T>, HeadingFault> {
         let mut bytes = Vec::new();
         // The kind, a blank, a number of 10 digits and the line feed.

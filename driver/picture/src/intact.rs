@@ -1,16 +1,16 @@
-//! Checks that files of finished pictures are as they were written.
+//! Checks that files of finished pictures are unchanged since they were written.
 //!
-//! An `OpenEXR` file has no checksum of its own: this program's have the CRC-32C of the file in the standard
-//! attribute `comments`, whose digits count as zeros in the sum. A PNG has a CRC-32 for each of its chunks.
+//! An `OpenEXR` file has no checksum of its own. Files of this program contain a CRC-32C of the file in the
+//! standard attribute `comments`; its digits count as zeros in the sum. A PNG has a CRC-32 for each of its
+//! chunks.
 
 use photoncard_shared::checksum::Checksum;
 
-/// Text of the attribute `comments` until the checksum is known.
+/// Text of the attribute `comments` before the checksum is known.
 pub(crate) const BLANK: &str = "photoncard checksum 00000000";
 /// Number of hexadecimal digits of the checksum, at the end of the text.
 const DIGITS: usize = 8;
 
-/// Signature of a PNG.
 const PNG_SIGNATURE: [u8; 8] = *b"\x89PNG\r\n\x1a\n";
 
 /// Writes the checksum of an `OpenEXR` file into its attribute `comments`, which is [`BLANK`].
@@ -20,7 +20,7 @@ pub(crate) fn seal_exr(bytes: &mut [u8]) {
     bytes[at..at + DIGITS].copy_from_slice(format!("{sum:0DIGITS$x}").as_bytes());
 }
 
-/// Returns whether an `OpenEXR` file has the checksum of its bytes.
+/// Returns whether an `OpenEXR` file contains the checksum of its bytes.
 pub(crate) fn is_intact_exr(bytes: &[u8]) -> bool {
     digits_at(bytes).is_some_and(|at| {
         let stated = str::from_utf8(&bytes[at..at + DIGITS]).ok();
@@ -28,8 +28,8 @@ pub(crate) fn is_intact_exr(bytes: &[u8]) -> bool {
     })
 }
 
-/// Place of the checksum's digits. No text attribute has zero bytes, so that the first match is that of the
-/// attribute.
+/// Position of the checksum's digits. No text attribute contains zero bytes, so that the first match is in
+/// the attribute `comments`.
 fn digits_at(bytes: &[u8]) -> Option<usize> {
     let text = &BLANK[..BLANK.len() - DIGITS];
     let mut mark = b"comments\0string\0".to_vec();
@@ -39,7 +39,7 @@ fn digits_at(bytes: &[u8]) -> Option<usize> {
     (at + DIGITS <= bytes.len()).then_some(at)
 }
 
-/// CRC-32C of a file, with zeros in place of the digits.
+/// CRC-32C of a file with zeros in place of the digits.
 fn sum_without_digits(bytes: &[u8], at: usize) -> u32 {
     let mut sum = Checksum::default();
     sum.update(&bytes[..at]);
@@ -48,7 +48,8 @@ fn sum_without_digits(bytes: &[u8], at: usize) -> u32 {
     sum.value()
 }
 
-/// Returns whether a file is a PNG of whole chunks with their CRC-32, of which `IEND` is the last.
+/// Returns whether a file is a PNG whose chunks are complete and have the right CRC-32, and whose last chunk
+/// is `IEND`.
 pub(crate) fn is_intact_png(bytes: &[u8]) -> bool {
     let Some(mut rest) = bytes.strip_prefix(&PNG_SIGNATURE) else { return false };
     while let Some((kind, behind)) = take_chunk(rest) {
@@ -60,7 +61,7 @@ pub(crate) fn is_intact_png(bytes: &[u8]) -> bool {
     false
 }
 
-/// Kind of the first chunk, and the bytes after it; `None` if it is cut off or has another CRC-32.
+/// Kind of the first chunk, and the bytes after it; `None` if the chunk is truncated or has a wrong CRC-32.
 fn take_chunk(bytes: &[u8]) -> Option<([u8; 4], &[u8])> {
     let (length, rest) = bytes.split_first_chunk()?;
     let checked = 4 + usize::try_from(u32::from_be_bytes(*length)).ok()?;

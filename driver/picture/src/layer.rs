@@ -1,4 +1,4 @@
-//! Layers of a picture (arbitrary output variables) and their channels, in the EXR file and on the display
+//! Layers of a picture (arbitrary output variables) and their channels, in `OpenEXR` files and on a display
 //! server.
 
 use std::fmt;
@@ -11,11 +11,11 @@ use crate::sums::FilmPixel;
 pub struct Channel {
     /// Name by the convention of `OpenEXR`: `layer.component`, or `component` in the unnamed layer.
     pub name: &'static str,
-    /// Value of the channel in a pixel.
+    /// Function that returns the channel's value in a pixel.
     pub value: fn(&FilmPixel) -> f32,
 }
 
-/// Channels of radiance, in the unnamed layer, which every viewer shows.
+/// Channels of radiance. They are in the unnamed layer, which every viewer shows.
 const COLOUR: [Channel; 3] = [
     Channel { name: "R", value: |film| film.pixel.radiance[0] },
     Channel { name: "G", value: |film| film.pixel.radiance[1] },
@@ -52,20 +52,20 @@ const GATHERS: [Channel; 1] = [Channel { name: "gathers.Y", value: |film| film.l
 /// A layer of a picture besides radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
-    /// Direct light ([`photoncard_shared::message::PixelLayers::direct`]), W/(sr m^2).
+    /// Direct light, W/(sr m^2) ([`photoncard_shared::message::PixelLayers::direct`]).
     Direct,
     /// Indirect light, W/(sr m^2).
     Indirect,
-    /// Light from the caustic map, through specular surfaces, W/(sr m^2). Direct, indirect and caustic light
-    /// add up to radiance.
+    /// Caustics, W/(sr m^2): light from the caustic map, through specular surfaces. Direct light, indirect
+    /// light and caustics add up to radiance.
     Caustic,
-    /// Mean albedo of the surfaces seen, 0 to 1.
+    /// Mean albedo of the visible surfaces, 0 to 1.
     Albedo,
-    /// Mean of the unit normals seen.
+    /// Mean unit normal of the visible surfaces.
     Normal,
-    /// Mean distance along the view's axis, metres; infinite where nothing is seen.
+    /// Mean distance along the view axis, metres; infinite if no surface is visible.
     Depth,
-    /// Number of a pixel's samples that took a final gather of their own instead of interpolated irradiance.
+    /// Number of the pixel's samples with a final gather instead of interpolated irradiance.
     Gathers,
 }
 
@@ -105,26 +105,26 @@ impl Layer {
         matches!(self, Self::Direct | Self::Indirect | Self::Caustic | Self::Gathers)
     }
 
-    /// Returns whether the layer is always stored in single precision: distances and counts exceed the
-    /// precision of halves.
+    /// Returns whether the layer is always stored in single precision, because distances and counts exceed
+    /// the precision of halves.
     pub fn is_always_single(self) -> bool {
         matches!(self, Self::Depth | Self::Gathers)
     }
 }
 
-/// Layers of a picture besides radiance: the argument of `--aov`.
+/// Layers of a picture in addition to radiance: the argument of `--aov`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layers(Vec<Layer>);
 
 impl Default for Layers {
-    /// Albedo, normals and depth: denoisers and compositors need them, and they cost nothing.
+    /// Albedo, normals and depth. Denoisers and compositors need them, and they cost nothing.
     fn default() -> Self {
         Self(vec![Layer::Albedo, Layer::Normal, Layer::Depth])
     }
 }
 
 impl Layers {
-    /// No layer.
+    /// Absence of layers.
     pub const NONE: Self = Self(Vec::new());
 
     /// All layers.
@@ -137,23 +137,23 @@ impl Layers {
         self.0.iter().copied()
     }
 
-    /// Returns whether chips must render a frame with layers.
+    /// Returns whether chips must render frames with layers.
     pub fn are_of_chip(&self) -> bool {
         self.iter().any(Layer::is_of_chip)
     }
 
-    /// The layers among these that chips render; chips render all of them or none.
+    /// Layers among these that chips render. Chips render all of them or none.
     pub fn of_chip(&self) -> Self {
         let are_of_chip = self.are_of_chip();
         Self(Layer::ALL.into_iter().filter(|layer| are_of_chip && layer.is_of_chip()).collect())
     }
 
-    /// The channels `R G B` of radiance.
+    /// Channels `R G B` of radiance.
     pub fn colour() -> &'static [Channel] {
         &COLOUR
     }
 
-    /// All channels of the picture: radiance first, then the layers.
+    /// Channels of the picture: radiance first, then the layers.
     pub fn channels(&self) -> Vec<Channel> {
         COLOUR.into_iter().chain(self.iter().flat_map(Layer::channels).copied()).collect()
     }
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn only_some_layers_are_left_to_chips() {
+    fn chips_render_only_some_layers() {
         for (text, are_of_chip) in
             [("none", false), ("albedo,N,Z", false), ("caustic", true), ("Z,gathers", true)]
         {

@@ -1,19 +1,20 @@
 //! Pictures: pixels as sums of samples, their layers, and files that appear whole or not at all.
 //!
-//! A card's tile is a [`FinishedTile`](sink::FinishedTile), and [`TileSink`](sink::TileSink) is what takes
-//! one: a [`Film`](film::Film), which [`exr`] and [`tone_mapping`] write, or a sink of another crate. A film
-//! is equal for every order of its tiles, since sums are integers.
+//! A card renders a [`FinishedTile`](sink::FinishedTile). A [`TileSink`](sink::TileSink) is its destination:
+//! a [`Film`](film::Film), which [`exr`] and [`tone_mapping`] write to files, or a sink of another crate. A
+//! film does not depend on the order of its tiles, because sums are integers.
 //!
-//! - [`output`], [`heading`], [`intact`]: output files; their headings; checks that finished files are whole.
+//! - [`output`], [`heading`], [`intact`]: output files; their headings; checks that finished files are
+//!   intact.
 //! - [`printable`], [`choice`]: escaping of foreign text; names of enumerations.
 //! - [`allocation`], [`foreign`]: memory limits; decoders that panic.
-//! - [`sums`], [`sink`], [`viewer`]: format of pixels' sums, and their values; traits of what takes tiles,
-//!   and of what shows them.
+//! - [`sums`], [`sink`], [`viewer`]: format of pixels' sums, and their values; traits of destinations of
+//!   tiles, and of viewers.
 //! - [`film`], [`layer`], [`exr`], [`tone_mapping`], [`difference`]: pixels of a picture; its layers; files;
 //!   comparison.
 //!
-//! This is the lowest crate of the host: scenes read environments by [`exr`], and all crates write by
-//! [`output`].
+//! This is the lowest crate of the host. Scenes read environments through [`exr`], and all crates write files
+//! through [`output`].
 #![forbid(unsafe_code)]
 
 pub mod allocation;

@@ -1,4 +1,5 @@
-//! Output files that appear whole or not at all: written to a temporary file in their folder, then renamed.
+//! Output files that appear whole or not at all. They are written to a temporary file in their folder, which
+//! is then renamed.
 
 use std::fs::{self, FileType};
 use std::io::{self, Write};
@@ -7,17 +8,17 @@ use std::path::{Path, PathBuf};
 use tempfile::{Builder, NamedTempFile};
 use thiserror::Error;
 
-/// Error of an output file that cannot be written.
+/// Error that prevents an output file from being written.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum OutputError {
-    /// Error of a path without a file name.
+    /// The path has no file name.
     #[error("'{}' names no file; add a file name", path.display())]
     NoFileName {
         /// Path of the output.
         path: PathBuf,
     },
-    /// Error of a folder that does not exist, or is no folder.
+    /// The folder does not exist, or is not a folder.
     #[error("cannot write {}: the folder {} does not exist; create it or choose another", path.display(), folder.display())]
     MissingFolder {
         /// Path of the output file.
@@ -25,7 +26,7 @@ pub enum OutputError {
         /// Path of the folder.
         folder: PathBuf,
     },
-    /// Error of a path that names something other than a regular file.
+    /// The path names something other than a regular file.
     #[error("cannot write {}: a {kind} has that name; choose another", path.display())]
     NotAFile {
         /// Path of the output file.
@@ -33,12 +34,12 @@ pub enum OutputError {
         /// Kind of the existing object.
         kind: &'static str,
     },
-    /// Error of writing.
+    /// Writing the file failed.
     #[error("cannot write {}; check the folder's permissions and the free space", path.display())]
     Write {
         /// Path of the output file.
         path: PathBuf,
-        /// The operating system's error.
+        /// Error of the operating system.
         #[source]
         source: io::Error,
     },
@@ -47,12 +48,12 @@ pub enum OutputError {
 /// Checks, before long work starts, that `path` can be written when the work is done.
 ///
 /// # Errors
-/// If the folder is missing or cannot be written to, or `path` is something other than a file.
+/// If the folder is missing or cannot be written to, or `path` is not a regular file.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     PendingFile::create(path).map(drop)
 }
 
-/// Writes `bytes` to `path`, replacing a file of that name. On failure the old file, if any, is untouched.
+/// Writes `bytes` to `path`, replacing an existing file. On failure an existing file is unchanged.
 ///
 /// # Errors
 /// As [`check_writable`], and if the disk is full or fails.
@@ -62,7 +63,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     file.commit()
 }
 
-/// Temporary file that [`Self::commit`] renames to its path. If it is dropped before, it is removed.
+/// Temporary file that [`Self::commit`] renames to its path. It is removed if it is dropped before.
 #[derive(Debug)]
 pub struct PendingFile {
     file: NamedTempFile,
@@ -109,8 +110,8 @@ impl Write for PendingFile {
     }
 }
 
-/// Returns whether two paths name one file, or would after writing it. Of files that do not exist yet, names
-/// that the file system would identify, such as names that differ in case alone, count as different.
+/// Returns whether two paths name one file, or would after it is written. For files that do not exist yet,
+/// names that the file system treats as equal, such as names that differ only in case, count as different.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let absolute = |path: &Path| {
         let folder = || Some(fs::canonicalize(folder_of(path)).ok()?.join(path.file_name()?));
@@ -122,7 +123,7 @@ pub fn is_same_file(a: &Path, b: &Path) -> bool {
     }
 }
 
-/// Path of the file that will be replaced: `path` with symbolic links resolved.
+/// Path of the file that is replaced: `path` with symbolic links resolved.
 fn resolve(path: &Path) -> Result<PathBuf, OutputError> {
     if path.file_name().is_none() {
         return Err(OutputError::NoFileName { path: path.to_owned() });
@@ -198,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_written_file_is_whole_and_alone() {
+    fn a_written_file_is_complete_and_leaves_no_temporary_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("picture.exr");
         check_writable(&path).unwrap();
@@ -210,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pending_file_is_in_its_place_at_its_end_or_never() {
+    fn a_pending_file_appears_only_when_it_is_committed() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("trace");
         let mut given_up = PendingFile::create(&path).unwrap();
@@ -254,7 +255,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn one_file_is_recognised_by_any_of_its_names() {
+    fn is_same_file_recognises_a_file_by_any_of_its_names() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         assert!(is_same_file(&at("absent"), &at("./absent")));
@@ -267,7 +268,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_stays_a_link_and_a_device_stays_a_device() {
+    fn writing_keeps_links_and_devices() {
         let folder = tempfile::tempdir().unwrap();
         let (file, link) = (folder.path().join("file"), folder.path().join("link"));
         fs::write(&file, b"old").unwrap();
@@ -281,7 +282,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn pipes_sockets_and_broken_links_are_refused_and_stay() {
+    fn pipes_sockets_and_broken_links_are_refused_and_kept() {
         use std::os::unix::fs::{FileTypeExt, symlink};
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);

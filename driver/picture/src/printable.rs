@@ -1,11 +1,11 @@
-//! Escaping of foreign text, from scenes, cards, paths or arguments, before it is printed or put into a
+//! Escapes foreign text from scenes, cards, paths or arguments, before it is printed or inserted into a
 //! command.
 
 use std::borrow::Cow;
 
-/// Escapes all characters that do not print as themselves: control characters, line ends included, invisible
+/// Escapes all characters that do not print as themselves: control characters including line ends, invisible
 /// and bidirectional formatting characters, and unassigned code points. Quotes and backslashes are kept, so
-/// that escaped text stays as it is.
+/// that escaped text does not change when it is escaped again.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
         return Cow::Borrowed(text);
@@ -19,7 +19,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     text.split_inclusive(kept).map(piece).collect::<String>().into()
 }
 
-/// Quotes a word for a POSIX shell: the shell reads it as it is.
+/// Quotes a word for a POSIX shell, so that the shell takes it literally.
 pub fn shell_word(word: &str) -> Cow<'_, str> {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_does_not_print_is_escaped_and_all_else_stays() {
+    fn characters_that_do_not_print_are_escaped_and_others_kept() {
         for (text, expected) in [
             ("", ""),
             ("it's \"C:\\x\" \\\\", "it's \"C:\\x\" \\\\"),

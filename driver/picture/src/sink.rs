@@ -5,11 +5,12 @@ use photoncard_shared::message::{PixelSums, Tile};
 
 use crate::sums::{FilmPixel, SumFormat};
 
-/// Tile with all its pixels.
+/// A tile with all its pixels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FinishedTile {
     tile: Tile,
-    /// [`PixelSums`] in the format of the wire, row by row: equal bytes are equal pixels, bit for bit.
+    /// Encoded [`PixelSums`] in the wire format, row by row. Equal bytes are pixels that are equal bit for
+    /// bit.
     records: Vec<u8>,
     format: SumFormat,
     /// Work counters of the chip.
@@ -17,14 +18,14 @@ pub struct FinishedTile {
 }
 
 impl FinishedTile {
-    /// Tile from encoded sums; `None` unless there are those of each pixel.
+    /// Creates a tile from encoded sums; `None` unless there is one for each pixel.
     pub fn new(tile: Tile, records: Vec<u8>, format: SumFormat, counters: Counters) -> Option<Self> {
         let bytes = tile.pixels().checked_mul(format.record_bytes() as u64)?;
         (records.len() as u64 == bytes).then_some(Self { tile, records, format, counters })
     }
 
-    /// Tile from the sums of its pixels, row by row, with zero counters; `None` unless there are those of
-    /// each pixel.
+    /// Creates a tile from the sums of its pixels, row by row, with zero counters; `None` unless there is one
+    /// for each pixel.
     pub fn of_pixels(
         tile: Tile,
         pixels: impl IntoIterator<Item = PixelSums>,
@@ -79,7 +80,7 @@ pub trait TileSink: Sync {
     /// Stores a finished tile.
     fn put(&self, tile: &FinishedTile);
 
-    /// Revokes a stored tile, whose card sent wrong pixels. The tile is stored again once another card has
+    /// Revokes a stored tile whose card sent wrong pixels. The tile is stored again after another card has
     /// rendered it, unless the render ends before.
     fn revoke(&self, tile: &Tile);
 }

@@ -1,39 +1,42 @@
-//! Format of the sums of pixels, and the values that they stand for.
+//! Format of the sums of pixels, and the values that they represent.
 
 use photoncard_shared::image::Header;
 use photoncard_shared::message::{
     FrameParameters, Pixel, PixelLayers, PixelSums, SampleCount, SumScale, record_bytes,
 };
 
-/// Logarithm of the light of a sample, 2^-40 radiance units, beyond which a pixel is dazzling.
+/// Binary logarithm of the light per sample, in units of 2^-40 radiance units, above which a pixel is
+/// dazzling.
 const DAZZLING_SAMPLE: u32 = 40 + 16;
-/// Light beyond which a pixel is dazzling whatever its number of samples: a fourth of the range of sums.
+/// Sum of light above which a pixel is dazzling whatever its number of samples: a fourth of the range of
+/// sums.
 const DAZZLING: i64 = 1 << 61;
 
-/// Format of the sums of a tile or a film.
+/// Format of the sums in a tile or a film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SumFormat {
-    /// True with layers.
+    /// True if the sums have layers.
     pub layers: bool,
     /// Number of samples in each sum.
     pub samples: u32,
-    /// Number of probes among the samples, whose light counts by half; 0 without adaptive sampling.
+    /// Number of probes among the samples; 0 without adaptive sampling. The light of probes has the weight
+    /// 1/2.
     pub probes: u32,
     /// Units of the sums.
     pub scale: SumScale,
 }
 
-/// Values of a pixel, with its layers.
+/// Values of a pixel, including layers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FilmPixel {
     /// Radiance, albedo, normal and depth.
     pub pixel: Pixel,
-    /// Layers; zero in a film without layers.
+    /// Layers of the pixel; zero in a film without layers.
     pub layers: PixelLayers,
 }
 
 impl SumFormat {
-    /// Format of one sample a pixel without layers, in units of 1 W/(sr m^2) and 1 m.
+    /// Format with one sample per pixel and without layers, in units of 1 W/(sr m^2) and 1 m.
     pub const ONE: Self =
         Self { layers: false, samples: 1, probes: 0, scale: SumScale { radiance: 1.0, depth: 1.0 } };
 
@@ -43,13 +46,14 @@ impl SumFormat {
         Self::of_range(frame.layers, (frame.first_sample, frame.samples), is_adaptive, header.sum_scale())
     }
 
-    /// Format of a number of samples from a first one on, with or without adaptive sampling.
+    /// Format of `samples` samples from number `first` on, with or without adaptive sampling.
     pub fn of_range(layers: bool, (first, samples): (u32, u32), is_adaptive: bool, scale: SumScale) -> Self {
         let SampleCount { samples, probes } = SampleCount::of_range(first, samples, is_adaptive);
         Self { layers, samples, probes, scale }
     }
 
-    /// Format of a number of a picture's samples from a first one on, by the format of all.
+    /// Format of `samples` of the picture's samples from number `first` on, derived from the format of all
+    /// samples.
     pub(crate) fn of_part(&self, first: u32, samples: u32) -> Self {
         Self::of_range(self.layers, (first, samples), self.probes > 0, self.scale)
     }
@@ -64,7 +68,7 @@ impl SumFormat {
         record_bytes(self.layers)
     }
 
-    /// Values that sums stand for.
+    /// Values that sums represent.
     pub fn values(&self, sums: &PixelSums) -> FilmPixel {
         FilmPixel {
             pixel: sums.pixel(self.count(), &self.scale),
@@ -72,9 +76,9 @@ impl SumFormat {
         }
     }
 
-    /// Returns whether the light of a pixel is far beyond that of its scene: its samples have more than 2^16
-    /// radiance units in the mean, where the brightest surface has at most 2^7. A lamp without extent that
-    /// touches a surface makes such pixels, and they are rare.
+    /// Returns whether the light of a pixel is far above that of its scene: its samples have more than 2^16
+    /// radiance units on average, whereas the brightest surface has at most 2^7. Such pixels are rare. They
+    /// occur where a lamp without an area touches a surface.
     pub fn is_dazzling(&self, sums: &PixelSums) -> bool {
         let most = (i64::from(self.samples) << DAZZLING_SAMPLE).min(DAZZLING);
         sums.light.into_iter().any(|light| light > most)
@@ -86,7 +90,7 @@ impl SumFormat {
         if self.layers { sums.with_nearest_layers(layers, self.count(), &self.scale) } else { sums }
     }
 
-    /// Format of the sums of the samples of both; `None` if their units or layers differ.
+    /// Format of sums over the samples of both; `None` if their units or layers differ.
     pub fn plus(&self, more: &Self) -> Option<Self> {
         let is_alike = self.layers == more.layers && self.scale == more.scale;
         let samples = self.samples.checked_add(more.samples)?;

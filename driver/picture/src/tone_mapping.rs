@@ -1,9 +1,10 @@
-//! Tone mapping of radiance to a PNG picture in sRGB, 8 bits per channel.
+//! Tone mapping of radiance to an sRGB picture in PNG with 8 bits per channel.
 //!
-//! Radiance is scaled by `2^exposure`, or without an exposure so that the log-average luminance of the lit
-//! pixels becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone reproduction
-//! for digital images*, equations 1 and 2). A [`ToneCurve`] then compresses it, and it is clipped to 1 and
-//! encoded with the sRGB transfer curve. Negative radiance is shown black, infinite radiance white.
+//! Radiance is scaled by `2^exposure`. Without an exposure it is scaled so that the log-average luminance of
+//! the lit pixels becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone
+//! reproduction for digital images*, equations 1 and 2). A [`ToneCurve`] then compresses it, and it is
+//! clipped to 1 and encoded with the sRGB transfer function. Negative radiance is shown black, infinite
+//! radiance white.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -23,14 +24,14 @@ use crate::output::{self, OutputError};
 pub enum ToneCurve {
     /// No compression: values above 1 are clipped.
     None,
-    /// Reinhard's extended curve (2002, equation 4) of luminance, `L (1 + L / w^2) / (1 + L)` with the white
-    /// point `w = 4`. The colour is scaled with its luminance.
+    /// Reinhard's extended curve of luminance (2002, equation 4), `L (1 + L / w^2) / (1 + L)` with the white
+    /// point `w = 4`. The colour is scaled by the same factor as its luminance.
     #[default]
     Reinhard,
-    /// Narkowicz' fit of the Academy Color Encoding System's filmic curve, for each channel: `x (2.51 x +
-    /// 0.03) / (x (2.43 x + 0.59) + 0.14)` (2016,
-    /// <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>). It maps 1 to 0.80; the
-    /// Academy's own curve is this one at 0.6 times the radiance.
+    /// Narkowicz' fit of the Academy Color Encoding System's filmic curve, for each channel:
+    /// `x (2.51 x + 0.03) / (x (2.43 x + 0.59) + 0.14)` (2016,
+    /// <https://knarkowicz.wordpress.com/2016/01/06/aces-filmic-tone-mapping-curve/>). It maps 1 to 0.80. The
+    /// Academy's own curve corresponds to this one at 0.6 times the radiance.
     Aces,
 }
 
@@ -60,26 +61,26 @@ impl ToneCurve {
 /// Mapping of radiance to a screen: exposure and tone curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToneMapping {
-    /// Exposure in stops: radiance is scaled by `2^exposure`. `None` derives the scale from the picture's
-    /// log-average luminance.
+    /// Exposure in stops: radiance is scaled by `2^exposure`. `None` derives the scale from the log-average
+    /// luminance of the picture.
     pub exposure: Option<f32>,
     /// Tone curve.
     pub curve: ToneCurve,
 }
 
 impl ToneMapping {
-    /// Exposure in stops, null for the automatic one, and name of the curve.
+    /// JSON with the exposure in stops, null for the automatic one, and the name of the curve.
     fn to_json(self) -> String {
         serde_json::json!({"exposure": self.exposure, "tonemap": self.curve.name()}).to_string()
     }
 }
 
-/// Keyword of the PNG's text chunk that holds exposure and tone curve.
+/// Keyword of the PNG text chunk that contains exposure and tone curve.
 pub const TONE_MAPPING: &str = "photoncard-tonemap";
 
 /// White point of Reinhard's curve: the scaled luminance that it maps to 1.
 const WHITE: f32 = 4.0;
-/// Maximum of scaled radiance, beyond which it is clamped; its square is finite.
+/// Upper limit to which scaled radiance is clamped. Its square is finite.
 const MOST: f32 = 1e18;
 
 /// Log-average luminance after automatic exposure.
@@ -89,27 +90,27 @@ const MIDDLE_GREY: f64 = 0.18;
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PngError {
-    /// The file cannot be written.
+    /// Path of the output file.
     #[cfg(not(target_family = "wasm"))]
     #[error(transparent)]
     Output(#[from] OutputError),
     /// The encoder refused the picture.
     #[error("cannot encode {} as PNG", path.display())]
     Encode {
-        /// The output file.
+        /// Path of the output file.
         path: PathBuf,
         /// The encoder's error.
         #[source]
         source: png::EncodingError,
     },
-    /// A pixel has no radiance that could be shown.
+    /// A pixel's radiance is not a number.
     #[error("pixel ({x}, {y}) of the picture for {} is not a number; repair the picture, or render it again", path.display())]
     NotANumber {
-        /// The output file.
+        /// Path of the output file.
         path: PathBuf,
-        /// The pixel's column in the PNG.
+        /// Column of the pixel in the PNG.
         x: usize,
-        /// The pixel's row in the PNG.
+        /// Row of the pixel in the PNG.
         y: usize,
     },
     /// The exposure is not a finite number.
@@ -125,7 +126,7 @@ pub enum PngError {
 /// Writes a picture of `width` x `height` pixels of linear radiance to `path` as PNG, whole or not at all.
 ///
 /// The JSON of the picture's provenance is stored in the text chunk [`PROVENANCE`], with characters beyond
-/// ASCII as `\u` escapes, and that of the mapping in the text chunk [`TONE_MAPPING`].
+/// ASCII as `\u` escapes. The JSON of the mapping is stored in the text chunk [`TONE_MAPPING`].
 ///
 /// # Errors
 /// If the file cannot be written, the exposure is not finite, a pixel is NaN, or there are not `width` x
@@ -142,10 +143,10 @@ pub fn write_png(
     Ok(output::write(path, &bytes)?)
 }
 
-/// Bytes of the file that [`write_png`] writes; `path` is its name in errors.
+/// Encodes the file that [`write_png`] writes. `path` is its name in errors.
 ///
 /// # Errors
-/// As [`write_png`], but for those of files.
+/// As [`write_png`], except for errors of files.
 pub fn png_bytes(
     path: &Path,
     [width, height]: [u32; 2],
@@ -169,19 +170,20 @@ pub fn png_bytes(
     encoded.map_err(|source| PngError::Encode { path: path.to_owned(), source })
 }
 
-/// Returns whether a file is a PNG that has a provenance of this program.
+/// Returns whether a file is a PNG with a provenance of this program.
 pub fn is_of_photoncard(path: &Path) -> bool {
     texts(path).is_some_and(|texts| texts.iter().any(|(keyword, _)| keyword == PROVENANCE))
 }
 
-/// Reads the provenance of a PNG of this mapping, without its pixels; `None` if the file is none.
+/// Reads the provenance of a PNG that was tone-mapped by `mapping`, without its pixels; `None` for any other
+/// file.
 pub fn read_form(path: &Path, mapping: ToneMapping) -> Option<String> {
     let texts = texts(path)?;
     let text = |name: &str| texts.iter().find(|(keyword, _)| keyword == name).map(|(_, text)| text);
     text(PROVENANCE).filter(|_| text(TONE_MAPPING) == Some(&mapping.to_json())).cloned()
 }
 
-/// Keywords and texts of a PNG before its pixels; `None` if the file is none.
+/// Keywords and texts that precede the pixels of a PNG; `None` if the file is not a PNG.
 fn texts(path: &Path) -> Option<Vec<(String, String)>> {
     let file = BufReader::new(File::open(path).ok()?);
     let reader = foreign::decode(|| png::Decoder::new(file).read_info().map_err(drop), || ()).ok()?;
@@ -189,12 +191,12 @@ fn texts(path: &Path) -> Option<Vec<(String, String)>> {
     Some(chunks.iter().map(|chunk| (chunk.keyword.clone(), chunk.text.clone())).collect())
 }
 
-/// Returns whether a file is a PNG that is neither cut off nor damaged; an unreadable one is not.
+/// Returns whether a file is a PNG that is neither truncated nor damaged. An unreadable file is not.
 pub fn is_intact(path: &Path) -> bool {
     std::fs::read(path).is_ok_and(|bytes| intact::is_intact_png(&bytes))
 }
 
-/// Bytes of a PNG file with text chunks.
+/// Encodes a PNG file with text chunks.
 fn encode_png(
     [width, height]: [u32; 2],
     pixels: &[u8],
@@ -231,13 +233,13 @@ fn automatic_scale(radiance: impl Iterator<Item = [f32; 3]>) -> f32 {
     if count == 0 { 1.0 } else { (MIDDLE_GREY / libm::exp(sum / count as f64)) as f32 }
 }
 
-/// Code of a screen for a pixel, which must not be NaN.
+/// 8-bit sRGB code of a pixel, which must not be NaN.
 fn tone_map(radiance: [f32; 3], scale: f32, curve: ToneCurve) -> [u8; 3] {
     let scaled = radiance.map(|value| (value * scale).clamp(0.0, MOST));
     curve.compress(scaled).map(encode)
 }
 
-/// The sRGB transfer curve, in 8 bits.
+/// Applies the sRGB transfer function, rounded to 8 bits.
 fn encode(linear: f32) -> u8 {
     let linear = linear.clamp(0.0, 1.0);
     let encoded =
@@ -270,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_are_rows_and_grow_with_radiance() {
+    fn pixels_are_in_rows_and_grow_with_radiance() {
         let picture = grey(|x, y| (4 * y + x) as f32 * 0.08);
         for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
             let (width, height, pixels) = written(&picture, Some(0.0), curve);
@@ -282,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_cut_off_or_damaged_is_not_intact() {
+    fn a_truncated_or_damaged_png_is_not_intact() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("picture.png");
         let picture = grey(|x, y| (x * y) as f32);
@@ -320,7 +322,7 @@ mod tests {
         }
     }
 
-    /// Computed by hand from the curves' formulas.
+    /// Compares with values computed by hand from the curves' formulas.
     #[test]
     fn curves_have_their_known_values() {
         let grey = |curve: ToneCurve, value: f32| curve.compress([value; 3])[1];
@@ -344,7 +346,7 @@ mod tests {
         assert!(red / green < 2.0);
     }
 
-    /// IEC 61966-2-1: half of full intensity is 188 of 255.
+    /// By IEC 61966-2-1, half of full intensity has the code 188 of 255.
     #[test]
     fn the_screen_curve_has_its_known_values() {
         for (linear, code) in [(0.0, 0), (0.003, 10), (0.18, 118), (0.5, 188), (1.0, 255), (7.0, 255)] {
@@ -353,7 +355,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_values_are_shown() {
+    fn negative_and_infinite_radiance_is_shown() {
         for curve in [ToneCurve::None, ToneCurve::Reinhard, ToneCurve::Aces] {
             assert_eq!(tone_map([-1.0, f32::NEG_INFINITY, 0.0], 1.0, curve), [0; 3]);
             assert_eq!(tone_map([f32::INFINITY; 3], 1.0, curve), [255; 3]);
@@ -363,7 +365,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_shown_is_refused_and_nothing_written() {
+    fn pictures_that_cannot_be_shown_are_refused_before_anything_is_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("x.png");
         let refused = |size, picture: &[[f32; 3]], exposure| {

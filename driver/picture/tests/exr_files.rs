@@ -25,7 +25,7 @@ fn value(x: u32, y: u32) -> PixelValue {
     }
 }
 
-/// Units in which the values of these tests have sums, with room for a dazzling light.
+/// Format whose units suit the values of these tests, with room for a dazzling light.
 const FORMAT: SumFormat = SumFormat {
     samples: 1,
     probes: 0,
@@ -55,7 +55,7 @@ fn written(format: SampleFormat, provenance: &str) -> (tempfile::TempDir, std::p
     (folder, path)
 }
 
-/// No byte of a file can be changed, added or removed unnoticed.
+/// No byte of a file can be changed, added or removed without being detected.
 #[test]
 fn a_file_is_intact_only_as_it_was_written() {
     for format in [SampleFormat::Float, SampleFormat::Half] {
@@ -80,7 +80,7 @@ fn a_file_is_intact_only_as_it_was_written() {
 }
 
 #[test]
-fn radiance_is_read_back_to_the_format_s_precision() {
+fn radiance_is_read_back_to_the_precision_of_the_format() {
     for (format, precision) in [(SampleFormat::Float, 0.0), (SampleFormat::Half, 1.0 / 2048.0)] {
         let (_folder, path) = written(format, "{}");
         let image = read_rgb(&path).unwrap();
@@ -95,7 +95,7 @@ fn radiance_is_read_back_to_the_format_s_precision() {
     }
 }
 
-/// A picture of 40 x 40 pixels whose blocks are of DWA, and its bytes.
+/// Writes a picture of 40 x 40 pixels with DWA compression. Returns its path and its bytes.
 fn dwa(folder: &std::path::Path, compression: Compression) -> (std::path::PathBuf, Vec<u8>) {
     let path = folder.join("picture.exr");
     let channels = SpecificChannels::rgb(|Vec2(x, y)| {
@@ -109,7 +109,7 @@ fn dwa(folder: &std::path::Path, compression: Compression) -> (std::path::PathBu
 }
 
 #[test]
-fn pictures_of_dwa_are_read() {
+fn pictures_with_dwa_compression_are_read() {
     let folder = tempfile::tempdir().unwrap();
     for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
         let (path, _) = dwa(folder.path(), compression);
@@ -124,9 +124,9 @@ fn pictures_of_dwa_are_read() {
     }
 }
 
-/// The decoder allocates as much as a block states.
+/// The decoder would allocate as much as a block states.
 #[test]
-fn blocks_of_dwa_that_state_too_much_are_refused() {
+fn dwa_blocks_that_state_impossible_sizes_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
         let (path, bytes) = dwa(folder.path(), compression);
@@ -198,7 +198,7 @@ fn channels(path: &Path) -> Vec<(String, bool, Vec<f32>)> {
 }
 
 #[test]
-fn the_layers_that_are_asked_for_are_in_the_file() {
+fn requested_layers_are_in_the_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("layers.exr");
     let layers = PixelLayers {
@@ -265,7 +265,7 @@ fn a_bright_light_stays_finite_in_halves() {
 }
 
 #[test]
-fn bad_files_are_named() {
+fn errors_name_the_bad_file() {
     let folder = tempfile::tempdir().unwrap();
     assert!(matches!(read_rgb(&folder.path().join("absent.exr")), Err(ExrError::Unreadable { .. })));
     assert!(matches!(read_rgb(folder.path()), Err(ExrError::Unreadable { .. })));
@@ -285,7 +285,7 @@ fn bad_files_are_named() {
 }
 
 #[test]
-fn a_grey_picture_has_no_colour() {
+fn a_picture_without_colour_channels_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grey.exr");
     let grey = exr::image::AnyChannel::new("Y", exr::image::FlatSamples::F32(vec![1.0; 4]));
@@ -297,7 +297,7 @@ fn a_grey_picture_has_no_colour() {
     assert!(matches!(error, ExrError::NoColour { .. }) && error.to_string().contains('Y'), "{error}");
 }
 
-/// A window whose pixels the file cannot hold is refused before they are allocated.
+/// The decoder must refuse a window whose pixels the file cannot hold before it allocates them.
 #[test]
 fn absurd_windows_are_refused() {
     let (_folder, path) = written(SampleFormat::Float, "{}");

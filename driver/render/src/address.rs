@@ -1,4 +1,4 @@
-//! Addresses of cards: the arguments of `--card`.
+//! Addresses of cards, as in the arguments of `--card`.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -10,28 +10,28 @@ use photoncard_picture::choice::Choice;
 use super::RenderError;
 use crate::emulator::EmulatedKind;
 
-/// Address of one card or of several emulated ones: an argument of `--card`.
+/// Address of one card, or of several emulated cards: an argument of `--card`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CardAddress {
     /// Emulated chips in this process.
     Emulated {
-        /// Their kind.
+        /// Kind of the chips.
         kind: EmulatedKind,
         /// Number of chips.
         chips: usize,
     },
-    /// Card at the other end of a link.
+    /// A card at the other end of a link.
     Remote(RemoteAddress),
 }
 
 /// Address of a card that is not emulated in this process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum RemoteAddress {
-    /// Serial port, or pseudo terminal.
+    /// A serial port or pseudo terminal.
     Serial {
         /// Path of the device.
         path: PathBuf,
-        /// Speed, bits/s.
+        /// Speed, bit/s.
         baud: u32,
     },
     /// TCP port on which the card listens.
@@ -50,11 +50,11 @@ pub enum RemoteAddress {
 
 /// Maximum number of chips that one process emulates.
 const MAX_CHIPS: usize = 1024;
-/// Default speed of a serial port, bits/s.
+/// Default speed of a serial port, bit/s.
 const DEFAULT_BAUD: u32 = 115_200;
-/// Minimum speed of a serial port, bits/s. A card is silent while it receives two whole frames and
-/// acknowledges them. Even if one acknowledgement is lost, the next has to arrive within the 10 s after which
-/// a card counts as lost.
+/// Minimum speed of a serial port, bit/s. A card is silent while it receives two whole frames and
+/// acknowledges them. Even if one acknowledgement is lost, the next must arrive within the 10 s after which a
+/// card counts as lost.
 const MIN_BAUD: u32 = 4800;
 
 impl Default for CardAddress {
@@ -65,7 +65,7 @@ impl Default for CardAddress {
 }
 
 impl CardAddress {
-    /// Chips of a kind in this process, one for each of its processor's cores.
+    /// Emulated chips of a kind in this process, one per processor core.
     pub fn emulated(kind: EmulatedKind) -> Self {
         let chips = std::thread::available_parallelism().map_or(1, usize::from);
         Self::Emulated { kind, chips }
@@ -76,14 +76,14 @@ impl CardAddress {
         Self::Remote(RemoteAddress::Serial { path: path.into(), baud: DEFAULT_BAUD })
     }
 
-    /// The forms of an address, in a line of help.
+    /// Forms of an address, for a line of help.
     pub fn forms() -> String {
         let emulated: String =
             EmulatedKind::ALL.iter().map(|kind| format!("{}[:CHIPS], ", kind.name())).collect();
         format!("{emulated}serial:PATH[@BAUD], tcp:HOST:PORT or unix:PATH")
     }
 
-    /// Chips that this process emulates there.
+    /// Number of chips at this address that this process emulates.
     pub(super) fn emulated_chips(&self) -> usize {
         match *self {
             Self::Emulated { chips, .. } => chips,
@@ -91,7 +91,8 @@ impl CardAddress {
         }
     }
 
-    /// Name of a card at the address in errors: its number, and the address if it is not emulated.
+    /// Name in errors of card number `index` at this address. It includes the address if the card is not
+    /// emulated.
     pub(super) fn name_of(&self, index: usize) -> String {
         match self {
             Self::Emulated { .. } => format!("card {index}"),
@@ -99,7 +100,8 @@ impl CardAddress {
         }
     }
 
-    /// Size of each card's memory at the address, bytes; for remote cards the maximum that a card can report.
+    /// Memory size of each card at this address, bytes. For a remote card it is the maximum that a card can
+    /// report.
     pub fn dram_bytes(&self) -> u32 {
         match self {
             Self::Emulated { kind, .. } => kind.budget().dram_bytes,
@@ -239,7 +241,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_address_is_refused_with_what_is() {
+    fn invalid_addresses_are_refused_with_the_valid_forms() {
         for (text, said) in [
             ("", "no kind of card"),
             ("abacus", "no kind of card"),

@@ -1,4 +1,4 @@
-//! A card's thread on the host, which moves bytes between the card's port and its session.
+//! Thread of a card on the host. It moves bytes between the card's port and its session.
 
 use std::time::Duration;
 
@@ -12,18 +12,17 @@ use super::greeting::GreetedCard;
 use super::reopening::reopen;
 use super::{CardError, Phase, RenderError};
 
-/// Card at work.
 struct CardAtWork<'a> {
     number: CardNumber,
     greeted: &'a mut GreetedCard,
-    /// True after the card's loss was reported, until it is loaded again.
+    /// True from the report of the card's loss until the card is loaded again.
     is_lost: bool,
     crew: &'a Crew<'a>,
 }
 
 /// Loads the image into a card and renders tiles on it until none is left. A lost card is retried as long as
-/// there are others; a card that answers wrongly, or fails repeatedly, is given up. Returns the time when the
-/// card was loaded, since the start of the crew; zero if it was not.
+/// there are others. A card that answers wrongly, or fails repeatedly, is given up. Returns the time when the
+/// card was loaded, since the start of the crew; zero if it was not loaded.
 pub(super) fn render_on(
     number: CardNumber,
     greeted: &mut GreetedCard,
@@ -65,7 +64,7 @@ impl CardAtWork<'_> {
         collected.map_err(|error| self.crew.end(error))
     }
 
-    /// Returns a card's tiles to the scheduler after an error. Returns whether the card is retried.
+    /// Returns the card's tiles to the scheduler after an error. Returns whether the card is retried.
     fn recover(&mut self, error: SessionError) -> Result<bool, RenderError> {
         let Self { number, crew, .. } = *self;
         if error.is_wrong() {

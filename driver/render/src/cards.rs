@@ -1,5 +1,5 @@
-//! Executor of tiles on cards: connects to all cards, greets them, and renders on them in parallel. Cards
-//! stay open for the next picture.
+//! Executor that renders tiles on cards. It connects to all cards, greets them, and renders on them in
+//! parallel. Cards stay open for the next picture.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::AtomicBool;
@@ -26,32 +26,33 @@ use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{MemoryModel, SharedImage, TileLines};
 
-/// Maximum time without a render after which a card elsewhere is used without a new greeting: it may close a
-/// link that is silent.
+/// Maximum time without a render after which a remote card is used without a new greeting, because it may
+/// close a silent link.
 const MAX_REST: Duration = Duration::from_secs(5);
 
-/// Cards that have answered the greeting.
+/// Cards that answered the greeting.
 pub(super) struct Cards {
     set: CardSet,
     cards: Vec<(String, GreetedCard)>,
-    /// Emulated cards that were left out of the last picture for their budget, and may fit the next.
+    /// Emulated cards that were left out of the last picture because of their budget. They may fit the next
+    /// picture.
     left_out: Vec<(String, GreetedCard)>,
-    /// Names of the cards that the observer knows to be left out.
+    /// Names of the cards that were reported to the observer as left out.
     known: Vec<String>,
     start: Instant,
     shared: SharedImage,
-    /// Image that the cards were last loaded with.
+    /// Image that was last loaded into the cards.
     upload: Option<(Arc<CardImage>, Arc<Upload>)>,
-    /// Number of cards that have not answered the greeting, were left out for their budget, or given up in an
-    /// earlier render.
+    /// Number of cards that did not answer the greeting, were left out because of their budget, or were given
+    /// up in an earlier render.
     lost: usize,
-    /// Time of the end of the last render, or of the greeting.
+    /// Time when the last render ended, or of the greeting.
     used: Instant,
 }
 
 impl Cards {
-    /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it, the
-    /// first card's with the trace. A card that does not answer counts as lost.
+    /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it; the
+    /// first card's model has the trace. A card that does not answer counts as lost.
     ///
     /// # Errors
     /// If the trace cannot be written, or fewer cards are left than needed.
@@ -91,7 +92,7 @@ impl Cards {
         Ok(this)
     }
 
-    /// Returns whether the cards are those of the settings, as many as needed, and can be used without a new
+    /// Returns whether these are the cards of the settings, as many as needed, and usable without a new
     /// greeting.
     pub(super) fn serve(&self, settings: &RenderSettings) -> bool {
         let is_remote = |address: &CardAddress| matches!(address, CardAddress::Remote(_));
@@ -101,17 +102,17 @@ impl Cards {
         self.set == settings.cards && !is_modelled && is_fresh && self.cards.len() >= settings.needed_cards()
     }
 
-    /// Has cards that were left out of the last picture be checked for the next.
+    /// Takes back cards that were left out of the last picture, so that they are checked for the next.
     pub(super) fn take_back(&mut self) {
         self.lost -= self.left_out.len();
         self.known = self.left_out.iter().map(|(name, _)| name.clone()).collect();
         self.cards.append(&mut self.left_out);
     }
 
-    /// Reports cards that have not answered the greeting, or have too small a budget, to the observer.
+    /// Reports cards that did not answer the greeting, or have too small a budget, to the observer.
     ///
     /// # Errors
-    /// If too few are left: the error of the last lost card.
+    /// The error of the last lost card, if too few are left.
     fn lose(
         &self,
         mut errors: Vec<(String, CardError)>,
@@ -123,8 +124,9 @@ impl Cards {
         last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
     }
 
-    /// Has emulated cards to which nothing was loaded hold the image by reference: all of them, or all but
-    /// the first, whose load is the one that is counted. Cards on faulty links are loaded.
+    /// Shares the image with emulated cards into which nothing was loaded, instead of sending it over their
+    /// links. Unless `is_image_kept`, the first card is loaded over its link, so that its loading is counted.
+    /// Cards on faulty links are always loaded.
     fn share(&mut self, image: &Arc<CardImage>, checksum: u64, is_image_kept: bool) {
         let is_faulty = self.set.faults.is_some();
         for (index, (_, GreetedCard { card, session, .. })) in self.cards.iter_mut().enumerate() {
@@ -138,7 +140,7 @@ impl Cards {
         }
     }
 
-    /// The image as the cards receive it: those that hold the last one receive only its differences.
+    /// Upload of the image. Cards that have the previous image receive only the differences.
     fn upload(&mut self, image: &Arc<CardImage>) -> Arc<Upload> {
         let upload = match self.upload.take() {
             Some((last, upload)) if Arc::ptr_eq(&last, image) => upload,
@@ -149,13 +151,13 @@ impl Cards {
         upload
     }
 
-    /// Tiles of the last picture, each with the number of its card.
+    /// Tiles of the last picture, with the numbers of their cards.
     fn homes(&self) -> impl Iterator<Item = (CardNumber, &Tile)> {
         let cards = self.cards.iter().enumerate();
         cards.flat_map(|(number, (_, card))| card.tiles.iter().map(move |tile| (number, tile)))
     }
 
-    /// Renders a scheduler's tiles on all cards, into sinks.
+    /// Renders a scheduler's tiles on all cards and stores them in sinks.
     fn render(
         &mut self,
         job: &Job,
@@ -297,8 +299,8 @@ impl Executor for Cards {
     }
 }
 
-/// Does each piece of work on a thread of its own. Returns the results in the order of the work. A panic of
-/// one is the caller's.
+/// Runs each piece of work on its own thread. Returns the results in the order of the work. Panics if one of
+/// them panics.
 fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) -> Vec<T> {
     std::thread::scope(|scope| {
         let threads: Vec<_> = works.map(|work| scope.spawn(work)).collect();
@@ -310,7 +312,7 @@ fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) 
 /// Latest time when a card was loaded.
 ///
 /// # Errors
-/// The first failure: it has stopped the other cards.
+/// The first failure, which stopped the other cards.
 fn latest(results: Vec<Result<Duration, RenderError>>) -> Result<Duration, RenderError> {
     let mut latest = Duration::ZERO;
     let mut is_stopped = false;

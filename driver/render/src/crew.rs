@@ -1,4 +1,4 @@
-//! State that the threads of all cards share.
+//! State shared by the threads of all cards.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -10,7 +10,7 @@ use super::exchange::WAIT;
 use super::outputs::Outputs;
 use super::{CardError, RenderError};
 
-/// State that the threads of all cards share.
+/// State shared by the threads of all cards.
 pub(super) struct Crew<'a> {
     pub(super) dispatcher: Dispatcher<'a>,
     pub(super) outputs: &'a Outputs<'a>,
@@ -20,7 +20,7 @@ pub(super) struct Crew<'a> {
     pub(super) failed: AtomicBool,
 }
 
-/// Guard that stops the threads of the other cards if its own panics: they would wait for its tiles forever.
+/// Guard that stops the threads of the other cards if its own panics. They would wait for its tiles forever.
 pub(super) struct EndOthersOnPanic<'a>(pub(super) &'a AtomicBool);
 
 impl Drop for EndOthersOnPanic<'_> {
@@ -36,7 +36,7 @@ impl Crew<'_> {
     /// Returns whether all tiles are done.
     ///
     /// # Errors
-    /// If the observer or the failure of a card has stopped the render.
+    /// If the observer or the failure of a card stopped the render.
     pub(super) fn is_complete(&self) -> Result<bool, RenderError> {
         if self.failed.load(Ordering::Relaxed) || self.outputs.observer.is_stopped() {
             return Err(RenderError::Stopped);
@@ -46,7 +46,7 @@ impl Crew<'_> {
         Ok(self.dispatcher.scheduler().is_complete())
     }
 
-    /// Waits at most `longest` until all tiles are done. Returns whether they are.
+    /// Waits until all tiles are done, for at most `longest`. Returns whether they are.
     ///
     /// # Errors
     /// As [`Self::is_complete`].
@@ -69,8 +69,8 @@ impl Crew<'_> {
         error
     }
 
-    /// Handles a card that is lost or given up; the others render its tiles. `was_lost` is true if its loss
-    /// was reported before.
+    /// Handles a card that is lost or given up; other cards render its tiles. `was_lost` is true if its loss
+    /// was already reported.
     ///
     /// # Errors
     /// If no other card is left.
@@ -98,7 +98,7 @@ impl Crew<'_> {
         }))
     }
 
-    /// Stops the render with the scheduler's error.
+    /// Stops the render with an error of the scheduler.
     pub(super) fn end(&self, error: SchedulerError) -> RenderError {
         let name = |source: &Source| match *source {
             Source::Card(card) => self.names[card].clone(),

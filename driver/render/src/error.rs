@@ -17,41 +17,41 @@ use crate::partial::PartialError;
 /// Error of a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum CardError {
-    /// Error of starting an emulated card.
+    /// An emulated card cannot be started.
     #[error("it could not be started: {0}")]
     #[diagnostic(help("use fewer cards"))]
     Start(#[source] std::io::Error),
-    /// Error of opening the link.
+    /// The link cannot be opened.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Link(#[from] LinkError),
-    /// Error of a link that was closed before the card answered the greeting.
+    /// The link was closed before the card answered the greeting.
     #[error("it closed the link before it said hello")]
     #[diagnostic(help(
         "another host may be using the card: wait until it is done; or check that a card listens at the address"
     ))]
     Refused,
-    /// Error of a card whose budget is too small for the picture.
+    /// The card's budget is too small for the picture.
     #[error("{reason}")]
     #[diagnostic(help("{remedy}; or leave the card out"))]
     Budget {
-        /// Description of what has no room.
+        /// Description of the part that does not fit.
         reason: String,
         /// Remedy.
         remedy: String,
     },
-    /// Error of a card that was reset during its self-test.
+    /// The card was reset during its self-test.
     #[error("it was reset during its self-test")]
     #[diagnostic(help("watch the card's own messages, and check its power supply and its watchdog"))]
     Reset,
-    /// Error of the session.
+    /// The session failed.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Session(#[from] SessionError),
 }
 
 impl CardError {
-    /// Error of a card whose budget fails a check.
+    /// Error of a card whose budget fails a check with `error`.
     pub(super) fn of_budget(error: &RenderError) -> Self {
         let remedy = error.help().map_or("choose other settings".to_owned(), |help| help.to_string());
         Self::Budget { reason: error.to_string(), remedy }
@@ -61,7 +61,7 @@ impl CardError {
 /// Error of a render.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum RenderError {
-    /// Error of a setting that is not possible.
+    /// A setting is not possible.
     #[error("{option} {value} is not possible: {reason}")]
     #[diagnostic(help("{remedy}"))]
     Setting {
@@ -74,27 +74,27 @@ pub enum RenderError {
         /// Remedy.
         remedy: String,
     },
-    /// Error of a camera that is not in the scene.
+    /// The scene has no such camera.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
-    /// Error of the picture's size or crop window.
+    /// The size of the picture or its crop window is not possible.
     #[error(transparent)]
     #[diagnostic(help("change --size or --crop"))]
     Film(#[from] FilmError),
-    /// Error of a scene that does not fit the card.
+    /// The scene does not fit the card.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Pack(#[from] PackError),
-    /// Error of the photon pass.
+    /// The photon pass failed.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Photons(PhotonError),
-    /// Error of a malformed image, though it was just packed.
+    /// The image is malformed although it was just packed.
     #[error("the packed card image is malformed: {0}")]
     #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
     Image(Fault),
-    /// Error of the last card that was left.
+    /// The last remaining card failed.
     #[error("{card}: {source}")]
     Card {
         /// Number of the card, and its address if it is not emulated.
@@ -104,52 +104,52 @@ pub enum RenderError {
         #[diagnostic_source]
         source: CardError,
     },
-    /// Error of cards that render a tile differently, with no other card left to decide.
+    /// Two cards render a tile differently, and no other card is left to decide.
     #[error("{cards} render the tile {tile} differently: at least one of them lies")]
     #[diagnostic(help(
         "render with a third card, which decides; or with one that you trust. Tiles that only one of these cards has rendered are not kept"
     ))]
     Disagreement {
-        /// The tile as an argument of `--crop`.
+        /// Tile in the form of the argument of `--crop`.
         tile: String,
         /// Names of the cards.
         cards: String,
     },
-    /// Error of a tile in the partial file that differs from the one that two cards render.
+    /// A tile in the partial file differs from the one that two cards render.
     #[error(
         "the tile {tile} in the file of finished tiles differs from what two cards render: a card has lied to the render that wrote it"
     )]
     #[diagnostic(help("remove that file, and render all tiles"))]
     KeptDiffers {
-        /// The tile as an argument of `--crop`.
+        /// Tile in the form of the argument of `--crop`.
         tile: String,
     },
-    /// Error of a tile to be verified when only one card is left.
+    /// A tile must be verified, but only one card is left.
     #[error("no second card is left to verify the tile {tile}")]
     #[diagnostic(help("go on with --resume and another card, or without --verify"))]
     Unverified {
-        /// The tile as an argument of `--crop`.
+        /// Tile in the form of the argument of `--crop`.
         tile: String,
     },
-    /// Error of tiles at which cards crash; all others are done.
+    /// Cards crash at some tiles. All other tiles are done.
     #[error("cards were lost again and again at work on the tiles {tiles}; all others are done")]
     #[diagnostic(help(
         "each is X0,X1,Y0,Y1 as --crop takes it: watch the card's own messages while it renders one of them alone, or go on with \
          --resume and another kind of card"
     ))]
     Unrendered {
-        /// The tiles as arguments of `--crop`.
+        /// Tiles in the form of arguments of `--crop`.
         tiles: String,
     },
-    /// Error of starting the chips of whole-frame reordering.
+    /// The threads of whole-frame reordering cannot be started.
     #[error("the chips could not be started: {0}")]
     #[diagnostic(help("use fewer cards"))]
     Chips(rayon::ThreadPoolBuildError),
-    /// Error of the partial file.
+    /// The partial file cannot be used.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Partial(#[from] PartialError),
-    /// Error of writing the trace.
+    /// The trace cannot be written.
     #[error(transparent)]
     Trace(#[from] OutputError),
     /// The observer stopped the render.
@@ -194,7 +194,7 @@ impl From<PhotonError> for RenderError {
 }
 
 impl RenderError {
-    /// Returns whether the arguments or the scene are at fault.
+    /// Returns whether the arguments or the scene cause the error.
     pub fn is_input(&self) -> bool {
         match self {
             Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,

@@ -5,12 +5,12 @@ use std::time::{Duration, Instant};
 use photoncard_cards::session::{Session, SessionError};
 use photoncard_shared::link::Port;
 
-/// Maximum wait of a port for a byte, and so the time until a card's thread notices that the render is
+/// Maximum time that a port waits for a byte, and thus until a card's thread notices that the render was
 /// stopped.
 pub(super) const WAIT: Duration = Duration::from_millis(4);
 
-/// Moves bytes once in each direction; waits at most [`WAIT`] if there are none. `slowest` is an argument of
-/// [`Session::tick`].
+/// Moves the available bytes once in each direction. Waits at most [`WAIT`] if there are none. `slowest` is
+/// the argument of [`Session::tick`].
 pub(super) fn exchange(
     session: &mut Session,
     port: &mut impl Port,

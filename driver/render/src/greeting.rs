@@ -1,4 +1,4 @@
-//! Greeting of a card: the first message and its reply.
+//! Greeting of a card: the first message, and its reply.
 
 use std::hash::{BuildHasher, RandomState};
 use std::time::{Duration, Instant};
@@ -13,19 +13,19 @@ use super::open_card::OpenCard;
 use super::{CardAddress, CardError, Observer, RenderError, Unobserved};
 use crate::emulator::SharedImage;
 
-/// Card that has answered the greeting.
+/// A card that answered the greeting.
 pub(super) struct GreetedCard {
     pub(super) card: OpenCard,
     pub(super) session: Session,
     pub(super) budget: Budget,
-    /// Bytes of the link that statistics of earlier renders hold.
+    /// Bytes of the link that statistics of earlier renders include.
     pub(super) counted: LinkBytes,
-    /// Tiles of the last picture that the card alone has rendered.
+    /// Tiles of the last picture that only this card rendered.
     pub(super) tiles: Vec<Tile>,
 }
 
 impl GreetedCard {
-    /// Bytes of the link since the last call.
+    /// Bytes transferred over the link since the last call.
     pub(super) fn count_bytes(&mut self) -> LinkBytes {
         let all = self.session.link_bytes();
         let earlier = std::mem::replace(&mut self.counted, all);
@@ -42,7 +42,7 @@ pub(super) enum GreetingError {
 }
 
 impl GreetingError {
-    /// The error of a card of this name.
+    /// Error of the card with this name.
     pub(super) fn of_card(self, card: String) -> RenderError {
         match self {
             Self::Card(source) => RenderError::Card { card, source },
@@ -60,11 +60,11 @@ impl From<CardError> for GreetingError {
 /// Information that a card reports about itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct CardInfo {
-    /// Name and version of its firmware.
+    /// Name and version of the firmware.
     pub build: String,
     /// Capacities and limits of the chip.
     pub budget: Budget,
-    /// On-chip memory that the firmware takes; `None` for a card that does not measure it.
+    /// On-chip memory that the firmware uses; `None` if the card does not measure it.
     pub memory_use: Option<MemoryUse>,
 }
 
@@ -92,7 +92,7 @@ pub fn card_ping(address: &CardAddress, count: usize) -> Result<Vec<Duration>, R
     Ok(answers)
 }
 
-/// Starts or connects to the first card at an address.
+/// Starts, or connects to, the first card at an address.
 pub(super) fn open(address: &CardAddress) -> Result<OpenCard, RenderError> {
     let card = OpenCard::open(0, address, None, &SharedImage::default(), None);
     card.map_err(|source| RenderError::Card { card: address.name_of(0), source })
@@ -112,7 +112,7 @@ pub(super) fn greet(
     Ok(GreetedCard { card, session, budget, counted: LinkBytes::default(), tiles: Vec::new() })
 }
 
-/// [`greet`], on any port.
+/// Does [`greet`] on any port.
 pub(super) fn greet_port(
     port: &mut impl Port,
     start: Instant,
@@ -133,8 +133,8 @@ pub(super) fn greet_port(
     }
 }
 
-/// Random number of a session, to distinguish it from frames of earlier sessions on the line; two coincide
-/// with probability 2^-32.
+/// Random number of a session. It distinguishes the session from earlier ones whose frames may still arrive;
+/// two numbers are equal with probability 2^-32.
 fn session_number() -> u32 {
     // The standard library's hashers have random keys.
     RandomState::new().hash_one(std::process::id()) as u32

@@ -1,8 +1,8 @@
 //! A render, from a loaded scene to a complete film.
 //!
 //! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, executor, statistics.
-//! The executor fills the film: cards over their links, or for the order `hilbert` emulated chips with the
-//! host. [`render`] is a renderer's first picture.
+//! The executor fills the film. It is either the cards at the ends of their links or, for the order
+//! `hilbert`, emulated chips and the host. [`render`] is a renderer's first picture.
 #![forbid(unsafe_code)]
 
 mod address;
@@ -62,9 +62,9 @@ pub use times::Times;
 use photoncard_map::pack::PackedScene;
 use photoncard_scene::Scene;
 
-/// Renders a scene. For further pictures on the same cards use a [`Renderer`].
+/// Renders a scene. A [`Renderer`] renders further pictures on the same cards.
 ///
-/// A serial port may be held open for about a second after the end: an attempt to reopen it runs on a
+/// A serial port may stay open for about a second after the end, because an attempt to reopen it runs on a
 /// detached thread.
 ///
 /// # Errors
@@ -77,11 +77,11 @@ pub fn render(
     Renderer::default().render(scene, settings, observer)
 }
 
-/// Renders a scene with photons and an integrator that are chosen when the cards have answered and the scene
-/// is packed. `choose` takes the packed scene; everything else is by `settings`.
+/// Renders a scene with photons and an integrator that `choose` returns for the packed scene, after the cards
+/// have answered. `settings` determine everything else.
 ///
 /// # Errors
-/// As [`render`], and those of `choose`.
+/// As [`render`], and the errors of `choose`.
 pub fn render_chosen(
     scene: &Scene,
     settings: &RenderSettings,

@@ -1,4 +1,4 @@
-//! Statistics of reads from card memory: the key `memory` of `--stats`.
+//! Statistics of reads from card memory, the key `memory` of `--stats`.
 
 use photoncard_firmware::memory::Stage;
 use photoncard_shared::address::Structure;
@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use crate::emulator::memory_model::{CacheSettings, MemoryTraffic};
 
-/// Reads of card memory by all tiles, on all chips together. The sums do not depend on the number of chips.
+/// Reads of card memory by all tiles, summed over all chips. The sums do not depend on the number of chips.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MemoryStatistics {
-    /// Caches as an argument of `--cache`.
+    /// Caches, in the form of the argument of `--cache`.
     pub caches: String,
     /// Reads of the photon map.
     pub photon_map: ReadStatistics,
@@ -19,7 +19,7 @@ pub struct MemoryStatistics {
     pub structures: StructureReads,
     /// Reads by stage.
     pub stages: StageReads,
-    /// Bytes of the image, written into every card.
+    /// Bytes of the image written into every card.
     pub written_bytes: u64,
 }
 
@@ -30,7 +30,7 @@ pub struct ReadStatistics {
     pub requests: u64,
     /// Number of bytes requested.
     pub raw_bytes: u64,
-    /// Number of requests that a cache answered.
+    /// Number of requests that hit a cache.
     pub line_hits: u64,
     /// Number of requests for which a cache line was fetched.
     pub line_misses: u64,
@@ -41,53 +41,53 @@ pub struct ReadStatistics {
 /// Reads by structure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StructureReads {
-    /// Bounding volume hierarchy.
+    /// Reads of the bounding volume hierarchy.
     pub nodes: ReadStatistics,
-    /// Triangles.
+    /// Reads of triangles.
     pub triangles: ReadStatistics,
-    /// Materials.
+    /// Reads of materials.
     pub materials: ReadStatistics,
-    /// Light tree, lights and the cells of the environment.
+    /// Reads of the light tree, lights, and the environment's cells.
     pub emitters: ReadStatistics,
-    /// Inner nodes of a photon map in the line layout.
+    /// Reads of inner nodes of a photon map in the line layout.
     pub photon_nodes: ReadStatistics,
-    /// Photons.
+    /// Reads of photons.
     pub photons: ReadStatistics,
-    /// Inner nodes above irradiance points.
+    /// Reads of inner nodes above irradiance points.
     pub irradiance_nodes: ReadStatistics,
-    /// Irradiance points.
+    /// Reads of irradiance points.
     pub irradiance_points: ReadStatistics,
-    /// Inner nodes of the caustic map.
+    /// Reads of inner nodes of the caustic map.
     pub caustic_nodes: ReadStatistics,
-    /// Photons of the caustic map.
+    /// Reads of photons of the caustic map.
     pub caustic_photons: ReadStatistics,
-    /// Vertex attributes: normals, texture coordinates and colours.
+    /// Reads of vertex attributes: normals, texture coordinates and colours.
     pub attributes: ReadStatistics,
-    /// Textures and their texels.
+    /// Reads of textures and their texels.
     pub textures: ReadStatistics,
 }
 
 /// Reads by stage of the chip's work.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct StageReads {
-    /// Eye rays.
+    /// Reads by eye rays.
     pub eye: ReadStatistics,
-    /// Rays of irradiance records that survey their surroundings.
+    /// Reads by rays that survey the surroundings of irradiance records.
     pub survey: ReadStatistics,
-    /// Photon gathers that fill importance tables.
+    /// Reads by photon gathers for importance tables.
     pub table: ReadStatistics,
-    /// Shadow rays.
+    /// Reads by shadow rays.
     pub shadow: ReadStatistics,
-    /// Final gather rays.
+    /// Reads by final gather rays.
     pub gather_ray: ReadStatistics,
-    /// Photon gathers at the ends of final gather rays.
+    /// Reads by photon gathers at the ends of final gather rays.
     pub gather: ReadStatistics,
-    /// Gathers in the caustic map.
+    /// Reads by gathers in the caustic map.
     pub caustic: ReadStatistics,
 }
 
 impl MemoryStatistics {
-    /// Statistics of the traffic through some caches.
+    /// Statistics of the traffic through these caches.
     pub(super) fn new((caches, traffic): (CacheSettings, &MemoryTraffic)) -> Self {
         let of = |chosen: fn(Structure) -> bool| reads(traffic, |_, structure| chosen(structure));
         let structure = |chosen| reads(traffic, |_, structure| structure == chosen);

@@ -1,34 +1,37 @@
-//! Estimate of the noise of a picture from the differences of its passes.
+//! Estimates the noise of a picture from the differences of its passes.
 //!
-//! Let `A` and `B` be the means of the pixels over the first and the next `n` samples, `M` their mean, `e_n`
-//! and `e_2n` the errors of `A` and `M` (root mean squares), and `D_n = E[(A - B)^2]`. `B` has the error of
-//! `A`, so that `e_2n^2 = e_n^2 - D_n / 4`. With `e_2n^2 = r e_n^2` this is `e_2n^2 = D_n / 4 * r / (1 - r)`.
+//! Let `A` and `B` be the means of the pixels over the first `n` and the next `n` samples, `M` their mean,
+//! `e_n` and `e_2n` the root mean square errors of `A` and `M`, and `D_n = E[(A - B)^2]`. `B` has the same
+//! error as `A`, so that `e_2n^2 = e_n^2 - D_n / 4`. If `e_2n^2 = r e_n^2`, then
+//! `e_2n^2 = D_n / 4 * r / (1 - r)`.
+//!
 //! Independent samples have `r = 1/2`. A stratified sequence does better, down to `1/4` for edges and smooth
-//! light (Owen 1997), with few samples more than with many, and unevenly: the ratios of successive `D_n` are
-//! 0.24 to 0.69, and some numbers of samples are luckier than others. One ratio for all pictures is nearer to
-//! the truth than ratios that follow them.
+//! light (Owen 1997), more so with few samples than with many, and unevenly: the ratios of successive `D_n`
+//! are 0.24 to 0.69, and some numbers of samples happen to be better than others. One ratio for all pictures
+//! is closer to the truth than ratios measured in each.
 
 use photoncard_picture::film::Film;
 
-/// Factor of the squared noise at a doubling of the samples.
+/// Factor of the squared noise when the number of samples doubles.
 const RATIO: f64 = 0.45;
 
-/// Estimate of the noise of a picture from the differences of its passes, each of which doubles the samples.
+/// Estimate of the noise of a picture from the differences of passes that double the samples.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NoiseEstimate {
-    /// Samples after the last pass that has doubled them.
+    /// Number of samples after the last pass that doubled them.
     samples: f64,
-    /// Squared noise after that pass, relative to the mean pixel; `None` before there is one.
+    /// Squared noise after that pass, relative to the squared mean of the picture; `None` before the first
+    /// such pass.
     squared: Option<f64>,
-    /// Samples after the last pass.
+    /// Number of samples after the last pass.
     all: f64,
-    /// If the picture of the last pass that has doubled the samples is black.
+    /// True if the picture after the last pass that doubled the samples is black.
     is_of_black: bool,
 }
 
 impl NoiseEstimate {
-    /// Adds the picture before a pass and the one after it. A pass that does not double the samples has no
-    /// part in the estimate.
+    /// Adds the pictures before and after a pass. A pass that does not double the samples does not contribute
+    /// to the estimate.
     pub(super) fn add(&mut self, before: &Film, after: &Film) {
         let [few, all] = [before, after].map(|film| f64::from(film.format().samples));
         self.all = all;
@@ -56,13 +59,12 @@ impl NoiseEstimate {
         self.samples = all;
     }
 
-    /// Returns whether the picture is black, so that noise has no measure.
+    /// Returns whether the picture is black, so that its relative noise is undefined.
     pub(super) fn is_of_black(&self) -> bool {
         self.is_of_black
     }
 
-    /// Noise of the last picture, relative to its mean; `None` before there is a pass that has doubled the
-    /// samples.
+    /// Noise of the last picture, relative to its mean; `None` before a pass has doubled the samples.
     pub(super) fn noise(&self) -> Option<f64> {
         // Linear from one doubling to the next: the last samples of the sequence are not stratified against
         // the first.
@@ -71,7 +73,7 @@ impl NoiseEstimate {
     }
 
     /// Number of samples to be added so that the noise is at most `aim`; `None` before there is an estimate,
-    /// and where twice the samples of the last doubling do not suffice.
+    /// and if twice the samples of the last doubling do not suffice.
     pub(super) fn samples_to(&self, aim: f64) -> Option<u32> {
         if self.noise()? <= aim {
             return Some(0);
@@ -92,7 +94,7 @@ mod tests {
 
     const SIDE: u32 = 64;
 
-    /// A film of the mean of `value(pixel, sample)` over the first samples.
+    /// Film with the means of `value(pixel, sample)` over the first samples.
     fn film(samples: u32, value: impl Fn(u32, u32) -> f64) -> Film {
         let format = SumFormat { samples, ..SumFormat::ONE };
         let mut film = Film::new(SIDE, SIDE, Window::full(SIDE, SIDE), format).unwrap();
@@ -106,7 +108,7 @@ mod tests {
         film
     }
 
-    /// Checks that the estimate for pixels of the mean 1/2, over their true error, is in a range.
+    /// Checks that the ratio of the estimate to the true error, for pixels with mean 1/2, is in `range`.
     fn check(value: impl Fn(u32, u32) -> f64, range: RangeInclusive<f64>) {
         let mut estimate = NoiseEstimate::default();
         let mut before = film(1, &value);
@@ -132,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_of_independent_samples_is_found() {
+    fn noise_of_independent_samples_is_estimated() {
         let random = |pixel: u32, sample: u32| f64::from(hash(hash(pixel) ^ sample)) / f64::from(u32::MAX);
         check(random, 0.85..=1.0);
     }

@@ -1,4 +1,4 @@
-//! Observer of a render or of a card's self-test, which can stop it.
+//! Observer of a render or of a card's self-test. It can stop the work.
 
 use std::error::Error;
 
@@ -11,22 +11,22 @@ use super::error::CardError;
 /// Phase of a render, or of a card's self-test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// Pilot renders, by which settings are chosen: without progress.
+    /// Pilot renders, from which settings are chosen. There is no progress.
     Pilot,
-    /// Tracing photons: progress in photons.
+    /// Photon tracing. Progress counts photons.
     Photons,
-    /// Building the photon map and the card image: without progress.
+    /// Construction of the photon map and the card image. There is no progress.
     Pack,
-    /// Loading the image into the cards: progress in bytes.
+    /// Loading of the image into the cards. Progress counts bytes.
     Load,
-    /// Rendering: progress in tiles.
+    /// Rendering. Progress counts tiles.
     Tiles,
-    /// Testing a card's memory, which is no phase of a render: progress in bytes, written or read.
+    /// Test of a card's memory, which is not a phase of a render. Progress counts bytes written or read.
     SelfTest,
 }
 
-/// Observer of a render or of a card's self-test, which can stop it. Its methods are called from the threads
-/// of the work.
+/// Observer of a render or of a card's self-test, which can stop the work. Its methods are called from the
+/// threads that do the work.
 pub trait Observer: Sync {
     /// Reports the progress of a phase: `done` of `total`.
     fn progress(&self, phase: Phase, done: u64, total: u64);
@@ -34,29 +34,29 @@ pub trait Observer: Sync {
     /// Returns whether the work should stop as soon as possible.
     fn is_stopped(&self) -> bool;
 
-    /// Reports that `done` of `total` tiles are taken over from an earlier render.
+    /// Reports that `done` of `total` tiles were taken over from an earlier render.
     fn resumed(&self, _done: usize, _total: usize) {}
 
-    /// Reports that finished tiles are in the partial file, so that a render that ends early can be resumed.
+    /// Reports that finished tiles are in the partial file, so that a render that ended early can be resumed.
     fn kept(&self) {}
 
-    /// Reports that a card was lost or given up; the others render its tiles.
+    /// Reports that a card was lost or given up. The other cards render its tiles.
     fn lost(&self, _card: &str, _error: &CardError) {}
 
-    /// Reports that a card has rendered a tile, before the sinks have it; with the lines that it has read
-    /// from DRAM, if its memory is [modelled](super::RenderSettings::modelled_caches).
+    /// Reports that a card rendered a tile, before the sinks get it. `_dram_lines` is the number of lines
+    /// read from DRAM, if the memory is [modelled](super::RenderSettings::modelled_caches).
     fn rendered(&self, _card: &str, _tile: &Tile, _dram_lines: Option<u64>) {}
 
-    /// Sink of the observer's own for finished tiles.
+    /// Returns a sink of the observer for finished tiles, if it has one.
     fn tiles(&self) -> Option<&dyn TileSink> {
         None
     }
 
-    /// Reports the [statistics](super::Statistics) of a render that ends with an error after its cards have
-    /// begun, up to then, as JSON.
+    /// Reports [statistics](super::Statistics) as JSON when a render ends with an error after its cards
+    /// began. They describe the work until then.
     fn failed(&self, _statistics: Value) {}
 
-    /// Tells that a viewer does not show the picture, or no more; the render goes on.
+    /// Reports that a viewer does not, or no longer, show the picture. The render continues.
     fn not_shown(&self, _error: &dyn Error) {}
 }
 

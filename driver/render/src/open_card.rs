@@ -12,16 +12,16 @@ use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, Tile
 /// Host's end of a link.
 pub(super) type BoxedPort = Box<dyn Port + Send>;
 
-/// Card with an open connection, and faults of its line if any are injected.
+/// Card with an open connection, and faults injected into its line, if any.
 pub(super) struct OpenCard {
     connection: Connection,
     injector: Option<FaultInjector>,
 }
 
-/// Connection to a card.
 enum Connection {
     Emulated(EmulatedCard),
-    /// The port is closed before it is reopened, as a device may allow one user at a time.
+    /// Port of a remote card. It is closed before it is reopened, because a device may allow only one user at
+    /// a time.
     Remote {
         address: RemoteAddress,
         port: Option<BoxedPort>,
@@ -29,9 +29,8 @@ enum Connection {
 }
 
 impl OpenCard {
-    /// Starts or connects to the card at an address, the first if there are several. An emulated card may
-    /// have a model of its memory, and shares the host's image. `index` is the card's number, on which
-    /// injected faults depend.
+    /// Starts, or connects to, the first card at an address. An emulated card can have a model of its memory,
+    /// and shares the host's image. Injected faults depend on the card's number `index`.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
@@ -55,7 +54,7 @@ impl OpenCard {
         matches!(self.connection, Connection::Emulated(_))
     }
 
-    /// Closes the link to a card. Returns the address to reconnect to; `None` for an emulated card.
+    /// Closes the link to a card. Returns the address for reconnecting; `None` for an emulated card.
     pub(super) fn close(&mut self) -> Option<RemoteAddress> {
         match &mut self.connection {
             Connection::Emulated(_) => None,
@@ -66,14 +65,14 @@ impl OpenCard {
         }
     }
 
-    /// Continues with a reopened link.
+    /// Replaces the closed link by a reopened one.
     pub(super) fn go_on_with(&mut self, opened: BoxedPort) {
         if let Connection::Remote { port, .. } = &mut self.connection {
             *port = Some(opened);
         }
     }
 
-    /// Empty memory of an emulated card ([`EmulatedCard::take_empty_memory`]).
+    /// Takes the empty memory of an emulated card ([`EmulatedCard::take_empty_memory`]).
     pub(super) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         match &mut self.connection {
             Connection::Emulated(card) => card.take_empty_memory(),
@@ -81,12 +80,12 @@ impl OpenCard {
         }
     }
 
-    /// Returns whether writing the trace has failed.
+    /// Returns whether writing the trace failed.
     pub(super) fn trace_has_failed(&self) -> bool {
         matches!(&self.connection, Connection::Emulated(card) if card.trace_has_failed())
     }
 
-    /// Lines from DRAM of the card's tiles, if its memory is modelled.
+    /// Number of DRAM lines read for each of the card's tiles, if its memory is modelled.
     pub(super) fn tile_lines(&self) -> TileLines {
         match &self.connection {
             Connection::Emulated(card) => card.tile_lines().clone(),
@@ -134,7 +133,6 @@ impl Port for OpenCard {
     }
 }
 
-/// Opens the link to a card.
 pub(super) fn reach(address: &RemoteAddress) -> Result<BoxedPort, LinkError> {
     match address {
         RemoteAddress::Serial { path, baud } => open_serial(path, *baud).map(boxed),

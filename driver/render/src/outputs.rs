@@ -1,4 +1,4 @@
-//! Outputs of a render while it runs: the file of finished tiles, the viewers and the observer.
+//! Outputs that are written while a render runs: the file of finished tiles, viewers and the observer.
 
 use std::sync::{Arc, Mutex};
 
@@ -12,22 +12,21 @@ use super::{Observer, RenderSettings};
 use crate::display::Display;
 use crate::partial::{PartialError, PartialRender};
 
-/// Outputs of a render while it runs, as far as the settings ask for them.
+/// Outputs that are written while a render runs, as the settings ask for.
 pub(super) struct Outputs<'a> {
     partial: Option<PartialRender>,
-    /// Samples that the render adds to: all that are shown have them.
+    /// Earlier samples that the render adds to. All tiles that are shown include them.
     pub(super) base: Option<Arc<Film>>,
     viewers: Vec<Box<dyn Viewer>>,
     pub(super) observer: &'a dyn Observer,
 }
 
 impl<'a> Outputs<'a> {
-    /// Opens the outputs. Tiles of the render that is resumed are written into the film, and shown. Samples
-    /// that are complete in the render that is resumed take the place of `base`, and the film is of the
-    /// others.
+    /// Opens the outputs. Tiles of a resumed render are written into the film and shown. If the resumed
+    /// render has complete samples, they replace `base`, and the film has the remaining samples.
     ///
     /// # Errors
-    /// If the file of finished tiles cannot be read or is not the file of this picture.
+    /// If the file of finished tiles cannot be read, or is not the file of this picture.
     pub(super) fn open(
         scene: &FixedScene,
         settings: &RenderSettings,
@@ -57,8 +56,8 @@ impl<'a> Outputs<'a> {
         Ok(outputs)
     }
 
-    /// Sinks of finished tiles: the film, the outputs that show them, and the file if tiles are finished
-    /// early.
+    /// Sinks of finished tiles: the film, the outputs that show them, and the partial file if tiles are
+    /// finished early.
     pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>, finished_early: bool) -> Vec<&'s dyn TileSink> {
         let mut sinks: Vec<&dyn TileSink> = vec![film, self];
         let partial = self.partial.as_ref().filter(|_| finished_early);
@@ -66,29 +65,29 @@ impl<'a> Outputs<'a> {
         sinks
     }
 
-    /// Checks that finished tiles could be written into their file.
+    /// Checks that all finished tiles were written into their file.
     ///
     /// # Errors
-    /// If one could not.
+    /// If writing a tile failed.
     pub(super) fn check_partial(&self) -> Result<(), PartialError> {
         self.partial.as_ref().map_or(Ok(()), PartialRender::check)
     }
 
-    /// Reports to the observer that finished tiles are in the file, if any are.
+    /// Reports to the observer that finished tiles are in the file, if there are any.
     pub(super) fn report_kept(&self) {
         if self.partial.as_ref().is_some_and(PartialRender::holds_tiles) {
             self.observer.kept();
         }
     }
 
-    /// Reports to the observer, once for each viewer that has failed, why the picture is not shown.
+    /// Reports to the observer, once per failed viewer, why the picture is not shown.
     pub(super) fn report_failed_viewers(&self) {
         for error in self.viewers.iter().filter_map(|viewer| viewer.failure()) {
             self.observer.not_shown(error.as_ref());
         }
     }
 
-    /// Shows the rest of the picture. Returns the file of finished tiles.
+    /// Shows the remaining pixels. Returns the file of finished tiles.
     pub(super) fn finish(self, film: &Film) -> Option<PartialRender> {
         self.viewers.iter().for_each(|viewer| viewer.finish(film));
         self.report_failed_viewers();
@@ -111,7 +110,7 @@ impl TileSink for Outputs<'_> {
     }
 }
 
-/// The viewers that the settings ask for.
+/// Creates the viewers that the settings ask for.
 fn viewers(settings: &RenderSettings, film: &Film) -> Vec<Box<dyn Viewer>> {
     let channels = settings.picture.layers.channels();
     let mut viewers: Vec<Box<dyn Viewer>> = Vec::new();

@@ -9,16 +9,16 @@
 //! ...
 //! ```
 //!
-//! Numbers are little-endian. The first checksum covers the two lines; that of a record covers the first
-//! checksum and all preceding bytes of the record. An incomplete last record, left when the process ended
-//! during a write, is cut off. A damaged record is skipped: the reader searches for the magic number that
-//! begins the next one. If two records contain a pixel, the later one holds. The settings are those that
-//! pixels depend on: a resumed render may use other tiles, another order and other cards. They do not hold
-//! the number of samples: a picture of more samples takes over complete ranges of samples from the first on,
-//! and renders the others.
+//! Numbers are little-endian. The first checksum covers the two lines. The checksum of a record covers the
+//! first checksum and all preceding bytes of the record. An incomplete last record, left when the process
+//! ended during a write, is truncated. A damaged record is skipped: the reader searches for the magic number
+//! of the next one. If two records contain the same pixel, the later one is used. The settings are those that
+//! pixels depend on, so that a resumed render can use other tiles, another order and other cards. They
+//! exclude the number of samples: a picture with more samples takes over complete ranges of samples from the
+//! first on, and renders the others.
 //!
-//! The render that writes the file locks it. A file of this name that is no partial render is refused and
-//! left unchanged, and so is one with tiles that the render is not to go on from.
+//! The render that writes the file locks it. A file with this name that is not a partial render is refused
+//! and left unchanged, and so is a file with tiles if the render does not resume.
 
 mod error;
 mod file;
@@ -45,11 +45,11 @@ use self::samples::{KeptSamples, Split};
 use photoncard_picture::film::Film;
 use photoncard_picture::sink::{FinishedTile, TileSink};
 
-/// File of a render's finished tiles. It is created with the first tile.
+/// File of a render's finished tiles. It is created when the first tile is finished.
 pub struct PartialRender {
     path: PathBuf,
     settings: Value,
-    /// The first sample of the tiles that are appended.
+    /// Number of the first sample of the tiles that are appended.
     first_sample: u32,
     kept: Mutex<KeptTiles>,
 }
@@ -59,11 +59,11 @@ pub struct PartialRender {
 struct KeptTiles {
     /// The file, locked; `None` until it is created.
     file: Option<File>,
-    /// Checksum of title and settings, once they are written.
+    /// Checksum of title and settings, after they are written.
     head: Option<u32>,
     /// True if the file has tiles of the earlier render.
     holds_earlier: bool,
-    /// True if the file has tiles of either render.
+    /// True if the file has tiles of this or the earlier render.
     holds_tiles: bool,
     /// Offset of each record of this render, by tile number.
     records: HashMap<u32, u64>,
@@ -71,14 +71,14 @@ struct KeptTiles {
 }
 
 impl PartialRender {
-    /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on
-    /// but the number of samples, which `film` states. With [`PartialSettings::resume`] the file's tiles are
-    /// written into the film. If it has all tiles of fewer samples, these are the second result, and the film
-    /// is of the others.
+    /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on,
+    /// except the number of samples, which `film` states. With [`PartialSettings::resume`], tiles of the file
+    /// are written into the film. If the file has all tiles of fewer samples, these are the second result,
+    /// and the film has the remaining samples.
     ///
     /// # Errors
-    /// If the file is no partial render, in use by another render or unreadable, or its settings are damaged;
-    /// if it is to be resumed and has other settings, or is not and has tiles.
+    /// If the file is not a partial render, in use by another render, or unreadable, or its settings are
+    /// damaged; if it is resumed but has other settings; or if it is not resumed but has tiles.
     pub(crate) fn begin(
         partial: &PartialSettings,
         settings: Value,
@@ -106,8 +106,8 @@ impl PartialRender {
         PartialError::File { path: self.path.clone(), source }
     }
 
-    /// Writes the valid tiles of the file into the film, and truncates the file after the last one. Returns
-    /// the film of the first samples if the file has all of their tiles.
+    /// Writes the valid tiles of the file into the film, and truncates the file after the last one. Returns a
+    /// film of the first samples if the file has all their tiles.
     fn resume(&self, mut file: &File, film: &mut Film) -> Result<Option<Film>, PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let mut reader = BufReader::new(file);
@@ -137,16 +137,16 @@ impl PartialRender {
         Ok(base)
     }
 
-    /// Checks that a file that was read still has its settings: its records have checksums, and those of
-    /// another picture as well.
+    /// Checks that a file that was read still has its settings. Records of another picture have valid
+    /// checksums too.
     fn check_unchanged(&self, reader: &mut BufReader<&File>, head: &Head) -> Result<(), PartialError> {
         reader.rewind().map_err(|error| self.error(error))?;
         let is_same = read_head(reader, &self.path)?.is_some_and(|again| again.checksum == head.checksum);
         is_same.then_some(()).ok_or_else(|| self.written_over("read"))
     }
 
-    /// Checks that a file that is written still has this render's settings, whose checksum is `head`: tiles
-    /// behind those of another picture would be lost.
+    /// Checks that a file being written still has this render's settings, whose checksum is `head`. Tiles
+    /// after those of another picture would be lost.
     fn check_own(&self, mut file: &File, head: u32) -> Result<(), PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let found = read_head(&mut BufReader::new(file), &self.path)?;
@@ -196,7 +196,7 @@ impl PartialRender {
         Ok(())
     }
 
-    /// Writes title and settings, and returns their checksum.
+    /// Writes title and settings. Returns their checksum.
     fn write_head(&self, file: &mut File) -> io::Result<u32> {
         let (bytes, sum) = encode(&self.settings);
         file.set_len(0)?;
@@ -205,7 +205,7 @@ impl PartialRender {
         Ok(sum)
     }
 
-    /// Removes a file without tiles that cannot be written: there is nothing to resume from.
+    /// Removes a file without tiles that cannot be written, because there is nothing to resume from.
     fn discard_empty(&self, kept: &mut KeptTiles) {
         if let Some(file) = kept.file.take_if(|_| !kept.holds_tiles) {
             // If the removal fails, the file is empty at least.
@@ -220,7 +220,7 @@ impl PartialRender {
         self.lock().holds_tiles
     }
 
-    /// Reports the first failure of writing tiles, once.
+    /// Reports the first failure of writing a tile, once.
     ///
     /// # Errors
     /// If a write failed.
@@ -230,8 +230,8 @@ impl PartialRender {
         kept.failed.take().map_or(Ok(()), Err)
     }
 
-    /// Removes the file after the picture is written. A file that this render has not opened is another's,
-    /// and stays.
+    /// Removes the file after the picture is written. A file that this render did not open belongs to another
+    /// render, and stays.
     ///
     /// # Errors
     /// If it cannot be removed.
@@ -243,7 +243,7 @@ impl PartialRender {
     }
 }
 
-/// Failures are stored until the render loop calls `PartialRender::check`.
+/// Stores tiles. A failure is kept until the render loop calls `PartialRender::check`.
 impl TileSink for PartialRender {
     fn put(&self, tile: &FinishedTile) {
         let mut kept = self.lock();

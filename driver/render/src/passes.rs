@@ -1,7 +1,7 @@
-//! Pictures by passes: samples are added until the time is over or the noise is low enough.
+//! Renders pictures by passes: samples are added until the time is over or the noise is low enough.
 //!
-//! The numbers of samples double. A pass and the picture before it are then estimates of equally many
-//! samples, whose difference shows the noise of their mean ([`NoiseEstimate`]).
+//! The number of samples doubles from pass to pass. A pass and the picture before it are therefore estimates
+//! with equally many samples, and their difference shows the noise of their mean ([`NoiseEstimate`]).
 
 use std::cell::RefCell;
 use std::sync::Arc;
@@ -14,57 +14,57 @@ use super::noise::NoiseEstimate;
 use super::renderer::{Chosen, Renderer, Rendering};
 use super::{Integrator, Observer, RenderError, RenderSettings};
 
-/// Maximum number of samples of a pixel: that of the kinds of chips.
+/// Maximum number of samples per pixel, which all kinds of chips support.
 const MAX_SAMPLES: u32 = 4096;
-/// Minimum number of samples whose noise is trusted to be below a limit.
+/// Minimum number of samples at which an estimated noise is trusted to be below a limit.
 const MIN_SAMPLES: u32 = 16;
-/// Number of samples of a first pass.
 const FIRST_SAMPLES: u32 = 1;
-/// Share of the remaining time that a pass is planned for.
+/// Fraction of the remaining time that a pass is planned to take.
 const PLANNED_SHARE: f64 = 0.95;
 
-/// Aim of a picture by passes: the first of the two, and 4096 samples a pixel in any case.
+/// Condition that ends the passes of a picture: time or noise, whichever is reached first, and in any case
+/// 4096 samples per pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
-    /// Time of the render; the first pass may take longer, and without room for irradiance records on a card
-    /// the second.
+    /// Time of the render. The first pass may take longer, and so may the second if a card has no room for
+    /// irradiance records.
     pub time: Option<Duration>,
-    /// Noise: estimated standard error of the pixels (root mean square), relative to the mean of the picture.
+    /// Noise: estimated root mean square standard error of the pixels, relative to the mean of the picture.
     pub noise: Option<f64>,
 }
 
-/// Picture by passes.
+/// A picture rendered by passes, with its end.
 pub struct Passes {
-    /// The picture of all complete passes. Its statistics of the work are those of the last pass.
+    /// Picture of all complete passes. Its statistics of work are those of the last pass.
     pub rendering: Rendering,
     /// Estimated noise, as in [`Aim::noise`]; `None` after a single pass.
     pub noise: Option<f64>,
     /// Number of complete passes.
     pub count: u32,
-    /// End of the passes.
+    /// Reason why the passes ended.
     pub ending: Ending,
 }
 
-/// End of the passes of a picture.
+/// Reason why the passes of a picture ended.
 #[derive(Debug)]
 pub enum Ending {
-    /// The aim is reached.
+    /// The aim was reached.
     Reached,
-    /// The aim is not reached, and the picture has the maximum number of samples.
+    /// The aim was not reached, but the picture has the maximum number of samples.
     MaxSamples,
-    /// The picture is black: noise relative to its mean has no measure.
+    /// The picture is black, so that noise relative to its mean is undefined.
     Black,
-    /// Error that ended a pass after the first, or the observer's stop.
+    /// A pass after the first failed, or the observer stopped it.
     Failed(RenderError),
 }
 
 impl Renderer {
-    /// Renders a picture by passes until an aim is reached. Photons and integrator are chosen as by
-    /// [`Self::render_chosen`]; the number of samples chosen is the planned one. The picture is, to the bit,
-    /// that of one render of as many samples with as many planned.
+    /// Renders a picture by passes until an aim is reached. Photons and integrator are chosen as in
+    /// [`Self::render_chosen`]; the chosen number of samples becomes the planned number. The picture equals,
+    /// bit for bit, that of a single render with the same numbers of samples and planned samples.
     ///
     /// # Errors
-    /// As [`Self::render_chosen`], in the first pass.
+    /// As [`Self::render_chosen`], if the first pass fails.
     pub fn render_until(
         &mut self,
         scene: &FixedScene,
@@ -123,7 +123,7 @@ impl Renderer {
 /// Number of samples of the next pass.
 ///
 /// # Errors
-/// The end of the passes.
+/// The reason to end the passes.
 fn next_pass(
     passes: &Passes,
     estimate: &NoiseEstimate,
@@ -152,11 +152,11 @@ fn next_pass(
     }
 }
 
-/// Time of passes: a part that each has, and one in proportion to its samples.
+/// Model of the time of passes: a constant, plus a time in proportion to the samples.
 #[derive(Default)]
 struct Pace {
-    /// Samples and seconds of the last two passes, without a first one that gathers irradiance records for
-    /// all.
+    /// Samples and seconds of the last two passes, without a first pass that gathers irradiance records for
+    /// all passes.
     last: [Option<(f64, f64)>; 2],
 }
 
@@ -165,7 +165,7 @@ impl Pace {
         self.last = [self.last[1], Some((f64::from(samples), seconds))];
     }
 
-    /// Number of samples that a pass of this time has.
+    /// Number of samples that a pass of this time can have.
     fn samples_in(&self, seconds: f64) -> u32 {
         let Some((samples, time)) = self.last[1] else { return u32::from(seconds > 0.0) };
         let slope = self.last[0].filter(|(before, _)| *before != samples);

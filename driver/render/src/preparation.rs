@@ -1,4 +1,4 @@
-//! Preparation of a render: the card image, with scene and photon maps.
+//! Prepares a render: creates the card image with scene and photon maps.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,21 +12,21 @@ use super::executor::FitChips;
 use super::times::Times;
 use super::{Observer, Phase, RenderError, RenderSettings};
 
-/// Card image with the parameters that a frame derives from it.
+/// Card image, and the frame parameters that are derived from it.
 #[derive(Clone)]
 pub(super) struct Prepared {
     pub(super) image: Arc<CardImage>,
     /// Maximum distance of a gather, metres.
     pub(super) max_distance: f32,
-    /// Gathers of caustics.
+    /// Parameters of gathers in the caustic map.
     pub(super) caustics: Option<CausticGather>,
     /// Number of paths that were traced for the photons.
     pub(super) paths: u64,
-    /// Guiding of these paths; `None` for photons of any camera.
+    /// Guiding of these paths; `None` if photons are for any camera.
     pub(super) guiding: Option<Guiding>,
 }
 
-/// Maps the photons of a packed scene.
+/// Adds the photon maps to a packed scene.
 ///
 /// # Errors
 /// If the image does not fit the chips, the photons cannot be traced, or the observer stops the render.

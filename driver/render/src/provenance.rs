@@ -1,4 +1,4 @@
-//! Provenance of a render: everything that its picture and its statistics depend on, by the names of options.
+//! Provenance of a render: everything that its picture and statistics depend on, by option names.
 
 use std::collections::BTreeMap;
 
@@ -12,12 +12,11 @@ use serde_json::{Value, json};
 use super::{NamedSettings, RenderSettings};
 use crate::emulator::EmulatedKind;
 
-/// Provenance of a render. The caller of a render adds the names of its inputs, which the library does not
-/// know.
+/// Provenance of a render. The caller adds the names of its inputs, which the library does not know.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Provenance {
-    /// Everything that pixels depend on: the provenance that pictures store. It is equal for all orders,
-    /// caches and cards.
+    /// Everything that pixels depend on. Pictures store this provenance; it is equal for all orders, caches
+    /// and cards.
     pub pixels: NamedSettings,
     /// Everything else that the work depends on: order, photon map layout, cards, caches.
     pub work: NamedSettings,
@@ -46,15 +45,15 @@ impl Provenance {
     }
 }
 
-/// The camera with all changes of it applied: name, place in metres, unit vectors, vertical field of view in
-/// degrees.
+/// Description of the camera with all changes applied: name, position in metres, unit vectors, vertical field
+/// of view in degrees.
 fn view(camera: &Camera) -> Value {
     let Camera { name, origin, right: _, up, forward, vertical_fov, aspect: _ } = camera;
     let [origin, up, forward] = [origin, up, forward].map(Vec3::to_array);
     json!({"camera": name, "at": origin, "forward": forward, "up": up, "fov": vertical_fov.to_degrees()})
 }
 
-/// Number of chips by kind.
+/// Numbers of chips by kind.
 fn chips(budgets: &[Budget]) -> BTreeMap<&'static str, usize> {
     let mut chips = BTreeMap::new();
     for budget in budgets {
@@ -70,7 +69,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn chips_are_counted_by_the_kind_of_their_budget() {
+    fn chips_are_counted_by_kind() {
         let other = Budget { samples: REFERENCE.samples + 1, ..REFERENCE };
         let counted = chips(&[REFERENCE, MICRO, REFERENCE, other]);
         assert_eq!(json!(counted), json!({"micro": 1, "other": 1, "reference": 2}));

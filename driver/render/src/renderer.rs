@@ -1,4 +1,4 @@
-//! Pictures one after another on the same cards.
+//! Renders several pictures on the same cards.
 
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -18,32 +18,31 @@ use super::whole_frame::WholeFrame;
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
 use crate::partial::{PartialRender, PartialSettings};
 
-/// Finished picture.
+/// A finished picture.
 pub struct Rendering {
     /// Pixels of the picture.
     pub film: Film,
     /// Statistics of the work.
     pub statistics: Statistics,
-    /// File of finished tiles, to be removed after the picture is written.
+    /// File of finished tiles. It should be removed after the picture is written.
     pub partial: Option<PartialRender>,
 }
 
-/// Photons and integrator that are chosen for a packed scene.
+/// Photons and integrator chosen for a packed scene.
 pub type Chosen = Result<(PhotonMaps, Integrator), RenderError>;
 
-/// Choice of photons and integrator by the packed scene.
+/// Function that chooses photons and integrator for a packed scene.
 type Choice<'a> = &'a dyn Fn(&PackedScene) -> Chosen;
 
-/// Renders pictures one after another on the same cards, which stay open between them.
+/// Renders pictures one after another on the same cards, which stay open between pictures.
 ///
-/// A picture of another camera, of the same scene and photons, takes the host no photons and the cards no
-/// image: nothing but tiles is sent. After a change of the scene or its photons the host makes the image
-/// anew, and a card receives the lines that have changed; it checks the checksum of the whole image, and
-/// receives the image as a whole if that differs, or if it was reset or lost. A picture never depends on
-/// those before it.
+/// If only the camera changes, the host traces no photons and sends no image; it sends only tiles. If the
+/// scene or its photons change, the host makes a new image, and a card receives only the changed lines. The
+/// card checks the checksum of the whole image, and receives the whole image if the checksum differs or the
+/// card was reset or lost. A picture never depends on earlier pictures.
 ///
-/// Cards are connected again for settings with other cards, for each picture with modelled memory, after a
-/// render that has failed, and, if any are remote, after some seconds without a picture.
+/// Cards are connected again if the settings have other cards, for each picture with modelled memory, after a
+/// failed render, and, if any card is remote, after some seconds without a picture.
 #[derive(Default)]
 pub struct Renderer {
     cards: Option<Cards>,
@@ -51,7 +50,7 @@ pub struct Renderer {
 }
 
 impl Renderer {
-    /// Renderer with the card image of a prepared scene.
+    /// Creates a renderer with the card image of a prepared scene.
     pub(super) fn with_image(kept: Kept) -> Self {
         Self { cards: None, kept: Some(kept) }
     }
@@ -69,7 +68,7 @@ impl Renderer {
         self.render_fixed(&scene.into(), settings, observer)
     }
 
-    /// Renders a picture of a scene that stays as it is between pictures: for another camera neither
+    /// Renders a picture of a scene that does not change between pictures. For another camera neither
     /// triangles nor texels are read.
     ///
     /// # Errors
@@ -83,12 +82,13 @@ impl Renderer {
         self.render_by(scene, settings, None, None, observer)
     }
 
-    /// Adds samples to a picture: renders those from the `base`'s on, and returns the picture of all samples
-    /// of the settings. It is, to the bit, the picture of one render of as many.
-    /// [`Integrator::planned_samples`] and all else that pixels depend on must be those of the base.
+    /// Adds samples to a picture: renders the samples that `base` lacks, and returns the picture with all
+    /// samples of the settings. It equals, bit for bit, the picture of a single render.
+    /// [`Integrator::planned_samples`] and everything else that pixels depend on must be equal to those of
+    /// the base.
     ///
     /// # Errors
-    /// As [`Self::render`]; if the base does not have fewer samples, or is of another size, crop window or
+    /// As [`Self::render`]; and if the base does not have fewer samples, or has another size, crop window or
     /// other layers.
     pub fn refine(
         &mut self,
@@ -100,16 +100,16 @@ impl Renderer {
         self.render_by(scene, settings, None, Some(base), observer)
     }
 
-    /// Closes the cards: the next picture connects to them again, and to those that were lost.
+    /// Closes the cards. The next picture connects to them again, including lost ones.
     pub fn close_cards(&mut self) {
         self.cards = None;
     }
 
-    /// Renders a picture of a scene with photons and an integrator that are chosen when the cards have
-    /// answered and the scene is packed.
+    /// Renders a picture of a scene with photons and an integrator that `choose` returns for the packed
+    /// scene, after the cards have answered.
     ///
     /// # Errors
-    /// As [`Self::render`], and those of `choose`.
+    /// As [`Self::render`], and the errors of `choose`.
     pub fn render_chosen(
         &mut self,
         scene: &Scene,
@@ -120,7 +120,7 @@ impl Renderer {
         self.render_chosen_fixed(&scene.into(), settings, choose, observer)
     }
 
-    /// [`Self::render_chosen`] of a scene that stays as it is between pictures.
+    /// Does [`Self::render_chosen`] for a scene that does not change between pictures.
     ///
     /// # Errors
     /// As [`Self::render_chosen`].
@@ -224,7 +224,7 @@ impl Renderer {
     }
 }
 
-/// Error of a picture whose samples cannot be added to those of another.
+/// Error of a picture whose samples cannot be added to another picture.
 fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
     let samples = settings.integrator.samples;
     move |error| RenderError::Setting {
@@ -235,7 +235,7 @@ fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
     }
 }
 
-/// The open cards, if they are those of the settings, or newly connected ones.
+/// Returns the open cards if they are those of the settings, otherwise newly connected ones.
 fn connected<'c>(
     cards: &'c mut Option<Cards>,
     settings: &RenderSettings,
@@ -252,32 +252,32 @@ fn connected<'c>(
     }))
 }
 
-/// A card image, and what it was made of.
+/// A card image, and the inputs from which it was made.
 #[derive(Clone)]
 pub(super) struct Kept {
-    /// [`Scene::checksum_without_cameras`].
+    /// Checksum of the scene ([`Scene::checksum_without_cameras`]).
     pub(super) scene: String,
     pub(super) photons: PhotonSettings,
     pub(super) prepared: Prepared,
 }
 
 impl Kept {
-    /// Returns whether the image is that of a scene, with the photons of the settings.
+    /// Returns whether the image is of this scene, with the photons of the settings.
     fn is_of(&self, scene: &FixedScene, settings: &RenderSettings) -> bool {
         self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings_of(scene)
     }
 }
 
-/// Origin of the card image.
+/// Origin of a picture's card image.
 pub(super) enum Source {
     /// The image of an earlier picture.
     Kept(Kept),
-    /// The packed scene; its photons are to be traced.
+    /// A packed scene whose photons must be traced.
     Packed(Box<PackedScene>),
 }
 
 impl Source {
-    /// Source of the image, with the settings that are stated or chosen.
+    /// Determines the source of the image, and the settings as stated or chosen.
     pub(super) fn new(
         scene: &FixedScene,
         settings: &RenderSettings,
@@ -299,7 +299,7 @@ impl Source {
         Ok((RenderSettings { photons, integrator, ..settings.clone() }, Self::Packed(Box::new(packed))))
     }
 
-    /// Units of the sums of pixels.
+    /// Units of the sums in pixels.
     fn sum_scale(&self) -> SumScale {
         match self {
             Self::Kept(kept) => kept.prepared.image.view().0.header.sum_scale(),
@@ -307,7 +307,7 @@ impl Source {
         }
     }
 
-    /// The card image.
+    /// Creates or reuses the card image.
     ///
     /// # Errors
     /// If it does not fit the chips, the photons cannot be traced, or the observer stops the render.

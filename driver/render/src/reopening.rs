@@ -11,8 +11,8 @@ use super::open_card::{BoxedPort, reach};
 /// Pause before each attempt to reconnect.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// Tries to reconnect to a card until it succeeds, or all tiles are done. `wait_for_end` waits at most for
-/// the time given, and returns whether they are.
+/// Tries to reconnect to a card until it succeeds, or all tiles are done. `wait_for_end` waits for at most
+/// the given time and returns whether all tiles are done.
 pub(super) fn reopen(
     address: &RemoteAddress,
     wait_for_end: &dyn Fn(Duration) -> Result<bool, RenderError>,
@@ -33,8 +33,8 @@ pub(super) fn reopen(
     Ok(None)
 }
 
-/// Tries once, on a thread of its own: looking up or connecting to an address may take seconds, and a render
-/// that ends does not wait for it. A port that is not received is closed.
+/// Tries to connect once, on a separate thread: resolving or connecting to an address can take seconds, and a
+/// render that ends does not wait for it. A port that nobody receives is closed.
 fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
     let (sender, receiver) = channel();
     let work = move || {

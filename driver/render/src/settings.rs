@@ -20,14 +20,14 @@ use photoncard_picture::film::{Film, FilmError, Window};
 use photoncard_picture::sums::SumFormat;
 use photoncard_scene::{Camera, FixedScene, Scene};
 
-/// Settings of a render: each field is an option of the command line, in groups.
+/// Settings of a render, in groups. Each field is an option of the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderSettings {
-    /// The picture and the camera that sees it.
+    /// Picture, and the camera that sees it.
     pub picture: Picture,
     /// Photon map and caustic map.
     pub photons: PhotonMaps,
-    /// Estimation of light by rays.
+    /// Parameters of light estimation by rays.
     pub integrator: Integrator,
     /// Order of the work.
     pub schedule: Schedule,
@@ -37,36 +37,36 @@ pub struct RenderSettings {
     pub outputs: TileOutputs,
 }
 
-/// Default number of direction bins: three per entry of the table that samples directions.
+/// Default number of direction bins: three per entry of the direction table.
 const DEFAULT_BINS: u32 = 3 * ENTRIES as u32;
 
-/// Minimum number of tiles for each of several cards by default. A card waits for the last tile of another
-/// half a tile's time on average.
+/// Default minimum number of tiles per card, if there are several cards. A card waits half a tile's time, on
+/// average, for the last tile of another card.
 const TILES_OF_CARD: u64 = 4;
 
-/// Side of tiles that are not divided for more cards by default, pixels: that of the coarsest cells of
-/// irradiance records, which narrower tiles would compute several times.
+/// Minimum side of tiles by default, pixels: the side of the coarsest cells of irradiance records. Narrower
+/// tiles would compute these records several times.
 const NARROWEST_TILE: u32 = 16;
 
 /// Default number of caustic photons for a scene with a specular surface.
 pub const DEFAULT_CAUSTIC_PHOTONS: usize = 200_000;
 
 impl RenderSettings {
-    /// Settings with a change.
+    /// Applies a change to the settings.
     #[must_use]
     pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
         change(&mut self);
         self
     }
 
-    /// Window of the picture to render.
+    /// Window of the picture that is rendered.
     pub fn window(&self) -> Window {
         self.picture.crop.unwrap_or(Window::full(self.picture.width, self.picture.height))
     }
 
-    /// Side of the tiles on cards of `budgets`, pixels: [`Schedule::tile`]; without one the widest that each
-    /// card has room for, as it reads the least memory; for several cards halved while the window has fewer
-    /// than four tiles for each, down to 16 pixels.
+    /// Side of the tiles on cards with `budgets`, pixels. It is [`Schedule::tile`] if stated; otherwise the
+    /// widest for which each card has room, because wide tiles read the least memory. For several cards it is
+    /// halved, down to 16 pixels, while the window has fewer than four tiles per card.
     pub fn tile_side(&self, budgets: &[Budget]) -> u32 {
         if let Some(side) = self.schedule.tile {
             return side;
@@ -85,7 +85,7 @@ impl RenderSettings {
         std::iter::successors(Some(widest), narrower).last().unwrap_or(widest)
     }
 
-    /// Tiles to render, each of at most `side * side` pixels.
+    /// Tiles to render. Each has at most `side * side` pixels.
     pub fn tiles(&self, side: u32) -> Vec<Tile> {
         let order = self.schedule.order;
         match self.schedule.part {
@@ -94,10 +94,10 @@ impl RenderSettings {
         }
     }
 
-    /// Empty film for the picture, with sums in units of `scale`.
+    /// Creates an empty film for the picture, whose sums have the units `scale`.
     ///
     /// # Errors
-    /// If its size or its crop window is not possible.
+    /// If the picture's size or its crop window is not possible.
     pub fn film(&self, scale: SumScale) -> Result<Film, FilmError> {
         let layers = self.picture.layers.are_of_chip();
         let Integrator { samples, adaptive_threshold, .. } = self.integrator;
@@ -110,21 +110,22 @@ impl RenderSettings {
         self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| self.cards.own_caches()))
     }
 
-    /// Photons of the caustic map of a scene that is specular or not; 0 for no map.
+    /// Number of photons in the caustic map; 0 for no map. It depends on whether the scene has specular
+    /// surfaces.
     fn caustic_photons(&self, is_specular: bool) -> usize {
         let asked = self.photons.caustic_photons.unwrap_or(DEFAULT_CAUSTIC_PHOTONS);
         if is_specular { asked } else { 0 }
     }
 
-    /// Canonical settings, equal for all settings that give the scene equal pixels: the number of caustic
-    /// photons is the scene's, photons that no pilot has chosen are for any camera, and without a caustic map
-    /// the neighbours of its gathers are the default's.
+    /// Canonical settings, equal for all settings that give this scene equal pixels. The number of caustic
+    /// photons is that for the scene; photons are for any camera if no pilot has decided; and without a
+    /// caustic map, the number of its neighbours is the default.
     #[must_use]
     pub fn resolved(&self, scene: &Scene) -> Self {
         self.resolved_if(scene.is_specular())
     }
 
-    /// [`Self::resolved`] for a scene that is specular or not.
+    /// Does [`Self::resolved`]. `is_specular` states whether the scene has specular surfaces.
     pub(super) fn resolved_if(&self, is_specular: bool) -> Self {
         let caustic_photons = self.caustic_photons(is_specular);
         self.clone().with(|settings| {
@@ -141,8 +142,8 @@ impl RenderSettings {
         self.photon_settings_of(&scene.into())
     }
 
-    /// [`Self::photon_settings`] of a scene that stays as it is. A camera that the scene does not have is
-    /// any.
+    /// Parameters of the photon maps of a scene that does not change between pictures. If the scene lacks
+    /// the camera of the settings, the parameters name no camera.
     pub(super) fn photon_settings_of(&self, scene: &FixedScene) -> PhotonSettings {
         let camera = match self.photons.photons_for {
             PhotonsFor::Scene | PhotonsFor::Auto => None,
@@ -151,7 +152,8 @@ impl RenderSettings {
         PhotonSettings { camera, ..self.photon_settings_if(scene.is_specular()) }
     }
 
-    /// [`Self::photon_settings`] for any camera of a scene that is specular or not.
+    /// Parameters of photon maps without a camera. `is_specular` states whether the scene has specular
+    /// surfaces.
     pub(super) fn photon_settings_if(&self, is_specular: bool) -> PhotonSettings {
         PhotonSettings {
             camera: None,
@@ -166,14 +168,14 @@ impl RenderSettings {
         }
     }
 
-    /// Returns whether cards keep irradiance records for pictures of other samples.
+    /// Returns whether cards keep irradiance records for pictures with other samples.
     fn keeps_records(&self) -> bool {
         self.schedule.keep_records
             && self.integrator.irradiance_error.is_some()
             && self.cards.verify.is_none()
     }
 
-    /// Parameters of the frame for a camera of the scene.
+    /// Frame parameters for a camera of the scene.
     pub fn frame(
         &self,
         camera: &Camera,
@@ -208,7 +210,7 @@ impl RenderSettings {
     }
 
     /// Pinhole camera of the frame. The vertical field of view is the camera's; the horizontal one follows
-    /// from the picture's size.
+    /// from the picture's aspect ratio.
     pub(crate) fn pinhole(&self, camera: &Camera) -> message::Camera {
         let half_height = libm::tanf(0.5 * camera.vertical_fov);
         let half_width = half_height * self.picture.width as f32 / self.picture.height as f32;

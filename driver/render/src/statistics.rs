@@ -1,4 +1,4 @@
-//! Statistics of a render: the keys of `--stats`.
+//! Statistics of a render. The field names are the keys of `--stats`.
 
 use photoncard_cards::session::LinkBytes;
 use photoncard_map::photon_map::Guiding;
@@ -28,69 +28,70 @@ pub struct Statistics {
     pub photons: u64,
     /// Number of paths traced from the lights for the photons.
     pub photon_paths: u64,
-    /// Guiding of these paths; absent for photons of any camera.
+    /// Guiding of these paths; absent if photons are for any camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub photon_guiding: Option<Guiding>,
     /// Maximum distance of a gather, metres.
     pub max_distance: f32,
     /// Number of cards, one chip each.
     pub cards: usize,
-    /// Number of cards that were given up, left out for their budget, or have never answered the greeting.
+    /// Number of cards that were given up, left out because of their budget, or never answered the greeting.
     pub cards_given_up: usize,
-    /// Number of tiles that two cards have rendered equally.
+    /// Number of tiles that two cards rendered with equal pixels.
     pub verified_tiles: usize,
     /// Number of tiles rendered once more, for verification or because another card took too long. Not
     /// included in the other counts.
     pub repeated_tiles: usize,
-    /// Number of tiles with light far beyond that of the scene's surfaces for which there was no second card
-    /// to verify them, and of such tiles that were kept.
+    /// Number of tiles with light far above that of the scene's surfaces that were not verified because there
+    /// was no second card, and of such tiles that were kept.
     pub dazzling_tiles: usize,
-    /// Names of the cards that have rendered these; `an earlier render` for kept tiles.
+    /// Names of the cards that rendered these tiles; `an earlier render` for kept ones.
     #[serde(skip)]
     pub dazzling_cards: Vec<String>,
-    /// Number of tiles rendered again because their card was outvoted. The other counts include each once.
+    /// Number of tiles rendered again because their card was outvoted. The other counts include such a tile
+    /// once.
     pub revoked_tiles: usize,
     /// Time of each phase, seconds.
     pub time_s: Times,
     /// Number of rays cast on the chips.
     pub rays: Rays,
-    /// Number of paths that exceeded the limit of specular bounces, or met a surface that absorbs all light;
-    /// they contribute nothing.
+    /// Number of paths that contribute nothing, because they exceeded the limit of specular bounces or hit a
+    /// surface that absorbs all light.
     pub lost_paths: u64,
     /// Number of searches of the caustic map.
     pub caustic_gathers: u64,
     /// Number of searches of the photon map.
     pub gathers: u64,
-    /// Number of these searches that filled an importance table.
+    /// Number of photon searches for importance tables, included in `gathers`.
     pub tables: u64,
-    /// Number of irradiance records gathered; a record that two tiles use counts twice.
+    /// Number of irradiance records gathered. A record that two tiles use counts twice.
     pub records: u64,
-    /// Number of irradiance records of an earlier pass that were used again.
+    /// Number of irradiance records reused from an earlier pass.
     pub kept_records: u64,
-    /// Share of interpolated irradiance among the samples that see a surface with a Lambertian part.
+    /// Fraction of the samples that see a surface with a Lambertian part whose irradiance was interpolated.
     pub interpolated_share: f64,
     /// Number of photons whose distance was computed.
     pub photons_tested: u64,
     /// Number of photons that became candidates of a search.
     pub photons_taken: u64,
-    /// Number of candidates processed by selections of the k nearest.
+    /// Number of candidates read while the k nearest were selected.
     pub photons_selected: u64,
-    /// Number of photons that the searches returned.
+    /// Number of photons that searches returned.
     pub photons_found: u64,
     /// Number of searches for the nearest irradiance point.
     pub lookups: u64,
     /// Number of irradiance points whose distance was computed.
     pub points_tested: u64,
-    /// Number of times that a chip's queue of gathers was emptied.
+    /// Number of times that a chip's queue of gathers was drained.
     pub drains: u64,
-    /// Maximum number of gathers that waited at once on any chip.
+    /// Maximum number of gathers that waited at the same time on any chip.
     pub most_waiting: u64,
     /// Floating-point operations of the counted work by the constants of Table 7.1 (`docs/scaling.md`),
-    /// without lookups of irradiance.
+    /// without searches for irradiance points.
     pub flops: Flops,
-    /// Bytes of the card image.
+    /// Size of the card image, bytes.
     pub image_bytes: u64,
-    /// Bytes over all links.
+    /// Bytes transferred over all links.
     pub link: LinkStatistics,
     /// Reads of card memory; absent if memory is not modelled.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -160,8 +161,8 @@ impl Statistics {
     }
 }
 
-/// Number of photons in the map of an image that `count` were requested for. They are counted where leaves
-/// have no room for as many.
+/// Number of photons in an image's map, for which `count` were requested. They are counted if the map's
+/// leaves have no room for as many.
 fn photons(count: u64, prepared: &Prepared) -> u64 {
     let leaves = prepared.image.section(SectionKind::PhotonLeaves);
     let nodes = prepared.image.section(SectionKind::Photons).len() * Photon::PER_LINE;
@@ -173,11 +174,11 @@ fn photons(count: u64, prepared: &Prepared) -> u64 {
     in_leaves + nodes as u64
 }
 
-/// Rays by kind.
+/// Numbers of rays by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Rays {
-    /// Eye rays: one per sample, cast twice, with the irradiance cache three times; and rays to points of its
-    /// lattice.
+    /// Number of eye rays. Each sample casts one twice, or three times with the irradiance cache. Rays to
+    /// points of the cache's lattice are included.
     pub eye: u64,
     /// Shadow rays.
     pub shadow: u64,
@@ -185,24 +186,24 @@ pub struct Rays {
     pub gather: u64,
     /// Rays that survey the surroundings of irradiance records.
     pub survey: u64,
-    /// Rays from specular surfaces, continuing any of these but shadow rays.
+    /// Number of rays from specular surfaces that continue rays of the other kinds, except shadow rays.
     pub specular: u64,
 }
 
-/// Bytes over all links.
+/// Bytes transferred over all links.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LinkStatistics {
-    /// Bytes of image lines sent to each card: those that it lacked.
+    /// Bytes of image lines sent to each card. Only lines that the card lacked are sent.
     pub image_bytes: Vec<u64>,
     /// Bytes of image lines and pixels.
     pub payload_bytes: u64,
-    /// All bytes in both directions.
+    /// Total number of bytes in both directions.
     pub wire_bytes: u64,
-    /// Frames sent more than once.
+    /// Number of frames sent more than once.
     pub retransmitted_frames: u64,
-    /// Damaged frames from cards.
+    /// Number of damaged frames received from cards.
     pub damaged_frames: u64,
-    /// Repeated frames from cards.
+    /// Number of duplicate frames received from cards.
     pub duplicate_frames: u64,
     /// Number of probes sent to silent cards.
     pub probes: u64,
@@ -211,7 +212,7 @@ pub struct LinkStatistics {
 }
 
 impl LinkStatistics {
-    /// Statistics of the link of each card.
+    /// Statistics of the links of all cards.
     fn new(links: &[LinkBytes]) -> Self {
         let mut sum = LinkBytes::default();
         links.iter().for_each(|link| sum.add(link));

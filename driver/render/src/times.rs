@@ -2,29 +2,29 @@
 
 use serde::Serialize;
 
-/// Seconds of each phase.
+/// Times of the phases, seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Times {
-    /// Reading the scene file.
+    /// Time to read the scene file.
     pub scene: f64,
-    /// Pilot renders, by which settings are chosen.
+    /// Time of pilot renders, from which settings are chosen.
     pub pilot: f64,
-    /// Tracing photons.
+    /// Time to trace photons.
     pub photons: f64,
-    /// Building hierarchy, photon map and card image.
+    /// Time to build the hierarchy, the photon map and the card image.
     pub pack: f64,
-    /// Part of `pack`: the hierarchy and the other sections of the scene.
+    /// Part of `pack` for the hierarchy and the other sections of the scene.
     pub hierarchy: f64,
-    /// Part of `pack`: the photon map.
+    /// Part of `pack` for the photon map.
     pub photon_map: f64,
-    /// Part of `pack`: the maximum distance of gathers, and disc fractions.
+    /// Part of `pack` to measure the maximum distance of gathers, and disc fractions.
     pub discs: f64,
-    /// Part of `pack`: irradiance points, if irradiance is precomputed.
+    /// Part of `pack` for irradiance points, if irradiance is precomputed.
     pub irradiance: f64,
-    /// Loading the slowest card.
+    /// Time until the slowest card was loaded.
     pub load: f64,
-    /// Rendering, after the last card was loaded.
+    /// Time of rendering, after the last card was loaded.
     pub render: f64,
-    /// Total.
+    /// Total time.
     pub total: f64,
 }

@@ -1,4 +1,4 @@
-//! Verification: tiles that two cards render for comparison.
+//! Verification of cards: some tiles are rendered by two cards and compared.
 
 use photoncard_cards::scheduler::{Scheduler, near, spread};
 use photoncard_shared::message::Tile;
@@ -9,8 +9,8 @@ impl RenderSettings {
     /// Checks that tiles can be verified, if requested.
     ///
     /// # Errors
-    /// If there are not two cards, the share is none, or reads are counted, which would be those of both
-    /// cards.
+    /// If there are fewer than two cards, the share is not valid, or reads are counted, which would be those
+    /// of both cards.
     pub(super) fn check_verification(&self) -> Result<(), RenderError> {
         let Some(share) = self.cards.verify else { return Ok(()) };
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
@@ -28,13 +28,13 @@ impl RenderSettings {
         Err(RenderError::Setting { option: "--verify", value, reason, remedy })
     }
 
-    /// Minimum number of cards.
+    /// Minimum number of cards that a render needs.
     pub(super) fn needed_cards(&self) -> usize {
         if self.cards.verify.is_some() { 2 } else { 1 }
     }
 
-    /// Scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice: all reads
-    /// count.
+    /// Creates the scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice,
+    /// because all reads count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
         // Modelled caches are read in the order of the picture.
         if self.modelled_caches().is_some() {

@@ -1,4 +1,4 @@
-//! Executor of the order `hilbert`: emulated chips that leave all gathers of the frame to the host.
+//! Executor of the order `hilbert`: emulated chips pass all gathers of the frame to the host.
 
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ pub(super) struct WholeFrame {
 }
 
 impl WholeFrame {
-    /// Executor with the chips of the settings.
+    /// Creates an executor with the chips of the settings.
     ///
     /// # Errors
     /// If there is a card of another kind.

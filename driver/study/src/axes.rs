@@ -9,48 +9,48 @@ pub const MAX_POINTS: usize = 512;
 /// Setting that a sweep varies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Axis {
-    /// Name of the setting: that of its option.
+    /// Name of the setting, equal to that of its option.
     pub name: String,
     /// Values, as arguments of the option.
     pub values: Vec<String>,
 }
 
-/// Error of axes that make no sweep.
+/// Error of axes that cannot form a sweep.
 #[derive(Debug, Error, Diagnostic, PartialEq, Eq)]
 pub enum AxisError {
-    /// Error of an axis without values.
+    /// An axis has no values.
     #[error("--vary {name} has no value")]
     #[diagnostic(help("write --vary {name}=VALUE,VALUE"))]
     NoValue {
         /// Name of the axis.
         name: String,
     },
-    /// Error of two axes of one name.
+    /// Two axes have the same name.
     #[error("{name} is varied twice")]
     #[diagnostic(help("give all of its values in one --vary {name}=VALUE,VALUE"))]
     SameName {
         /// Name of the axes.
         name: String,
     },
-    /// Error of a value that an axis has twice.
+    /// An axis has the same value twice.
     #[error("--vary {name} has the value {value} twice")]
     #[diagnostic(help("leave one of them out"))]
     SameValue {
         /// Name of the axis.
         name: String,
-        /// The value.
+        /// The repeated value.
         value: String,
     },
-    /// Error of too many combinations.
+    /// There are too many combinations.
     #[error("{factors} values make more than {MAX_POINTS} points")]
     #[diagnostic(help("vary fewer settings, or over fewer values"))]
     TooManyPoints {
-        /// Numbers of values, as a product.
+        /// Numbers of values of the axes, as a product.
         factors: String,
     },
 }
 
-/// Axes of a sweep. Its points are the Cartesian product of the values, the last axis varying fastest.
+/// Axes of a sweep. Its points are the Cartesian product of their values; the last axis varies fastest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Axes(Vec<Axis>);
 
@@ -83,12 +83,11 @@ impl Axes {
         Ok(Self(axes))
     }
 
-    /// The axes.
     pub(super) fn list(&self) -> &[Axis] {
         &self.0
     }
 
-    /// Indices of the values of each combination.
+    /// Combinations of values, as indices of the value on each axis.
     pub(super) fn combinations(&self) -> impl Iterator<Item = Vec<usize>> {
         let count = self.0.iter().map(|axis| axis.values.len()).product();
         (0..count).map(|point| self.combination(point))
@@ -107,12 +106,12 @@ impl Axes {
         indices
     }
 
-    /// Number of the point of a combination.
+    /// Number of the point with a combination of values.
     pub(super) fn point(&self, indices: &[usize]) -> usize {
         self.0.iter().zip(indices).fold(0, |point, (axis, index)| point * axis.values.len() + index)
     }
 
-    /// Names and values of a combination.
+    /// Names of the axes and values of a combination.
     pub(super) fn values(&self, indices: &[usize]) -> Vec<(&str, &str)> {
         let pairs = self.0.iter().zip(indices);
         pairs.map(|(axis, &index)| (axis.name.as_str(), axis.values[index].as_str())).collect()
@@ -128,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn every_combination_is_a_point_of_its_own() {
+    fn every_combination_has_its_own_point_number() {
         let axes = Axes::new(vec![
             axis("order", &["naive", "sort"]),
             axis("tile", &["4"]),
@@ -147,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_that_make_no_sweep_are_refused() {
+    fn axes_that_cannot_form_a_sweep_are_refused() {
         let name = || "tile".to_owned();
         assert_eq!(Axes::new(vec![axis("tile", &[])]), Err(AxisError::NoValue { name: name() }));
         let twice = vec![axis("tile", &["4"]), axis("queue", &["1"]), axis("tile", &["8"])];

@@ -12,38 +12,38 @@ use super::store::StoreError;
 /// Error that prevents a report.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum StudyError {
-    /// Error of a scene that is missing from the folder of scenes.
+    /// A scene is missing from the folder of scenes.
     #[error("cannot find the scene {scene} in the folder {}", folder.display())]
     #[diagnostic(help(
         "give the folder of photoncard's own scenes with --scenes; they are in `scenes` of its sources"
     ))]
     NoScene {
-        /// The scene's file.
+        /// Name of the scene's file.
         scene: String,
-        /// The folder of scenes.
+        /// Path of the folder of scenes.
         folder: PathBuf,
     },
-    /// Error of a scene that cannot be used.
+    /// A scene cannot be used.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Scene(#[from] SceneError),
-    /// Error of axes that make no sweep.
+    /// The axes cannot form a sweep.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Axes(#[from] AxisError),
-    /// Error of a point that cannot be measured.
+    /// A point cannot be measured.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Render(#[from] RenderError),
-    /// Error of a finished point that cannot be stored, or of the store's folder.
+    /// A finished point cannot be stored, or the store's folder cannot be created.
     #[error("{0}")]
     #[diagnostic(help("choose another folder with --out, or make room in it"))]
     Store(#[from] StoreError),
-    /// Error of writing the report.
+    /// The report cannot be written.
     #[error("{0}")]
     #[diagnostic(help("choose another folder with --out, or make room in it"))]
     Report(#[from] ReportError),
-    /// Error of starting the chips' threads.
+    /// The threads of the chips cannot be started.
     #[error("the chips' threads could not be started: {0}")]
     #[diagnostic(help("use fewer with --threads"))]
     Threads(#[from] rayon::ThreadPoolBuildError),
@@ -53,8 +53,8 @@ pub enum StudyError {
 }
 
 impl StudyError {
-    /// Returns whether the arguments or the scenes are at fault, rather than the work: the command's exit
-    /// status 2, not 1.
+    /// Returns whether the arguments or the scenes cause the error, rather than the work. The command's exit
+    /// status is then 2 instead of 1.
     pub fn is_input(&self) -> bool {
         match self {
             Self::NoScene { .. }

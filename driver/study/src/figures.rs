@@ -1,4 +1,5 @@
-//! Figures of a run: what made them, those of its studies, and a small measurement that a reader can repeat.
+//! Key figures of a run: its provenance, the figures of its studies, and a small measurement that a reader
+//! can repeat.
 
 use std::path::Path;
 
@@ -15,14 +16,14 @@ use super::scale::Scale;
 
 /// Scene of the check.
 const SCENE: &str = "cornell.gltf";
-/// Scale of the check: a second of work.
+/// Scale of the check. It takes about a second.
 const SCALE: Scale = Scale { side: 64, photons: 20_000, gather_rays: 25, ..Scale::QUICK };
 
-/// Figures of what all other figures depend on: versions of program and card image layout, and bytes of two
-/// small renders, to the byte. They differ from those of a file that another program made.
+/// Measures figures on which all other figures depend: the versions of program and card image layout, and the
+/// exact bytes of two small renders. They differ if another program made the file.
 ///
 /// # Errors
-/// If the scene is missing, or a point cannot be measured or kept.
+/// If the scene is missing, or a point cannot be measured or stored.
 pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
     let orders = [GatherOrder::Naive, GatherOrder::Sort];
     let points = orders.map(|order| SCALE.whole(SCENE, SCALE.settings(order)));
@@ -43,8 +44,8 @@ pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
     Ok(figures)
 }
 
-/// Writes the figures of studies into a folder, behind those of the check and the settings that all points
-/// share. Those of a trial say so.
+/// Writes a file with the figures of the check, the settings that all points share, and the figures of
+/// studies. A file of a trial says so.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -70,7 +71,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_file_says_what_made_it_and_if_it_is_a_trial() {
+    fn a_file_states_its_provenance_and_whether_it_is_a_trial() {
         let folder = tempfile::tempdir().unwrap();
         let figures_of = |scale: &Scale| {
             let check = vec![Figure::new("program", "", PROGRAM, "")];

@@ -1,5 +1,5 @@
-//! Measurement of the host's work for a frame with other photons: its time, and the lines of the card image
-//! that change.
+//! Measures the host's work for a frame with other photons: its time, and the changed lines of the card
+//! image.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -21,30 +21,30 @@ use super::error::StudyError;
 use super::laboratory::{StudyObserver, load_scene};
 use super::store::PointStore;
 
-/// Displacement of lights that move, as a share of the scene's diagonal.
+/// Displacement of moving lights, relative to the scene's diagonal.
 pub const LIGHT_STEP: f32 = 0.01;
 
-/// Host's work for the photon map of one scene, and what changes by changes of its light.
+/// Host's work for the photon map of one scene, and the effects of changes of its light.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub struct HostFrame {
-    /// Bytes of the card image.
+    /// Size of the card image, bytes.
     pub image_bytes: u64,
-    /// The photon map in it.
+    /// Size of the photon map in the card image.
     pub map: PhotonMapSize,
-    /// Threads that have worked.
+    /// Number of threads used.
     pub threads: usize,
-    /// Seconds of tracing photons.
+    /// Time to trace photons, seconds.
     pub tracing: f64,
-    /// Seconds of building the map and the other sections of the image.
+    /// Time to build the map and the other sections of the image, seconds.
     pub building: f64,
-    /// Seconds of measuring distances and disc fractions.
+    /// Time to measure distances and disc fractions, seconds.
     pub measuring: f64,
-    /// Lines that differ after changes.
+    /// Effects of the measured changes.
     pub changes: Vec<Changed>,
 }
 
 impl HostFrame {
-    /// Seconds of all its work.
+    /// Total time, seconds.
     pub fn seconds(&self) -> f64 {
         self.tracing + self.building + self.measuring
     }
@@ -53,22 +53,22 @@ impl HostFrame {
 /// Change of a scene's light between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub enum Change {
-    /// All lights shine half as strongly.
+    /// The emission of all lights is halved.
     Dimmed,
     /// All lights move by [`LIGHT_STEP`].
     Moved,
-    /// A share of the photons is traced anew.
+    /// This fraction of the photons is traced anew.
     Replaced(f64),
 }
 
-/// Bytes of lines that differ after a change.
+/// Lines that a change affects.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub struct Changed {
-    /// The change.
+    /// The change of light.
     pub change: Change,
-    /// Bytes of all lines that differ.
+    /// Size of all changed lines, bytes.
     pub bytes: u64,
-    /// Bytes of all lines of the new image.
+    /// Size of all lines of the new image, bytes.
     pub of: u64,
 }
 
@@ -81,10 +81,10 @@ pub struct HostBench<'a> {
 }
 
 impl<'a> HostBench<'a> {
-    /// A bench that keeps results in `folder/points` and reads scenes from the folder `scenes`.
+    /// Creates a bench that keeps results in `folder/points` and reads scenes from the folder `scenes`.
     ///
     /// # Errors
-    /// If the folder cannot be made, or the threads cannot be started.
+    /// If the folder cannot be created, or the threads cannot be started.
     pub fn new(
         folder: &Path,
         scenes: &Path,
@@ -95,11 +95,11 @@ impl<'a> HostBench<'a> {
         Ok(Self { scenes: scenes.to_owned(), store: PointStore::open(folder)?, pool, observer })
     }
 
-    /// Measures a frame of a scene with settings, and changes of it.
+    /// Measures a frame of a scene with settings, and the effects of changes.
     ///
     /// # Errors
-    /// If the scene cannot be read, its photons cannot be mapped, the result cannot be kept, or the observer
-    /// stops the study.
+    /// If the scene cannot be read, its photons cannot be mapped, the result cannot be stored, or the
+    /// observer stops the study.
     pub fn measure(
         &mut self,
         file: &str,
@@ -152,7 +152,7 @@ impl<'a> HostBench<'a> {
         })
     }
 
-    /// Card image after a change.
+    /// Creates the card image after a change.
     fn changed(
         &self,
         scene: &Scene,
@@ -184,7 +184,7 @@ impl<'a> HostBench<'a> {
     }
 }
 
-/// Moves all triangles that emit light.
+/// Moves all emissive triangles.
 fn move_lights(scene: &mut Scene) {
     let corners = || scene.triangles.iter().flat_map(|triangle| triangle.vertices);
     let lower = corners().fold(Vec3::INFINITY, Vec3::min);
@@ -199,7 +199,7 @@ fn move_lights(scene: &mut Scene) {
     }
 }
 
-/// Bytes of the lines of `after` that `before` lacks or has otherwise.
+/// Size of the lines of `after` that are not equal in `before`, bytes.
 fn differing_bytes(before: &CardImage, after: &CardImage) -> u64 {
     let differ: usize = changed_runs(before.lines(), after.lines()).iter().map(ExactSizeIterator::len).sum();
     (differ * LINE_BYTES) as u64

@@ -8,7 +8,7 @@ use super::error::StudyError;
 use super::report::{self, Block, Provenance, Report, Section};
 use super::studies::Study;
 
-/// Writes `index.html` into `folder`, which holds the studies' folders.
+/// Writes `index.html` into `folder`, which contains the folders of the studies.
 pub(super) fn write(
     folder: &Path,
     banner: Option<String>,

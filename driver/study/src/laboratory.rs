@@ -1,4 +1,4 @@
-//! Measurement of points: finished ones are read from the store, and points of one card image are measured
+//! Measures points. Finished points are read from the store. Points with the same card image are measured
 //! together, so that photons are traced once for all of them.
 
 use std::collections::HashMap;
@@ -22,18 +22,18 @@ use super::store::PointStore;
 
 /// Observer of a study's progress, which can stop it.
 pub trait StudyObserver: Sync {
-    /// Reports that `done` of a study's `total` points are finished: first, with `is_new` false, those in the
-    /// store; then each that was measured.
+    /// Reports that `done` of the study's `total` points are finished. The first call, with `is_new` false,
+    /// counts points in the store; then there is a call for each measured point.
     fn progress(&self, study: &str, done: usize, total: usize, is_new: bool);
 
-    /// Reports, as a sentence, the reason why a stored point cannot be used; the point is measured again.
+    /// Reports in a sentence why a stored point cannot be used. The point is measured again.
     fn notice(&self, text: &str);
 
     /// Returns whether the study should stop as soon as possible.
     fn is_stopped(&self) -> bool;
 }
 
-/// Result of the measurement of a point, by its [`Task`].
+/// Result of measuring a point. The variant depends on its [`Task`].
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub enum Outcome {
     /// Result of [`Task::Traffic`].
@@ -42,17 +42,17 @@ pub enum Outcome {
     Quality(Quality),
 }
 
-/// The outcomes of a study's points.
+/// Outcomes of a study's points.
 #[derive(Debug)]
 pub struct Results(Vec<(Point, Outcome)>);
 
 impl Results {
-    /// The outcomes of points.
+    /// Collects the outcomes of points.
     pub(super) fn new(outcomes: Vec<(Point, Outcome)>) -> Self {
         Self(outcomes)
     }
 
-    /// Work and memory traffic of a point.
+    /// Returns the work and memory traffic of a point.
     ///
     /// # Panics
     /// If the point was not measured, or its task is not [`Task::Traffic`].
@@ -63,7 +63,7 @@ impl Results {
         }
     }
 
-    /// Error of a point's pixels.
+    /// Returns the error of a point's pixels.
     ///
     /// # Panics
     /// If the point was not measured, or its task is not [`Task::Quality`].
@@ -86,15 +86,15 @@ pub struct Laboratory<'a> {
     pool: ThreadPool,
     observer: &'a dyn StudyObserver,
     loaded: HashMap<String, LoadedScene>,
-    /// The last point's card image, which the next point may share.
+    /// Card image of the last point. The next point may share it.
     last: Option<LastImage>,
-    /// The last reference, which points of other images of the same photons may share.
+    /// Last reference. Points with other images but the same photons may share it.
     reference: Option<SceneReference>,
 }
 
 struct LoadedScene {
     scene: Scene,
-    /// [`Scene::checksum`], which stands for the scene's content in keys.
+    /// Checksum of the scene ([`Scene::checksum`]), which represents its content in keys.
     digest: String,
 }
 
@@ -104,7 +104,7 @@ struct LastImage {
     mapped: MappedImage,
 }
 
-/// A reference, and what it depends on besides settings.
+/// A reference, and the inputs other than settings that it depends on.
 struct SceneReference {
     scene: String,
     assignments: Vec<String>,
@@ -112,11 +112,11 @@ struct SceneReference {
 }
 
 impl<'a> Laboratory<'a> {
-    /// A laboratory that keeps finished points in `folder/points` and reads scenes from the folder `scenes`.
-    /// Each of `threads` emulates one chip; `None` is one thread per core.
+    /// Creates a laboratory that keeps finished points in `folder/points` and reads scenes from the folder
+    /// `scenes`. Each of `threads` threads emulates one chip; `None` is one thread per core.
     ///
     /// # Errors
-    /// If the folder cannot be made, or the threads cannot be started.
+    /// If the folder cannot be created, or the threads cannot be started.
     pub fn new(
         folder: &Path,
         scenes: &Path,
@@ -137,10 +137,10 @@ impl<'a> Laboratory<'a> {
         })
     }
 
-    /// Measures the points that the store does not hold yet, and returns the outcomes of all.
+    /// Measures the points that are not in the store yet. Returns the outcomes of all points.
     ///
     /// # Errors
-    /// If a scene is missing, a point cannot be measured or kept, or the observer stops the study.
+    /// If a scene is missing, a point cannot be measured or stored, or the observer stops the study.
     pub fn measure(&mut self, study: &str, points: &[Point]) -> Result<Results, StudyError> {
         let points = sharing_images(points);
         let total = points.len();
@@ -163,13 +163,13 @@ impl<'a> Laboratory<'a> {
         Ok(Results::new(results))
     }
 
-    /// Adds a scene of the name, in place of the file in the folder of scenes.
+    /// Adds a scene with a name. It replaces the file with this name in the folder of scenes.
     pub fn add(&mut self, name: &str, scene: Scene) {
         let digest = scene.checksum();
         self.loaded.insert(name.to_owned(), LoadedScene { scene, digest });
     }
 
-    /// The scene of a file, before a point's assignments.
+    /// Loads the scene of a file, before a point's assignments are applied.
     ///
     /// # Errors
     /// If the file is missing or cannot be read.
@@ -181,7 +181,7 @@ impl<'a> Laboratory<'a> {
         Ok(&self.loaded[file])
     }
 
-    /// Outcome of a point in the store; `None` if it is to be measured.
+    /// Returns the outcome of a point in the store; `None` if it must be measured.
     fn stored(&mut self, point: &Point) -> Result<Option<Outcome>, StudyError> {
         let key = self.key(point)?;
         let noticed = self.store.notices().len();
@@ -192,7 +192,7 @@ impl<'a> Laboratory<'a> {
         Ok(outcome)
     }
 
-    /// Measures a point, and stores its outcome.
+    /// Measures a point and stores its outcome.
     fn measured(&mut self, point: &Point) -> Result<Outcome, StudyError> {
         let outcome = match self.measure_one(point) {
             Err(StudyError::Render(RenderError::Stopped)) => return Err(StudyError::Stopped),
@@ -233,7 +233,7 @@ impl<'a> Laboratory<'a> {
         Ok(outcome)
     }
 
-    /// The card image of a point: the last one, if their keys are equal.
+    /// Returns the card image of a point, which is the last one if their keys are equal.
     fn image(&mut self, point: &Point) -> Result<LastImage, StudyError> {
         let key = point.image_key();
         if let Some(last) = self.last.take_if(|last| last.key == key) {
@@ -272,7 +272,7 @@ impl SceneReference {
     }
 }
 
-/// The points without duplicates, sorted so that points of one card image follow each other.
+/// Removes duplicate points, and sorts the others so that points with the same card image are adjacent.
 fn sharing_images(points: &[Point]) -> Vec<Point> {
     let mut images: Vec<(ImageKey, Vec<Point>)> = Vec::new();
     for point in points {
@@ -286,7 +286,7 @@ fn sharing_images(points: &[Point]) -> Vec<Point> {
     images.into_iter().flat_map(|(_, sharing)| sharing).collect()
 }
 
-/// Loads a scene of the folder `scenes`.
+/// Loads a scene from the folder `scenes`.
 ///
 /// # Errors
 /// If the file is missing or cannot be read.
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn points_of_one_image_come_together_and_once() {
+    fn points_are_grouped_by_image_without_duplicates() {
         use PhotonLayout::{Jensen, Lines};
         let [a, b, c, d] =
             [point(1, Jensen, 16), point(2, Jensen, 16), point(1, Lines, 16), point(1, Jensen, 8)];

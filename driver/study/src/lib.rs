@@ -1,10 +1,10 @@
 //! Studies: measurements of the shipped scenes with one setting varied, reports on them, and predictions for
-//! machines that are not at hand.
+//! machines that do not exist yet.
 //!
 //! A study is a list of [`Point`]s and a function from their [`Results`] to a [`Report`]. [`run`] measures
 //! the points in a [`Laboratory`], which keeps their outcomes, and writes the report.
-//! [`photoncard_render::cost_model`] predicts the chips that a frame rate takes, [`load_balance`] how evenly
-//! tiles load them.
+//! [`photoncard_render::cost_model`] predicts the number of chips that a frame rate needs; [`load_balance`]
+//! simulates how evenly tiles load them.
 #![forbid(unsafe_code)]
 
 mod axes;
@@ -43,22 +43,22 @@ use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::Machine;
 use photoncard_scene::Scene;
 
-/// Options of [`run`]: the studies, their scale, and the folders they read and write.
+/// Options of [`run`]: the studies, their scale, and the folders that they read and write.
 #[derive(Clone, Debug)]
 pub struct StudyOptions {
-    /// The studies, in order.
+    /// Studies to run, in this order.
     pub studies: Vec<Study>,
-    /// The scale of all studies.
+    /// Scale of all studies.
     pub scale: Scale,
-    /// The folder of the scenes.
+    /// Folder of the scenes.
     pub scenes: PathBuf,
-    /// The folder of the reports.
+    /// Folder of the reports.
     pub out: PathBuf,
-    /// True if each report has a folder of its own in [`Self::out`], and an index page links them.
+    /// True if each report has its own folder in [`Self::out`], and an index page links them.
     pub is_collection: bool,
     /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,
-    /// Provenance of the numbers; each report adds its settings.
+    /// Provenance of the numbers. Each report adds its settings.
     pub provenance: Provenance,
 }
 
@@ -91,24 +91,24 @@ pub fn run(options: &StudyOptions, observer: &dyn StudyObserver) -> Result<(), S
 
 /// Options of [`run_sweep`].
 pub struct SweepOptions {
-    /// The sweep.
+    /// Sweep to run.
     pub sweep: Sweep,
     /// Name of the scene of all points.
     pub name: String,
-    /// The scene, before a point's assignments.
+    /// Scene before a point's assignments are applied.
     pub scene: Scene,
-    /// The folder of the report.
+    /// Folder of the report.
     pub out: PathBuf,
     /// Number of threads; `None` for one per core.
     pub threads: Option<usize>,
-    /// The machine of the report's times.
+    /// Machine for which the report's times are computed.
     pub machine: Machine,
-    /// Provenance of the numbers; the report adds its settings.
+    /// Provenance of the numbers. The report adds its settings.
     pub provenance: Provenance,
 }
 
-/// Measures and reports a sweep. All points are checked before the first is measured; finished ones are kept
-/// as by [`run`].
+/// Measures and reports a sweep. All points are checked before the first is measured. Finished points are
+/// kept, as in [`run`].
 ///
 /// # Errors
 /// If a point is not possible or cannot be measured, a file cannot be written, or the observer stops the

@@ -1,4 +1,4 @@
-//! Measurement of a point: work and memory traffic of a sample of a picture's tiles.
+//! Measures a point: work and memory traffic of a sample of a picture's tiles.
 
 use photoncard_cards::scheduler::tiles;
 use photoncard_firmware::kind::{ChipKind, Large, Micro, Reference};
@@ -23,7 +23,7 @@ use super::sample::{Chosen, Estimate, SampleRate, choose};
 /// Reads of one structure of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ReadSums {
-    /// Read requests of the chip.
+    /// Number of read requests by the chip.
     pub requests: u64,
     /// Bytes that the chip requested.
     pub raw_bytes: u64,
@@ -34,27 +34,27 @@ pub struct ReadSums {
 /// Work and memory traffic of one tile.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TileMeasurement {
-    /// The tile's number in the picture.
+    /// Number of the tile in the picture.
     pub tile: u32,
-    /// The tile's weight: tiles of the picture that it stands for, itself included.
+    /// Weight of the tile: the number of tiles in the picture that it represents, including itself.
     pub stands_for: usize,
-    /// Counts of the work.
+    /// Counters of the work.
     pub counters: Counters,
     /// Reads of each structure, in the order of [`Structure::ALL`].
     pub reads: [ReadSums; STRUCTURES],
-    /// Contents of the lines that were read.
+    /// Contents of the lines that the chip read.
     pub contents: Contents,
 }
 
 /// Work and memory traffic of a point.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measurement {
-    /// The measured tiles, in the picture's order; a single one for all tiles of a frame that was rendered as
-    /// a whole.
+    /// Measured tiles, in the picture's order. A frame that was rendered as a whole has a single entry for
+    /// all tiles.
     pub tiles: Vec<TileMeasurement>,
-    /// Number of rendered tiles.
+    /// Number of tiles that were rendered.
     pub rendered: usize,
-    /// The photon map of the image.
+    /// Size of the photon map in the image.
     pub map: PhotonMapSize,
 }
 
@@ -96,13 +96,13 @@ impl TileMeasurement {
 }
 
 impl Measurement {
-    /// Estimate of a count's total over the whole picture.
+    /// Estimates the total of a count over the whole picture.
     pub fn total(&self, count: impl Fn(&TileMeasurement) -> f64) -> Estimate {
         let sample: Vec<_> = self.tiles.iter().map(|tile| (count(tile), tile.stands_for)).collect();
         Estimate::of_total(&sample)
     }
 
-    /// Gathers: searches of the photon map.
+    /// Number of gathers, which are searches of the photon map.
     pub fn gathers(&self) -> Estimate {
         self.total(|tile| tile.counters.gathers as f64)
     }
@@ -112,36 +112,36 @@ impl Measurement {
         self.total(|tile| tile.photon_map().raw_bytes as f64)
     }
 
-    /// Bytes of the photon map from DRAM.
+    /// Bytes of the photon map fetched from DRAM.
     pub fn photon_map_bytes(&self) -> Estimate {
         self.total(|tile| tile.photon_map().dram_bytes as f64)
     }
 
-    /// Bytes of the scene from DRAM.
+    /// Bytes of the scene fetched from DRAM.
     pub fn scene_bytes(&self) -> Estimate {
         self.total(|tile| tile.scene().dram_bytes as f64)
     }
 
-    /// Bytes from DRAM, of photon map and scene together.
+    /// Bytes of photon map and scene fetched from DRAM.
     pub fn dram_bytes(&self) -> Estimate {
         self.total(|tile| (tile.photon_map().dram_bytes + tile.scene().dram_bytes) as f64)
     }
 }
 
-/// Test bench of emulated chips: a scene, its card image, and the threads that emulate the chips.
+/// Bench of emulated chips: a scene, its card image, and threads that emulate the chips.
 pub struct Bench<'a> {
-    /// The scene.
+    /// Scene of the bench.
     pub scene: &'a Scene,
-    /// The scene's card image, with its photon map.
+    /// Card image of the scene, with its photon map.
     pub mapped: &'a MappedImage,
-    /// Threads, one chip each; a thread's stack must hold a chip while it is built.
+    /// Threads, each of which emulates one chip. Their stacks must have room for a chip while it is built.
     pub pool: &'a ThreadPool,
-    /// Returns whether to stop; polled before each tile.
+    /// Function that returns whether to stop. It is polled before each tile.
     pub is_stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Bench<'_> {
-    /// The parameters of a frame with these settings.
+    /// Frame parameters for these settings.
     ///
     /// # Errors
     /// If the settings' camera is not possible in the scene.
@@ -150,7 +150,7 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders tiles, each on a chip of the kind `K` with a new memory that `model` makes, so that every tile
+    /// Renders tiles on chips of kind `K`. `model` creates a new memory for each tile, so that every tile
     /// begins with empty caches.
     ///
     /// # Errors
@@ -164,12 +164,12 @@ impl Bench<'_> {
         Ok(render_tiles_apart::<K, M>(self.pool, &self.mapped.image, frame, tiles, model, self.is_stopped)?)
     }
 
-    /// Measures the work and the memory traffic of a frame: of a sample of its tiles, or of all if there are
-    /// several in flight or the order is [of the whole
+    /// Measures the work and memory traffic of a frame, from a sample of its tiles. All tiles are rendered if
+    /// several are in flight, or if the order is [of the whole
     /// frame](photoncard_cards::scheduler::GatherOrder::is_of_whole_frame).
     ///
     /// # Errors
-    /// If the scene has no camera of the settings' name, the card image is malformed, or the bench is
+    /// If the scene has no camera with the name in the settings, the card image is malformed, or the bench is
     /// stopped.
     pub fn traffic(
         &self,
@@ -209,8 +209,8 @@ impl Bench<'_> {
         })
     }
 
-    /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows:
-    /// what a tile reads depends on the tiles that it is in flight with.
+    /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows.
+    /// The reads of a tile then depend on the tiles that are in flight with it.
     fn in_flight<K: ChipKind>(
         &self,
         frame: &FrameParameters,

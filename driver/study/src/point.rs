@@ -1,4 +1,4 @@
-//! Points: single measurements, each with everything that its result depends on.
+//! Points: individual measurements, each with everything that its result depends on.
 
 use photoncard_picture::choice::Choice;
 use photoncard_render::emulator::EmulatedKind;
@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 
 use super::sample::SampleRate;
 
-/// Maximum number of characters of a scene's name in the name of a point's file.
+/// Maximum number of characters of a scene's name within the name of a point's file.
 const MAX_SCENE_NAME: usize = 60;
 
-/// One measurement of a scene.
+/// A measurement of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// Name of the scene in the laboratory: its file in the folder of scenes.
@@ -20,30 +20,31 @@ pub struct Point {
     pub assignments: Vec<String>,
     /// Settings of the render.
     pub settings: RenderSettings,
-    /// Quantity that is measured.
+    /// Quantity to measure.
     pub task: Task,
 }
 
 /// Quantity that is measured at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Task {
-    /// Work and memory traffic of tiles behind caches that are empty when a tile begins.
+    /// Work and memory traffic of tiles, with caches that are empty when a tile begins.
     Traffic {
-        /// The kind of chip.
+        /// Kind of the chip.
         chip: EmulatedKind,
-        /// The caches between chip and DRAM.
+        /// Caches between chip and DRAM.
         caches: CacheSettings,
-        /// Share of the tiles; [`Hilbert`](photoncard_cards::scheduler::GatherOrder::Hilbert), and several
-        /// tiles in flight, render the whole frame whatever it is.
+        /// Fraction of the tiles to render. The order
+        /// [`Hilbert`](photoncard_cards::scheduler::GatherOrder::Hilbert), and several tiles in flight,
+        /// render the whole frame regardless.
         sample: SampleRate,
-        /// Minimum number of tiles, as far as the picture has that many.
+        /// Minimum number of tiles to render, if the picture has that many.
         least_tiles: usize,
     },
-    /// Error of indirect light against a reference with many more gather rays.
+    /// Error of indirect light, compared with a reference with many more gather rays.
     Quality {
-        /// Tiles of 16x16 pixels that are compared.
+        /// Number of tiles of 16x16 pixels that are compared.
         tiles: usize,
-        /// Final gather rays per pixel of the reference.
+        /// Number of final gather rays per pixel of the reference.
         reference_rays: u32,
     },
 }
@@ -57,7 +58,7 @@ impl Point {
         }
     }
 
-    /// Checks the settings against each other and against the kind of chip.
+    /// Checks the settings against each other, and against the kind of chip.
     ///
     /// # Errors
     /// The first setting that is not possible.
@@ -81,7 +82,8 @@ impl Point {
         self.settings.check_budget(&self.chip().budget())
     }
 
-    /// Name of the point's file: task, scene and order. Points that differ in other settings share it.
+    /// Name of the point's file: task, scene and order. Points that differ only in other settings have the
+    /// same name.
     pub fn name(&self) -> String {
         let task = match self.task {
             Task::Traffic { .. } => "traffic",
@@ -113,7 +115,7 @@ impl Point {
         key
     }
 
-    /// Key of the point's card image; points of equal keys share the image.
+    /// Key of the point's card image. Points with equal keys share the image.
     pub fn image_key(&self) -> ImageKey {
         let RenderSettings { photons, integrator, .. } = &self.settings;
         ImageKey {

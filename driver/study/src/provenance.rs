@@ -8,7 +8,8 @@ use photoncard_render::PROGRAM;
 use super::report::Provenance;
 
 impl Provenance {
-    /// This program on this machine today, called as `command_line`. Settings are for the study to add.
+    /// Provenance with this program, machine and date, and the command line `command_line`. The study adds
+    /// its settings.
     pub fn here(command_line: &str) -> Self {
         let days = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs() / 86_400);
         Self {
@@ -21,7 +22,7 @@ impl Provenance {
     }
 }
 
-/// The processor's model, its number of hardware threads, and the operating system.
+/// Text with the processor's model, its number of hardware threads, and the operating system.
 fn host() -> String {
     let information = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = information.lines().find(|line| line.starts_with("model name"));
@@ -31,7 +32,7 @@ fn host() -> String {
     format!("{processor}, {threads} threads, {}", std::env::consts::OS)
 }
 
-/// The Gregorian date, as `2007-05-01`, of a number of days after 1970-01-01.
+/// Gregorian date, such as `2007-05-01`, that is `days` days after 1970-01-01.
 fn date(days: u64) -> String {
     // Years are counted from March, so that a leap day is the last of its year; 1970-01-01 is day 719,468
     // from 0000-03-01.
@@ -51,7 +52,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn days_have_their_dates() {
+    fn days_convert_to_gregorian_dates() {
         for (days, text) in [
             (0, "1970-01-01"),
             (59, "1970-03-01"),

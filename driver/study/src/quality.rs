@@ -1,17 +1,17 @@
 //! Error of indirect light against a reference with many more gather rays.
 //!
-//! Only the sampling, the number of gather rays, the irradiance cache and precomputed irradiance change
-//! pixels; the order of the gathers, the tiles, the layout of the photon map and the caches do not. What they
-//! change is compared alone: the light that gather rays bring from the photon map,
+//! Sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels. The
+//! order of gathers, tiles, the layout of the photon map and caches do not. Only the light that they change
+//! is compared, the light that gather rays bring from the photon map:
 //!
 //! ```text
 //! L_indirect(x, w) = integral of f(x, w', w) L_map(y, -w') cos(theta') dw'
 //! ```
 //!
-//! with `y` the surface that the ray from `x` in the direction `w'` meets, and `L_map` the radiance that
-//! photons give it. Direct light has a noise of its own, that of shadow rays. Gather rays and records of the
-//! irradiance cache bring shares of it that depend on the number of rays, so all lights are put out in the
-//! card image: its layer of indirect light is then `L_indirect` by any technique.
+//! where `y` is the surface point that the ray from `x` in the direction `w'` hits, and `L_map` is its
+//! radiance estimated from photons. Direct light is excluded, because shadow rays add noise to it, and
+//! because gather rays and irradiance records contribute parts of it that depend on the number of rays. The
+//! card image therefore has no emission: its layer of indirect light is `L_indirect` for every technique.
 
 use photoncard_cards::scheduler::{GatherOrder, tiles};
 use photoncard_firmware::kind;
@@ -25,14 +25,14 @@ use serde::{Deserialize, Serialize};
 use super::measure::Bench;
 use super::sample::choose;
 
-/// Error of indirect light in the pixels of one tile, sums over pixels and channels.
+/// Error of indirect light in the pixels of one tile, as sums over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TileError {
-    /// Number of pixels that are compared.
+    /// Number of pixels that were compared.
     pub pixels: usize,
-    /// Sum of the squared differences from the reference.
+    /// Sum of squared differences from the reference.
     pub squares: f64,
-    /// Part of [`Self::squares`] that is the reference's own noise: an unbiased estimate.
+    /// Unbiased estimate of the part of [`Self::squares`] that is noise of the reference.
     pub noise: f64,
     /// Sum of the pixels.
     pub sum: f64,
@@ -40,33 +40,33 @@ pub struct TileError {
     pub reference: f64,
 }
 
-/// Error of a render's indirect light against a [`Reference`].
+/// Error of a render's indirect light compared with a [`Reference`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// Errors of the tiles, which have equal weight a pixel.
+    /// Errors by tile. All pixels have equal weight.
     pub tiles: Vec<TileError>,
 }
 
 impl Quality {
-    /// Root mean square error over pixels and channels, over the reference's mean, without the reference's
-    /// own noise; 0 if that noise is more than the difference.
+    /// Root mean square error over pixels and channels, relative to the reference's mean, without the
+    /// reference's noise; 0 if that noise exceeds the difference.
     pub fn rmse(&self) -> f64 {
         let TileError { squares, noise, .. } = self.total();
         self.relative((squares - noise).max(0.0))
     }
 
-    /// Root mean square of the reference's own noise, over its mean.
+    /// Root mean square of the reference's noise, relative to its mean.
     pub fn reference_noise(&self) -> f64 {
         self.relative(self.total().noise)
     }
 
-    /// Mean of the pixels over the mean of the reference; 1 without bias.
+    /// Ratio of the means of the pixels and of the reference; 1 without bias.
     pub fn mean(&self) -> f64 {
         let TileError { sum, reference, .. } = self.total();
         sum / reference
     }
 
-    /// The error without one of the tiles.
+    /// Omits one tile.
     #[must_use]
     pub fn without(&self, tile: usize) -> Self {
         let others = self.tiles.iter().enumerate().filter(|(index, _)| *index != tile);
@@ -93,36 +93,36 @@ impl Quality {
 /// Side of the tiles that are compared, pixels.
 const TILE: u32 = 16;
 
-/// A pixel of a reference.
 struct ReferencePixel {
     /// Indirect light, W/(sr m^2).
     light: [f64; 3],
-    /// Squared noise of the light, an estimate.
+    /// Estimated squared noise of the light.
     noise: f64,
 }
 
-/// Reference picture of indirect light by many gather rays, of the pixels that show a lit surface and no
-/// emitter.
+/// Reference picture of indirect light with many gather rays. It has the pixels that show a lit surface and
+/// no emitter.
 ///
-/// It is the mean of two renders by `n` and `m` rays with different strata, weighted by rays. If their errors
-/// are independent and their variances are `v / n` and `v / m`, the squared difference of the two is `v (1 /
-/// n + 1 / m)` on average, and the variance of their mean `v / (n + m)`.
+/// It is the mean, weighted by rays, of two renders with `n` and `m` rays and different strata. If their
+/// errors are independent and their variances are `v / n` and `v / m`, the squared difference of the two is
+/// `v (1 / n + 1 / m)` on average, and the variance of their mean is `v / (n + m)`.
 pub struct Reference {
-    /// Settings of the reference render.
+    /// Settings with which the reference was rendered.
     settings: RenderSettings,
-    /// Pixels of each tile; `None` for a pixel that is left out.
+    /// Pixels of each tile; `None` for an excluded pixel.
     tiles: Vec<Vec<Option<ReferencePixel>>>,
 }
 
-/// Rays of the two renders of a reference by `rays` in all. They differ so that their strata do.
+/// Numbers of rays of the two renders of a reference with `rays` rays in total. They differ, so that the
+/// strata differ.
 fn halves(rays: u32) -> [u32; 2] {
     let first = 3 * rays / 8;
     [first, rays - first].map(|rays| rays.max(1))
 }
 
 impl Reference {
-    /// Renders `tiles` tiles with `rays` gather rays per pixel by combined sampling, without the irradiance
-    /// cache, and with radiance by density estimation. Eye rays are those of `settings`.
+    /// Renders `tiles` tiles with `rays` gather rays per pixel, combined sampling, no irradiance cache, and
+    /// density estimates. Eye rays are those of `settings`.
     ///
     /// # Errors
     /// If the settings' camera is not possible in the scene, the card image is malformed, or the bench is
@@ -153,7 +153,7 @@ impl Reference {
         Ok(Self { tiles: tiles.collect(), settings })
     }
 
-    /// Returns whether [`Self::new`] would make this reference from photons of the same scene.
+    /// Returns whether [`Self::new`] would create an equal reference from photons of the same scene.
     pub fn is_of(&self, settings: &RenderSettings, tiles: usize, rays: u32) -> bool {
         self.tiles.len() == tiles && self.settings == Self::settings(settings, rays)
     }
@@ -168,7 +168,7 @@ impl Reference {
         })
     }
 
-    /// Renders the reference's tiles with `settings`, and returns their error.
+    /// Renders the reference's tiles with `settings`. Returns their error.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -180,7 +180,7 @@ impl Reference {
 }
 
 impl ReferencePixel {
-    /// The mean of two renders by these numbers of rays, and its noise.
+    /// Mean of two renders with these numbers of rays, and its noise.
     fn new(lights: [[f64; 3]; 2], rays: [u32; 2]) -> Self {
         let [first, second] = lights;
         let share = f64::from(rays[0]) / f64::from(rays[0] + rays[1]);
@@ -190,7 +190,6 @@ impl ReferencePixel {
     }
 }
 
-/// Error of a tile's pixels.
 fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileError {
     let mut error = TileError::default();
     for (reference, pixel) in reference.iter().zip(pixels) {
@@ -206,8 +205,8 @@ fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileError
     error
 }
 
-/// `settings` with tiles, order and queues replaced, which do not change pixels, and without shadow rays,
-/// which bring no indirect light: the fastest order.
+/// Replaces settings that do not change indirect light: tiles, order and queues, by the fastest order, and
+/// shadow rays, by none.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     let mut comparable = RenderSettings {
         schedule: Schedule {
@@ -226,10 +225,10 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
     comparable
 }
 
-/// Colours of the pixels of tiles, W/(sr m^2).
+/// Colours of the pixels by tile, W/(sr m^2).
 type TilePixels = Vec<Vec<[f64; 3]>>;
 
-/// Indirect light in `count` tiles: the scene's photons with its lights out.
+/// Indirect light in `count` tiles, rendered from an image that has the scene's photons but no emission.
 fn indirect(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<TilePixels, RenderError> {
     let MappedImage { image, max_distance, caustics, paths, guiding, times } = bench.mapped;
     let (max_distance, caustics) = (*max_distance, *caustics);
@@ -239,12 +238,13 @@ fn indirect(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Ti
     pixels(&bench, settings, true, count, |pixel| pixel.layers.indirect)
 }
 
-/// Visible emission in `count` tiles, by settings without gather rays and shadow rays.
+/// Visible emission in `count` tiles, rendered without gather rays and shadow rays.
 fn emitted(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<TilePixels, RenderError> {
     pixels(bench, settings, false, count, |pixel| pixel.pixel.radiance)
 }
 
-/// Pixels of `count` tiles, by a function of their values in a frame without or with layers.
+/// Renders `count` tiles. `light` is applied to the values of each pixel; `layers` states whether the frame
+/// has layers.
 fn pixels(
     bench: &Bench,
     settings: &RenderSettings,
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn indirect_light_is_the_layer_of_the_lit_scene_where_no_record_mixes_in_direct_light() {
+    fn indirect_light_equals_the_layer_of_the_lit_scene_without_records() {
         let room = Room::new();
         let layer = |pixel: &FilmPixel| pixel.layers.indirect;
         let lit = pixels(&room.bench(), &room.settings, true, 4, layer).unwrap();
@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn error_falls_with_rays_and_does_not_hold_the_noise_of_the_reference() {
+    fn error_falls_with_rays_and_excludes_the_noise_of_the_reference() {
         let room = Room::new();
         let error = |rays: u32, of_reference: u32| {
             let reference = Reference::new(&room.bench(), &room.settings, 4, of_reference).unwrap();
@@ -339,7 +339,7 @@ mod tests {
     }
 
     #[test]
-    fn a_tile_can_be_left_out() {
+    fn a_tile_can_be_omitted_from_a_quality() {
         let tile = |squares| TileError { pixels: 1, squares, noise: 1.0, sum: 2.0, reference: 3.0 };
         let quality = Quality { tiles: vec![tile(4.0), tile(13.0)] };
         assert_eq!(quality.without(1), Quality { tiles: vec![tile(4.0)] });

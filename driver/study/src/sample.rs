@@ -1,9 +1,9 @@
 //! Stratified sample of a picture's tiles, and estimates of totals from it.
 //!
-//! Tiles are sorted along the Z-order curve of their centres and cut into as many strata (*stretches*) as
-//! there are tiles to choose, of equal size except for one tile. A hash chooses one tile of each stretch,
-//! which represents it. The sample is thus spread over the picture whatever the shape of the tiles, does not
-//! alias with regular patterns of the scene, and is reproducible.
+//! Tiles are sorted along the Z-order curve of their centres and divided into as many strata (*stretches*) as
+//! there are tiles to choose. The sizes of strata differ by at most one tile. A hash chooses one tile of each
+//! stretch, which represents it. The sample is thus spread over the picture whatever the shape of the tiles,
+//! does not alias with regular patterns of the scene, and is reproducible.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,7 +12,7 @@ use photoncard_firmware::sampler::hash;
 use photoncard_shared::message::Tile;
 use serde::{Deserialize, Serialize};
 
-/// Share of a picture's tiles that is rendered: `1/17`, or `1` for all.
+/// Fraction of a picture's tiles that is rendered, such as `1/17`, or `1` for all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SampleRate {
     numerator: u32,
@@ -23,12 +23,12 @@ impl SampleRate {
     /// All tiles.
     pub const ALL: Self = Self { numerator: 1, denominator: 1 };
 
-    /// The share `numerator / denominator`; `None` unless it is above 0 and at most 1.
+    /// Fraction `numerator / denominator`; `None` unless it is above 0 and at most 1.
     pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
         if numerator == 0 || numerator > denominator { None } else { Some(Self { numerator, denominator }) }
     }
 
-    /// Number of tiles out of `total`: the share, rounded up, or `least` if that is more, but at most
+    /// Number of tiles to render out of `total`: the fraction, rounded up, but at least `least` and at most
     /// `total`.
     pub fn count(self, total: usize, least: usize) -> usize {
         let share = (total as u64 * u64::from(self.numerator)).div_ceil(u64::from(self.denominator));
@@ -54,16 +54,17 @@ impl FromStr for SampleRate {
     }
 }
 
-/// A tile of a sample.
+/// A tile chosen for a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Chosen {
     /// The tile.
     pub tile: Tile,
-    /// Weight: number of tiles in the stretch that the tile represents.
+    /// Weight of the tile: number of tiles in the stretch that it represents.
     pub stands_for: usize,
 }
 
-/// Chooses `count` of the tiles, spread over the picture, in the picture's order; all if `count` is larger.
+/// Chooses `count` of the tiles, spread over the picture, and returns them in the picture's order; all tiles
+/// if `count` is larger.
 pub fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
     let count = count.min(tiles.len());
     let mut sorted = tiles.to_vec();
@@ -84,8 +85,8 @@ pub fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
     chosen
 }
 
-/// The bits of a number at the even positions of a number of 64 bits, zeros at the odd ones: half of a Morton
-/// code.
+/// Spreads the bits of a number to the even positions of 64 bits, with zeros at the odd positions: half of a
+/// Morton code.
 fn spread_bits(number: u32) -> u64 {
     (0..32).map(|bit| (u64::from(number) >> bit & 1) << (2 * bit)).sum()
 }
@@ -93,21 +94,21 @@ fn spread_bits(number: u32) -> u64 {
 /// Estimate of a sum over all tiles, with its confidence interval.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Estimate {
-    /// The estimated sum.
+    /// Estimated sum.
     pub value: f64,
-    /// Half the width of the 95 % confidence interval; 0 if all tiles were rendered.
+    /// Half-width of the 95 % confidence interval; 0 if all tiles were rendered.
     pub half_width: f64,
 }
 
 impl Estimate {
-    /// Estimate of a population's sum from a sample of pairs: value, and weight `w`, the members that it
-    /// stands for.
+    /// Estimates a population's sum from a sample. Each pair is a value and its weight `w`, the number of
+    /// members that it represents.
     ///
-    /// The sum of value times weight, `+- t s sqrt(sum w (w - 1))`, with the standard deviation `s` of the
-    /// `n` values and Student's `t` of `n - 1` degrees of freedom. With equal weights that is the interval of
-    /// a simple random sample of a finite population. A sample that is spread over the picture errs less than
-    /// a random one, so the interval is wide rather than narrow. A single value that stands for more than
-    /// itself has an infinite half-width.
+    /// The estimate is the sum of value times weight, `+- t s sqrt(sum w (w - 1))`, where `s` is the standard
+    /// deviation of the `n` values and `t` is Student's t for `n - 1` degrees of freedom. With equal weights
+    /// this is the interval of a simple random sample of a finite population. A sample that is spread over
+    /// the picture has smaller errors than a random one, so that the interval is rather too wide than too
+    /// narrow. A single value that represents more than itself has an infinite half-width.
     pub fn of_total(sample: &[(f64, usize)]) -> Self {
         let value = sample.iter().map(|&(value, stands_for)| value * stands_for as f64).sum();
         let spread =
@@ -125,7 +126,7 @@ impl Estimate {
         Self { value, half_width: students_t(sample.len() - 1) * error }
     }
 
-    /// The estimate times `factor`, for another unit.
+    /// Multiplies the estimate by `factor`, for another unit.
     pub fn scaled(self, factor: f64) -> Self {
         Self { value: self.value * factor, half_width: self.half_width * factor.abs() }
     }
@@ -143,11 +144,11 @@ pub(super) struct Ratio {
 }
 
 impl Ratio {
-    /// The ratio of an estimate to itself.
+    /// Ratio of an estimate to itself.
     pub(super) const ONE: Self = Self { value: 1.0, lower: 1.0, upper: 1.0 };
 
-    /// Ratio of two independent estimates. Its logarithm has the relative half-widths of both and a `further`
-    /// one, all independent: the root of the sum of their squares.
+    /// Ratio of two independent estimates. The relative half-width of its logarithm is the root of the sum of
+    /// the squares of both relative half-widths and of `further`, all of which are independent.
     pub(super) fn new(numerator: Estimate, denominator: Estimate, further: f64) -> Self {
         let relative = |estimate: Estimate| estimate.half_width / estimate.value;
         let spread = relative(numerator).hypot(relative(denominator)).hypot(further).exp();
@@ -156,8 +157,8 @@ impl Ratio {
     }
 }
 
-/// Half the width of the 95 % confidence interval of a statistic by the jackknife (Tukey 1958), from its
-/// values without each one of the observations; infinite for fewer than two.
+/// Half-width of the 95 % confidence interval of a statistic, by the jackknife (Tukey 1958). `without_one`
+/// has the statistic without each of the observations. Infinite for fewer than two.
 pub(super) fn jackknife_half_width(without_one: &[f64]) -> f64 {
     if without_one.len() < 2 {
         return f64::INFINITY;
@@ -168,11 +169,11 @@ pub(super) fn jackknife_half_width(without_one: &[f64]) -> f64 {
     students_t(without_one.len() - 1) * (squares * (count - 1.0) / count).sqrt()
 }
 
-/// 97.5 % quantiles of Student's t-distribution of one to ten degrees of freedom.
+/// 97.5 % quantiles of Student's t-distribution with one to ten degrees of freedom.
 const FEW: [f64; 10] = [12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228];
 
-/// The 97.5 % quantile of Student's t-distribution; beyond ten degrees of freedom by the Cornish-Fisher
-/// expansion.
+/// 97.5 % quantile of Student's t-distribution. Above ten degrees of freedom it is computed by the
+/// Cornish-Fisher expansion.
 fn students_t(degrees: usize) -> f64 {
     const Z: f64 = 1.959_964;
     FEW.get(degrees.wrapping_sub(1)).copied().unwrap_or_else(|| {
@@ -192,7 +193,7 @@ mod tests {
     use photoncard_picture::film::Window;
 
     #[test]
-    fn a_share_is_a_fraction_of_some_tiles() {
+    fn a_sample_rate_is_parsed_and_counts_tiles() {
         for (text, written) in [("1/17", "1/17"), ("1", "1/1"), ("3/4", "3/4"), ("5/5", "5/5")] {
             assert_eq!(text.parse::<SampleRate>().unwrap().to_string(), written);
         }
@@ -222,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tiles_of_a_sample_stand_for_all_and_none_counts_for_more_than_its_stretch() {
+    fn weights_of_a_sample_sum_to_all_tiles_and_none_exceeds_its_stretch() {
         let tiles = tiles(Window::full(100, 70), 16, GatherOrder::Sort);
         for count in 1..=tiles.len() {
             let stands_for: Vec<usize> = choose(&tiles, count).iter().map(|tile| tile.stands_for).collect();
@@ -234,9 +235,9 @@ mod tests {
         assert_eq!(estimate.value, 5.0);
     }
 
-    /// Uniform, skewed and two-valued populations, sampled repeatedly in stretches of a shuffled order.
+    /// Uniform, skewed and two-valued populations are sampled repeatedly in stretches of a shuffled order.
     #[test]
-    fn the_interval_covers_the_total_of_a_population_as_often_as_it_says() {
+    fn the_interval_covers_the_total_of_a_population_at_its_confidence_level() {
         let uniform = |index: u32| (f64::from(hash(index)) + 0.5) / 4_294_967_296.0;
         let shapes: [fn(f64) -> f64; 3] = [|u| 5.0 + u, |u| -u.ln(), |u| if u < 0.3 { 0.0 } else { 1.0 }];
         for (shape, (total, count)) in
@@ -259,7 +260,7 @@ mod tests {
     }
 
     #[test]
-    fn the_jackknife_of_a_mean_is_its_students_interval() {
+    fn the_jackknife_interval_of_a_mean_is_its_students_t_interval() {
         let values: [f64; 5] = [1.0, 4.0, 2.0, 8.0, 5.0];
         let sum: f64 = values.iter().sum();
         let without: Vec<f64> = values.iter().map(|value| (sum - value) / 4.0).collect();
@@ -270,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ratio_is_as_uncertain_as_all_that_it_is_made_of() {
+    fn a_ratio_combines_the_uncertainties_of_its_estimates() {
         let estimate = |value, relative: f64| Estimate { value, half_width: relative * value };
         let ratio = Ratio::new(estimate(6.0, 0.3), estimate(2.0, 0.4), 1.2);
         assert_eq!(ratio.value, 3.0);
@@ -281,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn all_tiles_leave_no_doubt_and_one_tile_all() {
+    fn all_tiles_give_a_zero_interval_and_one_tile_an_infinite_one() {
         assert_eq!(
             Estimate::of_total(&[(1.0, 1), (2.0, 1), (4.0, 1)]),
             Estimate { value: 7.0, half_width: 0.0 }

@@ -1,5 +1,5 @@
-//! Scale of a study: the settings that its renders have in common, and the number of values that it varies
-//! them over.
+//! Scale of a study: the settings that its renders have in common, and the number of values over which it
+//! varies others.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;
@@ -15,7 +15,7 @@ use super::sample::SampleRate;
 
 /// Side of the dissertation's tiles, pixels.
 pub(super) const TILE: u32 = 16;
-/// Side of the largest tile that the reference chip has room for, pixels.
+/// Side of the largest tile for which the reference chip has room, pixels.
 pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
 
 /// Settings that all points of a study have in common, and the number of points.
@@ -23,30 +23,30 @@ pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
 pub struct Scale {
     /// Width and height of the picture, pixels.
     pub side: u32,
-    /// Photons in the map.
+    /// Number of photons in the map.
     pub photons: usize,
-    /// Photons that a gather searches for, `k`.
+    /// Number `k` of photons that a gather searches for.
     pub neighbors: u32,
-    /// Final gather rays per pixel, where the study does not vary them.
+    /// Number of final gather rays per pixel, unless the study varies it.
     pub gather_rays: u32,
-    /// Shadow rays per pixel.
+    /// Number of shadow rays per pixel.
     pub shadow_rays: u32,
-    /// Share of the tiles that is rendered.
+    /// Fraction of the tiles that is rendered.
     pub sample: SampleRate,
-    /// Minimum number of tiles that are rendered, as far as the picture has that many.
+    /// Minimum number of tiles that are rendered, if the picture has that many.
     pub least_tiles: usize,
-    /// Tiles of 16x16 pixels that are compared with a reference.
+    /// Number of tiles of 16x16 pixels that are compared with a reference.
     pub quality_tiles: usize,
-    /// Final gather rays per pixel of the reference.
+    /// Number of final gather rays per pixel of the reference.
     pub reference_rays: u32,
-    /// True if studies vary their settings over fewer values: [`Self::pick`].
+    /// True if studies vary their settings over fewer values ([`Self::pick`]).
     pub is_quick: bool,
-    /// The machine of times and numbers of chips.
+    /// Machine for which times and numbers of chips are computed.
     pub machine: Machine,
 }
 
 impl Scale {
-    /// The dissertation's nominal frame.
+    /// Scale with the dissertation's nominal frame.
     pub const FULL: Self = Self {
         side: 512,
         photons: 500_000,
@@ -60,7 +60,7 @@ impl Scale {
         is_quick: false,
         machine: Machine::NOMINAL,
     };
-    /// A small picture and fewer values, as a trial of the whole.
+    /// Scale with a small picture and fewer values, for a trial of all studies.
     pub const QUICK: Self = Self {
         side: 128,
         photons: 60_000,
@@ -75,15 +75,15 @@ impl Scale {
         machine: Machine::NOMINAL,
     };
 
-    /// True if all points share the settings of the dissertation's nominal frame. Only figures of such a
-    /// scale may stand beside published ones.
+    /// Returns true if all points have the settings of the dissertation's nominal frame. Only figures at such
+    /// a scale may be compared with published ones.
     pub fn is_nominal(&self) -> bool {
         let frame =
             |scale: &Self| (scale.side, scale.photons, scale.neighbors, scale.gather_rays, scale.shadow_rays);
         frame(self) == frame(&Self::FULL)
     }
 
-    /// Mark of figures that are not of the nominal frame; `None` for the others.
+    /// Text that marks figures as not being of the nominal frame; `None` if they are.
     pub fn banner(&self) -> Option<String> {
         let Self { side, photons, neighbors, gather_rays, .. } = self;
         let Self { side: nominal_side, photons: nominal_photons, .. } = Self::FULL;
@@ -96,23 +96,23 @@ impl Scale {
         })
     }
 
-    /// This scale with another share of the tiles.
+    /// Replaces the fraction of the tiles.
     pub fn with_sample(self, sample: SampleRate) -> Self {
         Self { sample, ..self }
     }
 
-    /// This scale with times and numbers of chips by another machine. No point depends on it.
+    /// Replaces the machine for times and numbers of chips. No point depends on it.
     pub fn on(self, machine: Machine) -> Self {
         Self { machine, ..self }
     }
 
-    /// The values that a study varies a setting over: `quick` if [`Self::is_quick`], else `full`.
+    /// Values over which a study varies a setting: `quick` if [`Self::is_quick`], else `full`.
     pub fn pick<T: Copy>(&self, full: &[T], quick: &[T]) -> Vec<T> {
         if self.is_quick { quick.to_vec() } else { full.to_vec() }
     }
 
-    /// Settings without any technique but an order: 16x16 tiles, one in flight, rays by the reflection,
-    /// Jensen's kd-tree.
+    /// Settings without any technique except an order: tiles of 16x16 pixels, one in flight, sampling by the
+    /// reflection, Jensen's kd-tree.
     pub fn settings(&self, order: GatherOrder) -> RenderSettings {
         RenderSettings {
             picture: Picture { width: self.side, height: self.side, ..Picture::default() },
@@ -133,8 +133,8 @@ impl Scale {
         }
     }
 
-    /// Settings with everything on: gathers sorted over the largest tiles, combined sampling, the irradiance
-    /// cache, photons in line leaves.
+    /// Settings with all techniques: gathers sorted over the largest tiles, combined sampling, the irradiance
+    /// cache, photons in leaves.
     pub fn all_on(&self) -> RenderSettings {
         self.settings(GatherOrder::Sort).with(|s| {
             s.photons.layout = PhotonLayout::Lines;
@@ -144,25 +144,26 @@ impl Scale {
         })
     }
 
-    /// [`Self::all_on`] in the dissertation's tiles of 16x16 pixels, of which a frame has enough for many
-    /// chips.
+    /// Settings of [`Self::all_on`] with the dissertation's tiles of 16x16 pixels, of which a frame has
+    /// enough for many chips.
     pub fn all_on_in_small_tiles(&self) -> RenderSettings {
         self.all_on().with(|s| s.schedule.tile = Some(TILE))
     }
 
-    /// A point that measures the traffic of sampled tiles behind the nominal caches.
+    /// Point that measures the traffic of sampled tiles behind the nominal caches.
     pub fn traffic(&self, scene: &str, settings: RenderSettings) -> Point {
         self.traffic_behind(scene, settings, CacheSettings::default())
     }
 
-    /// A point that measures the traffic of sampled tiles behind `caches`.
+    /// Point that measures the traffic of sampled tiles behind `caches`.
     pub fn traffic_behind(&self, scene: &str, settings: RenderSettings, caches: CacheSettings) -> Point {
         let chip = EmulatedKind::Reference;
         let task = Task::Traffic { chip, caches, sample: self.sample, least_tiles: self.least_tiles };
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
     }
 
-    /// A point that measures the traffic of all tiles in flight on one chip of a kind, behind `caches`.
+    /// Point that measures the traffic of all tiles on one chip of kind `chip`, which has them in flight,
+    /// behind `caches`.
     pub(super) fn on_one_chip(
         &self,
         scene: &str,
@@ -174,18 +175,18 @@ impl Scale {
         Point { task, ..self.traffic_behind(scene, settings, caches) }
     }
 
-    /// A point that measures the traffic of all tiles behind the nominal caches.
+    /// Point that measures the traffic of all tiles behind the nominal caches.
     pub fn whole(&self, scene: &str, settings: RenderSettings) -> Point {
         Self { sample: SampleRate::ALL, ..self.clone() }.traffic(scene, settings)
     }
 
-    /// A point that measures the error of [`Self::quality_tiles`] tiles.
+    /// Point that measures the error of [`Self::quality_tiles`] tiles.
     pub fn quality(&self, scene: &str, settings: RenderSettings) -> Point {
         let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
     }
 
-    /// Settings that all points share, as names and values for a report's provenance.
+    /// Names and values of the settings that all points share, for a report's provenance.
     pub fn rows(&self) -> Vec<(String, String)> {
         let settings = self.settings(GatherOrder::Sort);
         let rows = [
@@ -210,14 +211,14 @@ impl Scale {
         rows.into_iter().chain([machine_row(&self.machine)]).collect()
     }
 
-    /// Gathers of a frame in which every gather ray of every pixel ends in one, `side^2 N_FG`: 26.2 million
-    /// at the nominal values.
+    /// Number of gathers of a frame in which every gather ray of every pixel ends in one: `side^2 N_FG`, 26.2
+    /// million at the nominal values.
     pub fn nominal_gathers(&self) -> f64 {
         f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
     }
 }
 
-/// Machine of a report's times and numbers of chips, as a name and a value for its provenance.
+/// Name and value that describe the machine of a report's times and numbers of chips, for its provenance.
 pub(super) fn machine_row(machine: &Machine) -> (String, String) {
     let Machine { link, tasks, .. } = machine;
     let value = format!(
@@ -228,5 +229,5 @@ pub(super) fn machine_row(machine: &Machine) -> (String, String) {
     ("chip that times are of".to_owned(), value)
 }
 
-/// The dissertation's error bound of the irradiance cache, as figure 6.17 seems to state it.
+/// Error bound of the dissertation's irradiance cache, as figure 6.17 seems to state it.
 pub(super) const IRRADIANCE_ERROR: f32 = 0.025;

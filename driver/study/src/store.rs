@@ -1,8 +1,8 @@
-//! Finished points of a study, kept so that an interrupted study goes on where it stopped.
+//! Finished points of a study, stored so that an interrupted study continues where it stopped.
 //!
-//! A point is one JSON file that holds the settings it was computed with (its *key*) and its result. The key
-//! names everything that the result depends on, the program's version included: a point is found again only
-//! by an equal key, so that a new version computes all points anew.
+//! A point is one JSON file with the settings that determine it (its *key*) and its result. The key includes
+//! everything that the result depends on, also the program's version. A point is only found by an equal key,
+//! so that a new version computes all points again.
 
 use std::fs;
 use std::io::{self, ErrorKind};
@@ -23,29 +23,29 @@ const POINTS: &str = "points";
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StoreError {
-    /// Error of creating the folder.
+    /// The folder cannot be created.
     #[error("cannot create the folder {}; check the permissions of the folder that it is to be in", folder.display())]
     Folder {
-        /// The folder.
+        /// Path of the folder.
         folder: PathBuf,
-        /// The operating system's error.
+        /// Error of the operating system.
         #[source]
         source: io::Error,
     },
-    /// Error of a name that is not a portable file name.
+    /// The name is not a portable file name.
     #[error(
         "'{name}' cannot name a point; use up to 100 letters, digits, '-' and '.', the first and the last of them no dot"
     )]
     BadName {
-        /// The name.
+        /// Name of the point.
         name: String,
     },
-    /// Error of a result that JSON cannot represent.
+    /// The result cannot be represented in JSON.
     #[error("the result of the point '{name}' cannot be kept as JSON; its maps must have text for keys")]
     NotJson {
-        /// The point's name.
+        /// Name of the point.
         name: String,
-        /// The serializer's error.
+        /// Error of the serializer.
         #[source]
         source: serde_json::Error,
     },
@@ -61,20 +61,20 @@ pub struct PointStore {
     notices: Vec<String>,
 }
 
-/// The contents of a point's file.
+/// Contents of a point's file.
 #[derive(Deserialize, Serialize)]
 struct StoredPoint {
     key: Value,
     result: Value,
-    /// FNV-1a hash of key and result, hexadecimal.
+    /// FNV-1a hash of key and result, in hexadecimal.
     checksum: String,
 }
 
 impl PointStore {
-    /// Opens the store in `folder/points`, which is made if it is missing.
+    /// Opens the store in `folder/points`, which is created if it is missing.
     ///
     /// # Errors
-    /// If the folder cannot be made.
+    /// If the folder cannot be created.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         let folder = folder.join(POINTS);
         match fs::create_dir_all(&folder) {
@@ -83,10 +83,10 @@ impl PointStore {
         }
     }
 
-    /// The result of the point of this name and key, if it is finished.
+    /// Returns the result of the point with this name and key, if it is finished.
     ///
-    /// A file that cannot be read, is damaged or edited, or holds another key counts as absent and adds to
-    /// the [notices](Self::notices).
+    /// A file that cannot be read, is damaged or edited, or has another key counts as missing and adds to the
+    /// [notices](Self::notices).
     pub fn get<T: DeserializeOwned>(&mut self, name: &str, key: &Value) -> Option<T> {
         let path = self.path(name, key).ok()?;
         let read = match fs::metadata(&path).map(|found| kind_of(found.file_type())) {
@@ -109,14 +109,14 @@ impl PointStore {
         }
     }
 
-    /// Writes the result of a point; it replaces an earlier one of equal name and key.
+    /// Stores the result of a point. It replaces an earlier result with the same name and key.
     ///
-    /// Finite numbers are read back to the last bit. JSON has no infinities and no NaN: a result that may
-    /// have them must use an `Option`, or it is not found again.
+    /// Finite numbers are read back exactly. JSON has no infinities and no NaN: a result that may contain
+    /// them must use an `Option`, or it is not found again.
     ///
     /// # Errors
-    /// If the name is not of letters, digits, `-` and `.`, the result is not JSON, or the file cannot be
-    /// written.
+    /// If the name has other characters than letters, digits, `-` and `.`, the result cannot be represented
+    /// in JSON, or the file cannot be written.
     pub fn put<T: Serialize>(&self, name: &str, key: &Value, result: &T) -> Result<(), StoreError> {
         let path = self.path(name, key)?;
         let not_json = |source| StoreError::NotJson { name: name.to_owned(), source };
@@ -142,7 +142,7 @@ impl PointStore {
     }
 }
 
-/// The result in a point's file, or the fault that makes the file unusable.
+/// Decodes the result in a point's file. The error describes why the file cannot be used.
 fn result<T: DeserializeOwned>(bytes: &[u8], key: &Value) -> Result<T, String> {
     let point: StoredPoint =
         serde_json::from_slice(bytes).map_err(|error| format!("is damaged ({error})"))?;
@@ -159,7 +159,7 @@ fn checksum(key: &Value, result: &Value) -> String {
     format!("{:016x}", fnv1a(format!("{key}\n{result}").bytes()))
 }
 
-/// The 64-bit hash of Fowler, Noll and Vo (FNV-1a).
+/// 64-bit hash of Fowler, Noll and Vo (FNV-1a).
 fn fnv1a(bytes: impl Iterator<Item = u8>) -> u64 {
     bytes.fold(0xcbf2_9ce4_8422_2325, |hash, byte| (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3))
 }
@@ -205,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn another_name_key_or_version_is_another_point() {
+    fn a_point_is_found_only_by_its_name_key_and_version() {
         let folder = tempfile::tempdir().unwrap();
         let mut store = PointStore::open(folder.path()).unwrap();
         store.put("sort", &key("1"), &outcome()).unwrap();
@@ -216,7 +216,7 @@ mod tests {
         assert_eq!(store.get::<Outcome>("sort", &key("1")), Some(outcome()));
     }
 
-    /// Two keys of one hash share a file name.
+    /// Two keys with the same hash share a file name.
     #[test]
     fn a_file_with_another_key_is_not_trusted() {
         let folder = tempfile::tempdir().unwrap();
@@ -253,7 +253,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_pipe_in_a_points_place_is_not_waited_for() {
+    fn a_pipe_in_place_of_a_point_does_not_block() {
         let folder = tempfile::tempdir().unwrap();
         let mut store = PointStore::open(folder.path()).unwrap();
         let path = store.path("sort", &key("1")).unwrap();
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_stays_in_the_folder() {
+    fn names_that_leave_the_folder_are_refused() {
         let folder = tempfile::tempdir().unwrap();
         let mut store = PointStore::open(folder.path()).unwrap();
         assert!(matches!(store.put("../sort", &key("1"), &1), Err(StoreError::BadName { .. })));

@@ -11,7 +11,7 @@ unsafe extern "C" {
     static mut __card_dram_end: [Line; 0];
 }
 
-/// Takes all of card memory, with its contents at power-on; `None` if it was taken before.
+/// Takes the whole card memory with its contents at power-on; `None` if it was taken before.
 pub(super) fn take() -> Option<&'static mut [Line]> {
     static TAKEN: AtomicBool = AtomicBool::new(false);
     if TAKEN.swap(true, Ordering::Relaxed) {

@@ -1,5 +1,5 @@
-//! Instruction counts: one tile is rendered three times, each time with one more kind of work. The
-//! differences are the cost of gather rays, and of the gathers at their ends. `tests/instructions.sh` runs
+//! Instruction counts. One tile is rendered three times, each time with one more kind of work; the
+//! differences are the costs of gather rays and of the gathers at their ends. `tests/instructions.sh` runs
 //! it.
 
 use photoncard_firmware::chip::{MicroChip, Progress};
@@ -12,7 +12,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::image::Header;
 use photoncard_shared::message::{self, FrameParameters, Tile};
 
-/// Work to be done.
+/// Kinds of work that a measurement includes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Work {
     /// Eye and shadow rays.
@@ -30,15 +30,15 @@ impl Work {
 /// Side of the tile, which lies in the middle of the picture, pixels.
 const TILE_SIDE: u32 = 16;
 
-/// Outlet that drops gathers.
+/// Receiver of gathers that drops them.
 struct Nowhere;
 
 impl GatherOutlet for Nowhere {
     fn take(&mut self, _: u32, _: GatherRequest) {}
 }
 
-/// Renders the tile. The line after the image holds the length of the frame's parameters, and the parameters.
-/// Returns the counters; `None` if the memory holds anything else.
+/// Renders the tile. The line after the image holds the length of the frame's parameters and the encoded
+/// parameters. Returns the counters; `None` if the memory holds anything else.
 pub(crate) fn render(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
     let scene = SceneImage { header: Header::read(lines.first_chunk()?).ok()? };
     let (&length, bytes) = lines.get(scene.header.lines as usize)?.0.split_first()?;

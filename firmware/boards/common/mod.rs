@@ -1,5 +1,4 @@
-//! Code that the images of all boards share, including `main`. A board implements registers, time and
-//! interrupts.
+//! Code that the images of all boards share, including `main`. A board adds registers, time and interrupts.
 
 mod board;
 #[expect(unsafe_code, reason = "the linker script defines the address of card memory")]
@@ -39,7 +38,7 @@ pub(crate) use self::port::receive_all;
 use self::report::StackCheck;
 use crate::hardware::ThisBoard;
 
-/// The card, initialized at compile time: its buffers are never on the stack.
+/// The card. It is initialised at compile time, so that its buffers are never on the stack.
 static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(Dram::new(&mut [])));
 
 // The image's buffers besides the card's fit into the memory that the budget has for caches.
@@ -75,8 +74,9 @@ fn run<B: Board>() -> ! {
     semihosting::fail(format_args!("the port failed: {error:?}\n"));
 }
 
-/// Prints the counters and the time in milliseconds of each work of [`measure`]. With QEMU's `-icount
-/// shift=0` the clock advances 1 ns per instruction, so a millisecond is a million instructions.
+/// Prints the counters and the time, in milliseconds, of each [`measure::Work`]. With QEMU's
+/// `-icount shift=0` the clock advances 1 ns per instruction, so that a millisecond is a million
+/// instructions.
 fn measure_and_exit<B: Board>(lines: &[Line]) -> ! {
     static CHIP: Once<MicroChip> = Once::new(MicroChip::new());
     let Some(chip) = CHIP.take() else { semihosting::fail(format_args!("the chip is in use\n")) };

@@ -1,9 +1,9 @@
-//! Statics that one owner may take, mutable.
+//! Statics whose value one owner may take as a mutable reference.
 
 use core::cell::UnsafeCell;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-/// Value of a static that one owner may take.
+/// Value of a static that can be taken once, as a mutable reference.
 pub(super) struct Once<T> {
     taken: AtomicBool,
     value: UnsafeCell<T>,
@@ -14,7 +14,7 @@ pub(super) struct Once<T> {
 unsafe impl<T: Send> Sync for Once<T> {}
 
 impl<T> Once<T> {
-    /// Value that was not taken yet.
+    /// Creates a value that was not taken yet.
     pub(super) const fn new(value: T) -> Self {
         Self { taken: AtomicBool::new(false), value: UnsafeCell::new(value) }
     }

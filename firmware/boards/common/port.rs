@@ -8,8 +8,8 @@ use photoncard_shared::link::{Port, PortError};
 use super::board::Board;
 use super::ring::Ring;
 
-/// Capacity of the ring of received bytes: far more than the few tile commands that a host sends while a card
-/// computes.
+/// Capacity of the ring of received bytes. It is far larger than the few tile commands that a host sends
+/// while a card computes.
 const RECEIVED_BYTES: usize = 512;
 
 static RECEIVED: Ring<RECEIVED_BYTES> = Ring::new();
@@ -17,8 +17,8 @@ static RECEIVED: Ring<RECEIVED_BYTES> = Ring::new();
 /// On-chip memory of the port, bytes.
 pub(super) const STATIC_BYTES: usize = size_of::<Ring<RECEIVED_BYTES>>();
 
-/// Handler of the UART's interrupt: moves received bytes into the ring. If the ring is full it does not wait:
-/// the rest stays in the UART, whose interrupt is disabled until [`BoardPort`] has read.
+/// Handles the UART's interrupt: moves received bytes into the ring. It does not wait if the ring is full:
+/// the remaining bytes stay in the UART, whose interrupt is disabled until [`BoardPort`] has read.
 pub(crate) fn receive_all<B: Board>() {
     while !RECEIVED.is_full() {
         let Some(byte) = B::receive() else { return };
@@ -27,11 +27,11 @@ pub(crate) fn receive_all<B: Board>() {
     B::listen(false);
 }
 
-/// Port on a board's UART.
+/// Port that uses a board's UART.
 pub(super) struct BoardPort<B>(PhantomData<B>);
 
 impl<B: Board> BoardPort<B> {
-    /// The only port of the board.
+    /// Creates the port. A board has only one.
     pub(super) const fn new() -> Self {
         Self(PhantomData)
     }

@@ -43,7 +43,7 @@ pub(super) fn sections(board: &str) {
     ));
 }
 
-/// On-chip memory of the image's static data and stack, and the maximum use of the stack.
+/// Sizes of the image's static data and stack, and the maximum use of the stack.
 pub(super) fn memory_use() -> MemoryUse {
     MemoryUse {
         static_bytes: (data_bytes() + zeroed_bytes()) as u32,
@@ -52,7 +52,8 @@ pub(super) fn memory_use() -> MemoryUse {
     }
 }
 
-/// Port wrapper that stops the image when its stack was used up: data below it may be corrupt.
+/// Port wrapper that stops the image when the stack has overflowed, because data below the stack may be
+/// corrupt.
 pub(super) struct StackCheck<P>(pub(super) P);
 
 impl<P: Port> Port for StackCheck<P> {

@@ -1,31 +1,28 @@
-//! Single-producer, single-consumer ring of bytes from an interrupt to the program, without waiting.
+//! Lock-free ring of bytes from one producer, an interrupt, to one consumer, the program.
 
 use core::sync::atomic::{AtomicU8, AtomicUsize, Ordering};
 
-/// Ring of `N` bytes, a power of two.
+/// Ring of `N` bytes; `N` is a power of two.
 pub(crate) struct Ring<const N: usize> {
     bytes: [AtomicU8; N],
-    /// Number of bytes ever put, modulo the range of `usize`.
+    /// Number of bytes put so far, modulo the range of `usize`.
     put: AtomicUsize,
-    /// Number of bytes ever taken, modulo the range of `usize`.
+    /// Number of bytes taken so far, modulo the range of `usize`.
     taken: AtomicUsize,
 }
 
 impl<const N: usize> Ring<N> {
     const IS_POWER_OF_TWO: () = assert!(N.is_power_of_two());
 
-    /// Empty ring.
     pub(crate) const fn new() -> Self {
         let () = Self::IS_POWER_OF_TWO;
         Self { bytes: [const { AtomicU8::new(0) }; N], put: AtomicUsize::new(0), taken: AtomicUsize::new(0) }
     }
 
-    /// Returns whether the ring is empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.put.load(Ordering::Acquire) == self.taken.load(Ordering::Relaxed)
     }
 
-    /// Returns whether the ring is full.
     pub(crate) fn is_full(&self) -> bool {
         self.put.load(Ordering::Relaxed).wrapping_sub(self.taken.load(Ordering::Acquire)) >= N
     }
@@ -39,7 +36,7 @@ impl<const N: usize> Ring<N> {
         true
     }
 
-    /// Takes the oldest byte, if any.
+    /// Takes the oldest byte; `None` if the ring is empty.
     pub(crate) fn take(&self) -> Option<u8> {
         let taken = self.taken.load(Ordering::Relaxed);
         let byte = self.bytes.get(taken % N).filter(|_| !self.is_empty())?.load(Ordering::Relaxed);

@@ -1,5 +1,5 @@
-//! Semihosting: messages and exit through a debugger or QEMU (Arm's specification "Semihosting"; RISC-V's
-//! differs in the trap instructions alone).
+//! Semihosting: messages and exit through a debugger or QEMU (Arm's specification "Semihosting"). On RISC-V
+//! only the trap instructions differ.
 
 use core::arch::asm;
 use core::fmt::{self, Write};
@@ -7,16 +7,16 @@ use core::sync::atomic::{AtomicBool, Ordering};
 
 const WRITE0: usize = 0x04;
 const EXIT_EXTENDED: usize = 0x20;
-/// Reason of an exit by the program itself, which carries an exit code.
+/// Semihosting's reason code of an exit by the program itself, with an exit status.
 const APPLICATION_EXIT: usize = 0x20026;
-/// Exit status of Rust programs that panic.
+/// Exit status of a Rust program that panicked.
 const FAILED: usize = 101;
 
-/// True if no debugger receives messages.
+/// True if there is no debugger that receives messages.
 static IS_ALONE: AtomicBool = AtomicBool::new(false);
 
-/// Declares that there is no debugger: messages are dropped. A failure still makes its call, which is then a
-/// fault of the processor, and the board's fault handler ends the program.
+/// Declares that there is no debugger. Messages are dropped. A failure still calls the debugger; the call is
+/// then a fault of the processor, and the board's fault handler ends the program.
 #[allow(dead_code, reason = "a board in QEMU has a debugger")]
 pub(crate) fn leave_alone() {
     IS_ALONE.store(true, Ordering::Relaxed);
@@ -25,7 +25,7 @@ pub(crate) fn leave_alone() {
 /// Calls the debugger.
 ///
 /// # Safety
-/// `argument` must be valid for `operation`.
+/// `argument` must be valid for the operation `operation`.
 unsafe fn call(operation: usize, argument: *const ()) {
     #[cfg(target_arch = "arm")]
     // SAFETY: the debugger reads what the argument points to, and answers in r0.
@@ -49,7 +49,7 @@ unsafe fn call(operation: usize, argument: *const ()) {
     }
 }
 
-/// Buffer that collects text into zero-terminated pieces.
+/// Buffer that passes text on in zero-terminated pieces.
 struct Console {
     bytes: [u8; 128],
     length: usize,
@@ -81,7 +81,6 @@ impl Write for Console {
     }
 }
 
-/// Prints a message.
 pub(crate) fn print(message: fmt::Arguments) {
     if IS_ALONE.load(Ordering::Relaxed) {
         return;
@@ -92,7 +91,7 @@ pub(crate) fn print(message: fmt::Arguments) {
     console.flush();
 }
 
-/// Prints a message and ends the program with an exit status of failure.
+/// Prints a message and ends the program with the exit status [`FAILED`].
 pub(crate) fn fail(message: fmt::Arguments) -> ! {
     print(message);
     exit(FAILED);

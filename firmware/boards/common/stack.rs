@@ -1,13 +1,14 @@
-//! Stack use: the stack is painted at the start, and words that lost their paint were used.
+//! Measures stack use. The stack is filled with a pattern at the start; words that no longer hold the pattern
+//! were used.
 
-/// Value of unused words.
+/// Pattern of unused words.
 const PAINT: u32 = 0x5AFE_57AC;
 
-/// Number of words at the end of the stack that must not be used: a frame may leave some of its words
-/// unwritten.
+/// Number of words at the end of the stack that must stay unused. There are several because a stack frame may
+/// leave some of its words unwritten.
 const GUARD: usize = 16;
 
-/// Number of bytes below the caller's frame that painting itself may use.
+/// Number of bytes below the caller's stack frame that painting itself may use.
 const MARGIN: usize = 512;
 
 unsafe extern "C" {
@@ -21,12 +22,11 @@ fn lowest() -> *mut u32 {
     (&raw mut _stack_end).cast()
 }
 
-/// Size of the stack, bytes.
 pub(super) fn bytes() -> usize {
     (&raw mut _stack_start).addr() - lowest().addr()
 }
 
-/// Paints the unused stack. To be called first, before interrupts are enabled.
+/// Fills the unused stack with the pattern. To be called first, before interrupts are enabled.
 #[inline(never)]
 pub(super) fn paint() {
     let here = 0_u32;

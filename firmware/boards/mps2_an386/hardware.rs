@@ -1,4 +1,4 @@
-//! The board's registers and exceptions (Arm, "AN386", DAI 0386; "Cortex-M System Design Kit", DDI 0479;
+//! Registers and exceptions of the board (Arm, "AN386", DAI 0386; "Cortex-M System Design Kit", DDI 0479;
 //! "Armv7-M", DDI 0403).
 
 use core::arch::asm;
@@ -32,7 +32,7 @@ const STATE_RECEIVED: u32 = 2;
 const CONTROL_ENABLE: u32 = 3;
 const CONTROL_RECEIVE_INTERRUPT: u32 = 8;
 const INTERRUPT_RECEIVED: u32 = 2;
-/// Minimum divisor of the UART's clock: the maximum speed.
+/// Minimum divisor of the UART's clock, for maximum speed.
 const MIN_DIVISOR: u32 = 16;
 
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);

@@ -1,4 +1,4 @@
-//! The board's clocks, registers and exceptions (ST, "RM0399", "UM2411"; "Armv7-M", DDI 0403). The code
+//! Clocks, registers and exceptions of the board (ST, "RM0399", "UM2411"; "Armv7-M", DDI 0403). The code
 //! compiles, but was not run on the board.
 
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -14,12 +14,12 @@ use super::sdram::{self, Ports};
 use crate::common::{Board, receive_all, semihosting};
 
 const HERTZ: u32 = 400_000_000;
-/// Speed that the clocks of both the debugger's serial port and the board can produce.
+/// Baud rate. Both the debugger's serial port and the board can produce it from their clocks.
 const BAUD: u32 = 921_600;
 
 /// Base address of card memory, as in `memory.x`.
 const SDRAM: u32 = 0xD000_0000;
-/// Size of the MPU region: `log2(32 MB) - 1`.
+/// Size field of the memory protection unit's region: `log2(32 MB) - 1`.
 const SDRAM_SIZE: u32 = 25 - 1;
 
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
@@ -30,15 +30,15 @@ pub(crate) struct Disco;
 pub(crate) type ThisBoard = Disco;
 
 impl Disco {
-    /// UART that is connected to the debugger's serial port.
+    /// UART that is wired to the debugger's serial port.
     fn uart() -> &'static pac::usart1::RegisterBlock {
         // SAFETY: every register that is written here is written by single stores, with interrupts masked
         // where the interrupt writes it too.
         unsafe { &*USART1::ptr() }
     }
 
-    /// Maps card memory as normal, cacheable memory. By default its addresses are device memory: slow, and
-    /// unaligned accesses fault.
+    /// Maps card memory as normal, cacheable memory. Without this mapping its addresses are device memory,
+    /// which is slow and faults at unaligned accesses.
     fn make_cacheable(mpu: &MPU, scb: &mut SCB) {
         // SAFETY: the region is not in use yet. Full access, normal memory, write-through, execute never.
         unsafe {
@@ -57,7 +57,8 @@ impl Disco {
 impl Board for Disco {
     const NAME: &'static str = "stm32h747i-disco";
 
-    /// Without a debugger messages are dropped, and a failure is a fault, whose handler resets the chip.
+    /// Prepares for a start without a debugger: messages are dropped, and a failure is a fault whose handler
+    /// resets the chip.
     fn prepare() {
         if !DCB::is_debugger_attached() {
             semihosting::leave_alone();

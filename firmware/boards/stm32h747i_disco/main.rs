@@ -1,4 +1,4 @@
-//! The card on ST's board STM32H747I-DISCO, on the larger of the chip's two processors (Cortex-M7).
+//! The card on ST's board STM32H747I-DISCO. It runs on the larger of the chip's two processors (Cortex-M7).
 #![no_std]
 #![no_main]
 

@@ -7,7 +7,7 @@ use stm32h7xx_hal::pac::FMC;
 use stm32h7xx_hal::prelude::*;
 use stm32h7xx_hal::rcc::{CoreClocks, rec};
 
-/// GPIO ports of the memory's pins.
+/// GPIO ports that the memory's pins belong to.
 pub(crate) struct Ports {
     pub(crate) d: gpiod::Parts,
     pub(crate) e: gpioe::Parts,
@@ -23,7 +23,7 @@ macro_rules! pins {
     };
 }
 
-/// Memory controller, not yet started.
+/// Creates the memory controller without starting it.
 pub(crate) fn controller(
     fmc: FMC,
     Ports { d, e, f, g, h, i }: Ports,

@@ -1,4 +1,4 @@
-//! The machine's registers and traps (QEMU, `hw/riscv/virt.c`; "NS16550A"; RISC-V "ACLINT", "PLIC" and
+//! Registers and traps of the machine (QEMU, `hw/riscv/virt.c`; "NS16550A"; RISC-V "ACLINT", "PLIC" and
 //! privileged specifications).
 
 use riscv::interrupt::{Interrupt, machine};
@@ -32,9 +32,9 @@ const CLAIM: Register<u32> = unsafe { Register::at(0x0C20_0004) };
 
 const STATUS_RECEIVED: u8 = 1;
 const STATUS_TRANSMIT_EMPTY: u8 = 1 << 5;
-/// Eight bits, no parity, one stop bit.
+/// Line control: eight bits, no parity, one stop bit.
 const LINE_8N1: u8 = 3;
-/// FIFO enabled, receiver and transmitter cleared.
+/// FIFO control: FIFO enabled, receiver and transmitter cleared.
 const FIFO_ON: u8 = 7;
 
 /// QEMU's machine `virt`.

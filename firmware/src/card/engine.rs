@@ -1,4 +1,4 @@
-//! The state of a card that commands change, and the work that they leave to it.
+//! State of a card that commands change, and the work that they start.
 
 #[cfg(test)]
 mod tests;
@@ -22,41 +22,40 @@ use crate::render::RenderJob;
 use crate::self_test::MemoryTester;
 use crate::self_test::arithmetic::compute_bytes;
 
-/// Maximum number of queued tile commands, over all budgets.
+/// Maximum number of queued tile commands for all kinds of chips.
 pub(super) const TILE_QUEUE: usize = 8;
 
 /// Image, frame and tiles of a card: the state that commands change.
 pub(super) struct Engine<K: ChipKind> {
     chip: Chip<K>,
     image: ImageState,
-    /// Measurement of on-chip memory, on a board that has one.
+    /// Function that measures on-chip memory; `None` on a board without one.
     pub(super) measure: Option<fn() -> MemoryUse>,
-    /// Number of lines, from the first on, written since the card was switched on.
+    /// Number of lines, from the first line, written since the card was switched on.
     written: u32,
     checksums: Option<Checksums>,
     frame: Option<FrameParameters>,
     /// Tiles that the chip has not begun.
     tiles: Deque<Tile, TILE_QUEUE>,
-    /// Number of tiles that the chip has begun, and whose end is not sent.
+    /// Number of tiles that the chip has begun and whose end was not sent yet.
     begun: usize,
-    /// A tile whose pixels are sent, with its counters.
+    /// A tile whose pixels were sent, with its counters.
     finished: Option<(u32, Counters)>,
-    /// True if the host sends no further tile for now.
+    /// True if the host has announced that no tile follows for now.
     is_flushed: bool,
-    /// True if tiles are in flight and the chip has nothing to do for them before the next command.
+    /// True if tiles are in flight, but the chip can do nothing for them before the next command.
     waits: bool,
-    /// Tile and index of the first pixel in `data`.
+    /// Tile of the pixels in `data`, and the index of the first of them.
     first: (u32, u32),
-    /// Consecutive pixels of a tile, checksums, or results of a computation, to be sent.
+    /// Data to be sent: consecutive pixels of a tile, checksums, or results of a computation.
     data: heapless::Vec<u8, DATA_BYTES>,
 }
 
-/// Bytes of pixels, checksums or results in one reply.
+/// Maximum length of the data in one reply, bytes.
 const DATA_BYTES: usize = PIXELS_BYTES;
 const _: () = assert!(CHECKSUMS_BYTES <= DATA_BYTES && CASES_PER_COMMAND * RESULT_BYTES <= DATA_BYTES);
 
 impl<K: ChipKind> Engine<K> {
-    /// The engine of a card that has seen no host yet.
     pub(super) const fn new() -> Self {
         Self {
             chip: Chip::new(),
@@ -75,10 +74,10 @@ impl<K: ChipKind> Engine<K> {
         }
     }
 
-    /// Carries out a command. Returns its reply, if it is ready at once.
+    /// Executes a command. Returns its reply if it is ready at once.
     ///
     /// # Errors
-    /// The fault to be sent instead.
+    /// The fault to be sent in place of a reply.
     pub(super) fn execute(
         &mut self,
         memory: &mut impl CardMemory,
@@ -136,7 +135,7 @@ impl<K: ChipKind> Engine<K> {
         }
     }
 
-    /// The results of triples of operands.
+    /// Computes the results of triples of operands.
     fn compute(&mut self, operands: &[u8]) -> Result<Reply<'_>, Fault> {
         if self.is_at_work() {
             return Err(OUT_OF_ORDER);
@@ -161,7 +160,7 @@ impl<K: ChipKind> Engine<K> {
         self.drop_tiles();
     }
 
-    /// Drops all tiles, those that the chip has not begun included.
+    /// Drops all tiles, including those that the chip has not begun.
     fn drop_tiles(&mut self) {
         self.tiles.clear();
         self.drop_begun();
@@ -177,17 +176,17 @@ impl<K: ChipKind> Engine<K> {
         self.data.clear();
     }
 
-    /// True while tiles wait or are in flight.
+    /// Returns true while tiles are queued or in flight.
     fn has_tiles(&self) -> bool {
         self.begun > 0 || !self.tiles.is_empty()
     }
 
-    /// True while tiles wait or are in flight, or checksums are at work.
+    /// Returns true while tiles are queued or in flight, or checksums are being computed.
     fn is_at_work(&self) -> bool {
         self.has_tiles() || self.checksums.is_some()
     }
 
-    /// True while there is work to do without a command.
+    /// Returns true while there is work that needs no further command.
     pub(super) fn has_work(&self) -> bool {
         self.has_tiles() && !self.waits
             || self.checksums.is_some()
@@ -314,8 +313,9 @@ impl<K: ChipKind> Engine<K> {
         Ok(())
     }
 
-    /// Adds a pixel, by tile and index, to those to be sent, which are sent if it is not the next of them or
-    /// no other fits.
+    /// Adds the sums of a pixel, given by tile and index, to the buffer of pixels to be sent. The buffer is
+    /// sent first if the pixel does not directly follow the buffered ones, and sent afterwards if it has no
+    /// room for another pixel.
     fn add_pixel(
         &mut self,
         (tile, index): (u32, u32),
@@ -345,7 +345,7 @@ impl<K: ChipKind> Engine<K> {
         Ok(())
     }
 
-    /// Sends the pixels that wait, if any.
+    /// Sends the collected pixels, if any.
     fn send_pixels(&mut self, transport: &mut Transport) {
         if !self.data.is_empty() {
             let (tile, first) = self.first;
@@ -366,7 +366,7 @@ fn hello(budget: &Budget, written_lines: u32, memory_use: Option<MemoryUse>) -> 
     }
 }
 
-/// Sends a reply. To be called with room for it in the transport's window.
+/// Sends a reply. The transport's window must have room for it.
 pub(super) fn send(transport: &mut Transport, reply: &Reply) {
     // Every reply fits a frame, as tests of the longest show.
     transport.send(|bytes| message::encode(reply, bytes));

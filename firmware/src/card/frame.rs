@@ -1,4 +1,4 @@
-//! Check of a frame's parameters.
+//! Checks a frame's parameters.
 
 use photoncard_shared::budget::{Budget, MAX_BINS};
 use photoncard_shared::image::{Header, SectionKind};
@@ -49,15 +49,15 @@ fn is_irradiance_error(error: f32) -> bool {
     (MIN_IRRADIANCE_ERROR..=1.0).contains(&error)
 }
 
-/// True if an image has irradiance points, or no photons to compute them from.
+/// Returns true if an image has irradiance points, or has no photons to compute them from.
 fn has_irradiance(header: &Header) -> bool {
     let holds = |kind| header.section(kind).records > 0;
     holds(SectionKind::IrradianceLeaves) || !holds(SectionKind::Photons) && !holds(SectionKind::PhotonLeaves)
 }
 
-/// Minimum allowed error of interpolated irradiance; smaller errors are below rounding.
+/// Minimum error bound of interpolated irradiance. Smaller errors are below rounding.
 pub const MIN_IRRADIANCE_ERROR: f32 = 1e-6;
 
-/// Maximum width and height of a picture, pixels: an `f32` holds a pixel's index and 7 bits of the position
-/// in it.
+/// Maximum width and height of a picture, pixels. At this size an `f32` holds a pixel's index and 7 bits of a
+/// position in the pixel.
 pub const MAX_PICTURE_SIDE: u32 = 1 << 16;

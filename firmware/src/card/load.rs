@@ -1,4 +1,4 @@
-//! Loading of a card image: lines in any order, then the checksum of all lines, then the header.
+//! Loads a card image: lines in any order, then the checksum of all lines, then the header.
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::checksum::{ImageChecksum, image_checksum};
@@ -9,22 +9,22 @@ use crate::memory::{CardMemory, Stage};
 use crate::scene::SceneImage;
 use crate::self_test::MemoryTester;
 
-/// The fault of a command that needs another one before it.
+/// Fault of a command that requires another command before it.
 pub(super) const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
-/// State of the image in memory, or of the memory's test.
+/// State of the image in memory, or of a memory test.
 pub(super) enum ImageState {
     None,
     Loading(Loader),
     /// All lines have been received; their checksum is being computed.
     Checking(Check),
     Ready(SceneImage),
-    /// The memory holds patterns of a test instead.
+    /// The memory holds patterns of a memory test.
     Testing(MemoryTester),
 }
 
 impl ImageState {
-    /// The loader of the image.
+    /// Returns the loader of the image.
     ///
     /// # Errors
     /// [`FaultCode::Order`] if no image is being loaded.
@@ -35,7 +35,7 @@ impl ImageState {
         }
     }
 
-    /// The scene, if an image has been loaded and checked.
+    /// Returns the scene if an image was loaded and checked.
     pub(super) fn scene(&self) -> Option<&SceneImage> {
         match self {
             Self::Ready(scene) => Some(scene),
@@ -60,10 +60,10 @@ impl Loader {
         Ok(Self { lines, checksum })
     }
 
-    /// Writes lines from line `first`. Returns the index past the last line.
+    /// Writes lines from line `first` on. Returns the index past the last line.
     ///
     /// # Errors
-    /// [`FaultCode::Lines`] if `data` is not whole lines of the image; nothing is written.
+    /// [`FaultCode::Lines`] if `data` is not whole lines of the image. Nothing is written then.
     pub(super) fn write(self, memory: &mut impl CardMemory, first: u32, data: &[u8]) -> Result<u32, Fault> {
         let fault = Fault { code: FaultCode::Lines, detail: first };
         let (lines, rest) = data.as_chunks::<LINE_BYTES>();
@@ -79,7 +79,7 @@ impl Loader {
     }
 }
 
-/// Check of an image against its checksum, chunk by chunk.
+/// Compares an image with its checksum, chunk by chunk.
 pub(super) struct Check {
     loader: Loader,
     next: u32,
@@ -90,7 +90,7 @@ impl Check {
     /// Adds the next chunk to the checksum. Returns the scene after the last chunk, `None` before.
     ///
     /// # Errors
-    /// [`FaultCode::ImageChecksum`] or [`FaultCode::ImageHeader`] if the image is not the one announced.
+    /// [`FaultCode::ImageChecksum`] or [`FaultCode::ImageHeader`] if the image is not the announced one.
     pub(super) fn step(&mut self, memory: &mut impl CardMemory) -> Result<Option<SceneImage>, Fault> {
         let Loader { lines, checksum } = self.loader;
         let known = memory.known_checksum(lines);
@@ -123,10 +123,10 @@ impl Check {
     }
 }
 
-/// Maximum length of a reply's checksums, bytes.
+/// Maximum length of the checksums in one reply, bytes.
 pub(super) const CHECKSUMS_BYTES: usize = 8 * CHECKSUMS_PER_REPLY as usize;
 
-/// Computation of the checksums that the host has asked for, chunk by chunk.
+/// Computes the checksums that the host requested, chunk by chunk.
 pub(super) struct Checksums {
     pub(super) first: u32,
     end: u32,
@@ -134,10 +134,11 @@ pub(super) struct Checksums {
 }
 
 impl Checksums {
-    /// The checksums of `count` chunks from chunk `first`, in a memory with `written` lines written.
+    /// Prepares the checksums of `count` chunks from chunk `first` on, in a memory whose first `written`
+    /// lines were written.
     ///
     /// # Errors
-    /// [`FaultCode::Chunks`] if `count` is 0 or above [`CHECKSUMS_PER_REPLY`], or a chunk is not written.
+    /// [`FaultCode::Chunks`] if `count` is 0 or above [`CHECKSUMS_PER_REPLY`], or a chunk was not written.
     pub(super) fn new(first: u32, count: u32, written: u32) -> Result<Self, Fault> {
         let fault = Fault { code: FaultCode::Chunks, detail: first };
         let in_all = written.div_ceil(CHUNK_LINES);
@@ -148,8 +149,8 @@ impl Checksums {
         Ok(Self { first, end, next: first })
     }
 
-    /// The checksum of the next chunk, and whether it is the last asked for. The last chunk in memory may be
-    /// short.
+    /// Returns the checksum of the next chunk, and whether it is the last one requested. The last chunk in
+    /// memory may be shorter than others.
     pub(super) fn step(&mut self, memory: &impl CardMemory, written: u32) -> Result<(u64, bool), Fault> {
         let begin = self.next.saturating_mul(CHUNK_LINES);
         let lines = stored(memory, begin, CHUNK_LINES.min(written.saturating_sub(begin)))?;
@@ -158,10 +159,10 @@ impl Checksums {
     }
 }
 
-/// `count` lines of the memory from line `first`.
+/// Reads `count` lines of the memory from line `first` on.
 ///
 /// # Errors
-/// [`FaultCode::LineRange`] if they are not all in the memory.
+/// [`FaultCode::LineRange`] if some of them are not in the memory.
 fn stored(memory: &impl CardMemory, first: u32, count: u32) -> Result<&[Line], Fault> {
     memory.stored(LineAddress(first), count).ok_or(Fault { code: FaultCode::LineRange, detail: first })
 }

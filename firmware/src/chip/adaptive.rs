@@ -1,4 +1,4 @@
-//! Adaptive sampling: a pixel whose first samples differ has several paths in each of the others.
+//! Adaptive sampling: if the first samples of a pixel differ, its later samples have several paths each.
 //!
 //! The first [`PROBES`] samples of a pixel are its probes. Each later sample is the mean of `k` paths,
 //!
@@ -6,45 +6,46 @@
 //! k = s / (t sqrt(L)), rounded, 1 to 16
 //! ```
 //!
-//! with `L` the mean of the probes' light over samples and channels, `s^2` its variance over samples, mean of
-//! the channels, and `t` the frame's threshold: the number of samples for an equal error is proportional to
-//! `s`, and noise shows by about the inverse root of the light under a tone curve.
+//! where `L` is the mean of the probes' light over samples and channels, `s^2` is its variance over samples,
+//! averaged over channels, and `t` is the frame's threshold. `k` is proportional to `s`, and to the
+//! visibility of noise under a tone curve, which is about `1 / sqrt(L)`.
 //!
-//! An estimate whose own samples choose their number is biased (Kirk, Arvo 1991, *Unbiased sampling
-//! techniques for image synthesis*). Probes therefore have a fixed weight, half of a sample's, and later
-//! paths have patterns of their own ([`PixelSample::stratified`](crate::render::PixelSample::stratified)):
-//! the expectation of later paths depends neither on `k` nor on the probes.
+//! An estimate whose number of samples depends on these samples is biased (Kirk, Arvo 1991, *Unbiased
+//! sampling techniques for image synthesis*). Probes therefore have a fixed weight, half of a sample's, and
+//! later paths have patterns of their own
+//! ([`PixelSample::stratified`](crate::render::PixelSample::stratified)): the expectation of later paths
+//! depends neither on `k` nor on the probes.
 //!
 //! Frames are divided by samples, with adaptive sampling or without: a path is a function of pixel, sample
-//! and `k`, and `k` is a function of the pixel's probes. A frame of later samples looks at the probes again.
+//! and `k`, and `k` is a function of the pixel's probes. A frame of later samples traces the probes again.
 
 use glam::Vec3;
 use photoncard_shared::message::{FrameParameters, MAX_PATHS, PROBES, WEIGHT_OF_PROBE};
 
-/// True if the frame has samples whose number of paths the probes choose.
+/// Returns true if the frame has samples whose number of paths depends on the probes.
 pub(super) fn needs_probes(frame: &FrameParameters) -> bool {
     frame.adaptive_threshold.is_some() && frame.first_sample.saturating_add(frame.samples) > PROBES
 }
 
-/// Number of paths of each sample of a pixel after its probes.
+/// Number of paths per sample of a pixel, for samples after the probes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Paths(u8);
 
 impl Paths {
     pub(super) const ONE: Self = Self(1);
 
-    /// Number of paths of a sample.
+    /// Number of paths of sample number `sample`.
     pub(super) fn of_sample(self, sample: u32) -> u32 {
         if sample < PROBES { 1 } else { self.0.into() }
     }
 
-    /// Index in the pixel of a path of a sample.
+    /// Index in the pixel of path `path` of sample `sample`.
     pub(super) fn index(self, sample: u32, path: u32) -> u32 {
         let later = sample.saturating_sub(PROBES).wrapping_mul(self.0.into());
         sample.min(PROBES).wrapping_add(later).wrapping_add(path)
     }
 
-    /// Weight of each path of a sample.
+    /// Weight of each path of sample `sample` in the pixel's sum.
     pub(super) fn weight(self, frame: &FrameParameters, sample: u32) -> f32 {
         match frame.adaptive_threshold {
             None => 1.0,
@@ -54,7 +55,7 @@ impl Paths {
     }
 }
 
-/// Light of a pixel's probes.
+/// Statistics of the light of a pixel's probes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probes {
     sum: Vec3,
@@ -70,7 +71,7 @@ impl Probes {
         self.squares += light * light;
     }
 
-    /// Number of paths by all probes and a threshold, W^(1/2)/(sr^(1/2) m).
+    /// Number of paths per sample that follows from all probes and a threshold, W^(1/2)/(sr^(1/2) m).
     pub(super) fn paths(&self, threshold: f32) -> Paths {
         let probes = PROBES as f32;
         let mean = self.sum.element_sum() / (3.0 * probes);
@@ -94,7 +95,7 @@ mod tests {
     use crate::sampler::Dimension;
 
     #[test]
-    fn paths_of_all_samples_are_the_first_of_the_pixel() {
+    fn path_indices_of_all_samples_are_consecutive_from_zero() {
         for paths in 1..=16 {
             let paths = Paths(paths);
             let indices = (0..20)
@@ -104,8 +105,8 @@ mod tests {
         }
     }
 
-    /// Estimate of the share of a pixel that is lit, by its left edge up to `coverage`; and its number of
-    /// paths.
+    /// Estimates the fraction of a pixel that is lit, if its left part up to `coverage` is lit. Returns the
+    /// estimate and the number of paths.
     fn lit_share(frame: &FrameParameters, pixel: u32, coverage: f32) -> (f64, u32) {
         let mut probes = Probes::NONE;
         let [mut sum, mut weights] = [0.0, 0.0];
@@ -131,8 +132,8 @@ mod tests {
         (sum / weights, count)
     }
 
-    /// Points after the probes in one stratified pattern lie in the strata that the probes left: an edge at
-    /// an eighth of the pixel would be a third too bright.
+    /// If probes and later samples shared one stratified pattern, later points would lie in the strata that
+    /// the probes left free: an edge at an eighth of the pixel would be a third too bright.
     #[test]
     fn the_choice_of_the_number_of_paths_has_no_bias() {
         const PIXELS: u32 = 20_000;

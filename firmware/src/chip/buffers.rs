@@ -1,4 +1,4 @@
-//! Buffers that the tiles in flight of a chip share.
+//! Buffers that all tiles in flight of a chip share.
 
 use super::gathers::Gathers;
 use super::pixel_sums::PixelSums;
@@ -6,7 +6,7 @@ use super::points::Points;
 use crate::irradiance_cache::RecordStore;
 use crate::kind::ChipKind;
 
-/// Gather points, sums and gathers of a chip, and its kept irradiance records.
+/// Gather points, pixel sums, gathers and kept irradiance records of a chip.
 pub(super) struct Shared<K: ChipKind> {
     /// Gather points of the active tile.
     pub(super) points: Points<K::Points>,

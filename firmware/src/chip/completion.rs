@@ -1,11 +1,13 @@
-//! The completion of a pixel: light that needs no gather rays, albedo, normal and depth.
+//! Completion of a pixel: adds the light that needs no gather rays, albedo, normal and depth.
 //!
-//! Pixels without gather rays of their own are completed first, once the irradiance records of their block
-//! are gathered: each path is looked at once. Those with gather rays are found by it. They are completed when
-//! no gather of the block waits, and every path is looked at again, as no chip has room to keep them.
+//! Pixels without gather rays are completed first, as soon as the irradiance records of their block are
+//! gathered. Each of their paths is traced once. The same pass finds the pixels with gather rays. These are
+//! completed when no gather of the block waits; each of their paths is traced again, because no chip has
+//! memory to keep it.
 //!
-//! Probes ([`super::adaptive`]) are looked at here as well: of a pixel without gather rays as its first
-//! samples or, in a frame that begins later, before them; of others in a pass of their own.
+//! Probes ([`super::adaptive`]) are traced here as well. For a pixel without gather rays they are its first
+//! samples, or precede the samples of a frame that begins later. Other pixels have a separate pass for their
+//! probes.
 
 use glam::Vec3;
 use photoncard_shared::message::{Fault, FrameParameters, PROBES};
@@ -24,18 +26,18 @@ use crate::memory::{MemoryPort, Stage};
 use crate::render::eye::{Sight, View};
 use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
 
-/// Use of the light of a path.
+/// Purpose for which the light of a path is computed.
 #[derive(Clone, Copy)]
 enum Use {
-    /// Term of the pixel's sum, with the path's weight. Direct light of a path with gather rays is added by
-    /// [`Pass::Direct`].
+    /// Light is added to the pixel's sum with this weight. Direct light of a path with gather rays is not:
+    /// [`Pass::Direct`] adds it.
     Term(f32),
-    /// Choice of the number of paths alone, with direct light by shadow rays on every path.
+    /// Light only determines the number of paths. Every path gets its direct light from shadow rays.
     Probe,
 }
 
 impl<K: ChipKind> Flight<K> {
-    /// Next pixel to be completed in the present pass; `None` after the last.
+    /// Returns the next pixel to be completed in the current pass; `None` after the last.
     pub(super) fn pixel_to_complete(&self) -> Option<u32> {
         let rest = self.position.index..self.block.pixels();
         match self.pass() {
@@ -44,11 +46,11 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Completes the next path of a pixel. Returns the pixel with its last path. A pixel with gather rays is
-    /// left for a later pass if it is not known to have any.
+    /// Completes the next path of a pixel. Returns the pixel after its last path. A pixel that turns out to
+    /// have gather rays is left for a later pass.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     pub(super) fn complete<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -91,10 +93,10 @@ impl<K: ChipKind> Flight<K> {
         Ok(Some(FinishedPixel { tile: self.tile.id, index: self.index_in_tile(pixel), light, view }))
     }
 
-    /// Looks at the next probe of the next pixel with gather rays.
+    /// Traces the next probe of the next pixel with gather rays.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     pub(super) fn probe<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<(), Fault> {
         let Some(pixel) = self.first_with_rays(self.position.index..self.block.pixels()) else {
             self.position = Position::at(Pass::Eye);
@@ -113,7 +115,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Sets the number of a pixel's paths by its probes.
+    /// Sets the number of paths of a pixel from its probes.
     fn end_probes(&mut self, frame: &FrameParameters, pixel: u32, probes: &Probes) -> Result<(), Fault> {
         match frame.adaptive_threshold.filter(|_| adaptive::needs_probes(frame)) {
             Some(threshold) => self.set_paths(pixel, probes.paths(threshold)),
@@ -121,7 +123,7 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Looks at the present path of a completion. Returns whether it has gather rays.
+    /// Traces the current path of a completion. Returns whether it has gather rays.
     fn look_at<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -150,7 +152,7 @@ impl<K: ChipKind> Flight<K> {
 }
 
 impl Completion {
-    /// Advances to the next path, of `count` of the present sample.
+    /// Advances to the next path. The current sample has `count` paths.
     fn next_path(&mut self, count: u32) {
         self.path += 1;
         if self.path >= count {
@@ -159,7 +161,7 @@ impl Completion {
         }
     }
 
-    /// Adds light of the present path, in the image's radiance units.
+    /// Adds light of the current path, in the image's radiance units.
     fn add(&mut self, frame: &FrameParameters, as_what: Use, component: Component, light: Vec3) {
         self.of_path += light;
         if let Use::Term(weight) = as_what {
@@ -167,7 +169,7 @@ impl Completion {
         }
     }
 
-    /// Ends the light of the present path, in image radiance units of `unit`.
+    /// Ends the light of the current path. `unit` is the image's radiance unit, W/(sr m^2).
     fn end_light(&mut self, unit: f32) {
         let light = core::mem::replace(&mut self.of_path, Vec3::ZERO);
         if self.sample < PROBES {
@@ -176,8 +178,8 @@ impl Completion {
     }
 }
 
-/// Adds emission and interpolated irradiance of one of `paths` paths of a sample and, of a probe or without
-/// gather rays, its light by shadow rays and caustics. Returns whether it has gather rays.
+/// Adds the light of one of a sample's `paths` paths: emission and interpolated irradiance and, for a probe
+/// or without gather rays, shadow rays and caustics. Returns whether the path has gather rays.
 fn light_path<K: ChipKind, M: MemoryPort>(
     context: &mut Context<M>,
     cache: &IrradianceCache<K::IrradianceRecords>,

@@ -1,4 +1,4 @@
-//! A complete pixel, and its sums while it is completed.
+//! A complete pixel, and the sums of a pixel that is being completed.
 
 use glam::Vec3;
 use photoncard_shared::image::Header;
@@ -14,18 +14,18 @@ use crate::render::eye::View;
 /// A complete pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct FinishedPixel {
-    /// Number of its tile.
+    /// Number of the pixel's tile.
     pub tile: u32,
-    /// Index in the tile, row-major.
+    /// Row-major index of the pixel in the tile.
     pub index: u32,
-    /// Its light.
+    /// Light of the pixel.
     pub light: PixelLight,
-    /// Its other channels.
+    /// Albedo, normal and depth of the pixel.
     pub view: PixelView,
 }
 
 impl FinishedPixel {
-    /// Sums of the pixel.
+    /// Sums of the pixel, as they are sent.
     pub fn sums(&self, frame: &FrameParameters) -> PixelSums {
         self.view.sums(self.light.sums(frame))
     }
@@ -57,8 +57,8 @@ impl PixelView {
         sums.surfaces = sums.surfaces.saturating_add(1);
     }
 
-    /// Sums of the pixel with its sums of light: one, or with layers one for each component and the count of
-    /// gathers.
+    /// Combines albedo, normal and depth with sums of light. `light` has one sum or, with layers, one per
+    /// component and the count of gathers.
     pub fn sums(&self, light: &[ColourSum]) -> PixelSums {
         match light {
             [direct, indirect, caustic, gathers] => {
@@ -71,26 +71,26 @@ impl PixelView {
     }
 }
 
-/// The pixel that is being completed.
+/// State of the pixel that is being completed.
 pub(super) struct Completion {
     pub(super) light: PixelLight,
     pub(super) view: PixelView,
     /// Number in the pixel of the next sample.
     pub(super) sample: u32,
-    /// Path of the next sample.
+    /// Number in its sample of the next path.
     pub(super) path: u32,
-    /// Light of the present path, in the image's radiance units.
+    /// Light of the current path, in the image's radiance units.
     pub(super) of_path: Vec3,
-    /// Light of the probes.
+    /// Statistics of the probes' light.
     pub(super) probes: Probes,
-    /// Number of paths to surfaces with a Lambertian part.
+    /// Number of paths that see a surface with a Lambertian part.
     pub(super) lambertian: u32,
     /// Number of paths whose irradiance is interpolated.
     pub(super) interpolated: u32,
 }
 
 impl Completion {
-    /// Completion of a pixel with the light of its gather rays, from a sample on.
+    /// Begins the completion of a pixel at sample `sample`. `light` is the light of its gather rays.
     pub(super) const fn new(light: PixelLight, sample: u32) -> Self {
         Self {
             light,

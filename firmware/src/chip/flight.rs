@@ -1,4 +1,4 @@
-//! A tile in flight: its state from the command to its last pixel.
+//! State of a tile in flight, from its command to its last pixel.
 
 use core::ops::Range;
 
@@ -13,31 +13,31 @@ use crate::irradiance_cache::{IrradianceCache, Window};
 use crate::kind::{Buffer, Capacity, ChipKind, Vacant};
 use crate::render::PixelSample;
 
-/// Capacity of the stack of blocks: enough for all halvings of a tile.
+/// Capacity of the stack of blocks, sufficient for all halvings of a tile.
 const MAX_BLOCKS: usize = 32;
 
-/// In place of the number of its sum, a pixel without gather rays of its own, as far as is known.
+/// Code in place of a sum's number: the pixel is not known to have gather rays.
 const PLAIN: u16 = u16::MAX;
-/// In place of the number of its sum, a pixel with gather rays and no sum yet.
+/// Code in place of a sum's number: the pixel has gather rays, but no sum yet.
 const UNSUMMED: u16 = PLAIN - 1;
 
-/// State of a tile in flight. It is rendered in one block or, if its irradiance records do not fit into the
-/// cache, in several smaller ones, one after another.
+/// State of a tile in flight. A tile is one block. If its irradiance records do not fit into the cache, it is
+/// divided into smaller blocks, which are rendered one after another.
 pub(super) struct Flight<K: ChipKind> {
     pub(super) tile: Tile,
     pub(super) counters: Counters,
-    /// Blocks that have not begun, the next on top.
+    /// Blocks that have not begun; the next one is on top.
     blocks: Vec<Block, MAX_BLOCKS>,
     pub(super) block: Block,
     pub(super) position: Position,
-    /// Number of the block's gathers in the queue.
+    /// Number of queued gathers that belong to the block.
     pub(super) waiting: u32,
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
-    /// Number of each pixel's sum in [`super::pixel_sums::PixelSums`], [`PLAIN`] or [`UNSUMMED`].
+    /// Number of each pixel's sum in [`super::pixel_sums::PixelSums`]; or [`PLAIN`], or [`UNSUMMED`].
     sums: <K::TilePixels as Capacity>::Buffer<u16>,
-    /// Number of paths of each pixel's samples.
+    /// Number of paths per sample, by pixel.
     paths: <K::TilePixels as Capacity>::Buffer<Paths>,
-    /// State of the pixel that is being completed or probed.
+    /// State of the pixel that is being completed, or whose probes are traced.
     pub(super) completion: Option<Completion>,
 }
 
@@ -57,7 +57,6 @@ impl<K: ChipKind> Vacant for Flight<K> {
 }
 
 impl<K: ChipKind> Flight<K> {
-    /// Begins a tile.
     pub(super) fn begin(&mut self, tile: Tile) {
         self.vacate();
         self.tile = tile;
@@ -79,7 +78,7 @@ impl<K: ChipKind> Flight<K> {
         self.position.pass
     }
 
-    /// True if pixels of the block are being completed, or can be.
+    /// Returns true if pixels of the block are being completed, or can be.
     pub(super) fn is_completable(&self) -> bool {
         match self.pass() {
             Pass::CompletePlain | Pass::Complete => true,
@@ -104,13 +103,13 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// True if blocks are left.
+    /// Returns true if blocks are left.
     pub(super) fn has_blocks(&self) -> bool {
         !self.blocks.is_empty()
     }
 
-    /// Replaces the block, whose records do not fit into the cache, by its two halves. A block of one pixel
-    /// always fits.
+    /// Replaces the block by its two halves, because its records do not fit into the cache. The records of a
+    /// block of one pixel always fit.
     pub(super) fn divide_block(&mut self) -> Result<(), Fault> {
         let [first, second] = self.block.halves().ok_or(Invariant::Halves.fault())?;
         for half in [second, first] {
@@ -120,7 +119,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Goes on to the gather rays of all pixels.
+    /// Skips irradiance records: the pass of all pixels' gather rays begins.
     pub(super) fn do_without_records(&mut self) -> Result<(), Fault> {
         self.cache.forget();
         self.set_all_sums(UNSUMMED)?;
@@ -139,25 +138,25 @@ impl<K: ChipKind> Flight<K> {
         Window { x0, x1: x0 + self.block.width, y0, y1: y0 + self.block.height }
     }
 
-    /// A path of sample `sample` of pixel `index` of the block.
+    /// Identifies path `path` of sample `sample` of the block's pixel `index`.
     pub(super) fn path(&self, index: u32, sample: u32, path: u32) -> PixelSample {
         let [column, row] = self.block.pixel(index);
         let sample = self.paths(index).index(sample, path);
         PixelSample { x: self.tile.x + column, y: self.tile.y + row, sample }
     }
 
-    /// The path of pixel `index` of the block that gather points are stored of, and its weight.
+    /// Current path of the block's pixel `index`, for which gather points are stored, and its weight.
     pub(super) fn present_path(&self, frame: &FrameParameters, index: u32) -> (PixelSample, f32) {
         let sample = self.position.sample_of(frame);
         (self.path(index, sample, self.position.path), self.paths(index).weight(frame, sample))
     }
 
-    /// Number of paths of the samples of pixel `index` of the block.
+    /// Number of paths per sample of the block's pixel `index`.
     pub(super) fn paths(&self, index: u32) -> Paths {
         self.paths.view().get(index as usize).copied().unwrap_or(Paths::ONE)
     }
 
-    /// Sets the number of paths of the samples of pixel `index` of the block.
+    /// Sets the number of paths per sample of the block's pixel `index`.
     pub(super) fn set_paths(&mut self, index: u32, paths: Paths) -> Result<(), Fault> {
         let of_pixel = self.paths.view_mut().get_mut(index as usize);
         *of_pixel.ok_or(Invariant::Pixels.fault())? = paths;
@@ -169,30 +168,30 @@ impl<K: ChipKind> Flight<K> {
         self.position = Position::at(if adaptive::needs_probes(frame) { Pass::Probe } else { Pass::Eye });
     }
 
-    /// Index in the tile, row-major, of pixel `index` of the block.
+    /// Row-major index in the tile of the block's pixel `index`.
     pub(super) fn index_in_tile(&self, index: u32) -> u32 {
         let [column, row] = self.block.pixel(index);
         row * self.tile.width + column
     }
 
-    /// Number of the sum of pixel `index` of the block; `None` without one.
+    /// Number of the sum of the block's pixel `index`; `None` if it has none.
     pub(super) fn sum(&self, index: u32) -> Option<u16> {
         self.sums.view().get(index as usize).copied().filter(|&number| number < UNSUMMED)
     }
 
-    /// First of some pixels of the block with gather rays of its own; `None` without one.
+    /// First pixel with gather rays among `pixels` of the block; `None` if there is none.
     pub(super) fn first_with_rays(&self, pixels: Range<u32>) -> Option<u32> {
         let states = self.sums.view().get(pixels.start as usize..pixels.end as usize)?;
         let index = states.iter().position(|&state| state != PLAIN)?;
         Some(pixels.start + index as u32)
     }
 
-    /// Notes that pixel `index` of the block has gather rays of its own.
+    /// Records that the block's pixel `index` has gather rays.
     pub(super) fn give_rays(&mut self, index: u32) -> Result<(), Fault> {
         self.set_sum(index, UNSUMMED)
     }
 
-    /// Sets the number of the sum of pixel `index` of the block.
+    /// Sets the number of the sum of the block's pixel `index`.
     pub(super) fn set_sum(&mut self, index: u32, number: u16) -> Result<(), Fault> {
         let sum = self.sums.view_mut().get_mut(index as usize);
         *sum.ok_or(Invariant::Pixels.fault())? = number;
@@ -200,7 +199,7 @@ impl<K: ChipKind> Flight<K> {
     }
 }
 
-/// Error bound of interpolated irradiance; `None` if the frame interpolates none.
+/// Error bound of interpolated irradiance; `None` if the frame does not interpolate.
 pub(super) fn allowed_error(frame: &FrameParameters) -> Option<f32> {
     frame.irradiance_error.filter(|_| frame.gather_rays > 0)
 }

@@ -1,4 +1,4 @@
-//! Photon gathers of a chip: done at once, or queued for deferred reordering.
+//! Photon gathers of a chip, done at once or queued for deferred reordering.
 
 use glam::Vec3;
 use photoncard_shared::message::{Drain, Fault, FrameParameters};
@@ -10,7 +10,7 @@ use crate::photon::{CandidateStorage, Candidates};
 use crate::render::Context;
 use crate::render::final_gather::gathered;
 
-/// Candidate buffer of a gather, and the gather queue, whose requests are of all tiles in flight.
+/// Candidate buffer of a gather, and the gather queue. The queue holds requests of all tiles in flight.
 pub(super) struct Gathers<C: Capacity, Q: Capacity> {
     candidates: C::Candidates,
     queue: GatherQueue<Q>,
@@ -21,7 +21,7 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         Self { candidates: CandidateStorage::EMPTY, queue: GatherQueue::new() }
     }
 
-    /// The candidate buffer, for a search that is no gather.
+    /// Candidate buffer, for a photon search that is not a gather.
     pub(super) fn candidates(&mut self) -> Candidates<'_> {
         self.candidates.view()
     }
@@ -31,26 +31,27 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.clear();
     }
 
-    /// True if no gather is queued.
+    /// Returns true if no gather is queued.
     pub(super) fn is_empty(&self) -> bool {
         self.queue.is_empty()
     }
 
-    /// True while the queue is being drained.
+    /// Returns true while the queue is being drained.
     pub(super) fn is_draining(&self) -> bool {
         self.queue.is_draining()
     }
 
-    /// True if the queue is at the frame's limit: it must be drained before another ray is cast.
+    /// Returns true if the queue has reached the frame's limit. It must then be drained before another ray is
+    /// cast.
     pub(super) fn is_full(&self, frame: &FrameParameters) -> bool {
         self.queue.len() >= most_waiting::<Q>(frame)
     }
 
-    /// Queues a gather, or does it at once and returns its radiance: without deferred reordering, or if the
-    /// queue has filled up since the last check of [`Self::is_full`].
+    /// Queues a gather, or does it at once and returns its radiance. It is done at once without deferred
+    /// reordering, and if the queue filled up since the last check of [`Self::is_full`].
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     pub(super) fn submit<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -64,13 +65,13 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         }
     }
 
-    /// Queues a gather as if its tile had cast a ray for it. Returns whether there is room.
+    /// Queues a gather as if a ray of its tile had caused it. Returns whether there was room.
     #[cfg(test)]
     pub(super) fn wait_for_test(&mut self, request: GatherRequest) -> bool {
         self.queue.push(request).is_ok()
     }
 
-    /// Begins a drain. Returns the number of gathers that wait, and the first; `None` if there are none.
+    /// Begins a drain. Returns the number of waiting gathers and the first of them; `None` if none waits.
     pub(super) fn begin_drain(&mut self, drain: Drain) -> Option<(usize, &GatherRequest)> {
         if self.queue.is_empty() {
             return None;
@@ -79,15 +80,15 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.first().map(|first| (self.queue.len(), first))
     }
 
-    /// The next gather of the drain; `None` ends it.
+    /// Takes the next gather of the drain; `None` ends the drain.
     pub(super) fn take(&mut self) -> Option<GatherRequest> {
         self.queue.take()
     }
 
-    /// Does a gather. Returns its radiance.
+    /// Does a gather and returns its radiance.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     pub(super) fn gather<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -97,7 +98,7 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
     }
 }
 
-/// Maximum number of queued gathers in a frame: its own limit, within the capacity of the queue.
+/// Maximum number of queued gathers in a frame: the frame's limit, at most the capacity of the queue.
 fn most_waiting<Q: Capacity>(frame: &FrameParameters) -> usize {
     (frame.queue as usize).clamp(1, Q::ENTRIES)
 }

@@ -1,7 +1,7 @@
-//! Components of a pixel's light, and their sums: one for each pixel, or with layers one for each component.
+//! Components of a pixel's light, and their sums. A pixel has one sum or, with layers, one per component.
 //!
-//! Fixed-point sums are exact, so that layers do not change a bit of a pixel's radiance: it is the sum of the
-//! components. With layers a pixel takes [`SUMS_WITH_LAYERS`] sums, the last of which counts gathers.
+//! Fixed-point sums are exact, so that layers do not change a bit of a pixel's radiance, which is the sum of
+//! the components. With layers a pixel has [`SUMS_WITH_LAYERS`] sums, the last of which counts gathers.
 
 use glam::Vec3;
 use photoncard_shared::budget::{SUMS_WITH_LAYERS, sums_of_pixel};
@@ -9,28 +9,28 @@ use photoncard_shared::message::FrameParameters;
 
 use crate::fixed_point::ColourSum;
 
-/// Component of a pixel's light; light paths are in the notation of the crate's page.
+/// Component of a pixel's light. Light paths are in the notation of [the crate's documentation](crate).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
-    /// `L S* E` and `L D S* E`: visible emission, and direct light by shadow rays and by the pixel's own
-    /// gather rays.
+    /// Paths `L S* E` and `L D S* E`: visible emission, and direct light found by shadow rays and by the
+    /// pixel's own gather rays.
     Direct,
-    /// `L (S|D)* D S* D S* E`: radiance estimates at the ends of gather rays, and interpolated irradiance,
-    /// which includes the emission met by the irradiance records' rays.
+    /// Paths `L (S|D)* D S* D S* E`: radiance estimates at the ends of gather rays, and interpolated
+    /// irradiance. The latter includes emission that rays of the irradiance records hit.
     Indirect,
-    /// `L S+ D S* E`: radiance estimates in the caustic map.
+    /// Paths `L S+ D S* E`: radiance estimates in the caustic map.
     Caustic,
 }
 
 impl Component {
-    /// Index of the component's sum among the sums of consecutive pixels.
+    /// Index of the component's sum of pixel number `pixel` in an array with the sums of consecutive pixels.
     #[inline(always)]
     pub fn sum_of(self, frame: &FrameParameters, pixel: usize) -> usize {
         if frame.layers { pixel * SUMS_WITH_LAYERS as usize + self as usize } else { pixel }
     }
 }
 
-/// Index, among a pixel's sums, of its count of gathers.
+/// Index of the count of gathers among a pixel's sums.
 const GATHERS: usize = Component::Caustic as usize + 1;
 const _: () = assert!(GATHERS + 1 == SUMS_WITH_LAYERS as usize);
 
@@ -39,10 +39,9 @@ const _: () = assert!(GATHERS + 1 == SUMS_WITH_LAYERS as usize);
 pub struct PixelLight([ColourSum; SUMS_WITH_LAYERS as usize]);
 
 impl PixelLight {
-    /// No light.
     pub(super) const NONE: Self = Self([ColourSum::ZERO; SUMS_WITH_LAYERS as usize]);
 
-    /// The light of stored sums, which may be fewer than a pixel can have.
+    /// Converts stored sums, which may be fewer than the maximum.
     pub(super) fn of(sums: &[ColourSum]) -> Self {
         let mut light = Self::NONE;
         light.0.iter_mut().zip(sums).for_each(|(sum, stored)| *sum = *stored);
@@ -57,7 +56,7 @@ impl PixelLight {
         }
     }
 
-    /// Counts a sample with a final gather of its own, if the frame has layers.
+    /// Counts a sample with a final gather, if the frame has layers.
     #[inline]
     pub(super) fn count_gather(&mut self, frame: &FrameParameters) {
         if let Some(sum) = self.0.get_mut(GATHERS).filter(|_| frame.layers) {
@@ -65,7 +64,7 @@ impl PixelLight {
         }
     }
 
-    /// The sums: one, or in a frame with layers [`SUMS_WITH_LAYERS`].
+    /// Sums of the pixel: one or, in a frame with layers, [`SUMS_WITH_LAYERS`].
     pub fn sums(&self, frame: &FrameParameters) -> &[ColourSum] {
         self.0.get(..sums_of_pixel(frame.layers) as usize).unwrap_or_default()
     }

@@ -1,19 +1,20 @@
 //! One chip: its tiles in flight, and their passes.
 //!
-//! A tile goes through the passes of `position`, block by block; every pass is done for all gather points
-//! before the next begins, so that gathers of neighbouring points are adjacent. When all rays of the
-//! irradiance records of a block are cast, or all rays of its pixels, their gathers wait in the queue with
-//! those of other tiles, and another tile goes on: the queue is drained when it is full, or when there is
-//! nothing else to do. Pixels are completed when the last of these gathers is done: first those that need the
-//! records alone. Each call of [`Chip::step`] does a small piece of this work.
+//! A tile goes through the passes of `position`, block by block. Every pass is done for all gather points
+//! before the next pass begins, so that gathers of neighbouring points are adjacent.
+//!
+//! When all rays of a block's irradiance records, or of its pixels, are cast, their gathers wait in the queue
+//! with those of other tiles, and another tile proceeds. The queue is drained when it is full or nothing else
+//! can be done. Pixels are completed when the last of their gathers is done; pixels that need only irradiance
+//! records come first. Each call of [`Chip::step`] does a small piece of this work.
 //!
 //! | state | kept from the command to the last pixel, of each tile in flight |
 //! |---|---|
 //! | `Flight` | tile, counters, progress, irradiance records |
 //! | `PixelSums` | sums of the pixels with gather rays: a ring for all tiles in flight |
-//! | `Points` | nothing: gather points of the tile whose rays are being cast |
-//! | `Gathers` | nothing: the queue, each gather with its tile in flight |
-//! | `RecordStore` | nothing: the place of the irradiance records that frames of one picture share |
+//! | `Points` | nothing; it holds the gather points of the tile whose rays are being cast |
+//! | `Gathers` | nothing; it is the queue, in which each gather names its tile in flight |
+//! | `RecordStore` | nothing; it locates the irradiance records that frames of one picture share |
 
 mod adaptive;
 mod buffers;
@@ -50,35 +51,35 @@ use crate::kind::{self, Array, Capacity, ChipKind, Micro, Reference, TechniqueMe
 use crate::memory::MemoryPort;
 use crate::render::RenderJob;
 
-/// The chip of the budget [`REFERENCE`](crate::kind::REFERENCE).
+/// Chip with the budget [`REFERENCE`](crate::kind::REFERENCE).
 pub type ReferenceChip = Chip<Reference>;
-/// The chip of the budget [`MICRO`](crate::kind::MICRO).
+/// Chip with the budget [`MICRO`](crate::kind::MICRO).
 pub type MicroChip = Chip<Micro>;
 
-/// A chip of one kind, which gives the capacities of all its buffers.
+/// A chip of kind `K`, which determines the capacities of all buffers.
 pub struct Chip<K: ChipKind> {
     flights: <K::Flights as Capacity>::Array<Flight<K>>,
-    /// The tile in flight whose rays are being cast.
+    /// Number of the tile in flight whose rays are being cast.
     active: Option<usize>,
     shared: Shared<K>,
 }
 
 /// Number of rays and gathers after which a step ends.
 const WORK_OF_STEP: u64 = 16;
-/// Maximum number of pieces of one step, as some pieces cast no ray.
+/// Maximum number of pieces of work in one step, because some pieces cast no ray.
 const PIECES_PER_STEP: u32 = 64;
-/// Maximum number of queued gathers done in one piece.
+/// Maximum number of queued gathers done in one piece of work.
 const GATHERS_PER_PIECE: u64 = 16;
 
 /// Result of a step.
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
-    /// There is more to do.
+    /// There is more work to do.
     Busy,
-    /// A pixel of a tile is complete. The pixels of each block of a tile come row by row: those without
-    /// gather rays of their own, then the others.
+    /// A pixel is complete. Within each block of a tile, pixels without gather rays come first, row by row,
+    /// then the others, row by row.
     Pixel(FinishedPixel),
-    /// A tile is complete, with its last pixel before: its number, and the counts of its work.
+    /// A tile is complete, after its last pixel: number of the tile, and counters of its work.
     Tile(u32, Counters),
     /// There is nothing to do before the next [`Chip::begin`], for which there is room, or [`Chip::flush`].
     Idle,
@@ -98,13 +99,13 @@ impl<K: ChipKind> Chip<K> {
         importance_sampling: K::Points::ENTRIES * size_of::<DirectionTable>(),
     };
 
-    /// A chip without a tile.
+    /// Creates a chip without tiles.
     pub const fn new() -> Self {
         const { kind::check::<K>() };
         Self { flights: Array::VACANT, active: None, shared: Shared::new() }
     }
 
-    /// Maximum number of pixels of a tile of a frame.
+    /// Maximum number of pixels of a tile in a frame.
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
         u64::from(K::BUDGET.pixels_of_tile(frame.layers))
     }
@@ -119,19 +120,19 @@ impl<K: ChipKind> Chip<K> {
         }
     }
 
-    /// Begins a frame, with the lines of card memory beyond the image, where irradiance records may be kept.
-    /// Without this call none are.
+    /// Begins a frame. `room` are the lines of card memory beyond the image, where irradiance records may be
+    /// kept. Without this call no records are kept.
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         self.shared.store.begin_frame(frame, room);
     }
 
-    /// Forgets the irradiance records of earlier frames, as the image changes.
+    /// Drops the irradiance records of earlier frames. To be called when the image changes.
     pub fn forget_records(&mut self) {
         self.shared.store.forget();
     }
 
     /// Begins a tile of a frame. Returns false if the tile has no pixels or more than [`Self::tile_pixels`],
-    /// or as many tiles are in flight as the frame or the chip allows.
+    /// or if the frame or the chip allows no further tile in flight.
     #[must_use]
     pub fn begin(&mut self, memory: &mut impl MemoryPort, frame: &FrameParameters, tile: Tile) -> bool {
         if tile.pixels() == 0 || tile.pixels() > self.tile_pixels(frame) {
@@ -147,18 +148,18 @@ impl<K: ChipKind> Chip<K> {
         true
     }
 
-    /// Number of a vacant place for a tile in flight.
+    /// Number of a free place for a tile in flight.
     fn vacant(&self, frame: &FrameParameters) -> Option<usize> {
         let flights = self.flights.values().iter().take(frame.in_flight.max(1) as usize);
         flights.map(Flight::pass).position(|pass| pass == Pass::Vacant)
     }
 
-    /// Number of the first tile in flight for which something holds.
+    /// Number of the first tile in flight for which `holds` is true.
     fn find(&self, holds: impl Fn(&Flight<K>) -> bool) -> Option<usize> {
         self.flights.values().iter().position(holds)
     }
 
-    /// Begins to do the gathers that wait, as no tile follows. Returns false if there are none.
+    /// Begins to do the waiting gathers, because no tile follows. Returns false if there are none.
     pub fn flush(&mut self, frame: &FrameParameters) -> bool {
         let waits = !self.shared.gathers.is_empty();
         if waits && !self.shared.gathers.is_draining() {
@@ -167,11 +168,11 @@ impl<K: ChipKind> Chip<K> {
         waits
     }
 
-    /// Does the next pieces of work, about 16 rays and gathers: a card polls its link after each step, which
-    /// must be short enough for a prompt reply and long enough to make the cost of polling negligible.
+    /// Does the next pieces of work, about 16 rays and gathers. A card polls its link after each step: steps
+    /// are short, for a prompt reply, but long enough that the cost of polling is negligible.
     ///
     /// # Errors
-    /// If the image is not sound, or an [`Invariant`] is broken. All tiles should be dropped then.
+    /// If the image is invalid, or an [`Invariant`] is violated. All tiles should be dropped then.
     pub fn step<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<Progress, Fault> {
         let mut work = 0;
         for _ in 0..PIECES_PER_STEP {
@@ -186,8 +187,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Does the next piece of work, and adds its rays and gathers to `work`: some of the queued gathers, one
-    /// sample of a pixel to be completed, or a piece of a pass.
+    /// Does the next piece of work: some of the queued gathers, one sample of a pixel's completion, or a part
+    /// of a pass. Adds the number of its rays and gathers to `work`.
     #[inline(always)]
     fn piece<M: MemoryPort>(&mut self, job: &mut RenderJob<M>, work: &mut u64) -> Result<Progress, Fault> {
         if self.shared.gathers.is_draining() {
@@ -224,8 +225,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Begins the next block of a tile in flight, or the gather rays of its pixels. Without one the chip has
-    /// room for a tile or must drain its queue.
+    /// Begins the next block of a tile in flight, or the gather rays of its pixels. If there is no such tile,
+    /// the chip has room for a tile or must drain its queue.
     fn go_on(&mut self, frame: &FrameParameters) -> Result<Progress, Fault> {
         let of_pass = |pass| self.find(|flight| flight.pass() == pass);
         if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock)) {
@@ -243,8 +244,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(if must_drain { Progress::Busy } else { Progress::Idle })
     }
 
-    /// Completes the next sample of a block whose gathers are done. Its last pixels are followed by those
-    /// with gather rays, by another block or by the end of the tile.
+    /// Completes the next sample of a block whose gathers are done. After its last pixel follow the pixels
+    /// with gather rays, another block, or the end of the tile.
     fn complete<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -281,7 +282,7 @@ impl<K: ChipKind> Chip<K> {
         Ok(finished.map_or(Progress::Busy, Progress::Pixel))
     }
 
-    /// Begins a drain of the queue, which is counted with the tile of its first gather.
+    /// Begins a drain of the queue. The tile of its first gather counts it.
     fn begin_drain(&mut self, frame: &FrameParameters) {
         let Some((waiting, first)) = self.shared.gathers.begin_drain(frame.drain) else { return };
         if let Some(flight) = self.flights.values_mut().get_mut(first.target.flight()) {
@@ -290,7 +291,7 @@ impl<K: ChipKind> Chip<K> {
         }
     }
 
-    /// Does some of the queued gathers, and adds their radiance to records or pixels.
+    /// Does some of the queued gathers and adds their radiance to records or pixels.
     fn drain<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<(), Fault> {
         let Self { flights, shared, .. } = self;
         for _ in 0..GATHERS_PER_PIECE {

@@ -1,8 +1,8 @@
-//! Sums of the pixels that gather rays are cast for, of all tiles in flight.
+//! Sums of the pixels with gather rays, of all tiles in flight.
 //!
-//! Only such a pixel has light that waits: everything else is added when the pixel is completed. The sums lie
-//! in a ring, in runs of one tile each; a run grows while the tile's eye rays are cast, and ends with the
-//! tile.
+//! Only these pixels have light that waits; all other light is added when a pixel is completed. The sums are
+//! in a ring. The sums of one tile are consecutive, a run, which grows while the tile's eye rays are cast and
+//! ends with the tile.
 
 use core::num::NonZeroU32;
 
@@ -14,15 +14,15 @@ use super::light::{Component, PixelLight};
 use crate::fixed_point::ColourSum;
 use crate::kind::{Buffer, Capacity};
 
-/// The ring of sums, in the image's radiance units: [`sums_of_pixel`] for each pixel.
+/// Ring of sums, in the image's radiance units. Each pixel has [`sums_of_pixel`] of them.
 pub(super) struct PixelSums<C: Capacity> {
     sums: C::Buffer<ColourSum>,
     runs: [Run; MAX_IN_FLIGHT as usize],
-    /// Place in the ring of the next pixel.
+    /// Position in the ring of the next pixel.
     end: u32,
 }
 
-/// Consecutive pixels in the ring, of one tile in flight.
+/// Consecutive pixels in the ring that belong to one tile in flight.
 #[derive(Clone, Copy)]
 struct Run {
     first: u32,
@@ -32,7 +32,7 @@ struct Run {
 impl Run {
     const EMPTY: Self = Self { first: 0, count: 0 };
 
-    /// True if the run holds a place of a ring of `places`.
+    /// Returns true if the run contains position `place` of a ring with `places` positions.
     fn holds(&self, place: u32, places: NonZeroU32) -> bool {
         (place + places.get() - self.first) % places < self.count
     }
@@ -43,12 +43,12 @@ impl<C: Capacity> PixelSums<C> {
         Self { sums: Buffer::EMPTY, runs: [Run::EMPTY; MAX_IN_FLIGHT as usize], end: 0 }
     }
 
-    /// Number of pixels that the ring has room for; at least 1.
+    /// Number of pixels in the ring's capacity, at least 1.
     fn places(frame: &FrameParameters) -> NonZeroU32 {
         NonZeroU32::new(C::ENTRIES as u32 / sums_of_pixel(frame.layers)).unwrap_or(NonZeroU32::MIN)
     }
 
-    /// Begins the run of a tile in flight at the end of all others.
+    /// Begins the run of a tile in flight, after all other runs.
     pub(super) fn begin(&mut self, flight: usize) {
         // Always fits: the buffer's own capacity.
         let _ = self.sums.view_mut().resize(C::ENTRIES, ColourSum::ZERO);
@@ -61,21 +61,21 @@ impl<C: Capacity> PixelSums<C> {
         }
     }
 
-    /// Ends the run of a tile in flight, whose sums are read.
+    /// Ends the run of a tile in flight after its sums were read.
     pub(super) fn end(&mut self, flight: usize) {
         if let Some(run) = self.runs.get_mut(flight) {
             *run = Run::EMPTY;
         }
     }
 
-    /// True if there is room for another pixel.
+    /// Returns true if there is room for another pixel.
     pub(super) fn has_room(&self, frame: &FrameParameters) -> bool {
         let places = Self::places(frame);
         !self.runs.iter().any(|run| run.holds(self.end, places))
     }
 
-    /// Appends a pixel without light to the run that began last, and returns its number in the run. To be
-    /// called only if [`Self::has_room`].
+    /// Appends a pixel without light to the run that began last. Returns its number in the run.
+    /// [`Self::has_room`] must be true.
     pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> Result<u16, Fault> {
         let count = sums_of_pixel(frame.layers) as usize;
         let first = self.end as usize * count;
@@ -109,7 +109,7 @@ impl<C: Capacity> PixelSums<C> {
         Ok(())
     }
 
-    /// Light of pixel `number` of a tile in flight.
+    /// Light of the tile's pixel `number`.
     pub(super) fn light(
         &self,
         frame: &FrameParameters,
@@ -130,7 +130,8 @@ mod tests {
     use crate::chip::test_frame::frame;
     use crate::kind::Entries;
 
-    /// Tiles begin and end in many orders; each pixel keeps its own light, and all places are used again.
+    /// Tiles begin and end in many orders. Each pixel must keep its own light, and all positions of the ring
+    /// must be used again.
     #[test]
     fn every_pixel_of_every_tile_in_flight_has_a_sum_of_its_own() {
         for layers in [false, true] {

@@ -1,5 +1,5 @@
-//! The passes of a block's pixels with gather rays of their own, stripe by stripe and sample by sample: these
-//! rays, and direct light, which is weighted against them.
+//! Passes of a block's pixels with gather rays, stripe by stripe and sample by sample. They cast the gather
+//! rays and compute direct light, which is weighted against these rays.
 
 use core::ops::Range;
 
@@ -20,7 +20,7 @@ use crate::render::{
 };
 use crate::scene::Seen;
 
-/// The gather point of one of `paths` paths of a sample, its directions not yet chosen.
+/// Gather point of one of a sample's `paths` paths, with uninitialised directions.
 pub(super) fn pixel_point(
     frame: &FrameParameters,
     at: PixelSample,
@@ -43,18 +43,19 @@ pub(super) fn pixel_point(
     }
 }
 
-/// The error bound within which the irradiance of a sample may be interpolated; `None` if it is gathered.
+/// Error bound for interpolating the irradiance of a sample; `None` if it must be gathered.
 pub(super) fn allowed_error_at(frame: &FrameParameters, view: &View) -> Option<f32> {
     // Records lie where eye rays meet surfaces, not behind mirrors and glass.
     allowed_error(frame).filter(|_| view.is_first && view.surface.reflection.has_lambertian())
 }
 
-/// The sample of a view, for the irradiance cache.
+/// Converts a view to a sample for the irradiance cache.
 pub(super) fn seen_sample(at: PixelSample, view: &View) -> SeenSample<'_> {
     SeenSample { pixel: [at.x, at.y], film: view.film, surface: &view.surface }
 }
 
-/// The gather point of one of `paths` paths of a sample by geometry alone, its directions not yet chosen.
+/// Gather point of one of a sample's `paths` paths, determined by geometry only, with uninitialised
+/// directions.
 fn gather_point<M, R: Capacity>(
     context: &Context<M>,
     cache: &IrradianceCache<R>,
@@ -69,23 +70,24 @@ fn gather_point<M, R: Capacity>(
 }
 
 impl<K: ChipKind> Flight<K> {
-    /// Number of pixels of the stripe, all of which may have gather points.
+    /// Number of pixels of the stripe. Each of them may have a gather point.
     fn stripe(&self) -> u32 {
         self.block.pixels().saturating_sub(self.position.first).min(K::Points::ENTRIES as u32)
     }
 
-    /// True if the pixel of the next eye ray has a sum, or there is room for one.
+    /// Returns true if the pixel of the next eye ray has a sum, or there is room for one.
     pub(super) fn has_room(&self, frame: &FrameParameters, shared: &Shared<K>) -> bool {
         shared.sums.has_room(frame) || self.next_pixel(frame).is_none_or(|pixel| self.sum(pixel).is_some())
     }
 
-    /// Next pixel of the stripe with gather rays of its own and the present path; `None` after the last.
+    /// Next pixel of the stripe that has gather rays and whose samples have the current path; `None` after
+    /// the last.
     fn next_pixel(&self, frame: &FrameParameters) -> Option<u32> {
         let first = self.position.first;
         self.first_with_path(frame, first + self.position.index..first + self.stripe())
     }
 
-    /// Looks at the present path of the next pixel with gather rays.
+    /// Traces the current path of the next pixel with gather rays.
     pub(super) fn look<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -111,8 +113,8 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// First of some pixels of the block with gather rays of its own and the present path; `None` without
-    /// one.
+    /// First pixel among `pixels` of the block that has gather rays and whose samples have the current path;
+    /// `None` if there is none.
     fn first_with_path(&self, frame: &FrameParameters, pixels: Range<u32>) -> Option<u32> {
         let Range { mut start, end } = pixels;
         let sample = self.position.sample_of(frame);
@@ -125,7 +127,7 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Casts the eye ray of the present path of a pixel, and stores its gather point if it has gather rays.
+    /// Casts the eye ray of a pixel's current path. Stores its gather point if it has gather rays.
     fn store_point<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -155,7 +157,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Adds the light of shadow rays and caustics to the pixel of the present gather point, with the weight
+    /// Adds the light of shadow rays and caustics to the pixel of the current gather point, with the weight
     /// of its path.
     pub(super) fn gather_direct_light<M: MemoryPort>(
         &mut self,
@@ -179,7 +181,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Casts gather rays of the present bin, of the next gather point with any.
+    /// Casts gather rays in the current direction bin for the next gather point that has any.
     pub(super) fn cast_for_pixel<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -225,7 +227,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Goes on to the next path of the stripe's present sample, to its next sample, or to the next stripe.
+    /// Advances to the next path of the stripe's current sample, to its next sample, or to the next stripe.
     fn end_path(&mut self, frame: &FrameParameters) {
         self.position.pass = Pass::Eye;
         self.position.path += 1;
@@ -243,7 +245,7 @@ impl<K: ChipKind> Flight<K> {
     }
 }
 
-/// Light of shadow rays and caustics at a point, of one sample of a pixel, in the image's radiance units.
+/// Light of shadow rays and caustics at a gather point, for one sample, in the image's radiance units.
 pub(super) fn direct_light<M: MemoryPort>(
     context: &mut Context<M>,
     at: PixelSample,
@@ -255,7 +257,7 @@ pub(super) fn direct_light<M: MemoryPort>(
     Ok([(Component::Direct, direct), (Component::Caustic, caustic)])
 }
 
-/// The factor from radiance, W/(sr m^2), to the radiance units of a pixel's sum.
+/// Factor from radiance, W/(sr m^2), to the radiance units of a pixel's sum.
 #[inline(always)]
 pub(super) fn per_unit<M>(context: &Context<M>) -> f32 {
     1.0 / context.scene.header.radiance_unit

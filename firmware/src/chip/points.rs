@@ -1,4 +1,4 @@
-//! Gather points whose rays are cast together, bin by bin.
+//! Gather points whose rays are cast together, by direction bin.
 
 use core::ops::Range;
 
@@ -9,12 +9,13 @@ use super::stored_point::StoredPoint;
 use crate::kind::{Buffer, Capacity};
 use crate::sampler::Pattern;
 
-/// Stored gather points, each with its owner: the index of a pixel in its block, or of an irradiance record.
+/// Gather points with their owners. The owner is the index of a pixel in its block, or of an irradiance
+/// record.
 pub(super) struct Points<C: Capacity> {
     points: C::Buffer<StoredPoint>,
     owners: C::Buffer<u16>,
-    /// The direction bin of each point's next ray; after the last ray, the last one's. Alone, as most points
-    /// have no ray in a bin.
+    /// Direction bin of each point's next ray; after the last ray, the bin of that ray. The array is separate
+    /// from the points because most points have no ray in a bin.
     bins: C::Buffer<u8>,
 }
 
@@ -33,8 +34,8 @@ impl<C: Capacity> Points<C> {
         self.owners.view().len() as u32
     }
 
-    /// Appends a point with the bin of its first ray. There is room for one of each pixel of a stripe, and of
-    /// each record of a block.
+    /// Appends a point with the bin of its first ray. There is room for one point per pixel of a stripe, and
+    /// per record of a block.
     pub(super) fn push(&mut self, owner: u16, point: StoredPoint, bin: u32) -> Result<(), Fault> {
         let full = Invariant::Points.fault();
         self.points.view_mut().push(point).map_err(|_| full)?;
@@ -42,7 +43,7 @@ impl<C: Capacity> Points<C> {
         self.bins.view_mut().push(bin as u8).map_err(|_| full)
     }
 
-    /// The point of an index, with its owner.
+    /// Owner and point at `index`.
     #[inline(always)]
     pub(super) fn get(&self, index: u32) -> Result<(u16, &StoredPoint), Fault> {
         let at = index as usize;
@@ -50,7 +51,7 @@ impl<C: Capacity> Points<C> {
         point.ok_or(Invariant::Points.fault())
     }
 
-    /// Index and owner of the next point with rays in the present bin; `None` if there is none.
+    /// Index and owner of the next point with rays in the current bin; `None` if there is none.
     #[inline(always)]
     pub(super) fn next(&self, position: &Position) -> Option<(u32, u16)> {
         let first = position.index as usize;
@@ -59,8 +60,7 @@ impl<C: Capacity> Points<C> {
         Some((index as u32, *self.owners.view().get(index)?))
     }
 
-    /// The next rays of the point of an index in the present bin, of `bins`. The position goes on behind
-    /// them.
+    /// Takes the next rays of point `index` in the current bin, of `bins`. Advances the position past them.
     #[inline(always)]
     pub(super) fn take_rays(
         &mut self,

@@ -2,7 +2,7 @@
 
 use photoncard_shared::message::FrameParameters;
 
-/// A rectangle of a tile's pixels, in coordinates from the tile's upper left corner.
+/// A rectangle of a tile's pixels. Coordinates are relative to the tile's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Block {
     pub(super) x: u32,
@@ -14,7 +14,7 @@ pub(super) struct Block {
 impl Block {
     pub(super) const EMPTY: Self = Self { x: 0, y: 0, width: 0, height: 0 };
 
-    /// The block of all pixels of a tile.
+    /// Block with all pixels of a tile.
     pub(super) fn whole(width: u32, height: u32) -> Self {
         Self { x: 0, y: 0, width, height }
     }
@@ -23,13 +23,13 @@ impl Block {
         self.width * self.height
     }
 
-    /// Column and row in the tile of pixel `index` of the block, row-major.
+    /// Column and row in the tile of the block's pixel `index`, row-major.
     pub(super) fn pixel(&self, index: u32) -> [u32; 2] {
         let width = self.width.max(1);
         [self.x + index % width, self.y + index / width]
     }
 
-    /// The two halves of the block across its longer side; `None` for a block of one pixel.
+    /// Halves the block across its longer side; `None` for a block of one pixel.
     pub(super) fn halves(&self) -> Option<[Self; 2]> {
         let Self { x, y, width, height } = *self;
         if self.pixels() < 2 {
@@ -45,12 +45,12 @@ impl Block {
     }
 }
 
-/// Passes of a block, in order. The passes from [`Pass::ReadKept`] to [`Pass::WaitForRecords`] are skipped
-/// without the irradiance cache, and those after the first with kept records; [`Pass::CompletePlain`] is
-/// skipped where every sample has gather rays, and the passes after it are of the other pixels alone.
+/// Passes of a block, in order. Without the irradiance cache, [`Pass::ReadKept`] to [`Pass::WaitForRecords`]
+/// are skipped; with kept records, all of these but [`Pass::ReadKept`] are. [`Pass::CompletePlain`] is
+/// skipped if every sample has gather rays. The passes after it are for pixels with gather rays only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
-    /// No tile.
+    /// There is no tile.
     Vacant,
     /// The next block has not begun.
     NextBlock,
@@ -60,25 +60,25 @@ pub(super) enum Pass {
     Survey,
     /// Directions of the gather rays of the records.
     RecordPoints,
-    /// Gather rays of the records, bin by bin.
+    /// Gather rays of the records, by direction bin.
     RecordRays,
-    /// Gathers of the records wait.
+    /// The gathers of the records wait.
     WaitForRecords,
-    /// Completion of the pixels without gather rays of their own. The others are found, and left.
+    /// Completion of the pixels without gather rays. Pixels with gather rays are found and left for later.
     CompletePlain,
     /// The passes of the pixels with gather rays have not begun.
     NextPixels,
     /// Probes of the pixels with gather rays; skipped without adaptive sampling.
     Probe,
-    /// Eye rays of one path of each pixel of a stripe.
+    /// Eye rays of one path of each pixel in a stripe.
     Eye,
     /// Shadow rays and caustic gathers of the paths with gather rays.
     Direct,
-    /// Gather rays of the paths, bin by bin.
+    /// Gather rays of the paths, by direction bin.
     Rays,
-    /// All rays are cast; gathers wait.
+    /// All rays are cast; the gathers wait.
     Wait,
-    /// Completion of the pixels, once no gather waits.
+    /// Completion of the pixels with gather rays, when none of their gathers waits any more.
     Complete,
 }
 
@@ -86,59 +86,60 @@ pub(super) enum Pass {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Position {
     pub(super) pass: Pass,
-    /// Number of the present sample in the frame.
+    /// Number of the current sample in the frame.
     sample: u32,
-    /// Number of the present path in the sample.
+    /// Number of the current path in the sample.
     pub(super) path: u32,
-    /// Direction bin.
+    /// Number of the current direction bin.
     pub(super) bin: u32,
-    /// First pixel of the stripe: the pixels of the block, row-major, whose gather points are stored
-    /// together.
+    /// Index in the block of the stripe's first pixel. A stripe is a row-major run of pixels whose gather
+    /// points are stored together.
     pub(super) first: u32,
-    /// Index of the pixel in the stripe or in the block, of the lattice point, or of the gather point.
+    /// Index of the current pixel in the stripe or block, of the current lattice point, or of the current
+    /// gather point.
     pub(super) index: u32,
-    /// Number of rays of the bin already cast.
+    /// Number of rays already cast in the current bin.
     rays: u32,
 }
 
 impl Position {
     pub(super) const VACANT: Self = Self::at(Pass::Vacant);
 
-    /// The beginning of a pass, at the first sample.
+    /// Beginning of a pass, at the first sample.
     pub(super) const fn at(pass: Pass) -> Self {
         Self { pass, sample: 0, path: 0, bin: 0, first: 0, index: 0, rays: 0 }
     }
 
-    /// Number of rays of the present bin already cast, of the present gather point.
+    /// Number of rays of the current gather point already cast in the current bin.
     pub(super) fn rays_cast(&self) -> u32 {
         self.rays
     }
 
-    /// Advances by some rays of the present bin and of the gather point `index`: to its other rays, or to the
-    /// next point.
+    /// Advances by `rays` rays of the gather point `index` in the current bin: to its remaining rays or, if
+    /// these were the last, to the next point.
     pub(super) fn pass_rays(&mut self, index: u32, rays: u32, are_last: bool) {
         [self.index, self.rays] = if are_last { [index + 1, 0] } else { [index, self.rays + rays] };
     }
 
-    /// Advances to the first gather point and the next of `count` bins, cyclically. Returns whether the bin
-    /// was the last.
+    /// Advances to the first gather point and the next of `count` bins, cyclically. Returns whether the
+    /// previous bin was the last.
     pub(super) fn end_bin(&mut self, count: u32) -> bool {
         self.index = 0;
         next(&mut self.bin, count)
     }
 
-    /// Advances to the next of `count` indices, cyclically. Returns whether the index was the last.
+    /// Advances to the next of `count` indices, cyclically. Returns whether the previous index was the last.
     pub(super) fn next_index(&mut self, count: u32) -> bool {
         next(&mut self.index, count)
     }
 
-    /// Number of the present sample in the pixel.
+    /// Number of the current sample in the pixel.
     pub(super) fn sample_of(&self, frame: &FrameParameters) -> u32 {
         frame.first_sample.wrapping_add(self.sample)
     }
 
-    /// Advances to the first path of the next sample of the frame, cyclically. Returns whether the sample was
-    /// the last.
+    /// Advances to the first path of the frame's next sample, cyclically. Returns whether the previous sample
+    /// was the last.
     pub(super) fn next_sample(&mut self, frame: &FrameParameters) -> bool {
         self.path = 0;
         next(&mut self.sample, frame.samples)
@@ -162,7 +163,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn halves_make_up_the_whole_down_to_one_pixel() {
+    fn halves_partition_a_block_down_to_one_pixel() {
         let mut waiting = vec![Block { x: 3, y: 5, width: 7, height: 4 }];
         let mut pixels = Vec::new();
         while let Some(block) = waiting.pop() {

@@ -1,4 +1,4 @@
-//! The passes of a block's irradiance records.
+//! Passes of a block's irradiance records.
 
 use photoncard_shared::message::{Fault, Invariant};
 
@@ -13,7 +13,7 @@ use crate::memory::MemoryPort;
 use crate::render::{RenderJob, final_gather};
 
 impl<K: ChipKind> Flight<K> {
-    /// Reads back the block's records, if an earlier frame has kept them.
+    /// Reads the block's records back if an earlier frame kept them.
     pub(super) fn read_kept<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -24,7 +24,7 @@ impl<K: ChipKind> Flight<K> {
             Recalled::Records => {
                 self.position = Position::at(Pass::CompletePlain);
             }
-            Recalled::Divided => self.divide_block()?,
+            Recalled::TooMany => self.divide_block()?,
             Recalled::Nothing => self.begin_records()?,
         }
         Ok(())
@@ -65,7 +65,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Chooses the directions of one record's gather rays.
+    /// Chooses the directions of the gather rays of one record.
     pub(super) fn choose_record_point<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -85,7 +85,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Casts gather rays of the present bin, of the next record with any.
+    /// Casts gather rays in the current direction bin for the next record that has any.
     pub(super) fn cast_for_record<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -122,7 +122,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Ends the gather of the block's records, and keeps them if the frame asks for it.
+    /// Ends the gather of the block's records. Keeps the records if the frame asks for it.
     pub(super) fn end_records<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,

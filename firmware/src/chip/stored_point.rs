@@ -1,4 +1,4 @@
-//! A gather point as it waits from one direction bin to the next.
+//! A gather point as it is stored between two direction bins.
 
 use core::ops::Range;
 
@@ -11,23 +11,24 @@ use crate::render::{Context, GatherPoint, PixelSample, Purpose, eye};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
 
-/// Maximum number of gather rays of one piece of work.
+/// Maximum number of gather rays in one piece of work.
 const RAYS_PER_STEP: u32 = 64;
 
-/// State of a gather point from one direction bin to the next, 48 bytes: the rest is read again.
+/// Part of a gather point that is stored between two direction bins, 48 bytes. The remainder is computed
+/// again.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
-    /// Of pixels: the triangle and the place on it; elsewhere if it is seen by way of perfectly specular
-    /// surfaces.
+    /// For a pixel, the triangle and the position on it, or [`Seen::ELSEWHERE`] if the point is seen through
+    /// perfectly specular surfaces.
     pub(super) seen: Seen,
     pub(super) directions: DirectionTable,
-    /// The number of rays to cast, and their purpose.
+    /// Number of rays to cast, and their purpose.
     pub(super) rays: StoredRays,
 }
 
 const _: () = assert!(size_of::<StoredPoint>() == 48);
 
-/// The number of a point's rays, and whether they are for the lobe alone.
+/// Number of a point's rays, and whether they are for the lobe only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StoredRays(u16);
 
@@ -53,18 +54,18 @@ impl StoredRays {
 }
 
 impl StoredPoint {
-    /// The point of an irradiance record: the record has its surface.
+    /// Stores the point of an irradiance record. The surface is omitted, because the record has it.
     pub(super) fn of_record(point: &GatherPoint) -> Self {
         Self { seen: Seen::NOWHERE, directions: point.directions, rays: StoredRays::new(point) }
     }
 
-    /// Direction bin, of `bins`, of the first ray.
+    /// Direction bin, out of `bins`, of the first ray.
     pub(super) fn first_bin(&self, pattern: Pattern, bins: u32) -> u32 {
         self.directions.bin(pattern, 0, self.rays.number(), bins)
     }
 
-    /// The next rays of a direction bin, at most [`RAYS_PER_STEP`], of which `done` are cast; and the bin of
-    /// the ray after them. There is one at least.
+    /// Returns the next rays of direction bin `bin`, at least one and at most [`RAYS_PER_STEP`], and the bin
+    /// of the ray after them. `done` rays of the bin were already cast.
     #[inline(always)]
     pub(super) fn next_rays(
         &self,
@@ -85,7 +86,7 @@ impl StoredPoint {
         (first..number, None)
     }
 
-    /// The gather point of a sample of a pixel, but for its surface.
+    /// Restores the gather point of a pixel's sample, except for its surface.
     #[inline(always)]
     pub(super) fn point(&self, pattern: Pattern) -> GatherPoint {
         GatherPoint {
@@ -98,10 +99,10 @@ impl StoredPoint {
         }
     }
 
-    /// Reads the surface of a sample of a pixel into `surface`.
+    /// Reads the surface of a pixel's sample into `surface`.
     ///
     /// # Errors
-    /// If the image is not sound, or no surface is seen.
+    /// If the image is invalid, or no surface is seen.
     #[inline(always)]
     pub(super) fn read_surface<M: MemoryPort>(
         &self,
@@ -120,7 +121,7 @@ impl StoredPoint {
     }
 }
 
-/// The random numbers of a sample's gather rays.
+/// Random numbers for the gather rays of a sample.
 #[inline(always)]
 pub(super) fn pattern(frame: &FrameParameters, at: PixelSample) -> Pattern {
     Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather)

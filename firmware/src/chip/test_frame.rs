@@ -1,8 +1,8 @@
-//! A frame for unit tests.
+//! Frame parameters for unit tests.
 
 use photoncard_shared::message::{Camera, FrameParameters};
 
-/// One sample of 8x8 pixels, with one ray of each kind.
+/// Frame of 8x8 pixels with one sample per pixel and one ray of each kind.
 pub(super) fn frame() -> FrameParameters {
     let camera = Camera { origin: [0.0; 3], forward: [0.0; 3], right: [0.0; 3], up: [0.0; 3] };
     FrameParameters {

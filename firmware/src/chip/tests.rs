@@ -1,5 +1,4 @@
-//! Invariants of a chip that are broken on purpose: each is a fault with its number, never light that is
-//! lost.
+//! Invariants of a chip, violated on purpose. Each violation is a numbered fault and loses no light.
 
 use std::boxed::Box;
 
@@ -35,13 +34,13 @@ fn scene() -> SceneImage {
     SceneImage { header }
 }
 
-/// Result of a step of a chip without memory.
+/// Does a step of a chip without memory.
 fn step(chip: &mut MicroChip, frame: &FrameParameters) -> Result<Progress, Fault> {
     let (scene, memory) = (scene(), &mut Lines(&[]));
     chip.step(&mut RenderJob { scene: &scene, memory, frame, outlet: None })
 }
 
-/// A gather of a tile in flight.
+/// Gather request for tile in flight number `flight`.
 fn request(flight: usize) -> GatherRequest {
     let surface = Surface::white(Vec3::ZERO, Vec3::Y, 1.0);
     GatherRequest {
@@ -52,7 +51,7 @@ fn request(flight: usize) -> GatherRequest {
 }
 
 #[test]
-fn a_gather_of_no_tile_is_a_fault() {
+fn a_gather_without_a_tile_in_flight_is_a_fault() {
     let frame = &frame();
     // The micro chip has one tile in flight.
     for (flight, broken) in [(1, Invariant::Flight), (0, Invariant::Waiting)] {
@@ -64,14 +63,14 @@ fn a_gather_of_no_tile_is_a_fault() {
 }
 
 #[test]
-fn a_pass_of_no_tile_is_a_fault() {
+fn a_pass_without_a_tile_in_flight_is_a_fault() {
     let mut chip = Box::new(MicroChip::new());
     chip.active = Some(1);
     assert_eq!(step(&mut chip, &frame()).err(), Some(Invariant::Flight.fault()));
 }
 
 #[test]
-fn what_a_tile_in_flight_does_not_hold_is_a_fault() {
+fn data_missing_in_a_tile_in_flight_is_a_fault() {
     let mut chip = Box::new(MicroChip::new());
     let flight = &mut chip.flights.values_mut()[0];
     assert_eq!(flight.begin_block(&frame()), Err(Invariant::Block.fault()));
@@ -117,7 +116,7 @@ fn one_gather_point_too_many_is_a_fault() {
     assert_eq!(points.push(0, stored, 0), Err(broken));
 }
 
-/// Result of a piece of work in a scene without surfaces.
+/// Does a piece of work in a scene without surfaces.
 fn in_empty_scene<T>(
     work: impl FnOnce(&mut Context<Lines>, &GatherPoint) -> Result<T, Fault>,
 ) -> Result<T, Fault> {

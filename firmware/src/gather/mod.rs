@@ -1,12 +1,12 @@
-//! Waiting photon gathers, and their order.
+//! Photon gathers that wait, and the order in which they are done.
 //!
 //! The end of a gather ray becomes a [`GatherRequest`] of 24 bytes: position, partial reflection, target.
-//! Requests may be executed in any order, as sums are in fixed point. In an order with spatial coherence,
-//! photons of one gather are still in the cache for the next (Steinhurst, Coombe, Lastra 2005, *Reordering
-//! for cache conscious photon mapping*):
+//! Requests may be executed in any order, as sums are in fixed point. In a spatially coherent order, photons
+//! of one gather are still in the cache for the next (Steinhurst, Coombe, Lastra 2005, *Reordering for cache
+//! conscious photon mapping*):
 //!
 //! - *generative* reordering casts the rays of one bin of directions
-//!   ([`crate::importance::DirectionTable::bin`]) for all pixels of a tile before those of the next;
+//!   ([`crate::importance::DirectionTable::bin`]) for all pixels of a tile before the rays of the next bin;
 //! - *deferred* reordering ([`GatherQueue`]) queues requests, and executes them by a hash of their position
 //!   or along a Hilbert curve.
 

@@ -1,29 +1,29 @@
-//! Sort keys of deferred reordering: positions on the photons' grid, coded along a Hilbert curve.
+//! Sort keys of deferred reordering: positions on the photon grid, coded along a Hilbert curve.
 
 use photoncard_shared::layout::{GRID_BITS, PhotonGrid};
 use photoncard_shared::message::Drain;
 
 use crate::sampler::hash;
 
-/// Upper bits of a grid coordinate, which the Hilbert curve orders.
+/// Number of upper bits of a grid coordinate, which determine the cell of the Hilbert curve.
 const CURVE_BITS: u32 = 10;
-/// Lower bits of a grid coordinate, its offset in a cell of the curve.
+/// Number of lower bits of a grid coordinate, which are its offset in a cell of the curve.
 const REST_BITS: u32 = GRID_BITS - CURVE_BITS;
 const REST_MASK: u64 = (1 << REST_BITS) - 1;
-/// Bits of a hash cell's coordinates: 16 cells along each axis of the grid.
+/// Number of bits of a hash cell's coordinates: 16 cells along each axis of the grid.
 const CELL_BITS: u32 = 4;
 /// Number of buckets that cells are hashed to.
 const BUCKETS: u32 = 256;
 
-/// Bits of a length, below those of three coordinates.
+/// Number of low bits of a code that hold a length. Three grid coordinates take the others.
 const LENGTH_BITS: u32 = u64::BITS - 3 * GRID_BITS;
 const MAX_LENGTH: u64 = (1 << LENGTH_BITS) - 1;
-/// Length from which on lengths are told apart, cells of the grid.
+/// Minimum length that is resolved, in cells of the grid.
 const LEAST_LENGTH: f32 = 64.0;
 
-/// Position of a gather, rounded to the photons' grid: index along the Hilbert curve through 1024 cells an
-/// axis, and offset within the cell. The four bits below tell how long the gather ray is that ends there, by
-/// its binary exponent.
+/// Position of a gather, rounded to the photon grid: its index along the Hilbert curve through 1024 cells per
+/// axis, and the offset within the cell. The low four bits hold the binary exponent of the length of the
+/// gather ray that ends there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct HilbertCode(u64);
 
@@ -37,7 +37,7 @@ impl HilbertCode {
         Self(point.into_iter().fold(curve as u64, rest) << LENGTH_BITS)
     }
 
-    /// The code of the end of a ray of a length, metres.
+    /// Adds the length, metres, of the ray that ends at the position.
     #[inline(always)]
     #[must_use]
     pub fn with_length(self, grid: &PhotonGrid, length: f32) -> Self {
@@ -47,8 +47,8 @@ impl HilbertCode {
         Self(self.0 & !MAX_LENGTH | code)
     }
 
-    /// A length that the ray is shorter than, and has half of it at least, metres: 64 cells of the grid for
-    /// all shorter rays, infinite for long ones.
+    /// Upper bound of the ray's length, metres, at most twice the length. It is 64 grid cells for all shorter
+    /// rays and infinite for long ones.
     #[inline(always)]
     pub fn upper_length(self, grid: &PhotonGrid) -> f32 {
         match self.0 & MAX_LENGTH {
@@ -89,14 +89,14 @@ impl HilbertCode {
     }
 }
 
-/// Masks of a level of the curve: its bit of a coordinate, and all bits below.
+/// Masks of a level of the curve: its bit in a coordinate, and all bits below it.
 #[inline(always)]
 fn level_masks(level: u32) -> (u32, u32) {
     (1 << level, (1 << level) - 1)
 }
 
-/// Elementary transform of the curve: mirrors the lower bits of `x`, or exchanges those of `x` and `other`.
-/// Returns the new `other`.
+/// Elementary transform of the curve: mirrors the lower bits of `x`, or exchanges the lower bits of `x` and
+/// `other`. Returns the new `other`.
 #[inline(always)]
 fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
     if other & bit != 0 {
@@ -108,8 +108,8 @@ fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
     other ^ exchange
 }
 
-/// Index of a cell along the 3D Hilbert curve through `2^bits` cells an axis (Skilling 2004, *Programming the
-/// Hilbert curve*); `bits` from 1 to 10.
+/// Index of a cell along the 3D Hilbert curve through `2^bits` cells per axis (Skilling 2004, *Programming
+/// the Hilbert curve*); `bits` from 1 to 10.
 #[inline]
 pub fn hilbert_index(cell: [u32; 3], bits: u32) -> u32 {
     let [mut x, mut y, mut z] = cell;
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn a_code_gives_back_its_grid_point() {
+    fn a_code_decodes_to_its_grid_point() {
         let grid = PhotonGrid::around([-1.0, -2.0, 0.0], [1.0, 0.5, 4.0]);
         for i in 0..10_000 {
             let position = [0, 1, 2].map(|axis| -2.0 + 6.0 * (hash(3 * i + axis) >> 8) as f32 / 16_777_216.0);
@@ -191,7 +191,7 @@ mod tests {
     }
 
     #[test]
-    fn a_length_is_told_within_a_factor_of_two_and_moves_no_position() {
+    fn a_code_holds_a_length_within_a_factor_of_two_and_keeps_the_position() {
         for cell in [1.0 / 1024.0, 1.0, 16.0] {
             let grid = PhotonGrid { origin: [-5; 3], cell };
             let plain = HilbertCode::new(&grid, [1e6, 17.0 * cell, 0.0]);

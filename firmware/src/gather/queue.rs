@@ -1,6 +1,6 @@
-//! The gather queue of deferred reordering: requests are kept until the queue is full or no other work is
-//! left, and are then done in the order of [`super::HilbertCode::key`]. A full queue is drained before the
-//! next request; nothing is lost.
+//! Gather queue of deferred reordering. It keeps requests until it is full or no other work is left; they are
+//! then done in the order of [`super::HilbertCode::key`]. A full queue is drained before the next request, so
+//! that none is lost.
 
 use photoncard_shared::message::Drain;
 
@@ -36,12 +36,12 @@ impl<C: Capacity> GatherQueue<C> {
         self.waiting.view().len()
     }
 
-    /// True if no request is queued.
+    /// Returns true if no request is queued.
     pub fn is_empty(&self) -> bool {
         self.waiting.view().is_empty()
     }
 
-    /// True between [`Self::begin_drain`] and the end of the drain.
+    /// Returns true between [`Self::begin_drain`] and the end of the drain.
     pub fn is_draining(&self) -> bool {
         self.draining
     }
@@ -49,24 +49,24 @@ impl<C: Capacity> GatherQueue<C> {
     /// Appends a request.
     ///
     /// # Errors
-    /// The request itself if the queue is full.
+    /// Returns the request if the queue is full.
     pub fn push(&mut self, request: GatherRequest) -> Result<(), GatherRequest> {
         self.waiting.view_mut().push(request)
     }
 
-    /// Begins a drain: sorts the requests in the order of `drain`.
+    /// Begins a drain by sorting the requests in the order of `drain`.
     pub fn begin_drain(&mut self, drain: Drain) {
         // In descending order, as requests are popped from the end.
         self.waiting.view_mut().sort_unstable_by_key(|request| u64::MAX - request.position.key(drain));
         self.draining = true;
     }
 
-    /// The first request of a drain that has begun.
+    /// First request of a drain that has begun.
     pub fn first(&self) -> Option<&GatherRequest> {
         self.waiting.view().last()
     }
 
-    /// The next request; `None` ends the drain.
+    /// Takes the next request; `None` ends the drain.
     pub fn take(&mut self) -> Option<GatherRequest> {
         let next = self.waiting.view_mut().pop();
         self.draining = next.is_some();

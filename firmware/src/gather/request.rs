@@ -1,34 +1,34 @@
-//! The record of a waiting gather: position, partial reflection, and the sum that takes its result.
+//! Record of a waiting gather: position, partial reflection, and the sum that its result is added to.
 
 use photoncard_shared::budget::{MAX_IN_FLIGHT, MAX_TILE_PIXELS};
 
 use super::HilbertCode;
 use crate::scene::PartialReflection;
 
-/// Gather of photons at a position, whose radiance is added to a gather point's sum; 24 bytes.
+/// Request to gather photons at a position and add the radiance to a gather point's sum; 24 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherRequest {
-    /// Position, on the photons' grid.
+    /// Position on the photon grid.
     pub position: HilbertCode,
-    /// Partial reflection times the gather ray's weight, from photon power units to radiance units.
+    /// Partial reflection times the gather ray's weight. It converts photon power units to radiance units.
     pub reflection: PartialReflection,
-    /// The sum that takes the result.
+    /// Sum to which the result is added.
     pub target: GatherTarget,
 }
 
 const _: () = assert!(size_of::<GatherRequest>() == 24);
 
-/// The sum that takes the result of a gather: number of the tile in flight, and the gather point in it; 3
-/// bytes.
+/// Sum to which the result of a gather is added, 3 bytes: the tile in flight, the gather point in it, and the
+/// cell of the hemisphere.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherTarget {
-    /// Index of the gather point in 15 bits, and [`Self::OF_RECORD`]; little-endian.
+    /// Index of the gather point in 15 bits, and the flag [`Self::OF_RECORD`]; little-endian.
     point: [u8; 2],
-    /// Cell of the hemisphere in 5 bits, below the number of the tile in flight in 3.
+    /// Cell of the hemisphere in the low 5 bits, number of the tile in flight in the high 3.
     cell_and_flight: u8,
 }
 
-/// A gather point of a tile in flight.
+/// Index of a gather point in a tile in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointIndex {
     /// Number of a pixel's sum.
@@ -43,10 +43,10 @@ const _: () = assert!(MAX_IN_FLIGHT <= 1 << (u8::BITS - CELL_BITS));
 const _: () = assert!(MAX_TILE_PIXELS <= GatherTarget::OF_RECORD as u32);
 
 impl GatherTarget {
-    /// Marks an irradiance record.
+    /// Flag of an irradiance record.
     const OF_RECORD: u16 = 1 << 15;
 
-    /// The target of gathers of a point of the tile in flight `flight`, which is below [`MAX_IN_FLIGHT`].
+    /// Target of the gathers of a point in tile in flight `flight`, which is below [`MAX_IN_FLIGHT`].
     pub const fn new(flight: usize, point: PointIndex) -> Self {
         let bits = match point {
             PointIndex::Pixel(index) => index & !Self::OF_RECORD,
@@ -55,7 +55,7 @@ impl GatherTarget {
         Self { point: bits.to_le_bytes(), cell_and_flight: (flight as u8) << CELL_BITS }
     }
 
-    /// The target with the cell of the hemisphere that the gather ray is in.
+    /// Adds the cell of the hemisphere that contains the gather ray.
     #[inline(always)]
     #[must_use]
     pub const fn in_cell(self, cell: u8) -> Self {
@@ -90,7 +90,7 @@ mod tests {
     use crate::importance::CELLS;
 
     #[test]
-    fn a_target_gives_back_its_parts() {
+    fn a_target_decodes_to_its_parts() {
         for flight in 0..MAX_IN_FLIGHT as usize {
             for index in [0, 1, 255, 4095, 32_767] {
                 for point in [PointIndex::Pixel(index), PointIndex::Record(index)] {

@@ -1,8 +1,8 @@
-//! The hemisphere above a surface in 4x8 cells of equal projected solid angle: a cosine-weighted direction
-//! lies in each with probability 1/32 (Jensen 1995).
+//! The hemisphere above a surface in 4x8 cells of equal projected solid angle. A cosine-weighted direction
+//! lies in each cell with probability 1/32 (Jensen 1995).
 //!
-//! Rows divide the square of the sine of the angle to the normal, columns the azimuth. Cells are numbered
-//! along a walk through neighbours, every other row backwards.
+//! Rows divide the square of the sine of the angle to the normal, columns the azimuth. Cells are numbered in
+//! boustrophedon order, so that consecutive cells are neighbours.
 
 use core::f32::consts::PI;
 
@@ -10,11 +10,11 @@ use glam::Vec3;
 
 use crate::vector::{about, max, tangents};
 
-/// Rows, from the normal to the horizon.
+/// Number of rows, from the normal to the horizon.
 pub const ROWS: usize = 4;
-/// Columns, around the normal.
+/// Number of columns, around the normal.
 pub const COLUMNS: usize = 8;
-/// All cells.
+/// Number of cells.
 pub const CELLS: usize = ROWS * COLUMNS;
 
 /// Row and column of a cell.
@@ -24,7 +24,6 @@ fn row_and_step(cell: u8) -> [u8; 2] {
     [row, if row.is_multiple_of(2) { step } else { COLUMNS as u8 - 1 - step }]
 }
 
-/// Cell at a row and a column.
 #[inline(always)]
 pub(crate) fn cell_at(row: usize, column: usize) -> usize {
     row * COLUMNS + if row.is_multiple_of(2) { column } else { COLUMNS - 1 - column }
@@ -49,8 +48,8 @@ pub fn cell_of(normal: Vec3, direction: Vec3) -> Option<u8> {
     Some(cell_at(row, column) as u8)
 }
 
-/// Direction at a point of a cell, uniform in projected solid angle: `along` is the coordinate in the
-/// direction of the walk, `across` the one from the normal to the horizon, both 0 to 1.
+/// Direction at a point of a cell, uniform in projected solid angle. Both coordinates are in [0, 1]: `along`
+/// follows the numbering of the cells, `across` goes from the normal to the horizon.
 #[inline(always)]
 pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) -> Vec3 {
     let [row, column] = row_and_step(cell);
@@ -62,7 +61,7 @@ pub(crate) fn direction_in(normal: Vec3, cell: u8, [along, across]: [f32; 2]) ->
     about(normal, azimuth, sine, cosine)
 }
 
-/// Centre of a cell: azimuth, radians, and `sin^2` of the polar angle.
+/// Centre of a cell: its azimuth, radians, and `sin^2` of its polar angle.
 pub(crate) fn cell_centre(cell: u8) -> [f32; 2] {
     let [row, column] = row_and_step(cell);
     [(column as f32 + 0.5) * (2.0 * PI / COLUMNS as f32), (row as f32 + 0.5) * (1.0 / ROWS as f32)]

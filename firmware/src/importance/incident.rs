@@ -1,12 +1,12 @@
-//! Flux of indirect light through the cells of the hemisphere, estimated from the nearest photons, and
-//! direction tables from it.
+//! Flux of indirect light through the cells of the hemisphere, estimated from the nearest photons, and the
+//! direction tables that follow from it.
 //!
-//! Photons straight from a light are excluded: shadow rays bring that light. With k = 100 photons a cell has
-//! a few, and its flux is uncertain by half. A table of raw sums would cost more variance than it saves
-//! wherever light comes from all around. The sums are therefore shrunk towards their mean (James, Stein 1961,
-//! *Estimation with quadratic loss*): by the factor `max(0, 1 - noise / spread)`, with `spread` the sum of
-//! squared deviations and `noise` the part of it that the number of photons explains. Pure noise gives the
-//! table of the cosine; light through few cells keeps its shape.
+//! Photons straight from a light are excluded, because shadow rays account for that light. With k = 100
+//! photons a cell has a few, and its flux is uncertain by half. Where light comes from all around, a table of
+//! raw sums would add more variance than it removes. The sums are therefore shrunk towards their mean (James,
+//! Stein 1961, *Estimation with quadratic loss*) by the factor `max(0, 1 - noise / spread)`: `spread` is the
+//! sum of squared deviations, `noise` its expectation for uniform flux, given the photons' number and powers.
+//! Pure noise gives the cosine's table; light through few cells keeps its distribution.
 
 use glam::Vec3;
 use photoncard_shared::layout::decode_direction;
@@ -21,29 +21,30 @@ use crate::sampler::radical_inverse;
 use crate::scene::Reflector;
 use crate::vector::{max, unit};
 
-/// Uniform share of the cells of a product (defensive sampling): light varies within a cell too, and may come
-/// through a cell without photons. It bounds the weight of a ray by about twice the albedo. Measured:
-/// `docs/techniques.md`.
+/// Uniform share of the cells in a product table (defensive sampling), because light varies within a cell and
+/// may come through a cell without photons. It bounds the weight of a ray by about twice the albedo.
+/// `docs/techniques.md` has the measurement.
 const EVEN_SHARE: f32 = 0.55;
-/// Flux of an empty cell over the mean flux: the small energy of Jensen 1995.
+/// Flux of an empty cell as a fraction of the mean flux: the small energy of Jensen 1995.
 const EMPTY_CELL: f32 = 0.1;
-/// Number of sampled directions of the lobe that distribute it over the cells.
+/// Number of sampled directions by which the lobe is distributed over the cells.
 const LOBE_POINTS: u32 = 32;
-/// Sharpness of a lobe of which the cells take one half: its solid angle is about that of two cells.
+/// Sharpness of a lobe whose solid angle is about that of two cells. Cells take one half of such a lobe.
 const HALF_HELD_SHARPNESS: f32 = 16.0;
-/// Minimum share of the lobe's entry, over the lobe's share of the albedos.
+/// Minimum fraction of the lobe's share of the albedos that the lobe's entry has.
 const LOBE_PART: f32 = 0.25;
 
-/// Flux through the cells of the hemisphere: the photons' power weighted by a colour, in photon power units.
+/// Flux through the cells of the hemisphere: photon power weighted by a colour, in photon power units.
 pub struct IncidentFlux {
     cells: [Sum; CELLS],
-    /// Sum of the squares of the photons' powers.
+    /// Sum of the squared photon powers.
     squares: Sum,
 }
 
 impl IncidentFlux {
-    /// Flux of the nearest photons of the point's surface, without photons straight from a light. `colour`,
-    /// at most about 1, weights the channels of their power. `normal_code` is the code of `normal`.
+    /// Flux of the nearest photons on the point's surface, without photons straight from a light. The
+    /// channels of their power are weighted by `colour`, at most about 1. `normal_code` is the code of
+    /// `normal`.
     pub fn new(nearest: &NearestPhotons, normal: Vec3, normal_code: u8, colour: Vec3) -> Self {
         let mut flux = Self { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
         let mut same_surface = SameSurface::new(normal_code);
@@ -62,7 +63,7 @@ impl IncidentFlux {
         flux
     }
 
-    /// Flux of each cell; 1 for all if there is none.
+    /// Flux of each cell; 1 for all cells if there is no flux.
     fn raw(&self) -> [f32; CELLS] {
         let cells = self.cells.map(Sum::value);
         if cells.iter().any(|&cell| cell > 0.0) { cells } else { [1.0; CELLS] }
@@ -78,7 +79,7 @@ impl IncidentFlux {
         cells.map(|cell| mean + known * (cell - mean))
     }
 
-    /// Direction table of a sampling for a reflection that is not black.
+    /// Direction table for `sampling` and a reflection that is not black.
     pub fn table(&self, sampling: Sampling, reflector: &Reflector) -> DirectionTable {
         match sampling {
             Sampling::Reflection => DirectionTable::of_reflection(reflector),
@@ -94,7 +95,7 @@ impl IncidentFlux {
 }
 
 impl DirectionTable {
-    /// Direction table of the reflection alone.
+    /// Direction table of the reflection only.
     pub fn of_reflection(reflector: &Reflector) -> Self {
         let [diffuse, lobe] = reflector.albedos();
         Self::new(&[diffuse * (1.0 / CELLS as f32); CELLS], lobe)
@@ -105,7 +106,8 @@ fn mean(cells: &[f32; CELLS]) -> f32 {
     cells.iter().sum::<f32>() * (1.0 / CELLS as f32)
 }
 
-/// Table of flux times reflection: the Lambertian part, and the part of the lobe that is as wide as cells.
+/// Table of flux times reflection, for the Lambertian part and for the part of the lobe that is as wide as
+/// the cells.
 fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     let [diffuse, specular] = reflector.albedos();
     let even = EVEN_SHARE * mean(flux);
@@ -132,7 +134,7 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     DirectionTable::new(&cells, max(lobe, least))
 }
 
-/// Sampled directions of the lobe with their cells, without directions below the surface.
+/// Sampled directions of the lobe with their cells. Directions below the surface are omitted.
 fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, Vec3)> {
     (0..LOBE_POINTS).filter_map(move |index| {
         let point = [radical_inverse(index), (index as f32 + 0.5) / LOBE_POINTS as f32];
@@ -141,7 +143,7 @@ fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, Vec3)> {
     })
 }
 
-/// Table with half of the rays by the reflection, half by the flux.
+/// Table that draws half of the rays from the reflection and half from the flux.
 fn mixture(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     let all: f32 = flux.iter().sum();
     let diffuse_share = reflector.diffuse_share();
@@ -163,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn a_spread_that_noise_explains_is_drawn_to_the_mean() {
+    fn flux_whose_spread_is_noise_is_shrunk_to_the_mean() {
         let mut cells = [1.0; CELLS];
         cells[3] = 1.5;
         cells[20] = 0.5;

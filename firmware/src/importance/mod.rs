@@ -1,11 +1,11 @@
-//! Directions of final gather rays: importance sampling of the reflection function, of the photons, or of
+//! Directions of final gather rays by importance sampling of the reflection function, of the photons, or of
 //! both.
 //!
 //! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and
 //! the reflection's lobe as one more entry, each with a share of the rays. A stratified pattern is sent
 //! through the table's inverse cumulative distribution, and the density of the whole mixture weights each
-//! ray, so that no choice of shares biases the picture. The samplings differ in the source of the shares
-//! alone:
+//! ray, so that no choice of shares biases the picture. The sampling methods differ only in the source of the
+//! shares:
 //!
 //! | sampling | share of a cell | share of the lobe |
 //! |---|---|---|
@@ -14,10 +14,10 @@
 //! | product (Steinhurst, Lastra 2006, *Global importance sampling of glossy surfaces using the photon map*) | that flux, reflected | the part of the lobe that is narrower than a cell |
 //! | mixture | the mean of reflection and photon | half the lobe's albedo |
 //!
-//! Points of few rays have the table of the reflection by every sampling
+//! Points with few rays use the table of the reflection with every sampling method
 //! ([`GatherPoint::choose_directions`](crate::render::GatherPoint::choose_directions)).
 //!
-//! Table entries are the direction bins of generative reordering as well: see [`DirectionTable::bin`].
+//! Generative reordering derives its direction bins from the table entries ([`DirectionTable::bin`]).
 
 mod hemisphere;
 mod incident;
@@ -35,7 +35,7 @@ use glam::Vec3;
 pub struct GatherDirection {
     /// Unit vector away from the surface.
     pub direction: Vec3,
-    /// `f cos(theta) / p`, without unit: the factor of the radiance from this direction.
+    /// Weight of the radiance from this direction: `f cos(theta) / p`, dimensionless.
     pub weight: Vec3,
     /// Probability density of the direction, 1/sr.
     pub density: f32,

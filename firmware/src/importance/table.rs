@@ -1,4 +1,4 @@
-//! The direction table of a gather point: shares of its gather rays by direction.
+//! Direction table of a gather point: the shares of its gather rays by direction.
 
 use core::f32::consts::FRAC_1_PI;
 
@@ -10,13 +10,13 @@ use crate::sampler::Pattern;
 use crate::scene::Reflector;
 use crate::vector::max;
 
-/// Entries of a table: the cells of the hemisphere along their walk, then the lobe.
+/// Number of entries of a table: the cells of the hemisphere in their order, then the lobe.
 pub const ENTRIES: usize = CELLS + 1;
 
 /// Index of the lobe's entry.
 const LOBE: usize = CELLS;
 
-/// Shares of the gather rays: whole numbers, so that densities are exact. 34 bytes.
+/// Shares of the gather rays in each entry, 34 bytes. They are integers, so that densities are exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DirectionTable {
     cells: [u8; CELLS],
@@ -30,11 +30,11 @@ impl Default for DirectionTable {
 }
 
 impl DirectionTable {
-    /// Equal cells: the density `cos(theta) / pi`.
+    /// Table with equal cells: the density `cos(theta) / pi`.
     pub const COSINE: Self = Self { cells: [1; CELLS], lobe: 0 };
 
     /// Table in proportion to `cells` and `lobe`, which are finite and not negative. If any cell is positive,
-    /// all cells get a share.
+    /// every cell gets a share.
     pub(super) fn new(cells: &[f32; CELLS], lobe: f32) -> Self {
         let greatest = cells.iter().fold(0.0, |greatest, &cell| max(cell, greatest));
         if greatest <= 0.0 {
@@ -52,7 +52,7 @@ impl DirectionTable {
         sum(&self.cells) + self.lobe as u32
     }
 
-    /// Share of all rays in a cell's entry, without the lobe's rays through the cell.
+    /// Fraction of all rays that a cell's entry has, without the lobe's rays through the cell.
     pub(crate) fn cell_share(&self, cell: usize) -> f32 {
         self.cells.get(cell).map_or(0.0, |&share| share as f32) / self.total() as f32
     }
@@ -62,15 +62,15 @@ impl DirectionTable {
         self.cells.get(entry).map_or(self.lobe as u32, |&share| share as u32)
     }
 
-    /// Sum of the shares before an entry.
+    /// Sum of the shares of all entries before `entry`.
     #[inline(always)]
     fn before(&self, entry: usize) -> u32 {
         let cells = self.cells.get(..entry.min(CELLS)).unwrap_or_default();
         sum(cells) + if entry > LOBE { self.lobe as u32 } else { 0 }
     }
 
-    /// Index of the first ray, of `count` in all, in direction bin `bin` of `bins` or in a later one. Bins
-    /// divide the walk through the entries into equal parts; their rays follow each other.
+    /// Index of the first of `count` rays that is in direction bin `bin` of `bins` or in a later bin. Bins
+    /// divide the sequence of entries into equal parts, so that the rays of a bin are consecutive.
     ///
     /// `count` is at most [`MAX_GATHER_RAYS`](photoncard_shared::budget::MAX_GATHER_RAYS), `bins` at most
     /// [`MAX_BINS`](photoncard_shared::budget::MAX_BINS).
@@ -88,7 +88,7 @@ impl DirectionTable {
         first_ray(pattern, count, beginning, total)
     }
 
-    /// Direction bin, of `bins`, of ray `index` of `count`.
+    /// Direction bin, out of `bins`, of ray `index` of `count`.
     #[inline(always)]
     pub fn bin(&self, pattern: Pattern, index: u32, count: u32, bins: u32) -> u32 {
         if bins <= 1 {
@@ -107,7 +107,7 @@ impl DirectionTable {
         (entry as u32 * bins + part) / ENTRIES as u32
     }
 
-    /// Place of ray `index` of `count` along the walk.
+    /// Position of ray `index` of `count` in the sequence of entries.
     #[inline(always)]
     fn place(&self, pattern: Pattern, index: u32, count: u32) -> Place {
         let target = stratum_point(pattern, index) * self.total() as u64;
@@ -119,7 +119,7 @@ impl DirectionTable {
         Place { entry, offset: target - before, size }
     }
 
-    /// The entry with a share, by the number of shares before it, and the sum of those before the entry.
+    /// Entry that contains share number `shares`, and the sum of the shares before that entry.
     #[inline(always)]
     fn entry_at(&self, shares: u32) -> (usize, u32) {
         let (mut first, mut before) = (0, 0);
@@ -139,15 +139,15 @@ impl DirectionTable {
         (LOBE, before)
     }
 
-    /// Entry of ray `index` of `count`, and the ray's coordinates within the entry, along the walk and across
-    /// it.
+    /// Entry of ray `index` of `count`, and the ray's two coordinates within the entry: along the order of
+    /// the cells, and across it.
     #[inline(always)]
     fn entry(&self, pattern: Pattern, index: u32, count: u32) -> (usize, [f32; 2]) {
         let Place { entry, offset, size } = self.place(pattern, index, count);
         (entry, [part(offset, size), pattern.radical_inverse(index)])
     }
 
-    /// Number of rays, of `count`, in each cell, without the lobe's.
+    /// Number of rays in each cell, out of `count`, without those of the lobe.
     pub fn rays_in_cells(&self, pattern: Pattern, count: u32) -> [u16; CELLS] {
         let mut rays = [0; CELLS];
         for index in 0..count {
@@ -159,7 +159,7 @@ impl DirectionTable {
         rays
     }
 
-    /// Direction of ray `index` of `count`; `None` below the surface.
+    /// Samples the direction of ray `index` of `count`; `None` if it lies below the surface.
     #[inline(always)]
     pub fn sample(
         &self,
@@ -204,24 +204,24 @@ impl DirectionTable {
     }
 }
 
-/// Place of a ray along the walk: its entry, and the offset in it, both lengths in units of a share over the
-/// length of all strata.
+/// Position of a ray in the sequence of entries: its entry and the offset in it. One share has the length of
+/// all strata together.
 struct Place {
     entry: usize,
     offset: u64,
     size: u64,
 }
 
-/// Bits of a point's offset in its stratum.
+/// Number of bits of a point's offset in its stratum.
 const JITTER_BITS: u32 = 24;
 
-/// Length of all strata together.
+/// Length of all `count` strata together.
 #[inline(always)]
 fn whole(count: u32) -> u64 {
     (count as u64) << JITTER_BITS
 }
 
-/// Point of a ray along all strata, each `2^JITTER_BITS` long.
+/// Position of a ray's point on the line of all strata, each `2^JITTER_BITS` long.
 #[inline(always)]
 fn stratum_point(pattern: Pattern, index: u32) -> u64 {
     (index as u64) << JITTER_BITS | jitter(pattern, index) as u64
@@ -233,7 +233,7 @@ fn jitter(pattern: Pattern, index: u32) -> u32 {
     pattern.jitter(index) >> (u32::BITS - JITTER_BITS)
 }
 
-/// Index of the first ray of `count` at or after a beginning, of `total`; both at most 2^25.
+/// Index of the first of `count` rays at or after share `beginning` of `total`; both are at most 2^25.
 #[inline(always)]
 fn first_ray(pattern: Pattern, count: u32, beginning: u32, total: u32) -> u32 {
     let (ray, remainder) = divide([beginning, count], total);
@@ -245,8 +245,9 @@ fn first_ray(pattern: Pattern, count: u32, beginning: u32, total: u32) -> u32 {
     ray + u32::from(is_before)
 }
 
-/// Quotient, below 2^20, and remainder of a product by a divisor of at most 2^25. Processors of 32 bits
-/// divide 64 by hundreds of instructions; the quotient is estimated in `f32`, to within 1, and corrected.
+/// Quotient and remainder of `a b / divisor`. The quotient is below 2^20, the divisor at most 2^25. The
+/// quotient is estimated in `f32`, to within 1, and corrected, because 32-bit processors need hundreds of
+/// instructions for a 64-bit division.
 #[inline(always)]
 fn divide([a, b]: [u32; 2], divisor: u32) -> (u32, u32) {
     let estimate = (a as f32 * b as f32 / divisor as f32) as u32;
@@ -261,7 +262,7 @@ fn divide([a, b]: [u32; 2], divisor: u32) -> (u32, u32) {
     }
 }
 
-/// Sum of shares, four at a time.
+/// Sum of shares, computed four at a time.
 #[inline(always)]
 fn sum(shares: &[u8]) -> u32 {
     let (words, rest) = shares.as_chunks::<4>();
@@ -297,7 +298,7 @@ mod tests {
         Reflector { normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
     }
 
-    /// Some table with cells between 1 and 255 and a lobe.
+    /// A table with cells between 1 and 255 and a lobe.
     fn uneven(seed: u32, lobe: f32) -> DirectionTable {
         let mut cells = [0.0; CELLS];
         for (cell, share) in cells.iter_mut().enumerate() {
@@ -332,7 +333,7 @@ mod tests {
     }
 
     #[test]
-    fn a_quotient_is_that_of_integers() {
+    fn divide_agrees_with_integer_division() {
         for seed in 0..100_000 {
             let divisor = crate::sampler::hash(seed) % (1 << 25) + 1;
             let beginning = crate::sampler::hash(seed + 1_000_000) % (divisor + 1);
@@ -360,7 +361,7 @@ mod tests {
         }
     }
 
-    /// The mean weight over many patterns.
+    /// Mean weight of a direction over many patterns.
     fn mean_weight(table: &DirectionTable, reflector: &Reflector) -> f32 {
         let [patterns, count] = [50, 2000];
         let rays = (0..patterns).flat_map(|seed| (0..count).map(move |index| (seed, index)));

@@ -1,21 +1,22 @@
 //! Irradiance gradients (Ward, Heckbert 1992, *Irradiance gradients*) from rays in cells of the hemisphere.
 //!
-//! The translational gradient is a sum over the borders of neighbouring cells: the speed of a border over the
-//! hemisphere as the point moves, in proportion to the inverse distance of the nearer cell, times the
-//! difference of the cells' radiances. So it is linear in the radiances, with coefficients that depend on
-//! distances alone. The survey finds these before any photon is gathered, so that gathers can add their terms
-//! in any order.
+//! The translational gradient is a sum over the borders of neighbouring cells. Each term is the difference of
+//! the two cells' radiances times the speed at which the border moves over the hemisphere when the point
+//! moves, which is proportional to the inverse distance of the nearer cell. The gradient is therefore linear
+//! in the radiances, with coefficients that depend only on distances. The survey finds the distances before
+//! any photon is gathered, so that gathers can add their terms in any order.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
 use crate::importance::{CELLS, COLUMNS, ROWS, cell_at, cell_centre};
 use crate::render::GatherPoint;
 
-/// Distances to a record's surroundings in each cell, over their harmonic mean; logarithmic 8-bit codes.
+/// Distance from a record to its surroundings in each cell, divided by the harmonic mean of the distances;
+/// logarithmic 8-bit codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Distances([u8; CELLS]);
 
-/// Codes per factor of two.
+/// Number of codes per factor of two.
 const STEPS_PER_OCTAVE: u32 = 16;
 /// Code of the harmonic mean distance.
 const MEAN_CODE: u32 = 128;
@@ -25,19 +26,19 @@ impl Distances {
         Self(inverse_distances.map(|inverse| encode(1.0 / (inverse * mean))))
     }
 
-    /// Distance in a cell, over the harmonic mean.
+    /// Distance in a cell, divided by the harmonic mean.
     fn get(&self, cell: usize) -> f32 {
         decode(self.0.get(cell).copied().unwrap_or(u8::MAX))
     }
 }
 
-/// Number of low bits of an `f32` below the code's.
+/// Number of low bits of an `f32` that a code omits.
 const SHIFT: u32 = 23 - STEPS_PER_OCTAVE.ilog2();
-/// Bits of 1.0 above the low ones.
+/// Bits of 1.0 without the omitted low bits.
 const ONE: u32 = 1.0_f32.to_bits() >> SHIFT;
 
-/// Code of a ratio: sixteen codes per factor of two, from 2^-8 to 2^8; ratios out of range are clamped, NaN
-/// is the maximum.
+/// Code of a ratio, with sixteen codes per factor of two, from 2^-8 to 2^8. Ratios out of range are clamped;
+/// NaN becomes the maximum.
 fn encode(ratio: f32) -> u8 {
     ((ratio.to_bits() >> SHIFT) + MEAN_CODE).saturating_sub(ONE).min(u8::MAX as u32) as u8
 }
@@ -46,11 +47,12 @@ fn decode(code: u8) -> f32 {
     f32::from_bits(((code as u32 + ONE - MEAN_CODE) << SHIFT) | 1 << (SHIFT - 1))
 }
 
-/// Weight of a gather ray in each cell in the translational gradient, along tangent and bitangent, times the
-/// harmonic mean distance: dimensionless, so that sums do not depend on the scale of the scene.
+/// Weight of a gather ray in the translational gradient, by cell, along tangent and bitangent. It is
+/// multiplied by the harmonic mean distance and thus dimensionless, so that sums do not depend on the scale
+/// of the scene.
 pub(super) type Coefficients = [[f32; 2]; CELLS];
 
-/// Coefficients of the cells for the rays of a gather point on a white Lambertian surface.
+/// Coefficients of the cells for a gather point's rays on a white Lambertian surface.
 pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coefficients {
     let rays = point.directions.rays_in_cells(point.pattern, point.rays);
     let mut coefficients = [[0.0; 2]; CELLS];
@@ -98,7 +100,7 @@ pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coeffi
     coefficients
 }
 
-/// Weight of a gather ray in a cell in the rotational gradient, along tangent and bitangent.
+/// Weight of a gather ray in the rotational gradient, by cell, along tangent and bitangent.
 pub(super) fn rotation(cell: u8) -> [f32; 2] {
     let [azimuth, sine_squared] = cell_centre(cell);
     let tangent = libm::sqrtf(sine_squared / (1.0 - sine_squared));

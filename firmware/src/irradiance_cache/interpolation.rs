@@ -1,4 +1,4 @@
-//! Interpolation between the irradiance records at the corners of a cell.
+//! Interpolation between irradiance records at the corners of a lattice cell.
 
 use glam::Vec3;
 
@@ -9,10 +9,10 @@ use crate::kind::{Capacity, Map};
 use crate::scene::Surface;
 use crate::vector::{max, min};
 
-/// Minimum sum of the weights of a sample's records.
+/// Minimum sum of the weights of the records for a sample.
 const MIN_WEIGHT: f32 = 0.05;
 
-/// Records at the corners of a cell; `None` at a corner without one.
+/// Records at the corners of a cell; `None` for a corner without a record.
 pub(super) struct Corners<'a>([Option<&'a Record>; 4]);
 
 impl<'a> Corners<'a> {
@@ -20,8 +20,9 @@ impl<'a> Corners<'a> {
         self.0.into_iter().flatten()
     }
 
-    /// Error of each corner's record at a surface point, infinite without a record. Radii are clamped by
-    /// neighbours' (Křivánek 2006): by the triangle inequality, `R_i <= R_j + |p_i - p_j|`.
+    /// Error of each corner's record at a surface point; infinite without a record. Radii of validity are
+    /// clamped by those of neighbours (Křivánek 2006): by the triangle inequality,
+    /// `R_i <= R_j + |p_i - p_j|`.
     pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
         let mut errors = [f32::INFINITY; 4];
         for (error, record) in errors.iter_mut().zip(self.0) {
@@ -37,10 +38,10 @@ impl<'a> Corners<'a> {
     }
 }
 
-/// A sample: the surface that it sees, and its position in the picture.
+/// A sample: its position in the picture, and the surface that it sees.
 #[derive(Clone, Copy, Debug)]
 pub struct SeenSample<'a> {
-    /// Column and row of its pixel.
+    /// Column and row of the sample's pixel.
     pub pixel: [u32; 2],
     /// Position in the picture, pixels from the upper left corner.
     pub film: [f32; 2],
@@ -48,7 +49,7 @@ pub struct SeenSample<'a> {
     pub surface: &'a Surface,
 }
 
-/// Weights of the four corners of a sample's cell.
+/// Weights of the records at the four corners of a sample's cell.
 struct Weights {
     cell: Cell,
     weights: [f32; 4],
@@ -73,7 +74,7 @@ impl<R: Capacity> IrradianceCache<R> {
         Some(cell)
     }
 
-    /// Weights of the records for a sample; `None` if it cannot be interpolated.
+    /// Weights of the records for a sample; `None` if the sample cannot be interpolated.
     fn weights(&self, sample: &SeenSample, allowed: f32) -> Option<Weights> {
         let SeenSample { pixel, film, surface } = *sample;
         // By pixel, as the filter may move `film` out of the pixel.
@@ -91,13 +92,14 @@ impl<R: Capacity> IrradianceCache<R> {
         (weights.iter().sum::<f32>() >= MIN_WEIGHT).then_some(Weights { cell, weights })
     }
 
-    /// True if a sample is interpolated: by the geometry of the records, gathered or not.
+    /// Returns true if a sample is interpolated. This depends only on the geometry of the records, whether
+    /// they are gathered or not.
     pub fn covers(&self, sample: &SeenSample, allowed: f32) -> bool {
         self.weights(sample, allowed).is_some()
     }
 
-    /// Interpolated indirect irradiance over pi at a sample, W/(sr m^2); `None` if the sample needs a final
-    /// gather of its own.
+    /// Interpolated indirect irradiance at a sample divided by pi, W/(sr m^2); `None` if the sample needs a
+    /// final gather.
     pub fn interpolate(&self, sample: &SeenSample, allowed: f32) -> Option<Vec3> {
         let Weights { cell, weights } = self.weights(sample, allowed)?;
         let surface = sample.surface;

@@ -1,4 +1,4 @@
-//! Lines of kept irradiance records: little-endian words of 32 bits, those of floats by their bits.
+//! Format of kept irradiance records: lines of little-endian 32-bit words. Floats are stored as their bits.
 
 use glam::Vec3;
 use photoncard_shared::address::{LINE_BYTES, Line};
@@ -7,10 +7,9 @@ use super::packed_normal::PackedNormal;
 use super::record::{Content, Irradiance, Record};
 use super::{LatticePoint, MAX_ROOTS, Window};
 
-/// Words of a line.
 pub(super) const WORDS: usize = LINE_BYTES / 4;
 
-/// The words of a line.
+/// Splits a line into words.
 pub(super) fn words_of(line: &Line) -> [u32; WORDS] {
     let mut words = [0; WORDS];
     for (word, bytes) in words.iter_mut().zip(line.0.as_chunks().0) {
@@ -19,7 +18,7 @@ pub(super) fn words_of(line: &Line) -> [u32; WORDS] {
     words
 }
 
-/// The line of words.
+/// Joins words to a line.
 pub(super) fn line_of(words: [u32; WORDS]) -> Line {
     let mut line = Line::ZERO;
     for (bytes, word) in line.0.as_chunks_mut().0.iter_mut().zip(words) {
@@ -28,7 +27,7 @@ pub(super) fn line_of(words: [u32; WORDS]) -> Line {
     line
 }
 
-/// The line of the first words; the others are 0.
+/// Makes a line of its first words. The others are 0.
 fn line_of_first(first: impl IntoIterator<Item = u32>) -> Line {
     let mut words = [0; WORDS];
     words.iter_mut().zip(first).for_each(|(word, value)| *word = value);
@@ -39,15 +38,16 @@ fn line_of_first(first: impl IntoIterator<Item = u32>) -> Line {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BlockHead {
     pub(super) window: Window,
-    /// Line of the next older block of the same hash; 0 for none.
+    /// Line of the next older block with the same hash; 0 if there is none.
     pub(super) older: u32,
-    /// Number of records in the following lines; `None` if those of the window do not fit into the cache.
+    /// Number of records in the following lines; `None` if the records of the window do not fit into the
+    /// cache.
     pub(super) records: Option<u32>,
-    /// The divided cells of each coarsest cell.
+    /// Bit mask of the divided cells in the quadtree of each coarsest cell.
     pub(super) divided: [u32; MAX_ROOTS],
 }
 
-/// Number that stands for records that do not fit.
+/// Number that marks records that do not fit into the cache.
 const FULL: u32 = u32::MAX;
 
 impl BlockHead {
@@ -68,7 +68,7 @@ impl BlockHead {
     }
 }
 
-/// A gathered record with its lattice point.
+/// A gathered record and its lattice point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct KeptRecord {
     pub(super) point: LatticePoint,
@@ -76,7 +76,7 @@ pub(super) struct KeptRecord {
 }
 
 impl KeptRecord {
-    /// The line of the record; `None` if it is not gathered.
+    /// Encodes the record; `None` if it is not gathered.
     pub(super) fn line(&self) -> Option<Line> {
         let Self { point: LatticePoint { x, y }, record } = *self;
         let Content::Gathered(Irradiance { mean, translation, rotation }) = record.content else {
@@ -89,7 +89,7 @@ impl KeptRecord {
         Some(line_of_first([x, y, geometric_normal].into_iter().chain(values.map(f32::to_bits))))
     }
 
-    /// The record of a line, whatever it holds.
+    /// Decodes a line with any content.
     pub(super) fn read(line: &Line) -> Option<Self> {
         let [x, y, geometric_normal, magnitude, distance, radius, rest @ ..] = words_of(line);
         let vectors = rest.as_chunks::<3>().0.first_chunk()?;
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_read_is_what_was_written() {
+    fn kept_lines_are_read_as_written() {
         let vector = |from: f32| Vec3::new(from, -from, from + 0.25);
         let irradiance = Irradiance {
             mean: vector(1.0),

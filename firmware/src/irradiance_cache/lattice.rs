@@ -1,14 +1,15 @@
-//! The lattice of irradiance records: cells of 16x16 pixels, each the root of a quadtree of four levels.
+//! Lattice of irradiance records: cells of 16x16 pixels, each of which is the root of a quadtree with four
+//! levels.
 //!
-//! The lattice belongs to the picture and not to a tile: all tiles compute the same record for a lattice
+//! The lattice belongs to the picture, not to a tile, so that all tiles compute the same record for a lattice
 //! point.
 
 /// Side of the coarsest cells, pixels.
 pub(super) const COARSEST_SIDE: u32 = 16;
-/// Number of levels of cells: sides of 16, 8, 4 and 2 pixels.
+/// Number of levels of cells, whose sides are 16, 8, 4 and 2 pixels.
 pub(super) const LEVELS: u32 = 4;
 
-/// Side of the cells of a level, pixels; at least 1, so that division by it cannot panic.
+/// Side of the cells at a level, pixels. It is at least 1, so that division by it cannot panic.
 const fn side(level: u32) -> u32 {
     let side = COARSEST_SIDE >> level;
     if side == 0 { 1 } else { side }
@@ -17,30 +18,30 @@ const fn side(level: u32) -> u32 {
 /// A corner of the lattice, pixels from the picture's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LatticePoint {
-    /// Pixels to the right.
+    /// Distance to the right, pixels.
     pub x: u32,
-    /// Pixels downwards.
+    /// Distance downwards, pixels.
     pub y: u32,
 }
 
-/// Offset of a record's eye ray from its lattice point, pixels: in a symmetric view of a room, edges of walls
-/// run exactly through lattice points, and the survey rays of a record on an edge would miss the adjacent
-/// wall.
+/// Offset of a record's eye ray from its lattice point, pixels. In a symmetric view of a room, edges between
+/// walls would otherwise run exactly through lattice points, and the survey rays of a record on an edge would
+/// miss the adjacent wall.
 const FILM_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
 impl LatticePoint {
-    /// Picture position of the eye ray of the point's record, pixels.
+    /// Position in the picture of the eye ray of this point's record, pixels.
     pub(super) fn film_position(&self) -> [f32; 2] {
         let [right, down] = FILM_OFFSET;
         [self.x as f32 + right, self.y as f32 + down]
     }
 }
 
-/// A square of the lattice.
+/// A square cell of the lattice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Cell {
     pub(super) corner: LatticePoint,
-    /// Level in the quadtree, 0 for the coarsest cells.
+    /// Level in the quadtree; 0 is the coarsest.
     pub(super) level: u32,
 }
 
@@ -56,7 +57,7 @@ impl Cell {
         side(self.level)
     }
 
-    /// Returns whether the cell is of the last level, and cannot be divided.
+    /// Returns whether the cell is at the last level and cannot be divided.
     pub(super) fn is_finest(&self) -> bool {
         self.level + 1 >= LEVELS
     }
@@ -69,7 +70,8 @@ impl Cell {
         [point(0, 0), point(side, 0), point(0, side), point(side, side)]
     }
 
-    /// Corners of the cell's children that are not its own: the centre and the middles of its sides.
+    /// Corners of the cell's children that are not corners of the cell: its centre and the midpoints of its
+    /// sides.
     pub(super) fn middles(&self) -> [LatticePoint; 5] {
         let LatticePoint { x, y } = self.corner;
         let [half, side] = [self.side() / 2, self.side()];
@@ -77,8 +79,8 @@ impl Cell {
             .map(|(dx, dy)| LatticePoint { x: x + dx, y: y + dy })
     }
 
-    /// Index of the cell in its quadtree, level by level from the root, 0; below 21 for cells that can be
-    /// divided.
+    /// Index of the cell in its quadtree, level by level from the root, which is 0. It is below 21 for cells
+    /// that can be divided.
     pub(super) fn tree_number(&self) -> u32 {
         let root = Self::coarsest(self.corner.x, self.corner.y);
         let first = ((1 << (2 * self.level)) - 1) / 3;
@@ -87,19 +89,19 @@ impl Cell {
         first + (y << self.level) + x
     }
 
-    /// Number of cells of a level in one quadtree.
+    /// Number of cells at a level of one quadtree.
     pub(super) fn of_level(level: u32) -> usize {
         1 << (2 * level)
     }
 
-    /// Cell `number` of a level, row-major, in the quadtree with its upper left corner at `root`.
+    /// Cell `number`, row-major, at `level` of the quadtree whose upper left corner is `root`.
     pub(super) fn in_tree(root: LatticePoint, level: u32, number: usize) -> Self {
         let [row, column] = [number as u32 >> level, number as u32 & ((1 << level) - 1)];
         let side = side(level);
         Self { corner: LatticePoint { x: root.x + column * side, y: root.y + row * side }, level }
     }
 
-    /// The cell of which this one is a quarter; `None` for a coarsest cell.
+    /// Cell that this cell is a quarter of; `None` for a coarsest cell.
     pub(super) fn parent(&self) -> Option<Self> {
         let level = self.level.checked_sub(1)?;
         let floor = |v: u32| v - v % side(level);
@@ -115,7 +117,7 @@ impl Cell {
         Self { corner, level: self.level + 1 }
     }
 
-    /// Returns whether the cell has a pixel in common with a window.
+    /// Returns whether the cell and a window have a pixel in common.
     pub(super) fn overlaps(&self, window: &Window) -> bool {
         let LatticePoint { x, y } = self.corner;
         let side = self.side();
@@ -123,7 +125,7 @@ impl Cell {
     }
 }
 
-/// A rectangle of the picture: columns `x0..x1`, rows `y0..y1`.
+/// A rectangle of the picture with columns `x0..x1` and rows `y0..y1`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
     /// First column.
@@ -141,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_pixel_has_one_cell_of_each_level_and_cells_have_numbers_of_their_own() {
+    fn every_pixel_has_one_cell_per_level_and_cells_have_unique_numbers() {
         let mut numbers = std::collections::BTreeSet::new();
         for (x, y) in (32..48).flat_map(|x| (16..32).map(move |y| (x, y))) {
             let mut cell = Cell::coarsest(x, y);

@@ -1,34 +1,34 @@
-//! The parallel irradiance cache: indirect irradiance is gathered at few points, with its gradients, and
-//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992; neighbour clamping after
-//! Křivánek 2006, among the corners of a cell).
+//! Parallel irradiance cache. Indirect irradiance and its gradients are gathered at few points and
+//! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992). Radii of validity are
+//! clamped by those of neighbours, among the corners of a cell (Křivánek 2006).
 //!
 //! The published caches are filled on demand, so that each pixel depends on the pixels before it. The
-//! dissertation makes the cache parallel by removing this dependence, without giving the method; this is a
-//! reconstruction. The positions of the records depend only on the geometry seen in one cell of a lattice
-//! over the picture:
+//! dissertation makes the cache parallel by removing this dependence, without giving the method; this module
+//! is a reconstruction. The positions of the records depend only on the geometry seen in one cell of a
+//! lattice over the picture:
 //!
 //! - Records are at the corners of the cells, 16 pixels apart. A survey determines the surface that each
 //!   record sees, and the harmonic mean of its distances to surrounding surfaces along a few rays, without a
 //!   gather.
 //! - A cell is divided in four, down to a side of 2 pixels, unless its corners cover it: every corner, and
 //!   every point that a division would add, is within the allowed error of all four corner records.
-//! - A sample interpolates the up to four corner records of its undivided cell that are valid at the surface
-//!   it sees, with weights that are continuous across cells of one size. Without a valid record it casts
-//!   gather rays of its own.
-//! - All records are gathered. The coefficients of their gradients are known from the survey, so that their
-//!   gathers may be reordered like all others, and wait with those of the pixels: geometry alone decides
-//!   which samples are interpolated, and their light is added when all gathers of the block are done. Hardly
-//!   any record is wasted: each is a corner of an undivided cell.
+//! - A sample interpolates those of the four corner records of its undivided cell that are valid at the
+//!   surface it sees. Weights are continuous across cells of one size. A sample without a valid record casts
+//!   gather rays.
+//! - All records are gathered. The survey determines the coefficients of their gradients, so that their
+//!   gathers can be reordered like all others and wait together with those of pixels. Geometry alone decides
+//!   which samples are interpolated; their light is added when all gathers of the block are done. Hardly
+//!   any record is wasted, because each is a corner of an undivided cell.
 //!
 //! Two tiles with a common lattice point therefore compute the same record, and there are no seams. A tile
-//! whose records do not fit into the cache is rendered in smaller blocks: more records are computed twice,
-//! and no pixel changes.
+//! whose records do not fit into the cache is rendered in smaller blocks. More records are then computed
+//! twice, but no pixel changes.
 //!
 //! Frames of one picture that differ in samples share their records, which [`RecordStore`] keeps in card
 //! memory.
 //!
-//! Direct light is divided between shadow rays and gather rays ([`crate::render::direct`]): the gather rays'
-//! part, mostly light of large emitters, is in the records.
+//! Direct light is divided between shadow rays and gather rays ([`crate::render::direct`]). The records
+//! contain the part of the gather rays, mostly light of large emitters.
 
 mod gradient;
 mod interpolation;
@@ -58,12 +58,12 @@ use crate::vector::max;
 
 /// Maximum number of coarsest cells that a block may overlap.
 const MAX_ROOTS: usize = 16;
-/// Maximum number of records of a block of one pixel: 4 corners, and 5 more for each division.
+/// Maximum number of records of a block of one pixel: 4 corners, and 5 further points per division.
 const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
-/// Irradiance records of a block: up to `R`, a power of two.
+/// Irradiance records of a block. The capacity `R` is a power of two.
 pub struct IrradianceCache<R: Capacity> {
-    /// Records by lattice point; `None` where no surface with a Lambertian part is seen.
+    /// Records by lattice point; `None` at a point that sees no surface with a Lambertian part.
     records: R::Map<LatticePoint, Option<Record>>,
     /// Coarsest cells, each with a bit mask of the divided cells in its quadtree
     /// ([`lattice::Cell::tree_number`]).
@@ -71,7 +71,7 @@ pub struct IrradianceCache<R: Capacity> {
     survey: Survey,
 }
 
-/// Error: the cache's buffers do not suffice for the block.
+/// Error: the cache's buffers are too small for the block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Full;
 
@@ -90,7 +90,7 @@ impl<R: Capacity> IrradianceCache<R> {
         Self { records: Map::EMPTY, roots: Vec::new(), survey: Survey::BEGIN }
     }
 
-    /// Removes all records and begins with the coarsest cells of a window of the picture.
+    /// Removes all records and sets up the coarsest cells of a window of the picture.
     ///
     /// # Errors
     /// [`Full`] if the window overlaps too many cells.
@@ -108,19 +108,20 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(())
     }
 
-    /// Removes all cells and records: nothing is interpolated.
+    /// Removes all cells and records, so that nothing is interpolated.
     pub fn forget(&mut self) {
         self.records.clear();
         self.roots.clear();
         self.survey = Survey::BEGIN;
     }
 
-    /// Number of lattice points, with a record or without.
+    /// Number of lattice points, with or without a record.
     pub fn lattice_points(&self) -> u32 {
         self.records.entries() as u32
     }
 
-    /// Gather point of the record at the lattice point `index`, without directions; `None` without a record.
+    /// Gather point, without directions, of the record at lattice point number `index`; `None` without a
+    /// record.
     #[inline(always)]
     pub fn point(&self, frame: &FrameParameters, index: u32) -> Option<GatherPoint> {
         let (&LatticePoint { x, y }, record) = self.records.entry(index as usize)?;
@@ -128,11 +129,11 @@ impl<R: Capacity> IrradianceCache<R> {
         Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
     }
 
-    /// Begins the gather of a record, by the directions of its gather point, which determine its gradient's
-    /// coefficients.
+    /// Begins the gather of a record. The directions of its gather point determine the coefficients of its
+    /// gradient.
     ///
     /// # Errors
-    /// [`Invariant::Record`] if the record is not surveyed.
+    /// [`Invariant::Record`] if the record was not surveyed.
     pub fn begin_gather(&mut self, index: u32, point: &GatherPoint) -> Result<(), Fault> {
         if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
             && let Content::Surveyed(distances) = &record.content
@@ -143,10 +144,10 @@ impl<R: Capacity> IrradianceCache<R> {
         Err(Invariant::Record.fault())
     }
 
-    /// Adds the radiance of a gather ray in a cell of the hemisphere to a record that is being gathered.
+    /// Adds the radiance of a gather ray, in a cell of the hemisphere, to a record that is being gathered.
     ///
     /// # Errors
-    /// [`Invariant::Record`] if it is not.
+    /// [`Invariant::Record`] if the record is not being gathered.
     #[inline]
     pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) -> Result<(), Fault> {
         if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
@@ -158,10 +159,10 @@ impl<R: Capacity> IrradianceCache<R> {
         Err(Invariant::Record.fault())
     }
 
-    /// Ends the gather of all records: turns their sums into irradiance over pi, W/(sr m^2).
+    /// Ends the gather of all records: converts their sums to irradiance over pi, W/(sr m^2).
     ///
     /// # Errors
-    /// [`Invariant::Record`] if one is not being gathered.
+    /// [`Invariant::Record`] if a record is not being gathered.
     pub fn end_gather<M>(&mut self, context: &mut Context<M>, allowed: f32) -> Result<(), Fault> {
         let unit = context.scene.header.radiance_unit;
         for index in 0..self.records.entries() {

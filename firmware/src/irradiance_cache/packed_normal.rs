@@ -1,22 +1,22 @@
-//! Unit vectors in 32 bits, on an unfolded octahedron (Cigolle et al. 2014, *A survey of efficient
-//! representations for independent unit vectors*): exact to 1e-4.
+//! Unit vectors in 32 bits by the octahedral map (Cigolle et al. 2014, *A survey of efficient representations
+//! for independent unit vectors*). The error is at most 1e-4.
 
 use glam::Vec3;
 
 use crate::vector::{max, min, unit};
 
-/// Largest value of a coordinate.
+/// Maximum of a coordinate.
 const SCALE: f32 = 32_767.0;
 
 /// A unit vector in 32 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct PackedNormal(pub(super) u32);
 
-/// Bits that no vector has: an upper coordinate of -32768.
+/// Bits that encode no vector: the upper coordinate is -32768.
 const NONE: u32 = 0x8000_0000;
 
 impl PackedNormal {
-    /// No vector.
+    /// Absence of a vector.
     pub(super) const NONE: Self = Self(NONE);
 
     pub(super) fn new(normal: Vec3) -> Self {
@@ -31,7 +31,7 @@ impl PackedNormal {
         Self(bits(u) | bits(v) << 16)
     }
 
-    /// The vector; `None` for [`Self::NONE`].
+    /// Decodes the vector; `None` for [`Self::NONE`].
     pub(super) fn get(self) -> Option<Vec3> {
         if self == Self::NONE {
             return None;
@@ -44,7 +44,7 @@ impl PackedNormal {
     }
 }
 
-/// Mirrors a point at the diamond of the upper half.
+/// Folds a point between the upper and the lower half of the octahedron.
 fn folded([u, v]: [f32; 2]) -> [f32; 2] {
     let sign = |value: f32| if value < 0.0 { -1.0 } else { 1.0 };
     [(1.0 - v.abs()) * sign(u), (1.0 - u.abs()) * sign(v)]

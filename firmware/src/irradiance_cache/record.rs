@@ -13,21 +13,21 @@ use crate::vector::{from_upper_half, max, min, tangents, upper_half};
 /// State of a record, with its data.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Content {
-    /// During the survey: inverse distance to the surroundings in each cell of the hemisphere, 1/m, bfloat16;
-    /// 0 in cells to come.
+    /// During the survey: inverse distance to the surroundings by cell of the hemisphere, 1/m, bfloat16. It
+    /// is 0 in cells that are not surveyed yet.
     Surveying([u16; CELLS]),
     /// After the survey: distances to the surroundings.
     Surveyed(Distances),
-    /// During the gather: its sums.
+    /// During the gather: sums of radiance.
     Gathering(GatherSums),
-    /// After the gather: irradiance.
+    /// After the gather: irradiance and gradients.
     Gathered(Irradiance),
 }
 
 /// Sums of a record that is being gathered, in the image's radiance units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GatherSums {
-    /// Coefficients of each cell for the translational gradient, bfloat16.
+    /// Coefficients of the translational gradient by cell, bfloat16.
     coefficients: [[u16; 2]; CELLS],
     mean: ColourSum,
     translation: [ColourSum; 2],
@@ -35,7 +35,7 @@ pub(super) struct GatherSums {
 }
 
 impl GatherSums {
-    /// Empty sums.
+    /// Creates sums without terms.
     pub(super) fn new(coefficients: &Coefficients) -> Self {
         Self {
             coefficients: coefficients.map(|cell| cell.map(upper_half)),
@@ -59,7 +59,8 @@ impl GatherSums {
         }
     }
 
-    /// The irradiance, with the radiance unit and the record's harmonic mean distance, metres.
+    /// Converts the sums to irradiance. `unit` is the radiance unit, `distance` the record's harmonic mean
+    /// distance, metres.
     pub(super) fn irradiance(&self, unit: f32, distance: f32) -> Irradiance {
         Irradiance {
             mean: self.mean.value() * unit,
@@ -69,51 +70,52 @@ impl GatherSums {
     }
 }
 
-/// Indirect irradiance at a record. Gradients are in the surface's tangent plane, components along tangent
-/// and bitangent.
+/// Indirect irradiance at a record. Gradients lie in the surface's tangent plane; their components are along
+/// tangent and bitangent.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Irradiance {
-    /// Irradiance over pi, W/(sr m^2): the radiance that a white Lambertian surface reflects.
+    /// Irradiance divided by pi, W/(sr m^2): the radiance that a white Lambertian surface reflects.
     pub(super) mean: Vec3,
     /// Translational gradient of `mean`, W/(sr m^3).
     pub(super) translation: [Vec3; 2],
-    /// Rotational gradient of `mean`, W/(sr m^2 rad): derivative by the normal's rotation about each axis.
+    /// Rotational gradient of `mean`, W/(sr m^2 rad): derivative with respect to rotation of the normal about
+    /// each axis.
     pub(super) rotation: [Vec3; 2],
 }
 
-/// An irradiance record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Record {
     pub(super) position: Vec3,
-    /// Unit normal on the side of the eye.
+    /// Unit shading normal on the side of the eye.
     pub(super) normal: Vec3,
-    /// Unit normal of the triangle on that side; none if it is `normal`.
+    /// Unit normal of the triangle on the side of the eye; [`PackedNormal::NONE`] if it equals `normal`.
     pub(super) geometric_normal: PackedNormal,
-    /// Maximum magnitude of the coordinates that the position was computed from, metres: it bounds the
+    /// Maximum magnitude of the coordinates from which the position was computed, metres. It bounds the
     /// rounding error.
     pub(super) magnitude: f32,
     /// Harmonic mean of the distances to the surroundings, metres; undefined before the survey ends.
     pub(super) distance: f32,
-    /// Radius of validity, metres: `distance`, clamped from below so that the record reaches some pixels.
+    /// Radius of validity, metres: `distance`, but at least so large that the record is valid over some
+    /// pixels.
     pub(super) radius: f32,
     pub(super) content: Content,
 }
 
-/// Maximum harmonic mean distance, for records without surroundings, metres: its square is finite.
+/// Maximum of the harmonic mean distance, metres, for records without surroundings. Its square is finite.
 const FARTHEST: f32 = 1e18;
-/// Minimum distance to the surroundings, metres: the sum of the inverse distances, and their squares, are
+/// Minimum distance to the surroundings, metres. It keeps the sum of inverse distances, and their squares,
 /// finite.
 const NEAREST: f32 = 1.0 / FARTHEST;
-/// Maximum distance of an interpolated point from the record's tangent plane, over `radius sqrt(allowed
-/// error)`.
+/// Maximum distance of an interpolated point from the record's tangent plane, divided by
+/// `radius sqrt(allowed error)`.
 const PLANE_SHARE: f32 = 0.1;
-/// Maximum distance of an interpolated point from the record's tangent plane, over the harmonic mean
-/// distance: farther points may lie behind the surroundings, as the lower side of a lamp does for the ceiling
-/// in the gap above it.
+/// Maximum distance of an interpolated point from the record's tangent plane, divided by the harmonic mean
+/// distance. Farther points may lie behind the surroundings: a record on the ceiling in the gap above a lamp
+/// must not light the lamp's lower side.
 const FREE_SHARE: f32 = 0.5;
 
 impl Record {
-    /// Unsurveyed record of a surface, with a radius of at least `least` metres.
+    /// Record of a surface before its survey. The radius of validity is at least `least` metres.
     pub(super) fn new(surface: &Surface, least: f32) -> Self {
         let Surface { position, normal, magnitude, .. } = *surface;
         let is_flat = surface.geometric_normal == normal;
@@ -124,7 +126,7 @@ impl Record {
     }
 
     /// Sets the distance to the surroundings in a cell of the hemisphere, metres; infinite if there are none.
-    /// Its inverse is rounded to bfloat16.
+    /// The inverse is rounded to bfloat16.
     pub(super) fn set_distance(&mut self, cell: u8, distance: f32) -> Result<(), Fault> {
         if let Content::Surveying(inverses) = &mut self.content
             && let Some(inverse) = inverses.get_mut(cell as usize)
@@ -152,10 +154,10 @@ impl Record {
         Surface { geometric_normal, ..Surface::white(self.position, self.normal, self.magnitude) }
     }
 
-    /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, with `radius` R. It is of second
-    /// order in distance and angle, as gradients remove the first-order error of Ward, Rubinstein,
-    /// Clear 1988. Infinite off the record's tangent plane, by less the nearer its surroundings are, and for
-    /// normals 90 degrees or more apart.
+    /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, where R is `radius`. It is of second
+    /// order in distance and angle, because gradients remove the first-order error of Ward, Rubinstein, Clear
+    /// 1988. It is infinite for points off the record's tangent plane (the tolerance shrinks with the
+    /// distance of the surroundings) and for normals at 90 degrees or more.
     pub(super) fn error(&self, radius: f32, allowed: f32, position: Vec3, normal: Vec3) -> f32 {
         let way = position - self.position;
         let cosine = self.normal.dot(normal);
@@ -169,8 +171,8 @@ impl Record {
 }
 
 impl Irradiance {
-    /// Irradiance over pi, extrapolated to a point by the gradients (Ward, Heckbert 1992), from the record at
-    /// `origin` with normal `origin_normal`; not negative.
+    /// Irradiance over pi, extrapolated to a point by the gradients (Ward, Heckbert 1992). The record is at
+    /// `origin` with the normal `origin_normal`. The result is not negative.
     pub(super) fn at(&self, origin: Vec3, origin_normal: Vec3, position: Vec3, normal: Vec3) -> Vec3 {
         let (tangent, bitangent) = tangents(origin_normal);
         let along = |gradient: &[Vec3; 2], way: Vec3| {
@@ -182,8 +184,8 @@ impl Irradiance {
         changed.max(Vec3::ZERO)
     }
 
-    /// The irradiance with its translational gradient limited to `mean / distance`, in the mean of the
-    /// channels: steeper gradients are noise.
+    /// Limits the translational gradient to `mean / distance`, averaged over channels. Steeper gradients are
+    /// noise.
     pub(super) fn limited(mut self, distance: f32) -> Self {
         let greatest = self.mean.element_sum() * (1.0 / 3.0) / distance;
         let [x, y] = self.translation.map(|component| component.element_sum() * (1.0 / 3.0));

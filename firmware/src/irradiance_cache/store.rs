@@ -1,17 +1,18 @@
-//! Irradiance records that a chip keeps in card memory from one frame of a picture to the next, beyond the
-//! image.
+//! Irradiance records that a chip keeps in card memory, beyond the image, from one frame of a picture to the
+//! next.
 //!
-//! Records depend on the scene and the camera, and not on the samples of a frame or its order of work. The
-//! gathered records of a block are written with the division of its cells; a frame of other samples reads
-//! them back in place of survey and gathers. A block whose records do not fit into the cache is noted as
-//! well, so that its survey is not repeated. Blocks that are not found are surveyed and gathered again, to
-//! the same bits: those for which there was no room, and all after a change of the image or of the frame.
+//! Records depend on the scene and the camera, not on the samples of a frame or its order of work. The
+//! gathered records of a block are written together with the division of its cells. A frame with other
+//! samples reads them back instead of surveying and gathering. The store also notes blocks whose records do
+//! not fit into the cache, so that their survey is not repeated. Blocks that are not found are surveyed and
+//! gathered again, with the same bits: blocks for which there was no room, and all blocks after a change of
+//! the image or of the frame.
 //!
 //! | lines | contents |
 //! |---|---|
-//! | 128 | directory: for each hash of a window the newest block, by the address of its head; 0 for none |
-//! | 1 a block | [`BlockHead`] |
-//! | 1 a record | after the head of its block, [`KeptRecord`] |
+//! | 128 | directory: for each hash of a window, address of the newest block's head; 0 for none |
+//! | 1 per block | [`BlockHead`] |
+//! | 1 per record | [`KeptRecord`], after the head of its block |
 
 use core::ops::Range;
 
@@ -25,43 +26,42 @@ use crate::memory::{MemoryPort, Stage};
 use crate::render::Context;
 use crate::sampler::hash;
 
-/// Lines of the directory.
 const DIRECTORY_LINES: u32 = 128;
-/// Maximum length of a frame's parameters in a message, bytes, or more.
+/// Upper bound of the length of a frame's encoded parameters, bytes.
 const KEY_BYTES: usize = 128;
 
-/// Parameters that the records of a frame depend on, encoded: the bits of floats count.
+/// Parameters that the records of a frame depend on, encoded. Floats are compared by their bits.
 type Key = [u8; KEY_BYTES];
 
-/// The lines beyond the image, with the records of one picture.
+/// Location of the kept records of one picture in the lines beyond the image.
 pub struct RecordStore {
-    /// Key of the picture; `None` if nothing may be kept.
+    /// Key of the picture; `None` if no records may be kept.
     key: Option<Key>,
-    /// Lines beyond the image: the first one, and the end.
+    /// First line beyond the image; `limit` is past the last one.
     first: u32,
     limit: u32,
-    /// End of the lines in use: `first` without a directory.
+    /// End of the lines in use; equal to `first` if there is no directory.
     end: u32,
 }
 
-/// Result of a search for a block.
+/// Result of a search for a block's records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recalled {
-    /// The cache has the records of the block.
+    /// The records were found and are now in the cache.
     Records,
-    /// The records of the block do not fit into the cache.
-    Divided,
-    /// The block is not known.
+    /// The block was found, but its records do not fit into the cache.
+    TooMany,
+    /// The block was not found.
     Nothing,
 }
 
 // Not inlined: the stack of rays and gathers would have the lines of these functions as well.
 impl RecordStore {
-    /// The store without room.
+    /// Store without lines.
     pub const EMPTY: Self = Self { key: None, first: 0, limit: 0, end: 0 };
 
-    /// Begins a frame with `room` beyond the image. Keeps the records of earlier frames that are the same,
-    /// and forgets others. The image must be that of the frames before, or [`Self::forget`] be called.
+    /// Begins a frame with the lines `room` beyond the image. Keeps records of earlier frames with the same
+    /// key, and drops others. If the image has changed, [`Self::forget`] must be called.
     #[inline(never)]
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         let key = key(frame);
@@ -78,7 +78,7 @@ impl RecordStore {
     /// Fills a cache with the kept records of a window, if there are any.
     ///
     /// # Errors
-    /// If the memory is shorter than it was.
+    /// If the memory is shorter than when the records were written.
     #[inline(never)]
     pub fn read_kept<M: MemoryPort, R: Capacity>(
         &self,
@@ -88,7 +88,7 @@ impl RecordStore {
     ) -> Result<Recalled, Fault> {
         context.memory.enter(Stage::Survey);
         let Some((at, head)) = self.find(context.memory, window)? else { return Ok(Recalled::Nothing) };
-        let Some(count) = head.records else { return Ok(Recalled::Divided) };
+        let Some(count) = head.records else { return Ok(Recalled::TooMany) };
         if cache.begin(window).is_err() || count as usize > R::ENTRIES {
             return Ok(Recalled::Nothing);
         }
@@ -128,7 +128,7 @@ impl RecordStore {
         let _ = self.append(memory, &head, records());
     }
 
-    /// Notes that the records of a window do not fit into the cache, if there is room.
+    /// Records that the irradiance records of a window do not fit into the cache, if there is room.
     #[inline(never)]
     pub fn keep_full<M: MemoryPort>(&mut self, memory: &mut M, window: &Window) {
         let head = BlockHead { window: *window, older: 0, records: None, divided: [0; MAX_ROOTS] };
@@ -136,7 +136,7 @@ impl RecordStore {
         let _ = self.append(memory, &head, core::iter::empty());
     }
 
-    /// Head of a window's block, with its address.
+    /// Finds the head of a window's block, and its address.
     fn find<M: MemoryPort>(
         &self,
         memory: &mut M,
@@ -160,13 +160,13 @@ impl RecordStore {
         Ok(None)
     }
 
-    /// Line of the directory, and word in it, of a window.
+    /// Line of the directory for a window, and the word in that line.
     fn place(&self, window: &Window) -> (u32, usize) {
         let hash = hash(window.x0 ^ hash(window.y0));
         (self.first + hash % DIRECTORY_LINES, (hash / DIRECTORY_LINES) as usize % WORDS)
     }
 
-    /// Appends a block and enters it into the directory. `None` without room.
+    /// Appends a block and enters it into the directory; `None` if there is no room.
     fn append<M: MemoryPort>(
         &mut self,
         memory: &mut M,
@@ -204,7 +204,7 @@ fn write<M: MemoryPort>(memory: &mut M, address: u32, line: &Line) -> Option<()>
     memory.write(LineAddress(address), &[line.0])
 }
 
-/// The key of a frame; `None` if it keeps no records.
+/// Key of a frame; `None` if the frame keeps no records.
 fn key(frame: &FrameParameters) -> Option<Key> {
     let of_records = FrameParameters {
         first_sample: 0,

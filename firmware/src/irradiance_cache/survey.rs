@@ -1,9 +1,9 @@
-//! The survey: placement of a block's irradiance records, level by level of the lattice.
+//! Survey: places the irradiance records of a block, level by level of the lattice.
 //!
-//! For each level, records are first placed at the corners of its cells. Then survey rays are cast from all
-//! new records, all rays in one cell of the hemisphere before the next cell's, as rays of similar direction
-//! read the same lines of the scene. Then cells that are not covered by their corners' records are divided
-//! into cells of the next level.
+//! At each level, records are first placed at the corners of its cells. Then survey rays are cast from all
+//! new records, one cell of the hemisphere after another, because rays with similar directions read the same
+//! lines of the scene. Finally, cells that their corner records do not cover are divided into cells of the
+//! next level.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -21,18 +21,18 @@ use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::{BUNDLE_RAYS, Ray, Surface, closest_hits};
 use crate::vector::min;
 
-/// Minimum reach of a record, pixels: it bounds the cost in corners.
+/// Minimum radius of validity of a record, pixels. It bounds the number of records in corners.
 const MIN_REACH: f32 = 3.0;
-/// Allowed error below which the minimum reach falls in proportion, so that the picture converges to that
+/// Error bound below which the minimum radius shrinks in proportion, so that the picture converges to that
 /// without records.
 const ERROR_OF_MIN_REACH: f32 = 0.1;
 
 impl<R: Capacity> IrradianceCache<R> {
-    /// Does the next piece of the survey: one lattice cell, or one ray of each of some records. Returns
+    /// Does the next piece of the survey: one lattice cell, or one ray for each of some records. Returns
     /// whether it was the last.
     ///
     /// # Errors
-    /// A [`Fault`] if the image is not sound; `Ok(Err(Full))` if the records do not fit into the cache.
+    /// A [`Fault`] if the image is invalid; `Ok(Err(Full))` if the records do not fit into the cache.
     pub fn survey<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -64,7 +64,7 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(Ok(false))
     }
 
-    /// The next cell of the level that overlaps the window; `None` after the last.
+    /// Next cell of the current level that overlaps the window; `None` after the last.
     fn next_cell(&mut self, window: &Window) -> Option<Cell> {
         let Survey { level, ref mut index, .. } = self.survey;
         let of_level = Cell::of_level(level);
@@ -79,7 +79,7 @@ impl<R: Capacity> IrradianceCache<R> {
         None
     }
 
-    /// Places records at a cell's corners.
+    /// Places records at the corners of a cell.
     fn place<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -98,8 +98,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(Ok(()))
     }
 
-    /// Casts the rays of the next new records in the current cell of the hemisphere, a bundle. The rays in
-    /// the last cell end the records' survey.
+    /// Casts a bundle of rays: one in the current cell of the hemisphere for each of the next new records.
+    /// After the ray in the last cell, the survey of a record ends.
     fn cast<M: MemoryPort>(&mut self, context: &mut Context<M>) -> Result<(), Fault> {
         let Survey { index, direction, first, .. } = self.survey;
         let is_last = direction as usize + 1 >= CELLS;
@@ -141,8 +141,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(())
     }
 
-    /// Returns whether all four corners have records, within whose error bounds lie the other corners and all
-    /// points that a division would add.
+    /// Returns whether all four corners have records, and the other corners and all points that a division
+    /// would add are within the error bound of each.
     fn is_covered<M: MemoryPort>(
         &self,
         context: &mut Context<M>,
@@ -175,7 +175,8 @@ impl<R: Capacity> IrradianceCache<R> {
     }
 }
 
-/// Unsurveyed record of the surface seen at a lattice point; `None` without a surface with a Lambertian part.
+/// Creates the record of a lattice point, before its survey. Returns `None` if the eye ray there does not see
+/// a surface with a Lambertian part directly.
 fn new_record<M: MemoryPort>(
     context: &mut Context<M>,
     point: LatticePoint,
@@ -191,7 +192,7 @@ fn new_record<M: MemoryPort>(
     }))
 }
 
-/// A random ray from the surface of a record in a cell of its hemisphere; `None` below the triangle.
+/// Random ray from a record's surface in a cell of its hemisphere; `None` if it points below the triangle.
 fn survey_ray<M>(context: &Context<M>, point: &LatticePoint, surface: &Surface, cell: u8) -> Option<Ray> {
     let pattern = Pattern::new(context.frame.seed, point.x, point.y, 0, Dimension::Survey);
     let square = [unit_interval(pattern.jitter(cell as u32)), pattern.radical_inverse(cell as u32)];

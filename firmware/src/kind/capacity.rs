@@ -1,4 +1,4 @@
-//! Capacities as types: a family of containers of one fixed number of entries.
+//! Capacities as types. Each is a family of containers with a fixed number of entries.
 
 use core::hash::Hash;
 
@@ -7,24 +7,24 @@ use heapless::{Vec, VecView};
 
 use crate::photon::{CandidateBuffer, CandidateStorage};
 
-/// A number of entries, and the containers that hold as many.
+/// A number of entries, and the containers of that capacity.
 ///
-/// It stands for a const generic parameter where the number follows from a [`ChipKind`](super::ChipKind): the
-/// containers are associated types, so that a chip has one parameter instead of one for each container.
+/// It replaces a const generic parameter where the number follows from a [`ChipKind`](super::ChipKind). The
+/// containers are associated types, so that a chip has one type parameter instead of one per container.
 pub trait Capacity: 'static {
     /// Maximum number of entries.
     const ENTRIES: usize;
     /// A vector of up to [`Self::ENTRIES`] values.
     type Buffer<T>: Buffer<T>;
-    /// A hash map of up to [`Self::ENTRIES`] values, which must be a power of two.
+    /// A hash map of up to [`Self::ENTRIES`] values. The number must be a power of two.
     type Map<K: Eq + Hash, V>: Map<K, V>;
-    /// An array of [`Self::ENTRIES`] values, there from the beginning.
+    /// An array of [`Self::ENTRIES`] values that always exist.
     type Array<T: Vacant>: Array<T>;
     /// A buffer of [`Self::ENTRIES`] candidates of a photon search.
     type Candidates: CandidateStorage;
 }
 
-/// The capacity of `N` entries.
+/// Capacity of `N` entries.
 pub struct Entries<const N: usize>;
 
 impl<const N: usize> Capacity for Entries<N> {
@@ -37,13 +37,13 @@ impl<const N: usize> Capacity for Entries<N> {
 
 /// A vector of fixed capacity.
 pub trait Buffer<T> {
-    /// The vector without values.
+    /// Vector without values.
     const EMPTY: Self;
 
-    /// The values, to be read.
+    /// Values, read-only.
     fn view(&self) -> &VecView<T>;
 
-    /// The values, to be changed.
+    /// Values, mutable.
     fn view_mut(&mut self) -> &mut VecView<T>;
 }
 
@@ -61,21 +61,21 @@ impl<T, const N: usize> Buffer<T> for Vec<T, N> {
     }
 }
 
-/// A value of large state, which is built in place and never moved.
+/// A large value that is initialised in place and never moved.
 pub trait Vacant {
-    /// The value without a use.
+    /// Value that is not in use.
     const VACANT: Self;
 }
 
 /// An array of fixed length.
 pub trait Array<T> {
-    /// The array of values without a use.
+    /// Array of values that are not in use.
     const VACANT: Self;
 
-    /// The values, to be read.
+    /// Values, read-only.
     fn values(&self) -> &[T];
 
-    /// The values, to be changed.
+    /// Values, mutable.
     fn values_mut(&mut self) -> &mut [T];
 }
 
@@ -93,7 +93,7 @@ impl<T: Vacant, const N: usize> Array<T> for [T; N] {
     }
 }
 
-/// A hash map of fixed capacity that keeps the order of insertion.
+/// A hash map of fixed capacity that keeps the insertion order.
 pub trait Map<K, V> {
     /// The map without entries.
     const EMPTY: Self;
@@ -104,16 +104,16 @@ pub trait Map<K, V> {
     /// Removes all entries.
     fn clear(&mut self);
 
-    /// The value of a key.
+    /// Value at `key`.
     fn get(&self, key: &K) -> Option<&V>;
 
-    /// The entry of an index, in the order of insertion.
+    /// Key and value at an index, in insertion order.
     fn entry(&self, index: usize) -> Option<(&K, &V)>;
 
-    /// The entry of an index, in the order of insertion, its value to be changed.
+    /// Key and mutable value at an index, in insertion order.
     fn entry_mut(&mut self, index: usize) -> Option<(&K, &mut V)>;
 
-    /// Appends an entry, or replaces the value of its key. Returns false if the map is full.
+    /// Appends an entry, or replaces the value at its key. Returns false if the map is full.
     #[must_use]
     fn insert(&mut self, key: K, value: V) -> bool;
 }

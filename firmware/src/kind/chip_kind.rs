@@ -1,4 +1,4 @@
-//! The trait of a kind of chip, and the memory of its techniques and caches.
+//! Trait of a kind of chip, and the memory that its techniques and caches take.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{Budget, MAX_IN_FLIGHT, MAX_TILE_PIXELS, gather_candidates};
@@ -8,21 +8,22 @@ use crate::memory::CacheEntry;
 
 /// A kind of chip.
 pub trait ChipKind: 'static {
-    /// Capacities, as the card states them in its hello.
+    /// Capacities, as a card reports them when a session begins.
     const BUDGET: Budget;
-    /// Limits of the on-chip memory that each technique adds.
+    /// Upper limits of the on-chip memory that each technique adds.
     const TECHNIQUE_LIMITS: TechniqueMemory;
-    /// [`Budget::tile_pixels`].
+    /// Capacity [`Budget::tile_pixels`].
     type TilePixels: Capacity;
-    /// [`gather_candidates`] of [`Budget::neighbors`].
+    /// Capacity [`gather_candidates`] of [`Budget::neighbors`].
     type Candidates: Capacity;
-    /// [`Budget::gather_queue`].
+    /// Capacity [`Budget::gather_queue`].
     type GatherQueue: Capacity;
-    /// [`Budget::irradiance_records`].
+    /// Capacity [`Budget::irradiance_records`].
     type IrradianceRecords: Capacity;
-    /// Gather points whose rays are cast together: of the records of a block, or of as many pixels of it.
+    /// Number of gather points whose rays are cast together. They belong to the records of a block, or to as
+    /// many of its pixels.
     type Points: Capacity;
-    /// [`Budget::in_flight`].
+    /// Capacity [`Budget::in_flight`].
     type Flights: Capacity;
 }
 
@@ -31,14 +32,14 @@ pub trait ChipKind: 'static {
 pub struct TechniqueMemory {
     /// Deferred reordering: the gather queue.
     pub reordering: usize,
-    /// Irradiance cache: the records of all tiles in flight, with their sums.
+    /// Irradiance cache: the records of all tiles in flight, and their sums.
     pub irradiance_cache: usize,
     /// Combined importance sampling: a direction table for every gather point.
     pub importance_sampling: usize,
 }
 
 impl TechniqueMemory {
-    /// True if no technique exceeds its limit in `limit`.
+    /// Returns true if no technique exceeds its limit in `limit`.
     pub const fn is_within(&self, limit: &Self) -> bool {
         self.reordering <= limit.reordering
             && self.irradiance_cache <= limit.irradiance_cache
@@ -46,8 +47,8 @@ impl TechniqueMemory {
     }
 }
 
-/// Compile-time check that the capacities of a kind are those of its budget, and within the ranges of the
-/// chip's indices.
+/// Checks at compile time that the capacities of a kind equal those of its budget, and fit the chip's index
+/// types.
 pub(crate) const fn check<K: ChipKind>() {
     let budget = K::BUDGET;
     assert!(K::TilePixels::ENTRIES == budget.tile_pixels as usize, "TilePixels is not of the budget");
@@ -66,7 +67,7 @@ pub(crate) const fn check<K: ChipKind>() {
     assert!(budget.in_flight <= budget.tiles, "a tile in flight takes a credit");
 }
 
-/// On-chip memory of a budget's caches and their tags, bytes.
+/// On-chip memory of a budget's caches, including tags, bytes.
 pub const fn cache_bytes(budget: &Budget) -> usize {
     line_bytes(budget) + tag_bytes(budget)
 }

@@ -1,4 +1,4 @@
-//! The large chip: the reference chip with twice its on-chip memory.
+//! The large chip, with twice the on-chip memory of the reference chip.
 
 use photoncard_shared::budget::{Budget, gather_candidates};
 
@@ -6,7 +6,7 @@ use super::capacity::Entries;
 use super::chip_kind::{ChipKind, TechniqueMemory};
 use super::reference::REFERENCE;
 
-/// Budget of the large chip: a longer gather queue, as many tiles in flight as fill it, and a scene cache of
+/// Budget of the large chip: a longer gather queue, enough tiles in flight to fill it, and a scene cache of
 /// 128 KB.
 pub const LARGE: Budget = Budget {
     sram_bytes: 2 << 20,
@@ -17,7 +17,7 @@ pub const LARGE: Budget = Budget {
     ..REFERENCE
 };
 
-/// The kind of the large chip: [`LARGE`].
+/// Kind of the large chip ([`LARGE`]).
 #[derive(Clone, Copy, Debug)]
 pub enum Large {}
 

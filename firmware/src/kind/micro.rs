@@ -1,11 +1,11 @@
-//! The micro chip: the whole renderer in the SRAM that microcontrollers have.
+//! The micro chip, which has the whole renderer in the SRAM of a microcontroller.
 
 use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
 
 use super::capacity::Entries;
 use super::chip_kind::{ChipKind, TechniqueMemory};
 
-/// Budget of the micro chip: the whole renderer in 256 KB of SRAM.
+/// Budget of the micro chip: 256 KB of SRAM.
 pub const MICRO: Budget = Budget {
     sram_bytes: 256 << 10,
     dram_bytes: 16 << 20,
@@ -23,7 +23,7 @@ pub const MICRO: Budget = Budget {
     in_flight: 1,
 };
 
-/// The kind of the micro chip: [`MICRO`].
+/// Kind of the micro chip ([`MICRO`]).
 #[derive(Clone, Copy, Debug)]
 pub enum Micro {}
 

@@ -1,9 +1,9 @@
-//! Kinds of chip: a [`Budget`](photoncard_shared::budget::Budget), and the capacities of the buffers that
-//! follow from it.
+//! Kinds of chip. A kind is a [`Budget`](photoncard_shared::budget::Budget) and the capacities of the buffers
+//! that follow from it.
 //!
-//! A kind is one file here: the constant of its budget, the limits of its techniques, and an implementation
-//! of [`ChipKind`] on a type without values. [`Chip`](crate::chip::Chip) and [`Card`](crate::card::Card) have
-//! that type as their one parameter for all buffers.
+//! Each file here is a kind: the constant of its budget, the limits of its techniques, and an implementation
+//! of [`ChipKind`] for an uninhabited type. This type is the only capacity parameter of
+//! [`Chip`](crate::chip::Chip) and [`Card`](crate::card::Card).
 
 mod capacity;
 mod chip_kind;

@@ -1,4 +1,4 @@
-//! The reference chip: the dissertation's.
+//! The reference chip, which has the sizes of the dissertation.
 
 use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, REFERENCE_DRAM_BYTES, gather_candidates};
 
@@ -7,8 +7,8 @@ use super::chip_kind::{ChipKind, TechniqueMemory};
 use crate::photon::CandidateBuffer;
 
 /// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB
-/// (section 7.3.2); tiles have up to 64x64 pixels (16x16 in the dissertation). One tile in flight leaves room
-/// for a long gather queue, and gather points for half a tile.
+/// (section 7.3.2). Tiles have up to 64x64 pixels (16x16 in the dissertation). With one tile in flight there
+/// is room for a long gather queue and for gather points of half a tile.
 pub const REFERENCE: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: REFERENCE_DRAM_BYTES,
@@ -26,7 +26,7 @@ pub const REFERENCE: Budget = Budget {
     in_flight: 1,
 };
 
-/// The kind of the reference chip: [`REFERENCE`].
+/// Kind of the reference chip ([`REFERENCE`]).
 #[derive(Clone, Copy, Debug)]
 pub enum Reference {}
 
@@ -45,5 +45,6 @@ impl ChipKind for Reference {
     type Flights = Entries<{ REFERENCE.in_flight as usize }>;
 }
 
-/// Buffer of the candidates of a search with all neighbours of [`REFERENCE`]: for searches on the host.
+/// Buffer of candidates for a search with the maximum number of neighbours of [`REFERENCE`], used for
+/// searches on the host.
 pub type ReferenceCandidates = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;

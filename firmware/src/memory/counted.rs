@@ -7,7 +7,8 @@ use photoncard_shared::message::Fault;
 
 use super::{CardMemory, MemoryPort, Stage, Traffic};
 
-/// A memory and its traffic. Above a cache it counts the chip's requests, below a cache the cache's misses.
+/// A memory and its traffic. Above a cache it counts the chip's requests, below a cache the misses of the
+/// cache.
 pub struct Counted<M> {
     memory: M,
     stage: Stage,
@@ -15,7 +16,7 @@ pub struct Counted<M> {
 }
 
 impl<M> Counted<M> {
-    /// Counts the reads of `memory`.
+    /// Wraps `memory` and counts its reads.
     pub const fn new(memory: M) -> Self {
         Self { memory, stage: Stage::Begin, traffic: Traffic::ZERO }
     }
@@ -25,12 +26,12 @@ impl<M> Counted<M> {
         &self.traffic
     }
 
-    /// The memory below.
+    /// The wrapped memory.
     pub fn below(&self) -> &M {
         &self.memory
     }
 
-    /// The memory below, mutable.
+    /// The wrapped memory, mutable.
     pub fn below_mut(&mut self) -> &mut M {
         &mut self.memory
     }

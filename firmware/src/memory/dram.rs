@@ -8,13 +8,13 @@ use photoncard_shared::message::Fault;
 
 use super::{CardMemory, MemoryPort, copy_lines, outside};
 
-/// DRAM that the processor can address.
+/// DRAM that the processor addresses directly.
 pub struct Dram<'a> {
     lines: &'a mut [Line],
 }
 
 impl<'a> Dram<'a> {
-    /// The memory in `lines`; lines past the first 2^32 are unused.
+    /// Memory that consists of `lines`. Lines past the first 2^32 are unused.
     pub const fn new(lines: &'a mut [Line]) -> Self {
         Self { lines }
     }
@@ -38,7 +38,7 @@ impl MemoryPort for Dram<'_> {
     }
 }
 
-/// Read-only memory, which many readers may share.
+/// Read-only memory that several readers can share.
 #[derive(Clone, Copy)]
 pub struct Lines<'a>(pub &'a [Line]);
 

@@ -1,8 +1,8 @@
 //! Set-associative caches of lines with LRU replacement.
 //!
-//! One type for two uses: on a board with slow DRAM a cache keeps lines in on-chip memory; over a
-//! [`super::Counted`] it simulates the fetches of a chip with a cache of this shape. It holds data in either
-//! case, so that both have the same hits by construction, and a wrong line would show in the picture.
+//! One type serves two purposes. On a board with slow DRAM, a cache keeps lines in on-chip memory; over a
+//! [`super::Counted`] it simulates the fetches of a chip with a cache of this shape. It holds data in both
+//! cases, so that hits are equal by construction, and a wrong line would be visible in the picture.
 
 use core::ops::Range;
 
@@ -27,7 +27,7 @@ pub enum SetIndex {
 pub struct CacheShape {
     sets: u32,
     ways: u32,
-    /// Lines of card memory in one cache line.
+    /// Number of card memory lines per cache line.
     lines: u32,
     index: SetIndex,
 }
@@ -35,7 +35,7 @@ pub struct CacheShape {
 /// Invalid parameter of a [`CacheShape`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShapeError {
-    /// The cache line is not a whole number of card memory lines from 1 line to
+    /// The cache line is not a whole number of card memory lines, or larger than
     /// [`CacheShape::MAX_LINE_BYTES`].
     LineBytes,
     /// The number of ways is 0 or above the number of cache lines.
@@ -50,7 +50,7 @@ impl CacheShape {
     /// Maximum size of a cache line, bytes.
     pub const MAX_LINE_BYTES: u32 = 4096;
 
-    /// Shape of a cache of `bytes` in lines of `line_bytes`, `ways` in each set.
+    /// Shape of a cache of `bytes` bytes with cache lines of `line_bytes` bytes and `ways` ways per set.
     ///
     /// # Errors
     /// The first invalid parameter.
@@ -72,18 +72,17 @@ impl CacheShape {
         Ok(Self { sets: entries / ways, ways, lines, index })
     }
 
-    /// Number of cache lines, each with a [`CacheEntry`].
+    /// Number of cache lines. Each has a [`CacheEntry`].
     pub const fn entries(&self) -> usize {
         self.sets as usize * self.ways as usize
     }
 
-    /// Capacity of the cache, lines of card memory.
+    /// Capacity of the cache, in lines of card memory.
     pub const fn lines(&self) -> usize {
         self.entries() * self.lines as usize
     }
 
-    /// Set of a block: a run of card memory lines, aligned to the size of a cache line, that one cache line
-    /// holds.
+    /// Set of a block. A block is an aligned run of card memory lines that fills one cache line.
     #[inline(always)]
     pub fn set(&self, block: u32) -> u32 {
         match self.index {
@@ -92,7 +91,7 @@ impl CacheShape {
         }
     }
 
-    /// Indices of the entries of a block's set.
+    /// Indices of the cache entries in a block's set.
     #[inline(always)]
     fn entries_of(&self, block: u32) -> Range<usize> {
         let first = self.set(block) as usize * self.ways as usize;
@@ -109,30 +108,30 @@ pub struct CacheEntry {
     slot: u32,
 }
 
-/// Block of an empty entry; never held.
+/// Block number of an empty entry. No cache line ever holds that block.
 const NOTHING: u32 = u32::MAX;
 
 impl CacheEntry {
-    /// The tag of an empty cache line.
+    /// Tag of an empty cache line.
     pub const EMPTY: Self = Self { block: NOTHING, slot: 0 };
 }
 
-/// A cache in the caller's buffers, arrays on a board and vectors on a host: [`CacheShape::entries`] tags and
-/// [`CacheShape::lines`] lines.
+/// A cache in buffers of the caller, such as arrays on a board and vectors on a host: [`CacheShape::entries`]
+/// tags and [`CacheShape::lines`] lines.
 pub struct LineCache<E, L> {
     shape: CacheShape,
-    /// Tags by set, in each set from the most to the least recently used.
+    /// Tags by set; within a set, from the most to the least recently used.
     entries: E,
     lines: L,
-    /// True if the cache is known to be empty: the thousands of writes that load an image have nothing to
-    /// invalidate.
+    /// True if the cache is known to be empty. The thousands of writes that load an image then need not
+    /// invalidate lines.
     is_clear: bool,
-    /// End of the memory, if filling the last cache line has found it; `u32::MAX` before.
+    /// End of the memory, once a fill of the last cache line has found it; `u32::MAX` before.
     end: u32,
 }
 
 impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Line]>> LineCache<E, L> {
-    /// An empty cache; `None` if the buffers are not of the shape's size.
+    /// Creates an empty cache; `None` if the buffers do not have the sizes of the shape.
     pub fn new(shape: CacheShape, entries: E, lines: L) -> Option<Self> {
         let fits = entries.as_ref().len() == shape.entries() && lines.as_ref().len() == shape.lines();
         let mut cache = Self { shape, entries, lines, is_clear: false, end: u32::MAX };
@@ -152,7 +151,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
         self.end = u32::MAX;
     }
 
-    /// Invalidates lines that are written.
+    /// Invalidates lines that were written.
     fn forget(&mut self, written: &Range<u32>) {
         // A cache line at the end of a memory that grows is incomplete.
         if written.end > self.end {
@@ -167,7 +166,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
         }
     }
 
-    /// The line at an address, read from `memory` on a miss.
+    /// Reads a line from the cache, after filling it from `memory` on a miss.
     #[inline(always)]
     fn read(
         &mut self,
@@ -212,8 +211,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
     }
 }
 
-/// Fills a cache line with a block. Lines after `address` may be outside the memory: returns the first such
-/// line, if any.
+/// Fills a cache line with a block. Returns the first line of the block that is outside the memory, if any.
 ///
 /// # Errors
 /// If the line at `address` is outside the memory.
@@ -238,31 +236,31 @@ fn fill(
 }
 
 /// A memory behind caches: one for the photon maps and one for the scene, or one for both. Every tile begins
-/// with empty caches, so that its misses do not depend on the tile before it.
+/// with empty caches, so that its misses do not depend on earlier tiles.
 pub struct LineCaches<M, E, L> {
     memory: M,
-    /// Cache of the photon maps, or of everything without a cache of the scene.
+    /// Cache of the photon maps; of everything if there is no cache of the scene.
     first: LineCache<E, L>,
     scene: Option<LineCache<E, L>>,
 }
 
 impl<M, E, L> LineCaches<M, E, L> {
-    /// A memory behind a cache of the photon maps and one of the scene.
+    /// Memory behind one cache for the photon maps and one for the scene.
     pub const fn new(memory: M, photon_map: LineCache<E, L>, scene: LineCache<E, L>) -> Self {
         Self { memory, first: photon_map, scene: Some(scene) }
     }
 
-    /// A memory behind one cache of everything.
+    /// Memory behind one cache for everything.
     pub const fn unified(memory: M, cache: LineCache<E, L>) -> Self {
         Self { memory, first: cache, scene: None }
     }
 
-    /// The memory below.
+    /// Memory behind the caches.
     pub fn below(&self) -> &M {
         &self.memory
     }
 
-    /// The memory below, mutable.
+    /// Memory behind the caches, mutable.
     pub fn below_mut(&mut self) -> &mut M {
         &mut self.memory
     }

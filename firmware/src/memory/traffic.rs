@@ -7,9 +7,9 @@ use photoncard_shared::address::{STAGES, STRUCTURES, Stage, Structure};
 pub struct Reads {
     /// Number of reads.
     pub requests: u64,
-    /// Bytes used by the chip.
+    /// Number of bytes used by the chip.
     pub bytes: u64,
-    /// Misses of the cache above, cache lines; 0 without one.
+    /// Number of cache lines that the cache above missed; 0 without a cache.
     pub misses: u64,
 }
 
@@ -27,12 +27,12 @@ impl Reads {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Traffic {
     reads: [[Reads; STRUCTURES]; STAGES],
-    /// Bytes written.
+    /// Number of bytes written.
     pub written_bytes: u64,
 }
 
 impl Traffic {
-    /// No traffic.
+    /// Traffic without reads and writes.
     pub const ZERO: Self = Self { reads: [[Reads::ZERO; STRUCTURES]; STAGES], written_bytes: 0 };
 
     /// Adds the traffic of another memory.
@@ -42,7 +42,7 @@ impl Traffic {
         self.written_bytes += other.written_bytes;
     }
 
-    /// Counts a read.
+    /// Counts one read.
     #[inline(always)]
     #[expect(clippy::indexing_slicing, reason = "stages and structures number the rows and columns")]
     pub(super) fn count(&mut self, stage: Stage, structure: Structure, bytes: u32) {
@@ -64,12 +64,13 @@ impl Traffic {
         self.reads[stage as usize][structure as usize]
     }
 
-    /// Reads of the chosen structures in all stages of tiles: all but [`Stage::Begin`].
+    /// Sum of the reads of chosen structures over all stages of tiles, which are all stages but
+    /// [`Stage::Begin`].
     pub fn of_tiles(&self, chosen: impl Fn(Structure) -> bool) -> Reads {
         self.sum(|stage, structure| stage != Stage::Begin && chosen(structure))
     }
 
-    /// Reads summed over the chosen pairs of stage and structure.
+    /// Sum of the reads over chosen pairs of stage and structure.
     pub fn sum(&self, chosen: impl Fn(Stage, Structure) -> bool) -> Reads {
         let mut sum = Reads::ZERO;
         for stage in Stage::ALL {

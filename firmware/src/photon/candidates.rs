@@ -1,4 +1,4 @@
-//! Candidates of a search for the nearest photons: squared distances and contents, in separate arrays for
+//! Candidates of a search for the nearest photons. Squared distances and contents are in separate arrays, for
 //! vector instructions.
 
 use core::cell::Cell;
@@ -7,24 +7,24 @@ use photoncard_shared::layout::{PHOTON_CONTENT_BYTES, Photon, Rgbe};
 
 /// A photon near the query: its squared distance and its content.
 ///
-/// Candidates are ordered by distance, then by content. The order is independent of the map's layout and of a
-/// photon's index: candidates that compare equal are interchangeable in any sum.
+/// Candidates are ordered by distance, then by content. The order depends neither on the map's layout nor on
+/// photon indices. Candidates that compare equal are interchangeable in any sum.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Candidate {
-    /// Bits of the squared distance.
+    /// Squared distance from the query, m^2, as the bits of an `f32`.
     pub(super) distance: u32,
-    /// The photon's content as a little-endian number, with the splitting axis cleared.
+    /// Content of the photon as a little-endian number, with the splitting axis cleared.
     pub(super) content: u64,
 }
 
 /// Odd factor that permutes contents in the order, so that ties favour neither bright nor dim photons.
 const SCRAMBLE: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Mask of a photon's content without the splitting axis.
+/// Mask that clears the splitting axis in a photon's content.
 const WITHOUT_AXIS: u64 = !(3 << 48);
 
 impl Candidate {
-    /// The candidate of a photon at a squared distance, m^2, which must not be negative.
+    /// Candidate for a photon at a squared distance, m^2, which must not be negative.
     #[inline(always)]
     pub fn new(distance_squared: f32, content: [u8; PHOTON_CONTENT_BYTES]) -> Self {
         // Non-negative floats compare like their bits.
@@ -40,7 +40,7 @@ impl Candidate {
     /// Number of bits of [`Self::key`].
     pub(super) const KEY_BITS: u32 = 96;
 
-    /// [`Self::order`] as one number.
+    /// [`Self::order`] as a single number.
     #[inline(always)]
     pub(super) fn key(&self) -> u128 {
         let (distance, rest) = self.order();
@@ -82,8 +82,8 @@ impl Candidate {
         Photon::disc_of_flags(self.flags())
     }
 
-    /// Returns whether the photon came straight from a light; in the caustic map, whether it came from a
-    /// light with extent.
+    /// Returns whether the photon came straight from a light. In the caustic map: whether it came from a
+    /// light with an area.
     #[inline(always)]
     pub fn is_direct(&self) -> bool {
         Photon::direct_of_flags(self.flags())
@@ -92,10 +92,10 @@ impl Candidate {
 
 /// Storage of a fixed number of candidates.
 pub trait CandidateStorage {
-    /// The storage, zeroed.
+    /// Zeroed storage.
     const EMPTY: Self;
 
-    /// A view of the whole storage.
+    /// View of the whole storage.
     fn view(&mut self) -> Candidates<'_>;
 }
 
@@ -121,12 +121,12 @@ impl<const N: usize> Default for CandidateBuffer<N> {
 }
 
 impl<const N: usize> CandidateBuffer<N> {
-    /// A zeroed buffer.
+    /// Creates a zeroed buffer.
     pub const fn new() -> Self {
         Self { distances: [0; N], contents: [0; N] }
     }
 
-    /// Copies candidates into the buffer, as many as fit, and returns a view of the copies.
+    /// Copies candidates into the buffer, as many as fit. Returns a view of the copies.
     pub fn fill(&mut self, candidates: &[Candidate]) -> Candidates<'_> {
         let length = candidates.len().min(N);
         let mut view = self.view();
@@ -138,14 +138,14 @@ impl<const N: usize> CandidateBuffer<N> {
         }
     }
 
-    /// A view of the whole buffer.
+    /// View of the whole buffer.
     #[inline(always)]
     pub fn view(&mut self) -> Candidates<'_> {
         Candidates { distances: &mut self.distances, contents: &mut self.contents }
     }
 }
 
-/// View of a buffer of candidates: as many distances as contents.
+/// View of candidates in a buffer. It has as many distances as contents.
 pub struct Candidates<'a> {
     pub(super) distances: &'a mut [u32],
     pub(super) contents: &'a mut [u64],
@@ -179,7 +179,7 @@ impl<'a> Candidates<'a> {
         })
     }
 
-    /// Sets candidate `index`; no effect out of range.
+    /// Sets candidate `index`. Has no effect out of range.
     #[inline(always)]
     pub(super) fn set(&mut self, index: usize, candidate: Candidate) {
         if let (Some(distance), Some(content)) = (self.distances.get_mut(index), self.contents.get_mut(index))
@@ -188,7 +188,7 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// The view as cells.
+    /// Converts the view to cells.
     #[inline(always)]
     pub(super) fn cells(self) -> CandidateCells<'a> {
         CandidateCells {
@@ -198,7 +198,7 @@ impl<'a> Candidates<'a> {
     }
 }
 
-/// View of candidates with interior mutability, which allows copies of the view.
+/// View of candidates with interior mutability, so that the view can be copied.
 #[derive(Clone, Copy)]
 pub(super) struct CandidateCells<'a> {
     distances: &'a [Cell<u32>],

@@ -1,11 +1,11 @@
-//! Radiance that caustic photons reflect, each spread over a disc of its own radius: a kernel estimate with
-//! sample-point bandwidths (Abramson 1982, *On bandwidth variation in kernel estimates*).
+//! Radiance reflected from caustic photons. Each photon is spread over a disc with its own radius: a kernel
+//! estimate with sample-point bandwidths (Abramson 1982, *On bandwidth variation in kernel estimates*).
 //!
 //! `L = sum f(incoming) power K(d / h)`, over the photons of the surface within their radii `h`, with the
-//! kernel of Epanechnikov `K = 2 (1 - d^2 / h^2) / (pi h^2)`, whose integral over a plane is 1: a photon
-//! brings its power, however dense others are. The host chooses each radius by the density of the light that
-//! the photon belongs to. Boxes of the tree hold the discs of their photons, so that a search visits the
-//! boxes that hold its position.
+//! Epanechnikov kernel `K = 2 (1 - d^2 / h^2) / (pi h^2)`. The integral of the kernel over a plane is 1, so
+//! that a photon contributes its power whatever the density of others. The host chooses each radius from the
+//! density of the light that the photon belongs to. Boxes of the tree contain the discs of their photons, so
+//! that a search visits the boxes that contain its position.
 
 use core::f32::consts::PI;
 
@@ -22,30 +22,30 @@ use crate::scene::{DecodedLobe, PartialReflection, SceneImage};
 use crate::simd::{self, Isa, Kernel, LANES};
 use crate::vector::max;
 
-/// Light of caustic photons at a point.
+/// Light that caustic photons bring to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Caustics {
     /// Radiance, in the units of the reflection.
     pub radiance: Vec3,
-    /// Number of photons within their radii.
+    /// Number of photons whose radius includes the point.
     pub photons: u32,
-    /// Number of photons' normals that were decoded.
+    /// Number of photon normals decoded.
     pub normals_decoded: u32,
 }
 
-/// Photons that light a lobe; the Lambertian part is lit by all.
+/// Photons that light a lobe. All photons light the Lambertian part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LitBy {
     /// All photons.
     All,
-    /// Photons from lights without extent.
+    /// Photons from lights without an area.
     Punctual,
 }
 
-/// Radiance of reflected caustic photons at a position; see [`CausticSearch`].
+/// Radiance of caustic photons reflected at a position ([`CausticSearch`]).
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(always)]
 pub fn reflected_caustics(search: CausticSearch<'_, impl MemoryPort>) -> Result<Caustics, Fault> {
     simd::run(search)
@@ -59,26 +59,27 @@ pub struct CausticSearch<'s, M> {
     pub memory: &'s mut M,
     /// Query position, metres.
     pub position: Vec3,
-    /// Maximum radius of a photon, metres: that of the last code.
+    /// Maximum kernel radius of a photon, metres, which the last code stands for.
     pub max_radius: f32,
     /// Reflection at the position.
     pub reflection: &'s PartialReflection,
-    /// Its lobe.
+    /// Lobe of the reflection.
     pub lobe: DecodedLobe,
     /// Photons that light the lobe.
     pub lit_by: LitBy,
-    /// The shading normal and the triangle's. A photon of incidence `i` counts by `n.i / g.i`, `n` the
-    /// shading normal and `g` the triangle's: the density of photons is the irradiance of the triangle.
+    /// Unit shading normal `n` and unit normal `g` of the triangle. A photon from the direction `i` is
+    /// weighted by `n.i / g.i`, because the density of photons is the irradiance of the triangle.
     pub normals: [Vec3; 2],
 }
 
-/// Maximum of `n.i / g.i`, where light comes along the triangle.
+/// Maximum of `n.i / g.i`, for light at grazing incidence on the triangle.
 const MAX_SHADING: f32 = 4.0;
-/// Distance to boxes within which a search visits them, cells of the photon grid: rounding at the borders of
-/// the scene.
+/// Distance to a box within which a search visits it, cells of the photon grid. It allows for rounding at the
+/// borders of the scene.
 const MARGIN_CELLS: f32 = 2.0;
-/// Unit of the kernels' factors, 1 over the share of a disc's area: fifty photons of the smallest discs stay
-/// below the limit of a [`ColourSum`], and one of the largest has twenty bits.
+/// Unit of the kernels' factors, which are 1 over a disc's area as a fraction of the maximum. Fifty photons
+/// with the smallest disc stay below the limit of a [`ColourSum`], and one with the largest disc has a
+/// resolution of twenty bits.
 const FACTOR_UNIT: f32 = 32_768.0;
 
 impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
@@ -112,11 +113,11 @@ impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
     }
 }
 
-/// Sums over the photons within their radii, in any order.
+/// Sums over the photons whose radius includes the position. The order of photons does not matter.
 struct Sums<'a> {
-    /// Squared distance to boxes within which a search visits them, m^2.
+    /// Squared distance to a box within which a search visits it, m^2.
     limit: f32,
-    /// Squared maximum radius, m^2.
+    /// Squared maximum kernel radius, m^2.
     max_squared: f32,
     reflection: &'a PartialReflection,
     lobe: DecodedLobe,
@@ -125,7 +126,7 @@ struct Sums<'a> {
     surface: SameSurface,
     /// Sum of power times kernel.
     power: ColourSum,
-    /// Sum of power times kernel and the lobe's factor.
+    /// Sum of power times kernel times the lobe's factor.
     of_lobe: ColourSum,
     photons: u32,
 }
@@ -150,7 +151,7 @@ impl Sums<'_> {
         }
     }
 
-    /// `n.i / g.i`, 0 for light from below the shading normal's horizon.
+    /// Factor `n.i / g.i`; 0 for light from below the shading normal's horizon.
     #[inline(always)]
     fn shading(&self, photon: &Candidate) -> f32 {
         let [shading, geometric] = self.normals;

@@ -1,9 +1,9 @@
-//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the host has estimated
-//! the irradiance at points of all surfaces by the chip's own gathers, and a Lambertian surface takes the
-//! irradiance of the nearest point.
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*). The host estimates the
+//! irradiance at points on all surfaces by the chip's gathers. A Lambertian surface uses the irradiance of
+//! the nearest point.
 //!
-//! The points lie in a tree of their own, with leaves like photons'. The search is for one point: its
-//! distance becomes the search radius as soon as one is found.
+//! The points have a tree of their own, whose leaves have the format of photon leaves. As the search is for
+//! one point, the distance of the first point found becomes the search radius.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -17,23 +17,24 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::simd::{self, Isa, Kernel, LANES};
 
-/// Sections of the nodes and leaves of irradiance points.
+/// Sections with the nodes and the leaves of irradiance points.
 const SECTIONS: [SectionKind; 2] = [SectionKind::IrradianceNodes, SectionKind::IrradianceLeaves];
 
 /// Result of a search for an irradiance point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FoundIrradiance {
-    /// Irradiance at the nearest point of the surface, photon power units/m^2; 0 if there is none.
+    /// Irradiance at the nearest point, photon power units/m^2; 0 if there is none.
     pub irradiance: Vec3,
     /// Number of points whose distance was computed.
     pub tested: u32,
 }
 
-/// Irradiance at the point nearest to `position`, within `max_distance` metres, on a surface with the
-/// `normal` of this code ([`SameSurface`]). Points' contents break ties between equal distances.
+/// Returns the irradiance at the point nearest to `position`, within `max_distance` metres, among points of
+/// surfaces whose normal agrees with the code `normal` ([`SameSurface`]). Contents of points break ties
+/// between equal distances.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(always)]
 pub fn nearest_irradiance(
     scene: &SceneImage,
@@ -76,10 +77,10 @@ impl<M: MemoryPort> Kernel for PointSearch<'_, M> {
     }
 }
 
-/// The nearest point of a surface found so far.
+/// The nearest point found so far.
 struct NearestPoint {
     surface: SameSurface,
-    /// Squared search radius, m^2: the squared distance of `nearest`, if there is one.
+    /// Squared search radius, m^2: the squared distance of `nearest`, if a point was found.
     limit: f32,
     nearest: Option<Candidate>,
 }

@@ -1,5 +1,6 @@
 //! The photon map as a left-balanced kd-tree (Jensen 2001, *Realistic Image Synthesis Using Photon Mapping*,
-//! chapter 6): every node is a photon, and the children of node i are 2 i + 1 and 2 i + 2, without pointers.
+//! chapter 6). Every node is a photon. The children of node i are nodes 2 i + 1 and 2 i + 2, so that no
+//! pointers are needed.
 
 use glam::Vec3;
 use heapless::Vec;
@@ -22,11 +23,11 @@ struct Deferred {
     distance_squared: f32,
 }
 
-/// Collects the photons nearest to `position` in `nearest`, those that `filter` takes. Returns the number of
-/// photons tested, one for each visited node.
+/// Collects in `nearest` the photons nearest to `position` among those that `filter` accepts. Returns the
+/// number of photons tested, one per visited node.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(always)]
 pub(super) fn gather(
     isa: impl Isa,

@@ -1,4 +1,4 @@
-//! The photon map in leaves: leaves of one line each, below inner nodes of up to sixteen children.
+//! The photon map with leaves. Leaves of one line each are below inner nodes with up to sixteen children.
 
 use glam::Vec3;
 use photoncard_shared::budget::PHOTON_STACK;
@@ -17,11 +17,11 @@ use crate::wide_tree::{BEYOND, Descent, Order, Stack};
 
 const _: () = assert!(LEAF_LANES == LANES);
 
-/// Collects the photons or irradiance points nearest to `position` in `nearest`, those that `filter` takes,
-/// from the tree with nodes and leaves in these two sections. Returns the number of photons tested.
+/// Collects in `nearest` the photons or irradiance points nearest to `position` among those that `filter`
+/// accepts. The tree's nodes and leaves are in the two given sections. Returns the number of photons tested.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(always)]
 pub(super) fn gather(
     isa: impl Isa,
@@ -51,8 +51,8 @@ pub(super) fn gather(
     Ok(tested)
 }
 
-/// Bits of the squared distances to the boxes of a node's children, or [`BEYOND`] past the limit. They are
-/// computed like distances to photons, so that rounding keeps them lower bounds.
+/// Bits of the squared distances to the boxes of a node's children, or [`BEYOND`] past the limit. The
+/// distances are computed like those to photons, so that they are lower bounds in spite of rounding.
 #[inline(always)]
 fn distances_to_boxes(
     isa: impl Isa,

@@ -1,4 +1,4 @@
-//! Photon maps: search for the k nearest photons, radiance estimate, precomputed irradiance.
+//! Photon maps: search for the k nearest photons, radiance estimates, precomputed irradiance.
 
 mod candidates;
 mod caustic;
@@ -31,17 +31,17 @@ use crate::memory::{MemoryPort, Stage};
 use crate::scene::{PartialReflection, SceneImage};
 use crate::simd::{self, Isa, Kernel};
 
-/// One of the two photon maps.
+/// Selects one of the two photon maps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhotonMap {
     /// The photon map: every arrival of light at a surface that is not specular.
     Indirect,
-    /// The caustic map: photons whose bounces, one at least, were all specular (`L S+ D`).
+    /// The caustic map (`L S+ D`): photons with at least one bounce, whose bounces were all specular.
     Caustics,
 }
 
 impl PhotonMap {
-    /// Sections of the nodes and leaves.
+    /// Sections with the map's nodes and leaves.
     #[inline(always)]
     fn sections(self) -> [SectionKind; 2] {
         match self {
@@ -51,11 +51,11 @@ impl PhotonMap {
     }
 }
 
-/// Collects the photons of a map nearest to `position` in `nearest`; both layouts of the map give equal sets.
+/// Collects in `nearest` the photons of a map nearest to `position`. Both layouts of the map give equal sets.
 /// Returns the number of photons tested.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(never)]
 pub fn gather(
     scene: &SceneImage,
@@ -67,10 +67,10 @@ pub fn gather(
     simd::run(Search { scene, memory, map, position, nearest })
 }
 
-/// [`gather`] of the photons in the region that `position` sees.
+/// Restricts [`gather`] to photons in the region that `position` sees.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(never)]
 pub fn gather_visible(
     scene: &SceneImage,
@@ -83,32 +83,32 @@ pub fn gather_visible(
     simd::run(VisibleSearch { scene, memory, map, position, region, nearest })
 }
 
-/// Square of the distance within which a search of a visible region looks first, over that of a disc of the
-/// area in which all photons were found.
+/// Factor of the first search radius in a visible region, squared, relative to the radius at which the region
+/// has the area of the disc with the k nearest photons.
 const VISIBLE_MOST: f32 = 1.35;
 
 /// Parameters of a gather.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherLimits {
-    /// Number of photons to find.
+    /// Number k of photons to find.
     pub neighbors: u32,
-    /// Maximum distance of photons, metres.
+    /// Maximum distance of a photon, metres.
     pub max_distance: f32,
-    /// Radius of gathers, metres, above which the point may be in a narrow gap, whose light is not that of
-    /// the photons around.
+    /// Gather radius, metres, above which the point may be in a narrow gap, where the photons around do not
+    /// represent its light.
     pub free_within: f32,
 }
 
-/// Maximum reach of a visible region, over the distance of the k-th of all photons: where most of these are
-/// hidden, photons that are not lie farther away.
+/// Maximum reach of a visible region divided by the distance of the k-th photon of an unrestricted search.
+/// Visible photons are farther away where most photons are hidden.
 const MAX_REACH: f32 = 2.0;
 
-/// Radiance that the photons of the photon map reflect at a position, by those in the region that it sees
-/// where walls may hide others. `count` is called with the result of each search, of which there are one or
-/// two: the number of photons tested, the photons, their light.
+/// Radiance that the photon map's photons reflect at a position. Where walls may hide photons, only those in
+/// the region that the position sees are used. `count` is called with the result of each of the one or two
+/// searches: the number of photons tested, the photons, and their light.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(never)]
 pub fn gathered_radiance(
     (scene, memory): (&SceneImage, &mut impl MemoryPort),
@@ -156,7 +156,7 @@ pub struct Search<'s, 'n, M> {
     pub map: PhotonMap,
     /// Query position, metres.
     pub position: Vec3,
-    /// Set of the nearest photons.
+    /// The set that collects the nearest photons.
     pub nearest: &'s mut NearestPhotons<'n>,
 }
 
@@ -190,7 +190,8 @@ impl<M: MemoryPort> Kernel for VisibleSearch<'_, '_, M> {
     }
 }
 
-/// Collects the nearest photons of a map that a filter takes. Returns the number of photons tested.
+/// Collects the nearest photons of a map among those that a filter accepts. Returns the number of photons
+/// tested.
 #[inline(always)]
 fn search<M: MemoryPort>(
     isa: impl Isa,
@@ -216,7 +217,7 @@ fn search<M: MemoryPort>(
     Ok(tested)
 }
 
-/// Kernel of the selection of the nearest candidates alone: see [`NearestPhotons`].
+/// Kernel that only selects the nearest candidates ([`NearestPhotons`]).
 pub struct Selection<'a> {
     /// Candidates to select from.
     pub candidates: Candidates<'a>,
@@ -228,8 +229,8 @@ impl Kernel for Selection<'_> {
     type Output = Option<Candidate>;
 
     /// Moves the `count` nearest candidates to the front, unordered, and returns the farthest of them. The
-    /// elements behind are meaningless afterwards. `None`, without a change, if `count` is 0 or above the
-    /// number of candidates.
+    /// remaining elements are then meaningless. Returns `None`, and changes nothing, if `count` is 0 or above
+    /// the number of candidates.
     #[inline(always)]
     fn run(self, isa: impl Isa) -> Self::Output {
         let length = self.candidates.capacity();

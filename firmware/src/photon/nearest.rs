@@ -1,8 +1,8 @@
-//! The k nearest photons of a stream of candidates.
+//! The k nearest photons in a stream of candidates.
 //!
-//! Instead of a heap, which is updated for every candidate, a buffer collects more than k candidates; when it
-//! is full, the k nearest are selected in linear time and the search radius shrinks to the k-th distance. The
-//! result is a set, independent of the order of the stream: photons' contents break ties between equal
+//! A heap would be updated for every candidate. Instead, a buffer collects more than k candidates; when it is
+//! full, the k nearest are selected in linear time, and the search radius shrinks to the k-th distance. The
+//! result is a set, independent of the order of the stream: photon contents break ties between equal
 //! distances.
 
 use photoncard_shared::budget::selected_candidates;
@@ -12,7 +12,7 @@ use super::collector::Collector;
 use super::select::{Chosen, select};
 use crate::simd::{Isa, LANES};
 
-/// Square of the distance of a search that is widened, over that of the search before.
+/// Factor of the squared radius when a search is repeated with a larger radius.
 const WIDER: f32 = 3.0;
 
 /// The nearest photons found so far, in a borrowed buffer.
@@ -23,22 +23,22 @@ pub struct NearestPhotons<'a> {
     /// Number of candidates that triggers a selection.
     full: usize,
     limit: f32,
-    /// Limit of a search that is not narrowed, m^2.
+    /// Squared search radius without narrowing, m^2.
     widest: f32,
     is_narrowed: bool,
     max_distance_squared: f32,
-    /// Candidates read by selections.
+    /// Number of candidates read by selections.
     selected: u32,
-    /// Comparisons of distances by selections.
+    /// Number of comparisons of distances by selections.
     compared: u32,
-    /// Candidates dropped by selections.
+    /// Number of candidates dropped by selections.
     dropped: u32,
 }
 
 impl<'a> NearestPhotons<'a> {
-    /// An empty set for the `neighbors` nearest photons within `max_distance`, metres. The buffer should hold
-    /// [`photoncard_shared::budget::gather_candidates`]; `neighbors` is limited to its capacity less
-    /// [`LANES`] + 1.
+    /// Creates an empty set for the `neighbors` nearest photons within `max_distance`, metres. The buffer
+    /// should have room for [`photoncard_shared::budget::gather_candidates`]; `neighbors` is limited to its
+    /// capacity less [`LANES`] + 1.
     pub fn new(candidates: Candidates<'a>, neighbors: u32, max_distance: f32) -> Self {
         let room = candidates.capacity().saturating_sub(LANES);
         let neighbors = (neighbors as usize).clamp(1, room.saturating_sub(1).max(1));
@@ -60,14 +60,15 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Limits the search radius of an empty set, m^2: there are no photons beyond. The maximum distance
-    /// stays.
+    /// Limits the search radius of an empty set, given squared, m^2, because there are no photons beyond. The
+    /// maximum distance stays.
     pub(super) fn limit_to(&mut self, limit: f32) {
         self.widest = if limit < self.widest { limit } else { self.widest };
         self.limit = if self.widest < self.limit { self.widest } else { self.limit };
     }
 
-    /// Narrows a search that has not begun, once: most likely there are enough photons within `limit`, m^2.
+    /// Narrows a search before it begins, once, because there are most likely enough photons within `limit`,
+    /// m^2.
     #[inline(always)]
     pub(super) fn narrow_to(&mut self, limit: f32) {
         // False for NaN.
@@ -77,8 +78,8 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Begins the search anew, within more of its distance, if narrowing has left out photons that were asked
-    /// for. Returns whether it does.
+    /// Starts the search again with a larger radius, if narrowing excluded photons that are needed. Returns
+    /// whether it does so.
     #[inline(always)]
     pub(super) fn widen(&mut self) -> bool {
         let is_short = self.is_narrowed && !self.is_full() && self.limit < self.widest;
@@ -91,13 +92,13 @@ impl<'a> NearestPhotons<'a> {
         is_short
     }
 
-    /// Squared search radius: photons beyond it cannot be among the nearest, m^2.
+    /// Squared search radius, m^2. Photons beyond it cannot be among the nearest.
     #[inline(always)]
     pub fn limit(&self) -> f32 {
         self.limit
     }
 
-    /// Adds a candidate, which must be within [`Self::limit`].
+    /// Adds a candidate. Its distance must be within [`Self::limit`].
     #[inline(always)]
     pub(super) fn insert(&mut self, isa: impl Isa, candidate: Candidate) {
         self.candidates.set(self.length, candidate);
@@ -122,7 +123,7 @@ impl<'a> NearestPhotons<'a> {
         self.length = self.neighbors;
     }
 
-    /// Ends the search: leaves the nearest photons, unordered.
+    /// Ends the search: only the nearest photons remain, unordered.
     #[inline(always)]
     pub(super) fn finish(&mut self, isa: impl Isa) {
         self.select(isa);
@@ -135,20 +136,20 @@ impl<'a> NearestPhotons<'a> {
         (distances.get(..self.length).unwrap_or_default(), contents.get(..self.length).unwrap_or_default())
     }
 
-    /// All candidates; after the search, the nearest photons.
+    /// All candidates; after the end of the search, the nearest photons.
     #[inline(always)]
     pub fn candidates(&self) -> impl Iterator<Item = Candidate> {
         let (distances, contents) = self.columns();
         distances.iter().zip(contents).map(|(&distance, &content)| Candidate { distance, content })
     }
 
-    /// Number of candidates; after the search, of the nearest photons.
+    /// Number of candidates; after the end of the search, of the nearest photons.
     #[inline(always)]
     pub fn len(&self) -> usize {
         self.length
     }
 
-    /// True if there are no candidates.
+    /// Returns true if there are no candidates.
     pub fn is_empty(&self) -> bool {
         self.length == 0
     }
@@ -158,26 +159,26 @@ impl<'a> NearestPhotons<'a> {
         self.dropped + self.length as u32
     }
 
-    /// Number of candidates read by selections so far, and of the comparisons of their distances.
+    /// Number of candidates read by selections so far, and number of comparisons of their distances.
     pub fn selections(&self) -> [u32; 2] {
         [self.selected, self.compared]
     }
 
-    /// True if there are at least as many candidates as photons asked for.
+    /// Returns true if there are at least k candidates, where k is the number of photons to find.
     #[inline(always)]
     pub fn is_full(&self) -> bool {
         self.length >= self.neighbors
     }
 
-    /// After the search, the distance of the last photon asked for, or the maximum distance with fewer,
-    /// metres.
+    /// Distance of the k-th photon after the end of the search, metres; the maximum distance if there are
+    /// fewer than k.
     pub fn radius(&self) -> f32 {
         let (distances, _) = self.columns();
         let farthest = distances.iter().copied().max().filter(|_| self.is_full());
         libm::sqrtf(farthest.map_or(self.max_distance_squared, f32::from_bits))
     }
 
-    /// Square of the maximum distance asked for, m^2.
+    /// Squared maximum distance, as given, m^2.
     #[inline(always)]
     pub fn max_distance_squared(&self) -> f32 {
         self.max_distance_squared

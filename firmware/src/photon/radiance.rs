@@ -3,17 +3,17 @@
 //!
 //! `L = 1 / (pi r^2 c) sum f(incoming) power`, over the photons within `r`:
 //!
-//! - The distance r to the k-th photon is a stopping rule: with all k photons in the sum the estimate would
-//!   be too bright by `k / (k - 1)`. The k - 1 photons within r are summed, the unbiased estimate of a
-//!   Poisson density. If fewer than k lie within the maximum distance, all of them are summed, and r is that
-//!   distance.
-//! - Photons of another surface, by their normals, are excluded: those on the other side of a thin wall, and
-//!   those on the other wall of a corner.
-//! - `c` is the area of the surface whose photons are summed, over the disc's area: without it edges and
-//!   corners would darken, and stacked surfaces glow. The host measures it for each photon, with about the
-//!   photon's own distance to its k-th neighbour. A gather uses the c of the nearest photon of its surface,
-//!   at a distance of about r / sqrt(k), where c has hardly changed. Where walls hide photons, both are those
-//!   of the region that the point sees ([`super::region`]).
+//! - The distance r to the k-th photon is a stopping rule. With all k photons in the sum the estimate would
+//!   be too bright by `k / (k - 1)`. The sum therefore has the k - 1 photons within r, the unbiased estimate
+//!   of a Poisson density. If fewer than k photons lie within the maximum distance, the sum has all of them,
+//!   and r is that distance.
+//! - Photons of another surface are excluded by their normals: photons on the other side of a thin wall, and
+//!   on the adjacent wall of a corner.
+//! - `c` is the area of the surface whose photons are in the sum, divided by the disc's area. Without it
+//!   edges and corners would darken, and stacked surfaces would be too bright. The host measures it for each
+//!   photon, within about the photon's distance to its k-th neighbour. A gather uses the c of the nearest
+//!   photon of its surface, at a distance of about r / sqrt(k), over which c hardly changes. Where walls hide
+//!   photons, area and photons are those of the region that the point sees ([`super::region`]).
 //!
 //! The remaining bias is blur: the radiance is a mean over the disc.
 
@@ -28,40 +28,41 @@ use crate::scene::{DecodedLobe, PartialReflection, magnitude};
 use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, min};
 
-/// Minimum radius of a disc over the query's greatest coordinate, about its rounding error: photons at one
-/// point have no density.
+/// Minimum radius of a disc divided by the query's greatest coordinate, about the rounding error. It makes
+/// the density of photons at a single point finite.
 const MIN_RADIUS_SHARE: f32 = 1e-6;
 
-/// Light that photons bring.
+/// Light that photons bring to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflected {
     /// Radiance, in the units of the reflection.
     pub radiance: Vec3,
-    /// Number of photons' normals that were decoded.
+    /// Number of photon normals decoded.
     pub normals_decoded: u32,
-    /// Closest photon of the surface.
+    /// The closest photon of the point's surface.
     pub closest: Option<Candidate>,
-    /// Visibility of the photons from the point, by the closest one.
+    /// Visibility of the photons from the point, as the closest photon states it.
     pub sight: Sight,
 }
 
 /// Visibility of a gather's photons from its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sight {
-    /// All photons that matter are visible, or they are of a visible region.
+    /// All relevant photons are visible, or the search was limited to a visible region.
     Free,
     /// Walls hide photons around the closest one.
     Walled,
-    /// The closest photon is far away, or of another surface: it says nothing of the point.
+    /// The closest photon is far away, or of another surface, so that it does not represent the point.
     Unknown,
 }
 
-/// Area within the distance of the closest photon, over the mean area of a photon, beyond which the photon's
-/// disc says too little about that of the point: on a wall one gather in 1,100 has its closest farther away.
+/// Maximum ratio of two areas: the disc up to the closest photon, and the mean area per photon. Beyond it the
+/// photon's disc does not represent the point's. On a wall, one gather in 1,100 has its closest photon
+/// farther away.
 const APART: f32 = 7.0;
 
-/// Radiance of a gather at a position: the photons' power, reflected, over the area of their disc, or of the
-/// visible region that they were searched in.
+/// Radiance of a gather at a position: the reflected power of the photons, divided by the area of their disc
+/// or of the visible region that was searched.
 #[inline(never)]
 pub fn reflected_radiance(
     nearest: &NearestPhotons,
@@ -73,17 +74,17 @@ pub fn reflected_radiance(
     simd::run(Estimate { nearest, position, region, reflection, lobe })
 }
 
-/// The [`Kernel`] of [`reflected_radiance`].
+/// Kernel of [`reflected_radiance`].
 pub struct Estimate<'a, 'n> {
-    /// The nearest photons.
+    /// The nearest photons of a finished search.
     pub nearest: &'a NearestPhotons<'n>,
     /// Position of the gather, metres.
     pub position: Vec3,
-    /// Region in which the photons were searched; `None` for a sphere.
+    /// Region that was searched; `None` for a sphere.
     pub region: Option<&'a Sectors>,
     /// Reflection at the position.
     pub reflection: &'a PartialReflection,
-    /// Its lobe.
+    /// Lobe of the reflection.
     pub lobe: DecodedLobe,
 }
 
@@ -127,7 +128,7 @@ impl Kernel for Estimate<'_, '_> {
     }
 }
 
-/// Extreme candidate: `choose` selects among distances, `is_better` among candidates of equal distance.
+/// Candidate with the extreme distance by `choose`; among equal distances, the one that `is_better`.
 #[inline(always)]
 fn extreme(
     nearest: &NearestPhotons,
@@ -148,7 +149,7 @@ fn extreme(
     best
 }
 
-/// Closest photon of the surface, and the sums over its photons without `farthest`, if given.
+/// Closest photon of the surface, and the sums over the surface's photons, without `farthest` if given.
 #[inline(always)]
 fn sum<'a>(
     nearest: &NearestPhotons,
@@ -187,7 +188,7 @@ fn sum<'a>(
     Some((closest?, sums))
 }
 
-/// `true` if every photon has a normal of this code.
+/// Returns true if every photon has a normal with this code.
 #[inline(always)]
 fn are_all_of(normal: u8, contents: &[u64]) -> bool {
     let differ =
@@ -195,10 +196,10 @@ fn are_all_of(normal: u8, contents: &[u64]) -> bool {
     differ & 0xff << NORMAL_SHIFT == 0
 }
 
-/// First bit of the normal's code in a photon's content.
+/// Position of the normal's code in a photon's content: number of its lowest bit.
 const NORMAL_SHIFT: u32 = 50;
 
-/// Sum of the photons' power, and sum of the power times the lobe's factor.
+/// Sum of the photons' power, and sum of power times the lobe's factor.
 struct Sums<'a> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,

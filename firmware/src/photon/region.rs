@@ -1,15 +1,16 @@
-//! Visible region: the part of a gather's sphere that its point sees, for places where walls hide photons
-//! from it.
+//! Visible region: the part of a gather's sphere that its point sees, used where walls hide photons from the
+//! point.
 //!
-//! A density estimate over a sphere counts photons behind a thin wall that stands on the surface, or in the
-//! next room. Rays along the surface, a little above it, measure the free distance in sixteen directions.
-//! They divide the disc into sectors, each of which ends before the straight line between the two ends of its
-//! border rays: no photon behind a plane wall is in a sector. The area of the estimate is that of the
-//! sectors, so that it agrees with the photons that are counted, whatever the rays have met.
+//! A density estimate over a sphere would count photons in the next room, or behind a thin wall that stands
+//! on the surface. Rays along the surface, a little above it, measure the free distance in sixteen
+//! directions. They divide the disc into sectors. Each sector ends before the straight line between the ends
+//! of its two border rays, so that it contains no photon behind a plane wall. The area of the estimate is
+//! that of the sectors, so that it agrees with the photons that are counted, whatever the rays have hit.
 //!
-//! Photons far off the tangent plane belong to other surfaces, as the boards of a shelf: a region is the part
-//! of the sphere outside a cone about the normal. It ends below what covers the point: photons on the far
-//! side of a wall behind furniture face as the furniture's back does.
+//! Photons far off the tangent plane belong to other surfaces, such as the boards of a shelf. The region is
+//! therefore the part of the sphere outside a cone about the normal. It also ends below anything that covers
+//! the point: photons on the far side of a wall behind furniture have the same normal as the furniture's
+//! back.
 
 use core::f32::consts::PI;
 
@@ -26,69 +27,70 @@ use crate::vector::{max, max_component, min, tangents, unit};
 /// Number of sectors.
 pub const SECTORS: usize = BUNDLE_RAYS;
 
-/// Height of the rays over the surface, over the radius of a gather: lower things hide nothing.
+/// Height of the rays above the surface, divided by the radius of a gather. Lower objects hide nothing.
 const HEIGHT: f32 = 0.03;
-/// Distance of the reference point from the surface over the radius of a gather, besides a cell of the
-/// photons' grid.
+/// Distance of the reference point from the surface, divided by the radius of a gather. A cell of the photon
+/// grid is added to it.
 const LIFT: f32 = 1e-3;
-/// Maximum tangent of the angle between the surface and the way to a photon.
+/// Maximum tangent of the angle between the surface and the direction to a photon.
 const MAX_SLOPE: f32 = 0.4;
-/// Radius of a sector over the lesser length of its border rays: the cosine of half its angle, and half a
-/// percent for rounding.
+/// Radius of a sector divided by the shorter length of its border rays: the cosine of half its angle, less
+/// half a percent for rounding.
 const WITHIN: f32 = 0.976;
-/// Radius of a sector that holds all that may be visible, over the greater length of its border rays.
+/// Radius of a sector that contains everything that may be visible, divided by the longer length of its
+/// border rays.
 const BEYOND: f32 = 1.02;
-/// Height of the region over the distance of what covers the point.
+/// Height of the region, divided by the distance of the object that covers the point.
 const BELOW: f32 = 0.9;
-/// `tan(pi / 8)`.
 const TAN_PI_8: f32 = 0.414_213_57;
 /// Cosines of the multiples of `pi / 8` up to `pi / 2`.
 const COSINES: [f32; 5] = [1.0, 0.923_879_5, 0.707_106_77, 0.382_683_43, 0.0];
 
-/// Region of a tangent plane in sectors about a point.
+/// Region of a tangent plane, in sectors around a point.
 #[derive(Clone, Copy, Debug)]
 pub struct Sectors {
     /// Squared radius of each sector, m^2.
     limits: [f32; SECTORS],
-    /// Square of the height that any photon of the surface may have, m^2.
+    /// Squared maximum height of a photon of the surface, m^2.
     lift_squared: f32,
 }
 
-/// Sectors about a point, and the frame that they lie in.
+/// Sectors around a point, and their coordinate frame.
 #[derive(Clone, Copy, Debug)]
 pub struct VisibleRegion {
-    /// Two tangents and the normal.
+    /// Two unit tangents and the unit normal.
     pub axes: [Vec3; 3],
-    /// Region that is visible throughout.
+    /// Region that is visible as a whole.
     pub sectors: Sectors,
-    /// Region outside which nothing is visible.
+    /// Region that contains everything visible.
     pub outer: Sectors,
-    /// Height below what covers the point, metres: photons above are on its far side.
+    /// Height just below the object that covers the point, metres. Photons above it are on the object's far
+    /// side.
     ceiling: f32,
 }
 
 impl Sectors {
-    /// The sectors in units of `unit` metres.
+    /// Converts the sectors to units of `unit` metres.
     #[must_use]
     pub fn scaled(&self, unit: f32) -> Self {
         let per_unit = 1.0 / (unit * unit);
         Self { limits: self.limits.map(|limit| limit * per_unit), lift_squared: self.lift_squared * per_unit }
     }
 
-    /// Area within a radius, by its square.
+    /// Area of the region within a radius, given squared.
     pub fn area(&self, radius_squared: f32) -> f32 {
         let squares: f32 = self.limits.iter().map(|limit| min(*limit, radius_squared)).sum();
         squares * (PI / SECTORS as f32)
     }
 
-    /// Square of the greatest distance of a point in the region.
+    /// Squared distance of the region's farthest point.
     pub(super) fn reach_squared(&self) -> f32 {
         let greatest = self.limits.iter().copied().fold(0.0, max);
         greatest * (1.0 + MAX_SLOPE * MAX_SLOPE) + self.lift_squared
     }
 
-    /// Sets `outside` to 1 for the points outside the region, given along the axes from its centre, else to
-    /// 0.
+    /// Sets `outside` to 1 for points outside the region, else to 0. Points are given by their coordinates
+    /// along the axes, from the region's centre.
     #[inline(always)]
     pub fn test(&self, isa: impl Isa, [u, v, w]: [&[f32; LANES]; 3], outside: &mut [u32; LANES]) {
         let mut indices = [0; LANES];
@@ -108,7 +110,7 @@ impl Sectors {
         }
     }
 
-    /// True for a point in the region.
+    /// Returns true for a point in the region.
     #[inline(always)]
     fn holds(&self, [u, v, w]: [f32; 3]) -> bool {
         let across = u * u + v * v;
@@ -117,8 +119,8 @@ impl Sectors {
     }
 }
 
-/// Number of the sector of a direction: bits 0 and 1 count from the first axis to the second, bits 2 and 3
-/// are the signs.
+/// Number of the sector that contains a direction. Bits 0 and 1 count from the first axis to the second; bits
+/// 2 and 3 are the signs.
 #[inline(always)]
 fn sector(u: f32, v: f32) -> u32 {
     let (a, b) = (max(u, -u), max(v, -v));
@@ -126,7 +128,7 @@ fn sector(u: f32, v: f32) -> u32 {
     steps | u32::from(u < 0.0) << 2 | u32::from(v < 0.0) << 3
 }
 
-/// Numbers of the two rays along the borders of a sector, counted around the normal.
+/// Numbers of the two rays at the borders of a sector. Rays are counted around the normal.
 fn borders(sector: usize) -> [usize; 2] {
     let steps = sector % 4;
     let ray = |steps: usize| match sector / 4 {
@@ -151,11 +153,11 @@ fn azimuth(ray: usize) -> [f32; 2] {
 }
 
 impl VisibleRegion {
-    /// The region that a point sees on a surface whose normal has the code `normal`, within `reach` metres,
-    /// for gathers of about the radius `radius`. It depends on the scene alone.
+    /// Region that a point sees on a surface whose normal has the code `normal`, within `reach` metres, for
+    /// gathers with a radius of about `radius`. It depends only on the scene.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     #[inline(never)]
     pub fn new(
         scene: &SceneImage,
@@ -199,9 +201,9 @@ impl VisibleRegion {
         })
     }
 
-    /// Free height over a point above a surface, infinite beyond the first of two distances, and the normal
-    /// of the triangle below, which the coded normal tells apart from others; the coded normal without a
-    /// triangle within the second distance.
+    /// Free height above a point, infinite beyond the distance `up`, and normal of the surface below it. The
+    /// normal is that of the triangle within the distance `down` below, if it agrees with the coded normal;
+    /// otherwise the coded normal.
     fn clear_height(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -224,11 +226,11 @@ fn lift(scene: &SceneImage, radius: f32) -> f32 {
     LIFT * radius + scene.header.photon_grid.cell
 }
 
-/// True if something covers a point of a surface whose normal has the code `normal`, so low that photons on
-/// it may be taken for the surface's by a gather of the radius `radius`.
+/// Returns true if something covers a point so closely that a gather of radius `radius` may mistake its
+/// photons for the surface's. The code of the surface's normal is `normal`.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(never)]
 pub(super) fn is_covered(
     scene: &SceneImage,
@@ -244,7 +246,7 @@ pub(super) fn is_covered(
     Ok(up.is_some())
 }
 
-/// Unit normal of a triangle on the side of `towards`; zero for one without area.
+/// Unit normal of a triangle on the side of `towards`; zero for a triangle without area.
 fn normal_of(hit: &Hit, towards: Vec3) -> Vec3 {
     let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
     let (b, c) = (b - a, c - a);
@@ -254,17 +256,17 @@ fn normal_of(hit: &Hit, towards: Vec3) -> Vec3 {
     if normal.dot(towards) < 0.0 { -normal } else { normal }
 }
 
-/// Photons that a search takes, by their places.
+/// Criterion for the photons that a search accepts, by their positions.
 pub(super) trait Filter {
-    /// Sets the distances of photons that are not taken to `u32::MAX`, by the ways from the photons to the
-    /// query.
+    /// Sets the distances of photons that are not accepted to `u32::MAX`. The arguments are vectors from the
+    /// photons to the query.
     fn filter(&self, isa: impl Isa, ways: [&[f32; LANES]; 3], distances: &mut [u32; LANES]);
 
-    /// True for a photon that is taken, by the way from it to the query.
+    /// Returns true if a photon is accepted. The argument is the vector from the photon to the query.
     fn takes(&self, way: [f32; 3]) -> bool;
 }
 
-/// All photons.
+/// Filter that accepts all photons.
 pub(super) struct All;
 
 impl Filter for All {

@@ -1,15 +1,15 @@
-//! Photons of one surface, by their normals.
+//! Test by normals whether photons belong to one surface.
 
 use glam::Vec3;
 use photoncard_shared::layout::decode_normal;
 
 use crate::vector::unit;
 
-/// Minimum cosine between the normals of a photon and of the query that count as one surface.
+/// Minimum cosine between the normals of a photon and of the query that are taken as one surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
 
-/// Test for photons of one surface. Consecutive photons mostly have equal normals, so that the last result is
-/// cached.
+/// Test whether a photon belongs to a surface. Consecutive photons mostly have equal normals, so that the
+/// last result is cached.
 pub struct SameSurface {
     normal: Vec3,
     last: (u8, bool),
@@ -18,7 +18,7 @@ pub struct SameSurface {
 }
 
 impl SameSurface {
-    /// The test for a surface whose normal has this code.
+    /// Creates the test for a surface whose normal has this code.
     #[inline(always)]
     pub fn new(code: u8) -> Self {
         Self { normal: unit(decode_normal(code).into()), last: (code, true), decoded: 0 }
@@ -30,7 +30,7 @@ impl SameSurface {
         self.decoded
     }
 
-    /// `true` for a photon of the surface, by its normal's code.
+    /// Returns true if a photon whose normal has this code belongs to the surface.
     #[inline(always)]
     pub fn holds(&mut self, code: u8) -> bool {
         if self.last.0 != code {

@@ -1,20 +1,20 @@
 //! Selection of the k nearest candidates, in place and without panicking indices.
 //!
-//! On a surface the squared distance of the k-th photon grows in proportion to k. So an interval of distances
-//! that contains the k-th and few others is guessed by interpolation; counting the candidates below its ends
-//! verifies and corrects the guess. One pass then keeps the candidates below the interval and sets aside
-//! those in it, of which the first fill up the k. Where no guess succeeds, as with many candidates at one
-//! distance, quickselect (Hoare 1961) takes over, and after a bounded number of pivots a radix selection, bit
-//! by bit of the sort key. All of these give equal sets.
+//! On a surface the squared distance of the k-th photon is proportional to k. Interpolation therefore guesses
+//! an interval of distances that contains the k-th and few others; counting the candidates below its ends
+//! verifies and corrects the guess. One pass then keeps the candidates below the interval, and sets aside
+//! those in the interval, the first of which complete the k. If no guess succeeds, as with many candidates at
+//! one distance, quickselect (Hoare 1961) is used and, after a bounded number of pivots, a radix selection by
+//! bits of the sort key. All methods give equal sets.
 
 use super::candidates::{Candidate, CandidateCells, Candidates};
 use crate::simd::{Isa, LANES};
 
-/// Maximum number of guesses of the interval.
+/// Maximum number of guesses of an interval.
 const GUESSES: u32 = 4;
-/// Maximum number of candidates in the interval.
+/// Maximum number of candidates in an interval.
 const BETWEEN: usize = 32;
-/// Maximum number of quickselect's pivots, before the radix selection.
+/// Maximum number of quickselect's pivots before the radix selection begins.
 const PIVOTS: u32 = 16;
 /// Maximum number of candidates sorted by insertion.
 const FEW: usize = 16;
@@ -23,13 +23,13 @@ const FEW: usize = 16;
 pub(super) struct Chosen {
     /// The farthest candidate that was selected.
     pub(super) last: Candidate,
-    /// Number of comparisons of distances, but for those of quickselect and of candidates of equal distances.
+    /// Number of comparisons of distances, without those of quickselect and those between equal distances.
     pub(super) compared: u32,
 }
 
 /// Moves the `count` nearest of the first `length` candidates to the front, unordered, and returns the
-/// farthest of them. All elements behind, past `length` too, are meaningless afterwards. `None`, without a
-/// change, if `count` is 0 or above `length`.
+/// farthest of them. All other elements, including those past `length`, are then meaningless. Returns `None`,
+/// and changes nothing, if `count` is 0 or above `length`.
 #[inline(always)]
 pub(super) fn select(
     isa: impl Isa,
@@ -49,15 +49,17 @@ pub(super) fn select(
     Some(Chosen { last, compared: comparisons(length, guesses + 1, between) })
 }
 
-/// Comparisons of a selection: of all distances with the greatest so far; in each pass with both ends of the
-/// interval; and in the interval of each with all lanes, and with the last.
+/// Number of comparisons of a selection. Every distance is compared with the greatest so far and, in each
+/// pass, with both ends of the interval. Every candidate in the interval is compared with all lanes and with
+/// the last one.
 #[inline(always)]
 fn comparisons(length: usize, passes: u32, between: usize) -> u32 {
     length as u32 * (1 + 2 * passes) + (between * (BETWEEN + 1)) as u32
 }
 
-/// Bits of an interval `low <= d < high` that contains the `count`-th squared distance and at most
-/// [`BETWEEN`] in all; `None` if [`GUESSES`] do not find one. And the number of guesses.
+/// Guesses an interval `low <= d < high` of squared distances, as bits, that contains the `count`-th and at
+/// most [`BETWEEN`] in all. Returns the interval, `None` if [`GUESSES`] guesses find none, and the number of
+/// guesses.
 #[inline(always)]
 fn guess(distances: &[u32], count: usize) -> Option<(Option<[u32; 2]>, u32)> {
     let farthest = distances.iter().copied().max()?;
@@ -95,8 +97,8 @@ fn count_nearer(distances: &[u32], low: u32, high: u32) -> [usize; 2] {
     nearer.map(|count| count as usize)
 }
 
-/// [`select`] with an interval of [`guess`]. Returns the farthest candidate, and the number of those in the
-/// interval.
+/// Does [`select`] with an interval from [`guess`]. Returns the farthest candidate, and the number of
+/// candidates in the interval.
 #[inline(always)]
 fn keep(
     isa: impl Isa,
@@ -139,13 +141,13 @@ fn keep(
     Some((last, between))
 }
 
-/// Mask of the first `count` lanes, `count` at least 1; all lanes above [`LANES`].
+/// Mask of the first `count` lanes, at least one; of all lanes if `count` is above [`LANES`].
 #[inline(always)]
 fn first_lanes(count: usize) -> u32 {
     u32::MAX >> (u32::BITS - count.min(LANES) as u32)
 }
 
-/// Candidates set aside: those in the interval, and room for [`LANES`] that are written at once.
+/// Candidates in the interval, set aside, with room for [`LANES`] more because whole vectors are written.
 struct Aside {
     distances: [u32; BETWEEN + LANES],
     contents: [u64; BETWEEN + LANES],
@@ -175,7 +177,7 @@ impl Aside {
         Some(())
     }
 
-    /// Moves the `rank + 1` nearest to the front, unordered, and returns the farthest of them.
+    /// Moves the `rank + 1` nearest candidates to the front, unordered, and returns the farthest of them.
     #[inline(always)]
     fn select(&mut self, isa: impl Isa, rank: usize) -> Option<Candidate> {
         let Some(index) = self.only_one_at(rank) else {
@@ -194,7 +196,8 @@ impl Aside {
         Some(last)
     }
 
-    /// Index of the candidate with exactly `rank` nearer ones; `None` if it shares its distance with another.
+    /// Index of the candidate with exactly `rank` nearer ones; `None` if it shares its distance with another
+    /// candidate.
     #[inline(always)]
     fn only_one_at(&self, rank: usize) -> Option<usize> {
         let all: &[u32; BETWEEN] = self.distances.first_chunk()?;
@@ -235,13 +238,14 @@ fn part(mut cells: CandidateCells, mut rank: usize) -> Option<Candidate> {
     cells.get(rank)
 }
 
-/// The side of a partition after the first `less` cells that contains rank `rank`, and the rank in that side.
+/// Side of a partition that contains rank `rank`, and the rank within that side. The first side has `less`
+/// cells.
 fn follow(cells: CandidateCells, rank: usize, less: usize) -> Option<(CandidateCells, usize)> {
     let (front, back) = cells.split_at(less)?;
     Some(if rank < less { (front, rank) } else { (back, rank - less) })
 }
 
-/// Partitions the candidates: moves those of `is_first` to the front, and returns their number.
+/// Partitions the candidates: moves those for which `is_first` is true to the front. Returns their number.
 #[inline(always)]
 fn divide(cells: CandidateCells, is_first: impl Fn(&Candidate) -> bool) -> usize {
     let mut count = 0;
@@ -256,7 +260,7 @@ fn divide(cells: CandidateCells, is_first: impl Fn(&Candidate) -> bool) -> usize
     count
 }
 
-/// The median of three medians of three.
+/// Median of three medians of three.
 fn pivot(cells: CandidateCells) -> Option<Candidate> {
     let at = |ninth: usize| cells.get(cells.len() * ninth / 9);
     let of_three = |ninth| Some(median(at(ninth)?, at(ninth + 1)?, at(ninth + 2)?));
@@ -271,7 +275,7 @@ fn median(a: Candidate, b: Candidate, c: Candidate) -> Candidate {
     }
 }
 
-/// Insertion sort; returns the candidate of rank `rank`.
+/// Sorts by insertion. Returns the candidate of rank `rank`.
 fn sort(cells: CandidateCells, rank: usize) -> Option<Candidate> {
     for sorted in 1..cells.len() {
         let candidate = cells.get(sorted)?;

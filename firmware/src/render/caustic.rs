@@ -1,5 +1,5 @@
-//! Caustics, paths `L S+ D S* E`: a gather in the caustic map at the surface that the eye sees (Jensen 1996,
-//! *Global illumination using photon maps*).
+//! Caustics, paths `L S+ D S* E`, by a gather in the caustic map at the surface that the eye sees (Jensen
+//! 1996, *Global illumination using photon maps*).
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -11,10 +11,10 @@ use crate::memory::{MemoryPort, Stage};
 use crate::photon::{CausticSearch, LitBy, reflected_caustics};
 use crate::scene::{PartialReflection, Reflection, Reflector};
 
-/// Radiance of reflected caustics at a point, in the image's radiance units.
+/// Radiance of caustics reflected at a point, in the image's radiance units.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -> Result<Vec3, Fault> {
     let frame = context.frame;
     let Some(CausticGather { max_distance, .. }) = frame.caustics else { return Ok(Vec3::ZERO) };
@@ -54,8 +54,8 @@ pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -
     Ok(caustics.radiance)
 }
 
-/// The reflection that the map lights, and the photons that light its lobe. Gather rays of a narrow lobe meet
-/// lights with extent, but rarely the highlights of other lights.
+/// Part of a reflection that the caustic map lights, and the photons that light its lobe. Gather rays of a
+/// narrow lobe hit lights with an area, but rarely the highlights of other lights.
 fn lit(reflection: &Reflection, gather_rays: u32) -> (Reflection, LitBy) {
     if gather_rays == 0 || !reflection.has_narrow_lobe() {
         (*reflection, LitBy::All)

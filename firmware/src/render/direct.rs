@@ -1,22 +1,22 @@
-//! Direct light, paths `L D S* E`: shadow rays to lights ([`crate::scene::light`]), and final gather rays
-//! that meet a light.
+//! Direct light, paths `L D S* E`, by shadow rays to lights ([`crate::scene::light`]) and by final gather
+//! rays that hit a light.
 //!
 //! Shadow rays are noisy near an emitter, as their contribution grows with the inverse square of the
-//! distance; gather rays are noisy where the emitter is small. Gather rays are cast in any case, so both are
-//! combined by the balance heuristic (Veach, Guibas 1995): with `n` rays of density `p` in one technique and
-//! `m` of density `q` in the other, a path has the weight `n p / (n p + m q)` in the first. The two weights
-//! of a path sum to 1, so that direct light is counted once.
+//! distance; gather rays are noisy where the emitter is small. Gather rays are cast in any case, so that both
+//! techniques are combined by the balance heuristic (Veach, Guibas 1995). With `n` rays of density `p` in one
+//! technique and `m` rays of density `q` in the other, a path has the weight `n p / (n p + m q)` in the
+//! first. The two weights of a path add up to 1, so that direct light is counted once.
 //!
-//! The emission that rays of an irradiance record meet is interpolated for the samples around it, whose
-//! shadow rays bring the rest. Both sides must compute equal weights. So the record's density is replaced by
-//! `cos(theta) / pi`, as samples do not know its direction table; the number of shadow rays is that of all
-//! planned samples of a pixel; and the power heuristic leaves small emitters, which would make a record
-//! noisy, to shadow rays, and a sky to records.
+//! Emission that rays of an irradiance record hit is interpolated for the samples around the record; their
+//! shadow rays add the remainder. Both must compute equal weights. The record's density is therefore replaced
+//! by `cos(theta) / pi`, because samples do not know its direction table, and the number of shadow rays is
+//! that of all planned samples of a pixel. The power heuristic leaves small emitters, which would make a
+//! record noisy, to shadow rays, and a sky to records.
 //!
-//! Points, spots and distant lights are met by no gather ray: shadow rays alone bring their light.
+//! No gather ray hits point, spot and distant lights, so that only shadow rays contribute their light.
 //!
-//! Flat glass hides no light from a point: shadow rays pass it with its transmittance, and a gather ray that
-//! has passed nothing else meets the light as if it had passed nothing, with equal weights.
+//! Flat glass does not hide lights. Shadow rays pass it with its transmittance. A gather ray that has passed
+//! only flat glass hits a light with the same weights as if it had passed nothing.
 //!
 //! Light samples are stratified over all samples of a pixel: many samples with one or two shadow rays each
 //! are as good as one sample with many.
@@ -37,10 +37,10 @@ use crate::scene::light::{
 use crate::scene::{BUNDLE_RAYS, Passed, Ray, Surface, transmittances};
 use crate::vector::max_component;
 
-/// Reflected direct light at a point by shadow rays, weighted, W/(sr m^2).
+/// Direct light from shadow rays reflected at a point, weighted, W/(sr m^2).
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn reflected<M: MemoryPort>(
     context: &mut Context<M>,
     pixel: PixelSample,
@@ -73,7 +73,7 @@ pub fn reflected<M: MemoryPort>(
     Ok(rays.cast(context, point, sum)? / frame.shadow_rays as f32)
 }
 
-/// Shadow rays of a point that are cast together, each to its light.
+/// Shadow rays of a point that are cast together, each with its light sample.
 struct ShadowRays {
     rays: Vec<Ray, BUNDLE_RAYS>,
     lights: Vec<LightSample, BUNDLE_RAYS>,
@@ -84,7 +84,7 @@ impl ShadowRays {
         Self { rays: Vec::new(), lights: Vec::new() }
     }
 
-    /// Adds a ray, for which there is room.
+    /// Adds a ray. There must be room for it.
     fn push(&mut self, origin: Vec3, light: LightSample) -> Result<(), Fault> {
         let LightSample { direction, distance, .. } = light;
         let ray = Ray { origin, direction, max_distance: distance * SHORTER };
@@ -96,7 +96,7 @@ impl ShadowRays {
         self.rays.is_full()
     }
 
-    /// Casts the rays, and adds the radiance that the point reflects to a sum, W/(sr m^2).
+    /// Casts the rays. Returns `sum` plus the radiance that the point reflects, W/(sr m^2).
     fn cast<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -116,7 +116,7 @@ impl ShadowRays {
     }
 }
 
-/// Reflected radiance of one light sample, all of whose light arrives, W/(sr m^2).
+/// Reflected radiance of an unoccluded light sample, W/(sr m^2).
 fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample) -> Vec3 {
     let surface = &point.surface;
     let LightSample { direction, irradiance, density, .. } = *light;
@@ -138,11 +138,11 @@ fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample)
     reflected * irradiance * cosine
 }
 
-/// Emission of the surface at the end of a gather ray, times its weight against shadow rays, W/(sr m^2).
-/// `met.distance` is that from the point, and `gather_density` the ray's probability density, 1/sr.
+/// Emission of the surface that a gather ray hits, times the ray's weight against shadow rays, W/(sr m^2).
+/// `met.distance` is the distance from the point, `gather_density` the ray's probability density, 1/sr.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(always)]
 pub fn seen_by_gather_ray<M: MemoryPort>(
     context: &mut Context<M>,
@@ -167,11 +167,11 @@ pub fn seen_by_gather_ray<M: MemoryPort>(
     Ok(met.emission * weight_of_gather_ray(context, point, ray.direction, gather_density, density))
 }
 
-/// Radiance of the environment along a gather ray that leaves the scene, times its weight against shadow
-/// rays, W/(sr m^2). `gather_density` is the ray's probability density, 1/sr.
+/// Radiance of the environment along a gather ray that leaves the scene, times the ray's weight against
+/// shadow rays, W/(sr m^2). `gather_density` is the ray's probability density, 1/sr.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn escaped<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
@@ -186,7 +186,7 @@ pub fn escaped<M: MemoryPort>(
     Ok(radiance * weight_of_gather_ray(context, point, direction, gather_density, density))
 }
 
-/// Weight of a gather ray against light samples whose density in its direction is `density`, 1/sr.
+/// Weight of a gather ray against light samples, whose density in the ray's direction is `density`, 1/sr.
 #[inline(always)]
 fn weight_of_gather_ray<M>(
     context: &Context<M>,
@@ -203,33 +203,34 @@ fn weight_of_gather_ray<M>(
     }
 }
 
-/// Number of gather rays of a record, and the density that weights assume for one, `cos(theta) / pi`, 1/sr.
+/// Number of gather rays of a record, and the density `cos(theta) / pi`, 1/sr, that weights assume for each
+/// ray.
 #[inline(always)]
 fn rays_of_record<M>(context: &Context<M>, cosine: f32) -> (u32, f32) {
     (context.frame.gather_rays, cosine * FRAC_1_PI)
 }
 
-/// Number of shadow rays that share direct light with the rays of a record, and the density of one, 1/sr.
+/// Number of shadow rays that share direct light with a record's rays, and the density of each, 1/sr.
 #[inline(always)]
 fn shadow_rays_for_records<M>(context: &Context<M>, density: f32) -> (u32, f32) {
     (context.frame.shadow_rays * context.frame.planned_samples, density)
 }
 
-/// Balance heuristic: weight of the first of two sampling techniques, each with its number of rays and
-/// density.
+/// Balance heuristic: weight of the first of two sampling techniques, each given by its number of rays and
+/// its density.
 #[inline(always)]
 fn balance(way: (u32, f32), other: (u32, f32)) -> f32 {
     1.0 / (1.0 + ratio(other, way))
 }
 
-/// [`balance`] by the power heuristic with the exponent 2 (Veach, Guibas 1995).
+/// Power heuristic with exponent 2 (Veach, Guibas 1995), with the arguments of [`balance`].
 #[inline(always)]
 fn power(way: (u32, f32), other: (u32, f32)) -> f32 {
     let ratio = ratio(other, way);
     1.0 / (1.0 + ratio * ratio)
 }
 
-/// Ratio `n p / (m q)` of two sampling techniques; 0 for a first technique without rays.
+/// Ratio `n p / (m q)` of two sampling techniques; 0 if the first has no rays.
 #[inline(always)]
 fn ratio((rays, density): (u32, f32), (other_rays, other_density): (u32, f32)) -> f32 {
     if rays == 0 {

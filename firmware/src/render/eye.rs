@@ -13,7 +13,7 @@ use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
 use crate::vector::unit;
 
 /// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are
-/// stratified over the pixel filter, which may reach beyond the pixel and the picture.
+/// stratified over the pixel filter, which can extend beyond the pixel and the picture.
 pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     let PixelSample { x, y, .. } = pixel;
     let (pattern, index) = pixel.stratified(context.frame, Dimension::Pixel);
@@ -25,16 +25,15 @@ pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
 /// Surface that a sample sees.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// The surface, its reflection and emission times the throughput of the eye path.
+    /// The visible surface. Its reflection and emission are multiplied by the throughput of the eye path.
     pub surface: Surface,
-    /// Hit of the eye ray itself; `None` behind perfectly specular surfaces, and for a surface of several
-    /// layers.
+    /// Hit of the eye ray; `None` behind perfectly specular surfaces, and for a surface of several layers.
     pub seen: Option<Seen>,
-    /// `true` if the eye ray itself meets the surface.
+    /// True if the eye ray hits the surface directly.
     pub is_first: bool,
     /// Position of the sample in the picture ([`film_position`]).
     pub film: [f32; 2],
-    /// Depth of the eye ray's hit along the view's axis, metres.
+    /// Depth of the eye ray's hit along the view axis, metres.
     pub depth: f32,
 }
 
@@ -44,12 +43,12 @@ pub struct View {
 pub enum Sight {
     /// A surface.
     Surface(View),
-    /// The environment; its radiance, W/(sr m^2), zero without one.
+    /// The environment with its radiance, W/(sr m^2); zero if there is none.
     Background(Vec3),
 }
 
 impl Sight {
-    /// The surface; `None` for the environment.
+    /// Returns the surface; `None` for the environment.
     pub fn surface(self) -> Option<View> {
         match self {
             Self::Surface(view) => Some(view),
@@ -61,7 +60,7 @@ impl Sight {
 /// Follows the eye path of a sample through perfectly specular surfaces to its end.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Sight, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
@@ -103,16 +102,16 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     }))
 }
 
-/// Radiance of the environment at the end of a path that left the scene.
+/// Radiance of the environment at the end of a path that has left the scene.
 fn background<M: MemoryPort>(context: &mut Context<M>, path: &SpecularPath) -> Result<Sight, Fault> {
     let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
     Ok(Sight::Background(radiance * path.throughput))
 }
 
-/// Hit of the eye ray at a position of the picture.
+/// Finds the hit of the eye ray at position `film` in the picture.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn look<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Seen>, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
@@ -120,10 +119,10 @@ pub fn look<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<O
     Ok(hit.map(|hit| Seen::new(&hit)))
 }
 
-/// Reads the surface at a stored hit of the eye ray at a position of the picture into `surface`.
+/// Reads the surface at a stored hit of the eye ray at position `film` into `surface`.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(always)]
 pub fn surface<M: MemoryPort>(
     context: &mut Context<M>,
@@ -134,10 +133,10 @@ pub fn surface<M: MemoryPort>(
     seen.surface(context.scene, context.memory, &eye_ray(context, film), surface)
 }
 
-/// Surface at the hit of the eye ray at a position of the picture.
+/// Finds the surface that the eye ray at position `film` hits.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Surface>, Fault> {
     let Some(seen) = look(context, film)? else { return Ok(None) };
     let mut found = Surface::NOWHERE;
@@ -154,14 +153,14 @@ fn eye_ray<M>(context: &Context<M>, [x, y]: [f32; 2]) -> Ray {
     Ray::new(camera.origin.into(), unit(direction))
 }
 
-/// Side of a pixel's footprint at the depth of a surface, metres.
+/// Side length of a pixel's footprint at the depth of a surface, metres.
 pub fn pixel_side<M>(context: &Context<M>, surface: &Surface) -> f32 {
     let frame = context.frame;
     let up = libm::sqrtf(Vec3::from_array(frame.camera.up).length_squared());
     depth(context, surface) * up * 2.0 / frame.height as f32
 }
 
-/// Distance of a surface along the view's axis, metres.
+/// Distance of a surface along the view axis, metres.
 pub fn depth<M>(context: &Context<M>, surface: &Surface) -> f32 {
     let camera = &context.frame.camera;
     (surface.position - Vec3::from_array(camera.origin)).dot(camera.forward.into())

@@ -1,6 +1,6 @@
-//! The final gather: rays over the hemisphere, each ending in a gather of the photons nearest to its end.
+//! Final gather: rays over the hemisphere, with a photon gather at the end of each ray.
 //!
-//! Emission at a ray's end is direct light, weighted against shadow rays ([`super::direct`]).
+//! Emission at the end of a ray is direct light, weighted against shadow rays ([`super::direct`]).
 
 use core::ops::Range;
 
@@ -25,29 +25,29 @@ use crate::scene::{
 /// Contribution of one final gather ray.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherRayEnd {
-    /// Cell of the hemisphere with the ray's direction.
+    /// Cell of the hemisphere that contains the ray's direction.
     pub cell: u8,
-    /// Weighted emission of the surface or the environment that it meets, in the image's radiance units.
+    /// Weighted emission of the surface or environment that the ray hits, in the image's radiance units.
     pub direct: Vec3,
-    /// Gather of the reflected light; `None` at a black surface.
+    /// Gather of the reflected light at the end of the ray; `None` at a black surface.
     pub request: Option<GatherRequest>,
 }
 
 /// Contributions of the rays of a bundle.
 pub type GatherRayEnds = Vec<GatherRayEnd, BUNDLE_RAYS>;
 
-/// Parts of a range of rays, each for one [`cast`].
+/// Divides a range of rays into parts for one [`cast`] each.
 pub fn bundles(rays: Range<u32>) -> impl Iterator<Item = Range<u32>> {
     let Range { start, end } = rays;
     (start..end).step_by(BUNDLE_RAYS).map(move |first| first..end.min(first + BUNDLE_RAYS as u32))
 }
 
-/// Casts rays of a gather point, at most [`BUNDLE_RAYS`], and puts their contributions into `ends`, without
-/// those that meet neither a surface nor the environment. A contribution is one term of the mean over the
-/// point's rays; the gather's result goes to the sum `target`.
+/// Casts at most [`BUNDLE_RAYS`] rays of a gather point and stores their contributions in `ends`. Rays that
+/// hit neither a surface nor the environment have none. A contribution is one term of the mean over the
+/// point's rays; the gather's result is added to the sum `target`.
 ///
 /// # Errors
-/// If the image is not sound, or there are more than [`BUNDLE_RAYS`] rays.
+/// If the image is invalid, or there are more than [`BUNDLE_RAYS`] rays.
 pub fn cast<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
@@ -80,7 +80,7 @@ pub fn cast<M: MemoryPort>(
     Ok(())
 }
 
-/// Contribution of ray `index` of a gather point, in its sampled direction, by the ray's hit.
+/// Contribution of ray `index` of a gather point, from its sampled direction and its hit.
 fn arrive<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
@@ -132,7 +132,7 @@ fn arrive<M: MemoryPort>(
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request }))
 }
 
-/// The environment's light where a gather ray leaves the scene; `None` without an environment.
+/// Light of the environment where a gather ray leaves the scene; `None` without an environment.
 #[inline(never)]
 fn escaped<M: MemoryPort>(
     context: &mut Context<M>,
@@ -156,8 +156,8 @@ fn escaped<M: MemoryPort>(
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
 }
 
-/// Light of punctual lights that the path has collected at narrow lobes, weighted, in the image's radiance
-/// units; zero where the caustic map brings it.
+/// Weighted light of point, spot and distant lights that the path collected at narrow lobes, in the image's
+/// radiance units. It is zero where the caustic map contains this light.
 fn collected<M>(
     context: &Context<M>,
     point: &GatherPoint,
@@ -174,9 +174,9 @@ fn collected<M>(
         * (1.0 / context.scene.header.radiance_unit)
 }
 
-/// Weight of emission at the end of a gather ray that passed specular surfaces or narrow lobes other than
-/// flat glass: `weight` without a caustic map, and with one, which brings that light to all other reflection,
-/// the narrow lobe's part of it. No shadow ray brings it.
+/// Weight of emission at the end of a gather ray that passed specular surfaces or narrow lobes, not only flat
+/// glass. No shadow ray finds this light. Without a caustic map the weight is `weight`. With one it is only
+/// the part of the narrow lobe, because the map brings the light to all other reflection.
 fn beyond_specular<M>(
     context: &Context<M>,
     point: &GatherPoint,
@@ -198,7 +198,7 @@ fn beyond_specular<M>(
 /// Executes a gather. Returns its radiance, in the image's radiance units.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn gathered<M: MemoryPort>(
     context: &mut Context<M>,
     request: &GatherRequest,
@@ -226,8 +226,8 @@ pub fn gathered<M: MemoryPort>(
     gathered_radiance((scene, *memory), position, reflection, limits, candidates, &mut count)
 }
 
-/// Precomputed irradiance of the nearest irradiance point of a surface, photon power units/m^2; 0 without
-/// one.
+/// Precomputed irradiance at the nearest irradiance point of a surface, photon power units/m^2; 0 if there is
+/// none.
 #[inline(always)]
 fn irradiance<M: MemoryPort>(context: &mut Context<M>, position: Vec3, normal: u8) -> Result<Vec3, Fault> {
     let max_distance = context.frame.max_distance;

@@ -1,4 +1,5 @@
-//! Passes of a tile, each a function of one pixel or one ray: eye ray, direct light, caustics, final gather.
+//! Passes of a tile. Each is a function of one pixel or one ray: eye ray, direct light, caustics, final
+//! gather.
 
 pub mod caustic;
 pub mod direct;
@@ -18,8 +19,8 @@ use crate::gather::GatherRequest;
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::SceneImage;
 
-/// Length of a shadow ray over the distance of its light: it ends before the emitter's surface, whatever the
-/// rounding.
+/// Length of a shadow ray divided by the distance of its light. The ray ends before the emitter's surface in
+/// spite of rounding.
 const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// Arguments of every pass: scene, memory, frame parameters and counters.
@@ -34,7 +35,7 @@ pub struct Context<'a, M> {
     pub counters: &'a mut Counters,
 }
 
-/// Arguments of a chip's work on all its tiles.
+/// Arguments of a chip's work on all of its tiles.
 pub struct RenderJob<'a, M> {
     /// Sections of the card image.
     pub scene: &'a SceneImage,
@@ -42,18 +43,18 @@ pub struct RenderJob<'a, M> {
     pub memory: &'a mut M,
     /// Frame parameters.
     pub frame: &'a FrameParameters,
-    /// Receiver of the pixels' gathers, if the chip does not execute them itself.
+    /// Receiver of the gathers of pixels, if the chip does not do them itself.
     pub outlet: Option<&'a mut dyn GatherOutlet>,
 }
 
 impl<M> RenderJob<'_, M> {
-    /// Arguments of a pass of a tile, with its counters.
+    /// Arguments for a pass of a tile with these counters.
     #[inline(always)]
     pub fn context<'b>(&'b mut self, counters: &'b mut Counters) -> Context<'b, M> {
         Context { scene: self.scene, memory: self.memory, frame: self.frame, counters }
     }
 
-    /// Arguments of a pass of a tile, and the receiver of its gathers.
+    /// Arguments for a pass of a tile, and the receiver of its gathers.
     #[inline(always)]
     pub(crate) fn context_and_outlet<'b>(
         &'b mut self,
@@ -65,13 +66,14 @@ impl<M> RenderJob<'_, M> {
     }
 }
 
-/// Receiver of gathers of pixels: a host with memory for the gathers of a whole frame (`--order hilbert`).
+/// Receiver of the gathers of pixels: a host that has memory for the gathers of a whole frame
+/// (`--order hilbert`).
 pub trait GatherOutlet {
-    /// Takes a gather of a pixel, by its index in the tile.
+    /// Takes a gather of the pixel at a row-major index in the tile.
     fn take(&mut self, pixel: u32, request: GatherRequest);
 }
 
-/// One sample or path of one pixel, on which random numbers depend.
+/// Sample or path of a pixel, from which random numbers are derived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelSample {
     /// Column of the pixel in the whole picture.
@@ -83,9 +85,9 @@ pub struct PixelSample {
 }
 
 impl PixelSample {
-    /// Pattern that is stratified over the pixel's samples, and the index of this one in it. With adaptive
-    /// sampling probes and other paths have patterns of their own: in one pattern the points after the probes
-    /// fill the strata that these have left, and their mean would depend on what the probes have found.
+    /// Pattern that is stratified over the pixel's samples, and the index of this sample in it. With adaptive
+    /// sampling, probes and other paths have separate patterns: in a common pattern, later points would fill
+    /// the strata that the probes left free, and their mean would depend on what the probes found.
     #[inline(always)]
     pub fn stratified(self, frame: &FrameParameters, dimension: Dimension) -> (Pattern, u32) {
         let Self { x, y, sample } = self;

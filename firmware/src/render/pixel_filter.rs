@@ -1,13 +1,14 @@
-//! Pixel filters: places of samples by inverse cumulative distributions.
+//! Pixel filters: samples are placed by inverse cumulative distribution functions.
 
 use photoncard_shared::message::Filter;
 
 use crate::vector::min;
 
-/// Steps of a table.
+/// Number of steps of a table.
 const STEPS: usize = 32;
 
-/// Distances from the centre, pixels, within which the shares `i / STEPS` of a filter are, in one direction.
+/// Quantiles of a filter on one axis: entry `i` is the distance from the centre, pixels, within which the
+/// fraction `i / STEPS` of the filter lies.
 type Quantiles = [f32; STEPS + 1];
 
 const GAUSSIAN: Quantiles = [
@@ -24,8 +25,8 @@ const BLACKMAN_HARRIS: Quantiles = [
     0.439136, 0.75,
 ];
 
-/// Place of a sample in one direction from the left or upper border of its pixel, pixels, by a number in [0,
-/// 1).
+/// Position of a sample on one axis, pixels from the left or upper border of its pixel, for a random number
+/// in [0, 1).
 #[inline(always)]
 pub(super) fn place(filter: Filter, number: f32) -> f32 {
     match filter {
@@ -35,7 +36,7 @@ pub(super) fn place(filter: Filter, number: f32) -> f32 {
     }
 }
 
-/// Offset from the centre, linear between the quantiles.
+/// Offset from the pixel's centre, interpolated linearly between the quantiles.
 fn offset(quantiles: &Quantiles, number: f32) -> f32 {
     let signed = 2.0 * number - 1.0;
     let at = min(signed.abs() * STEPS as f32, STEPS as f32);
@@ -48,8 +49,8 @@ fn offset(quantiles: &Quantiles, number: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Checks the distribution of places against the integral of a filter, a function of the distance from
-    /// the centre with this radius.
+    /// Compares the distribution of positions with the integral of a filter. `value` is the filter as a
+    /// function of the distance from the centre, `radius` its support.
     fn check(filter: Filter, radius: f64, value: impl Fn(f64) -> f64) {
         const CELLS: i32 = 3200;
         let integral = |cells: i32| -> f64 {

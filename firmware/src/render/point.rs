@@ -11,40 +11,41 @@ use crate::photon::{Candidates, NearestPhotons, PhotonMap};
 use crate::sampler::Pattern;
 use crate::scene::{Reflector, Surface};
 
-/// The origin of gather rays.
+/// Origin of final gather rays.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
-    /// The surface, with its whole reflection whatever the purpose.
+    /// Surface at the point. It has its whole reflection, whatever the purpose of the rays.
     pub surface: Surface,
     /// Random numbers of the rays.
     pub pattern: Pattern,
-    /// Number of rays; with 0, direct light is left to shadow rays.
+    /// Number of rays. Without rays, all direct light comes from shadow rays.
     pub rays: u32,
     /// Shares of the rays by direction.
     pub directions: DirectionTable,
     /// The purpose of the rays.
     pub purpose: Purpose,
-    /// Weight of the rays' light in the sum that takes it.
+    /// Weight of the rays' light in the sum that it is added to.
     pub weight: f32,
 }
 
-/// The purpose of a point's gather rays.
+/// Purpose of a point's gather rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
-    /// All light that a sample reflects.
+    /// The rays gather all light that a sample reflects.
     Sample,
-    /// Light that the lobe of a sample reflects; irradiance records light its Lambertian part.
+    /// The rays gather the light that a sample's lobe reflects. Irradiance records light its Lambertian part.
     Lobe,
-    /// The irradiance of a record, which many samples share.
+    /// The rays gather the irradiance of a record, which many samples share.
     Record,
 }
 
 /// Minimum number of gather rays for which photons are searched for a direction table. The search costs as
-/// much as a gather ray; fewer rays spread over the cells too thinly to gain by it: `docs/techniques.md`.
+/// much as a gather ray, and fewer rays are spread too thinly over the cells to profit
+/// (`docs/techniques.md`).
 const MIN_RAYS_OF_SEARCH: u32 = 8;
 
 impl GatherPoint {
-    /// A point for all light that a sample reflects.
+    /// Point with rays for all light that a sample reflects.
     pub fn sample(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = if surface.reflection.is_black() { 0 } else { rays };
         Self {
@@ -57,7 +58,7 @@ impl GatherPoint {
         }
     }
 
-    /// A point for the irradiance of a record, whose surface is white.
+    /// Point with rays for the irradiance of a record. Its surface is white.
     pub fn record(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         Self {
             surface,
@@ -69,7 +70,7 @@ impl GatherPoint {
         }
     }
 
-    /// A point for the lobe of a surface, with [`Reflector::lobe_share`] of the rays.
+    /// Point with rays for a surface's lobe. It has [`Reflector::lobe_share`] of the rays.
     pub fn lobe(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = libm::ceilf(rays as f32 * surface.reflector().lobe_share()) as u32;
         Self {
@@ -82,7 +83,7 @@ impl GatherPoint {
         }
     }
 
-    /// The reflection that the rays serve, seen from the eye.
+    /// Part of the reflection that the rays serve, seen from the eye.
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
         let Surface { normal, outgoing, reflection, .. } = self.surface;
@@ -91,11 +92,11 @@ impl GatherPoint {
         Reflector { normal, outgoing, reflection }
     }
 
-    /// Chooses the directions: by the reflection for few rays, else by the frame's sampling, which may search
-    /// the nearest photons.
+    /// Chooses the shares of the directions. Points with few rays use the reflection, others the frame's
+    /// sampling method, which may search for the nearest photons.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     pub fn choose_directions<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,

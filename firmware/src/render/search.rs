@@ -1,4 +1,4 @@
-//! Photon search at points that the eye sees, and counts of the reflection of photons.
+//! Photon search at points that the eye sees, and counters of the reflection of photons.
 
 use glam::Vec3;
 use photoncard_shared::counters::Counters;
@@ -9,7 +9,7 @@ use crate::memory::MemoryPort;
 use crate::photon::{NearestPhotons, PhotonMap, Reflected, gather};
 use crate::scene::PartialReflection;
 
-/// Counts the photons that a lobe reflects, and the normals that were decoded for it.
+/// Counts the photons that a lobe reflects, and the normals decoded for a reflection.
 #[inline(always)]
 pub(super) fn count_reflection(
     counters: &mut Counters,
@@ -26,7 +26,7 @@ pub(super) fn count_reflection(
     }
 }
 
-/// Collects the photons of a map nearest to a position in `nearest`, for direction tables and caustics. These
+/// Collects in `nearest` the photons of a map nearest to a position, for direction tables and caustics. These
 /// searches are few and share one copy of the code, unlike gathers at the ends of rays.
 #[inline(never)]
 pub(super) fn search<M: MemoryPort>(

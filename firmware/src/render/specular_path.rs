@@ -1,13 +1,14 @@
-//! Paths through specular surfaces: mirrors, smooth coats, smooth glass, and for gather rays and photons
-//! narrow lobes ([`crate::scene::Reflection::has_narrow_lobe`]).
+//! Paths through specular surfaces: mirrors, smooth coats and smooth glass. For gather rays and photons,
+//! narrow lobes ([`crate::scene::Reflection::has_narrow_lobe`]) are specular too.
 //!
 //! At such a surface a path takes one continuation at random, in proportion to its share of the light:
 //! reflection, transmission, a direction of the narrow lobe, or an end at the surface for the rest of its
-//! reflection. The samples of a pixel cover all of them. After [`FREE_BOUNCES`] a path survives by its
-//! throughput (Russian roulette), and after [`SPECULAR_BOUNCES`] it is black.
+//! reflection. The samples of a pixel cover all of them. After [`FREE_BOUNCES`] bounces a path survives with
+//! the probability of its throughput (Russian roulette), and after [`SPECULAR_BOUNCES`] it contributes
+//! nothing.
 //!
-//! Absorption follows the Beer-Lambert law, with the coefficient of the glass entered last; nested glass is
-//! not tracked. Flat glass changes neither direction nor medium.
+//! Absorption follows the Beer-Lambert law, with the coefficient of the glass that the path entered last;
+//! nested glass is not tracked. Flat glass changes neither direction nor medium.
 
 use glam::Vec3;
 use photoncard_shared::budget::{FREE_BOUNCES, SPECULAR_BOUNCES};
@@ -21,32 +22,33 @@ use crate::scene::{
 };
 use crate::vector::{max, max_component, min};
 
-/// Minimum ratio of the probabilities to end at a surface and to go on, if its reflection is not black.
+/// Minimum ratio of two probabilities, to end at a surface and to continue, if the surface's reflection is
+/// not black.
 const MIN_STAY: f32 = 1.0 / 16.0;
 
-/// A path through specular surfaces, up to its present ray.
+/// A path through specular surfaces, up to its current ray.
 #[derive(Clone, Copy, Debug)]
 pub struct SpecularPath {
-    /// The present ray.
+    /// The current ray.
     pub ray: Ray,
-    /// Throughput between the path's origin and the present ray, without unit.
+    /// Throughput between the path's origin and the current ray, dimensionless.
     pub throughput: Vec3,
-    /// Light of punctual lights that the narrow lobes passed reflect towards the origin, W/(sr m^2): no ray
-    /// meets such a light.
+    /// Light of point, spot and distant lights that the path's narrow lobes reflect towards its origin, W/(sr
+    /// m^2). No ray can hit such a light.
     pub collected: Vec3,
     /// Number of specular surfaces passed.
     pub bounces: u32,
     /// Distance of the first specular surface from the origin, metres.
     pub first_distance: f32,
-    /// `true` as long as the path has passed nothing but flat glass: it is a straight line.
+    /// True while the path has passed only flat glass, so that it is a straight line.
     pub is_straight: bool,
-    /// Length of the path up to the present ray, metres.
+    /// Length of the path up to the current ray, metres.
     pub travelled: f32,
     /// Transported quantity.
     carried: Carried,
-    /// Surfaces that the path passes.
+    /// Kinds of surfaces that the path passes.
     passes: Passes,
-    /// Absorption coefficient around the ray, 1/m.
+    /// Absorption coefficient of the medium around the current ray, 1/m.
     absorption: Vec3,
 }
 
@@ -54,50 +56,53 @@ pub struct SpecularPath {
 /// refraction (Veach 1997, section 5.2), and leaves power unchanged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Carried {
-    /// Radiance: the path is followed from the eye, against the light.
+    /// Radiance. The path is followed from the eye, against the light.
     Radiance,
-    /// Power: the path is a photon's.
+    /// Power. The path is a photon's.
     Power,
 }
 
-/// Surfaces that a path passes.
+/// Kinds of surfaces that a path passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passes {
-    /// Perfectly specular surfaces: for the eye, whose gather points have rays for their lobes.
+    /// Perfectly specular surfaces. Used for eye paths, because their gather points have rays for the lobes.
     Specular,
-    /// Narrow lobes besides: for gather rays and photons ([`crate::scene::Reflection::has_narrow_lobe`]).
+    /// Perfectly specular surfaces and narrow lobes ([`crate::scene::Reflection::has_narrow_lobe`]). Used for
+    /// gather rays and photons.
     NarrowLobes,
-    /// Narrow lobes besides, and an end at those that the caustic map lights
-    /// ([`crate::scene::Reflection::keeps_caustics`]): for its photons.
+    /// As [`Self::NarrowLobes`], but the path can end at narrow lobes that the caustic map lights
+    /// ([`crate::scene::Reflection::keeps_caustics`]). Used for photons of the caustic map.
     CausticPhotons,
 }
 
-/// The continuation of a path at a surface.
+/// Continuation of a path at a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Arrival {
     /// The path ends at the surface.
     Ends,
-    /// The path goes on along its new ray.
+    /// The path continues along its new ray.
     GoesOn,
-    /// The path is black: after too many specular surfaces, or at one that absorbs everything.
+    /// The path contributes nothing, because it has passed too many specular surfaces, or reached one that
+    /// absorbs everything.
     Lost,
-    /// The path is black: the sampled direction of a narrow lobe lies below the surface.
+    /// The path contributes nothing, because the sampled direction of a narrow lobe lies below the surface.
     Absorbed,
 }
 
-/// The end of a path.
+/// End of a path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathEnd {
-    /// On a surface.
+    /// The path ends on a surface.
     Surface,
-    /// Outside the scene.
+    /// The path leaves the scene.
     Escaped,
-    /// Black: see [`Arrival::Lost`] and [`Arrival::Absorbed`]; or ended by Russian roulette.
+    /// The path contributes nothing ([`Arrival::Lost`], [`Arrival::Absorbed`]), or was ended by Russian
+    /// roulette.
     Lost,
 }
 
 impl SpecularPath {
-    /// A path along a ray.
+    /// Creates a path along a ray.
     #[inline(always)]
     pub fn new(ray: Ray, carried: Carried, passes: Passes) -> Self {
         Self {
@@ -114,7 +119,7 @@ impl SpecularPath {
         }
     }
 
-    /// Returns whether the path may go on at a surface.
+    /// Returns whether the path can continue at a surface.
     #[inline(always)]
     pub fn may_pass(&self, surface: &Surface) -> bool {
         !surface.specular.is_none() || self.passes_lobe(surface)
@@ -125,8 +130,8 @@ impl SpecularPath {
         self.passes != Passes::Specular && surface.reflection.has_narrow_lobe()
     }
 
-    /// Arrives at a surface. Of `random`, in [0, 1), the first chooses the continuation, the others a
-    /// direction. Where the path ends the surface loses a lobe that the path passes.
+    /// Arrives at a surface. The first of the three numbers in `random`, in [0, 1), chooses the continuation,
+    /// the others a direction. If the path ends, the surface loses any lobe that the path would pass.
     #[inline(always)]
     pub fn arrive(&mut self, surface: &mut Surface, random: [f32; 3]) -> Arrival {
         if !self.may_pass(surface) && self.absorption == Vec3::ZERO {
@@ -206,8 +211,8 @@ impl SpecularPath {
         Arrival::GoesOn
     }
 
-    /// Russian roulette of a path with many bounces: it survives with the probability of its throughput, over
-    /// which that is divided.
+    /// Applies Russian roulette to a path with many bounces. The path survives with the probability of its
+    /// throughput, which is then divided by that probability.
     fn survives(&mut self, random: &dyn Fn(u32) -> f32) -> bool {
         if self.bounces <= FREE_BOUNCES {
             return true;
@@ -220,11 +225,12 @@ impl SpecularPath {
         survives
     }
 
-    /// Follows the path from a surface that it may pass to its end, which replaces `surface` and `hit`.
-    /// `random` gives a number in [0, 1) for each choice, of which no two at any surface have one number.
+    /// Follows the path from `surface` to its end. `surface` and `hit` are replaced by those of the last
+    /// surface that the path reaches. `random` maps the number of a random choice to a value in [0, 1); no
+    /// two choices of a path have the same number.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     #[inline(never)]
     pub fn follow<M: MemoryPort>(
         &mut self,
@@ -259,7 +265,7 @@ impl SpecularPath {
     }
 }
 
-/// A choice of a path at a surface.
+/// A random choice of a path at a surface.
 #[derive(Clone, Copy, Debug)]
 struct Choice(u32);
 
@@ -269,10 +275,10 @@ impl Choice {
     const LIGHT: [Self; 2] = [Self(3), Self(4)];
     const LAYER: Self = Self(5);
     const SURVIVAL: Self = Self(Self::LAYER.0 + SURFACE_CHOICES);
-    /// Number of choices at a surface.
+    /// Number of choices per surface.
     const ALL: u32 = Self::SURVIVAL.0 + 1;
 
-    /// Number of the choice's random number after a number of bounces; each has one of its own.
+    /// Number of the choice's random number after `bounces` bounces. It is unique.
     fn number(self, bounces: u32) -> u32 {
         const NUMBERED: u32 = FREE_BOUNCES + 1;
         match bounces.checked_sub(NUMBERED) {
@@ -282,13 +288,13 @@ impl Choice {
     }
 }
 
-/// Number of the random number with which a path chooses the layer of a surface.
+/// Number of the random number by which a path chooses the layer of a surface.
 pub fn surface_choice(bounces: u32, choice: u32) -> u32 {
     Choice(Choice::LAYER.0 + choice).number(bounces)
 }
 
-/// Light of one sampled light, if it has no extent, that the narrow lobe of a surface reflects, W/(sr m^2).
-/// Lights with extent are met by the path itself.
+/// Light that a surface's narrow lobe reflects from one sampled light, W/(sr m^2), if the light has no area.
+/// The path itself hits lights with an area.
 #[inline(never)]
 fn punctual_light<M: MemoryPort>(
     context: &mut Context<M>,

@@ -1,9 +1,10 @@
-//! Bundles of rays: up to sixteen go through the hierarchy together, so that a line comes once for all rays
-//! that meet it (compare Barringer, Akenine-Möller 2014, *Dynamic ray stream traversal*). Each of them
-//! requests it, so that requests are those of work, as of rays alone; all but the first find it in any cache.
+//! Bundles of rays. Up to sixteen rays traverse the hierarchy together, so that a line is fetched once for
+//! all rays that need it (compare Barringer, Akenine-Möller 2014, *Dynamic ray stream traversal*). Each ray
+//! requests the line, so that the number of requests equals that of single rays; all requests but the first
+//! hit any cache.
 //!
-//! Each ray is tested against each box and triangle by the operations of a ray alone ([`super::bvh`]): the
-//! hits are equal bit for bit, whatever the rays beside it.
+//! Each ray is tested against boxes and triangles by the operations for a single ray ([`super::bvh`]), so
+//! that hits are equal bit for bit, whatever the other rays.
 
 use core::ops::ControlFlow;
 
@@ -23,12 +24,12 @@ use crate::wide_tree::{BEYOND, Descent, Order};
 /// Maximum number of rays of a bundle.
 pub const BUNDLE_RAYS: usize = LANES;
 
-/// A bit for each ray of a bundle: the lower half of the bits that are pushed with a child. The upper half is
-/// that of the least of the rays' distances, rounded down.
+/// Mask of the lower half of the bits pushed with a child: one bit per ray of the bundle. The upper half
+/// holds the upper half of the `f32` bits of the rays' least distance, rounded down.
 const RAYS: u32 = (1 << BUNDLE_RAYS) - 1;
 
-/// [`closest_hit`] of each of up to [`BUNDLE_RAYS`] rays, put into `hits`, which are `None`: in place, as
-/// they are a kilobyte.
+/// Finds [`closest_hit`] for each of up to [`BUNDLE_RAYS`] rays and stores it in `hits`, which must be `None`
+/// before. The hits are written in place because they take a kilobyte.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -48,7 +49,7 @@ pub fn closest_hits(
     }
 }
 
-/// [`transmittance`] of each of up to [`BUNDLE_RAYS`] rays.
+/// Finds [`transmittance`] for each of up to [`BUNDLE_RAYS`] rays.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -66,19 +67,19 @@ pub fn transmittances(
     Ok(searches)
 }
 
-/// Kernel of [`closest_hits`] with searches of the type `Option<Hit>`, of [`transmittances`] with [`Passed`].
+/// Kernel of [`closest_hits`] (`S` is `Option<Hit>`) and of [`transmittances`] (`S` is [`Passed`]).
 pub struct Bundle<'a, M, S> {
     /// The scene.
     pub scene: &'a SceneImage,
     /// Card memory.
     pub memory: &'a mut M,
-    /// The rays, up to [`BUNDLE_RAYS`].
+    /// Rays of the bundle, at most [`BUNDLE_RAYS`].
     pub rays: &'a [Ray],
-    /// The result of each ray, nothing found.
+    /// Result of each ray, initially nothing found.
     pub searches: &'a mut [S; BUNDLE_RAYS],
 }
 
-/// Runs a kernel, in a frame of its own: a ray alone needs no room on the stack for a bundle.
+/// Runs a kernel in a stack frame of its own, so that a single ray needs no stack for a bundle.
 #[inline(never)]
 fn cast<M: MemoryPort, S: Search>(bundle: Bundle<M, S>) -> Result<(), Fault> {
     if bundle.rays.len() > BUNDLE_RAYS {
@@ -87,14 +88,14 @@ fn cast<M: MemoryPort, S: Search>(bundle: Bundle<M, S>) -> Result<(), Fault> {
     simd::run(bundle)
 }
 
-/// A ray of a bundle.
+/// A ray of a bundle, with its slab and triangle test data.
 struct Way<'a> {
     ray: &'a Ray,
     frame: RayFrame,
     slabs: Slabs,
 }
 
-/// State of a bundle's search.
+/// State of a bundle's traversal.
 struct Rays<'a, S> {
     ways: Vec<Way<'a>, BUNDLE_RAYS>,
     /// Bits of the maximum distance of each ray.
@@ -102,7 +103,7 @@ struct Rays<'a, S> {
     searches: &'a mut [S; BUNDLE_RAYS],
 }
 
-/// Takes the lowest of some rays' bits: its index. `None` without one.
+/// Removes the lowest set bit and returns its index; `None` if no bit is set.
 #[inline(always)]
 fn take(rays: &mut u32) -> Option<usize> {
     let index = rays.trailing_zeros();
@@ -162,7 +163,7 @@ impl<'a, S: Search> Rays<'a, S> {
         Self { ways, until, searches }
     }
 
-    /// The rays of a child's bits whose maximum distance is not below that of the bits.
+    /// Rays of a child's bits whose maximum distance is not below the distance in the bits.
     #[inline(always)]
     fn within(&self, isa: impl Isa, bits: u32) -> u32 {
         match S::ORDER {
@@ -171,8 +172,8 @@ impl<'a, S: Search> Rays<'a, S> {
         }
     }
 
-    /// The bits to push with each child of a node: the rays of `here` that enter its box, and the least
-    /// distance at which one does.
+    /// Bits to push with each child of a node: the rays of `here` that enter its box, and the least distance
+    /// at which one of them does.
     #[inline(always)]
     fn enter(&self, isa: impl Isa, node: BvhNode, mut here: u32) -> [u32; LANES] {
         let children = WideNode(node.0).children() as usize;
@@ -197,7 +198,7 @@ impl<'a, S: Search> Rays<'a, S> {
         bits
     }
 
-    /// Finds the hits of the rays of `here` in a leaf. Returns the rays that need no other.
+    /// Finds the hits of the rays `here` in a leaf. Returns the rays that need no further hit.
     #[inline(always)]
     fn meet<M: MemoryPort>(
         &mut self,

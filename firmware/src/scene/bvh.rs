@@ -1,5 +1,5 @@
-//! The ray caster: traversal of a bounding volume hierarchy with nodes of sixteen children and leaves of up
-//! to eight triangles, one line each.
+//! Ray caster: traversal of a bounding volume hierarchy. Nodes have sixteen children and leaves up to eight
+//! triangles; each is one line.
 
 use core::ops::ControlFlow;
 
@@ -18,10 +18,10 @@ use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
 use crate::wide_tree::{Descent, Order, Stack};
 
-/// Closest hit of a ray. Ties of distance are broken by the lower triangle index.
+/// Closest hit of a ray. The lower triangle index breaks ties between equal distances.
 ///
 /// # Errors
-/// If the image is not sound: a record out of range, or a hierarchy deeper than the stack.
+/// If the image is invalid: a record is out of range, or the hierarchy is deeper than the stack.
 #[inline(never)]
 pub fn closest_hit(
     scene: &SceneImage,
@@ -31,8 +31,8 @@ pub fn closest_hit(
     simd::run(ClosestHit { scene, memory, ray })
 }
 
-/// Share of a light's radiance that arrives along a ray: the product of the transmittances of the flat glass
-/// that the ray meets, 0 if it meets anything else.
+/// Fraction of a light's radiance that arrives along a ray: the product of the transmittances of the flat
+/// glass that the ray hits, 0 if it hits anything else.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -85,18 +85,18 @@ impl<M: MemoryPort> Kernel for ShadowRay<'_, M> {
     }
 }
 
-/// Search along a ray: for the closest hit, or for the light that passes.
+/// Search along a ray, for the closest hit or for the light that passes.
 pub(super) trait Search {
-    /// Order of the visits to a node's children.
+    /// Order in which a node's children are visited.
     const ORDER: Order;
-    /// `true` for a search that goes on behind flat glass.
+    /// True if the search continues behind flat glass.
     const PASSES_FLAT_GLASS: bool;
 
-    /// Takes a hit of the triangle of an index, in a slot of its leaf. The next hits may be up to the
-    /// returned distance away; after [`ControlFlow::Break`] none is needed.
+    /// Takes a hit of the triangle with this index, in a slot of its leaf. Returns the maximum distance of
+    /// further hits, or [`ControlFlow::Break`] if no further hit is needed.
     fn meet(&mut self, hit: Intersection, index: u32, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
 
-    /// Passes flat glass of a transmittance.
+    /// Passes flat glass with this transmittance.
     fn pass(&mut self, _transmittance: Vec3) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -128,15 +128,15 @@ impl Search for Option<Hit> {
     }
 }
 
-/// Light that passes along a shadow ray, as a share.
+/// Fraction of the light that passes along a shadow ray.
 ///
-/// Factors are multiplied in the order of the visits, unsorted. It follows from the tree and the ray alone:
-/// rounding is equal in bundles of any rays and on every processor.
+/// Factors are multiplied in the unsorted order of the visits. The order depends only on the tree and the
+/// ray, so that rounding is equal in all bundles and on every processor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passed(pub Vec3);
 
 impl Passed {
-    /// All light.
+    /// All light passes.
     pub const ALL: Self = Self(Vec3::ONE);
 }
 
@@ -199,7 +199,7 @@ fn descend<S: Search>(
 /// Stack of a traversal of the hierarchy.
 pub(super) type BvhStack = Stack<{ BVH_STACK + LANES }>;
 
-/// Finds the hits of a ray in a leaf up to a distance; returns the new one.
+/// Finds the hits of a ray in a leaf up to the distance `until`. Returns the new maximum distance.
 #[inline(always)]
 pub(super) fn meet_leaf<S: Search>(
     scene: &SceneImage,
@@ -234,7 +234,6 @@ pub(super) fn meet_leaf<S: Search>(
     Ok(ControlFlow::Continue(until))
 }
 
-/// Triangle `index` of the image.
 #[inline(always)]
 pub(super) fn read_triangle(
     scene: &SceneImage,

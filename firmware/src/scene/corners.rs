@@ -1,4 +1,4 @@
-//! Vertex attributes of a triangle's corners, interpolated: normals, texture coordinates, colours.
+//! Interpolation of vertex attributes over a triangle: normals, texture coordinates, colours.
 
 use glam::Vec3;
 use photoncard_shared::image::{LEAF_ATTRIBUTES_PER_LINE, SectionKind};
@@ -12,7 +12,7 @@ use crate::vector::unit;
 
 const ATTRIBUTES_PER_LINE: u32 = Attributes::PER_LINE as u32;
 
-/// Vertex attributes of a triangle at a point on it.
+/// Vertex attributes of a triangle, to be interpolated at a point.
 pub(super) struct Corners {
     leaf: LeafAttributes,
     slot: u32,
@@ -21,7 +21,8 @@ pub(super) struct Corners {
 }
 
 impl Corners {
-    /// Reads the attributes of triangle `index` for barycentric `weights`; `None` without attributes.
+    /// Reads the attributes of triangle `index`, for the point with barycentric `weights`; `None` if it has
+    /// no attributes.
     pub(super) fn read(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -38,13 +39,14 @@ impl Corners {
         Ok(Some(Self { leaf, slot, attributes, weights }))
     }
 
-    /// Interpolated unit shading normal on the front; `None` for a flat triangle.
+    /// Interpolated unit shading normal on the front; `None` for a triangle without shading normals.
     pub(super) fn normal(&self) -> Option<Vec3> {
         self.attributes.normals.map(|normals| unit(self.interpolated(normals)))
     }
 
-    /// Tangent, bitangent and normal on the front, interpolated and not normalised, as bakers of normal maps
-    /// take them. `front_normal` is that of a flat triangle. The material must have a normal map.
+    /// Tangent, bitangent and normal on the front, interpolated but not normalised, as programs that bake
+    /// normal maps assume. `front_normal` is used if the triangle has no shading normals. The material must
+    /// have a normal map.
     pub(super) fn frame(
         &self,
         scene: &SceneImage,
@@ -59,7 +61,7 @@ impl Corners {
         Ok([tangent, normal.cross(tangent) * sign, normal])
     }
 
-    /// Mean of the corners' unit vectors, by their weights.
+    /// Weighted mean of the unit vectors at the corners.
     #[inline(always)]
     fn interpolated(&self, directions: [[f32; 3]; 3]) -> Vec3 {
         let weighted = directions.into_iter().zip(self.weights);

@@ -1,5 +1,5 @@
-//! Coverage: cut-outs (glTF's `alphaMode` `MASK`), points of a triangle whose alpha is below the material's
-//! cutoff, and partial coverage (`BLEND`), of which a ray sees the surface with the probability alpha.
+//! Coverage of triangles by alpha. With glTF's `alphaMode` `MASK`, points whose alpha is below the material's
+//! cutoff are cut out. With `BLEND`, a ray hits the surface with the probability alpha.
 
 use glam::Vec3;
 use photoncard_shared::layout::{BLENDS, DOUBLE_SIDED, Material, Reflectance, Triangle};
@@ -11,12 +11,12 @@ use super::{Ray, SceneImage};
 use crate::memory::MemoryPort;
 use crate::sampler::{hash, unit_interval};
 
-/// `true` if a ray meets a triangle at a point, with barycentric `weights`, that its cut-outs or its coverage
-/// leave. The choice depends on the ray and the triangle alone: shadow rays, gather rays and photons agree on
-/// the mean. The back of a one-sided surface of partial coverage is not there.
+/// Returns true if a ray hits a triangle at the point with barycentric `weights`, in spite of cut-outs and
+/// partial coverage. The random choice depends only on the ray and the triangle, so that shadow rays, gather
+/// rays and photons agree on the mean. The back of a one-sided surface with partial coverage is never hit.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(never)]
 pub(super) fn is_met(
     scene: &SceneImage,
@@ -40,11 +40,11 @@ fn is_back(ray: &Ray, triangle: &Triangle) -> bool {
     (b - a).cross(c - a).dot(ray.direction) > 0.0
 }
 
-/// Covered share at a point of triangle `index`, of a material, with barycentric `weights`: 0 or 1 with
-/// cut-outs, alpha with partial coverage.
+/// Coverage of triangle `index` at the point with barycentric `weights`: 0 or 1 with cut-outs, alpha with
+/// partial coverage.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(never)]
 pub(super) fn coverage(
     scene: &SceneImage,
@@ -60,7 +60,7 @@ pub(super) fn coverage(
     Ok(covered(material, texture * colour))
 }
 
-/// Covered share where texture and vertex colour have an alpha.
+/// Coverage of a material where texture and vertex colour have the product `alpha`.
 pub(super) fn covered(material: &Material, alpha: f32) -> f32 {
     if material.flags & BLENDS != 0 {
         alpha * material.cutoff
@@ -71,7 +71,7 @@ pub(super) fn covered(material: &Material, alpha: f32) -> f32 {
     }
 }
 
-/// Random number in [0, 1) of a ray and a triangle.
+/// Random number in [0, 1) for a ray and a triangle.
 fn chance(ray: &Ray, triangle: u32) -> f32 {
     let [a, b, c] = ray.origin.to_array().map(f32::to_bits);
     let [d, e, f] = ray.direction.to_array().map(f32::to_bits);

@@ -1,4 +1,4 @@
-//! Cut-outs at a place.
+//! Test for cut-outs at a point.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -9,10 +9,11 @@ use super::coverage::coverage;
 use super::materials::read_material;
 use crate::memory::MemoryPort;
 
-/// `true` if no cut-out is at a point of triangle `index`, metres; points off its plane are projected.
+/// Returns true if triangle `index` has no cut-out at a point, metres. A point off the triangle's plane is
+/// projected onto it.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn is_there(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

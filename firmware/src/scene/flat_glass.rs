@@ -8,10 +8,10 @@ use super::surface::{Surface, surface_of};
 use super::{Ray, SceneImage};
 use crate::memory::MemoryPort;
 
-/// Transmittance of a triangle of flat glass at barycentric `weights`, along a ray.
+/// Transmittance of a flat glass triangle along a ray, at the point with barycentric `weights`.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 #[inline(never)]
 pub(super) fn of_flat_glass(
     scene: &SceneImage,

@@ -13,7 +13,6 @@ use crate::memory::MemoryPort;
 const MATERIALS_PER_LINE: u32 = Material::PER_LINE as u32;
 const LAYERS_PER_LINE: u32 = Layers::PER_LINE as u32;
 
-/// Reads material `index`.
 #[inline(always)]
 pub(super) fn read_material(
     scene: &SceneImage,
@@ -25,14 +24,13 @@ pub(super) fn read_material(
     Ok(Material::read(bytes))
 }
 
-/// `true` for a material whose surfaces have several layers, or one that takes random numbers: rough glass.
+/// Returns true if surfaces of a material have several layers, or need random numbers as rough glass does.
 #[inline(always)]
 pub(super) fn has_layers(material: &Material) -> bool {
     material.layers.is_some()
         || matches!(material.reflectance, Reflectance::Glass { roughness, .. } if roughness > 0.0)
 }
 
-/// Layers of a material.
 pub(super) fn read_layers(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -43,7 +41,7 @@ pub(super) fn read_layers(
     Ok(Layers::read(bytes))
 }
 
-/// Values of the layers' textures at a point.
+/// Reads the values of the layers' textures at a point.
 pub(super) fn layer_texel(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

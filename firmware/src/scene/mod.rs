@@ -1,4 +1,4 @@
-//! The scene in card memory: views that read its records line by line.
+//! The scene in card memory, read line by line.
 
 mod bundle;
 mod bvh;
@@ -58,15 +58,15 @@ impl Ray {
     }
 }
 
-/// A card image in memory: locates its records by the header.
+/// A card image in memory. Its header locates the records.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SceneImage {
-    /// Header, validated.
+    /// Validated header.
     pub header: Header,
 }
 
 impl SceneImage {
-    /// Reads record `index` of a section, `N` bytes, `PER_LINE` to a line.
+    /// Reads record `index` of a section. Records have `N` bytes, `PER_LINE` of them per line.
     ///
     /// # Errors
     /// [`FaultCode::Record`] past the section's last record, [`FaultCode::LineRange`] outside the memory.
@@ -83,7 +83,7 @@ impl SceneImage {
         read_slot(memory, kind.structure(), line, slot, first..first + N as u32).ok_or(fault)?
     }
 
-    /// Reads line `index` of a section with records of one line each. The bytes in `used` are counted as
+    /// Reads line `index` of a section whose records are one line each. The bytes in `used` are counted as
     /// requested.
     ///
     /// # Errors
@@ -101,7 +101,7 @@ impl SceneImage {
         read_slot(memory, kind.structure(), line, slot, used).ok_or(fault)?
     }
 
-    /// Prefetches line `index` of a section with records of one line each.
+    /// Prefetches line `index` of a section whose records are one line each.
     #[inline(always)]
     pub(crate) fn prefetch(&self, isa: impl Isa, memory: &impl MemoryPort, kind: SectionKind, index: u32) {
         let line = self.header.section(kind).locate::<1>(index);
@@ -125,7 +125,7 @@ fn read_slot<const N: usize>(
     }
 }
 
-/// A point just off a surface, on the side of `normal`, from which a ray does not meet the surface again.
+/// Point just off a surface, on the side of `normal`, from which a ray does not hit the surface again.
 ///
 /// A computed point deviates from the triangle's plane by a few units in the last place of `magnitude`, the
 /// greatest coordinate of the corners and of the ray's origin. The offset is 32 such units.
@@ -134,7 +134,7 @@ pub fn offset_origin(position: Vec3, normal: Vec3, magnitude: f32) -> Vec3 {
     position + normal * (magnitude * (32.0 * f32::EPSILON) + f32::MIN_POSITIVE)
 }
 
-/// Greatest absolute value of the points' coordinates.
+/// Maximum absolute value of the points' coordinates.
 #[inline(always)]
 pub fn magnitude(points: &[Vec3]) -> f32 {
     points

@@ -1,4 +1,4 @@
-//! Normal maps: normals stated by a texture in the tangent space of a triangle's corners (`MikkTSpace`).
+//! Normal maps: normals given by a texture in the tangent space of a triangle's corners (`MikkTSpace`).
 
 use glam::Vec3;
 use photoncard_shared::layout::{LayerTexture, Material, NO_TEXTURE};
@@ -10,8 +10,8 @@ use super::materials::read_layers;
 use crate::memory::MemoryPort;
 use crate::vector::unit;
 
-/// Unit normal of a material's base on the front: by its normal map, or interpolated; `None` for the
-/// triangle's own. `front_normal` is the triangle's.
+/// Unit normal of a material's base on the front, from its normal map or interpolated; `None` for the
+/// triangle's own normal, which is `front_normal`.
 #[inline(always)]
 pub(super) fn base_normal(
     scene: &SceneImage,
@@ -28,7 +28,7 @@ pub(super) fn base_normal(
     mapped_normal(scene, memory, map, corners, front_normal)
 }
 
-/// Unit normal on the front by a normal texture and the scale of its x and y; interpolated for
+/// Unit normal on the front from a normal texture with a scale of its x and y; interpolated if the texture is
 /// [`NO_TEXTURE`].
 #[inline(never)]
 pub(super) fn mapped_normal(

@@ -1,4 +1,4 @@
-//! A hit in twelve bytes, from which the surface can be read again.
+//! A hit stored in twelve bytes, from which the surface can be read again.
 
 use photoncard_shared::message::Fault;
 
@@ -7,22 +7,21 @@ use super::surface::surface_of;
 use super::{Hit, Ray, SceneImage, Surface};
 use crate::memory::MemoryPort;
 
-/// Point on a triangle: index and barycentric coordinates.
+/// Point on a triangle, given by the triangle's index and barycentric coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seen {
-    /// Index of the triangle.
     triangle: u32,
-    /// Weights v and w of the second and third corner; the first has 1 - v - w.
+    /// Barycentric weights v and w of the second and third corner; the first has 1 - v - w.
     weights: [f32; 2],
 }
 
 impl Seen {
     /// Arbitrary initial value.
     pub const NOWHERE: Self = Self { triangle: 0, weights: [0.0; 2] };
-    /// Marks a point that is seen through specular surfaces, and must be found by its path.
+    /// Marks a point that is seen through specular surfaces. It must be found again along its path.
     pub const ELSEWHERE: Self = Self { triangle: u32::MAX, ..Self::NOWHERE };
 
-    /// `true` for [`Self::ELSEWHERE`].
+    /// Returns true for [`Self::ELSEWHERE`].
     #[inline(always)]
     pub fn is_elsewhere(&self) -> bool {
         self.triangle == u32::MAX
@@ -34,11 +33,11 @@ impl Seen {
         Self { triangle: hit.index, weights: [v, w] }
     }
 
-    /// Reads the surface on the side of the ray's origin into `surface`, of several layers the base. Its
-    /// `distance` is 0.
+    /// Reads the surface at the point into `surface`, on the side of the ray's origin. If the material has
+    /// several layers, the surface is the base. Its `distance` is 0.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     #[inline(always)]
     pub fn surface(
         &self,

@@ -1,19 +1,19 @@
-//! Shading normals, interpolated or mapped, made to agree with the triangle: without it, surfaces are black
-//! where the normal turns away from the viewer, or mirrors the view into the surface.
+//! Makes interpolated or mapped shading normals consistent with the triangle. Otherwise surfaces would be
+//! black where the normal points away from the viewer, or reflect the view into the surface.
 
 use glam::Vec3;
 
 use crate::vector::{max, min, mirror, unit};
 
-/// Least cosine between a shading normal and the direction to the viewer.
+/// Minimum cosine between a shading normal and the direction to the viewer.
 const MIN_COSINE: f32 = 0.01;
 
-/// `true` for a shading normal that is [`turned`] towards the viewer.
+/// Returns true if a shading normal must be [`turned`] towards the viewer.
 pub(super) fn points_away(normal: Vec3, outgoing: Vec3) -> bool {
     normal.dot(outgoing) < MIN_COSINE
 }
 
-/// A shading normal, turned towards the viewer where it points away, as it may at a silhouette.
+/// Turns a shading normal towards the viewer if it points away, as it may at a silhouette.
 pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     if normal == geometric_normal {
         return normal;
@@ -25,8 +25,9 @@ pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Ve
     if turned.dot(geometric_normal) > 0.0 { turned } else { geometric_normal }
 }
 
-/// A shading normal of a surface whose albedo is by this share that of a lobe around the mirror direction:
-/// [`bent`] by the share, as the Lambertian rest reflects by the normal itself.
+/// Bends a shading normal partly. `share` is the fraction of the albedo that belongs to a lobe around the
+/// mirror direction; the normal is [`bent`] by this fraction, because the Lambertian remainder reflects by
+/// the normal itself.
 #[inline(always)]
 pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     if share <= 0.0 || normal == geometric_normal {
@@ -36,12 +37,12 @@ pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_
     if bent == normal { normal } else { unit(normal + (bent - normal) * min(share, 1.0)) }
 }
 
-/// A unit shading normal, bent towards the triangle's until the mirror direction of `outgoing`, which lies
-/// above the triangle, does so as well: its cosine is at least 0.01, and at grazing views 0.9 of that of
-/// `outgoing`.
+/// Bends a unit shading normal towards the triangle's normal until the mirror direction of `outgoing` lies
+/// above the triangle. `outgoing` itself lies above it. The cosine of the mirror direction becomes at least
+/// 0.01, or at grazing views 0.9 times that of `outgoing`.
 ///
-/// In the plane of the two normals, at the angle `a` from the triangle's, `outgoing` has the projection `r
-/// (sin b, cos b)`, and its mirror direction the cosine `r cos(2 a - b)`.
+/// In the plane of the two normals, at the angle `a` from the triangle's normal, `outgoing` has the
+/// projection `r (sin b, cos b)`, and its mirror direction has the cosine `r cos(2 a - b)`.
 pub(super) fn bent(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     let height = geometric_normal.dot(outgoing);
     let least = min(0.9 * height, MIN_COSINE);
@@ -89,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn a_share_bends_in_part() {
+    fn a_share_of_the_lobe_bends_the_normal_partly() {
         let (outgoing, normal) = (at(60.0, 0.0), at(40.0, 180.0));
         let by = |share: f32| bent_by_share(normal, share, outgoing, Vec3::Z).z;
         assert_eq!(by(0.0), normal.z);

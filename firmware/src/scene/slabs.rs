@@ -1,11 +1,12 @@
 //! Slab test of a ray against all boxes of a node at once.
 //!
-//! A side of a box is at `corner + unit * side`, `side` a byte. The distance to its plane is
-//! `(corner - origin) / d + side * (unit / d)`; the first term and `unit / d` are common to a node's boxes.
+//! A side of a box is at `corner + unit * side`, where `side` is a byte. The distance to its plane is
+//! `(corner - origin) / d + side * (unit / d)`. The first term and `unit / d` are common to all boxes of a
+//! node.
 //!
-//! The test is conservative under rounding (compare Ize 2013, *Robust BVH ray traversal*): the first term is
-//! decreased for near planes and increased for far ones by more than its rounding error and the triangle
-//! test's; boxes are enlarged by more than the rounding error of the second term and the sum.
+//! The test is conservative under rounding (compare Ize 2013, *Robust BVH ray traversal*). The first term is
+//! decreased for near planes and increased for far planes by more than its rounding error plus that of the
+//! triangle test. Boxes are enlarged by more than the rounding error of the second term and of the sum.
 
 use photoncard_shared::layout::{BvhAxis, BvhNode, NODE_CHILDREN};
 
@@ -14,25 +15,24 @@ use crate::simd::{Isa, LANES};
 use crate::vector::{max, min};
 use crate::wide_tree::BEYOND;
 
-/// Ray with the values that are common to all boxes.
+/// Ray with precomputed values that all boxes share.
 pub(super) struct Slabs {
     axes: [SlabAxis; 3],
 }
 
-/// One axis of a [`Slabs`].
 struct SlabAxis {
     origin: f32,
-    /// Reciprocal of the direction's component.
+    /// Reciprocal of the direction's component on this axis.
     inverse: f32,
-    /// If that is negative: the upper side of a box is the near one.
+    /// True if the reciprocal is negative, so that the upper side of a box is nearer.
     is_downwards: bool,
 }
 
 /// Relative margin for rounding errors.
 const MARGIN: f32 = 8.0 * f32::EPSILON;
 
-/// Minimum magnitude of a direction's component: smaller ones, whose reciprocals overflow, are replaced by
-/// it.
+/// Minimum magnitude of a direction's component. It replaces smaller components, whose reciprocals would
+/// overflow.
 const MIN_COMPONENT: f32 = 1e-20;
 
 impl Slabs {
@@ -43,7 +43,8 @@ impl Slabs {
         Self { axes: [SlabAxis::new(a, x), SlabAxis::new(b, y), SlabAxis::new(c, z)] }
     }
 
-    /// Bits of the entry distance of each child's box; [`BEYOND`] for a miss, or an entry beyond `until`.
+    /// Bits of the distance at which the ray enters each child's box; [`BEYOND`] if it misses the box or
+    /// enters beyond `until`.
     #[inline(always)]
     pub(super) fn enter(&self, isa: impl Isa, node: BvhNode, children: usize, until: f32) -> [u32; LANES] {
         let [x, y, z] = node.axes();
@@ -79,12 +80,12 @@ impl SlabAxis {
     }
 }
 
-/// Planes of a node's boxes on one axis: distance along the ray is `first + side * unit` or `last + side *
-/// unit`.
+/// Planes of a node's boxes on one axis. Their distances along the ray are `first + side * unit` or
+/// `last + side * unit`.
 struct Planes<'a> {
     near: &'a [u8; NODE_CHILDREN],
     far: &'a [u8; NODE_CHILDREN],
-    /// Lower bound of the distance to the node's corner; `last` is the upper bound.
+    /// Lower bound of the distance to the node's corner. `last` is the upper bound.
     first: f32,
     last: f32,
     unit: f32,

@@ -9,25 +9,26 @@ use crate::vector::{max, mirror, unit};
 /// Perfectly specular reflection and transmission at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Specular {
-    /// Reflectance, to the mirror direction, 0 to 1.
+    /// Reflectance towards the mirror direction, 0 to 1.
     pub reflected: Vec3,
     /// Transmittance, 0 to 1.
     pub transmitted: Vec3,
-    /// Direction of reflected light, a unit vector; zero for the mirror direction about the shading normal.
+    /// Unit direction of reflected light; zero for the mirror direction about the shading normal.
     pub beside: Vec3,
-    /// Direction of transmitted light: a unit vector behind the surface.
+    /// Unit direction of transmitted light, behind the surface.
     pub behind: Vec3,
-    /// Absorption coefficient behind the surface, 1/m; meaningless where light passes straight.
+    /// Absorption coefficient behind the surface, 1/m. Meaningless where light passes straight.
     pub absorption: Vec3,
-    /// For flat glass, which light passes without a change of direction or medium (thin walls, and the faces
-    /// of panes), the probability with which its layer was taken; 0 for all else.
+    /// Probability with which the layer of flat glass (a thin wall, or a face of a pane) was chosen; 0 for
+    /// other surfaces. Light passes flat glass without a change of direction or medium.
     pub straight: f32,
-    /// Radiance in front over radiance behind at a transmittance of 1: `1 / n^2`, n the index of refraction.
+    /// Ratio of the radiances in front and behind at a transmittance of 1: `1 / n^2`, where n is the index of
+    /// refraction.
     pub radiance_scale: f32,
 }
 
 impl Specular {
-    /// No perfectly specular part.
+    /// Absence of a perfectly specular part.
     pub const NONE: Self = Self {
         reflected: Vec3::ZERO,
         transmitted: Vec3::ZERO,
@@ -38,30 +39,29 @@ impl Specular {
         radiance_scale: 1.0,
     };
 
-    /// A mirror.
     pub(super) fn mirror(reflected: Vec3) -> Self {
         Self { reflected, ..Self::NONE }
     }
 
-    /// Reflectance and transmittance times `share`.
+    /// Multiplies reflectance and transmittance by `share`.
     pub(super) fn dimmed(self, share: f32) -> Self {
         Self { reflected: self.reflected * share, transmitted: self.transmitted * share, ..self }
     }
 
-    /// `true` for flat glass.
+    /// Returns true for flat glass.
     #[inline(always)]
     pub fn is_straight(&self) -> bool {
         self.straight > 0.0
     }
 
-    /// `true` without perfectly specular reflection and transmission.
+    /// Returns true if there is neither perfectly specular reflection nor transmission.
     #[inline(always)]
     pub fn is_none(&self) -> bool {
         self.reflected == Vec3::ZERO && self.transmitted == Vec3::ZERO
     }
 
-    /// Mirror direction of `outgoing` about the shading normal, bent where that direction would be below the
-    /// surface.
+    /// Mirror direction of `outgoing` about the shading normal. The normal is bent if that direction would be
+    /// below the surface.
     pub(crate) fn reflected_direction(outgoing: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
         let direction = mirror(outgoing, bent(normal, outgoing, geometric_normal));
         // Rounding, at grazing views.
@@ -69,19 +69,19 @@ impl Specular {
     }
 }
 
-/// Body that a glass surface bounds.
+/// Kind of body that a glass surface bounds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Bounds {
     /// A volume of glass.
     Solid,
-    /// Air on both sides: a wall without thickness.
+    /// A wall without thickness, with air on both sides.
     ThinWall,
-    /// One face of a pane: see [`photoncard_shared::layout::PANE`].
+    /// A pane; the surface is one of its faces ([`photoncard_shared::layout::PANE`]).
     Pane,
 }
 
 impl Bounds {
-    /// By the flags of a material.
+    /// Kind of body by the flags of a material.
     #[inline(always)]
     pub(super) fn of(material: &Material) -> Self {
         match material.flags & (PANE | THIN_WALLED) {
@@ -92,14 +92,15 @@ impl Bounds {
     }
 }
 
-/// Smooth dielectric at a point, textures applied.
+/// Smooth dielectric at a point, with textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glass {
-    /// Tint of one passage: of a thin wall the base colour, of a face of a volume its square root.
+    /// Tint of one passage. For a thin wall it is the base colour, for a face of a volume the square root of
+    /// the base colour.
     pub(super) base: Vec3,
-    /// Absorption coefficient inside, 1/m; of a pane its optical depth.
+    /// Absorption coefficient inside, 1/m; for a pane, the optical depth.
     pub(super) absorption: Vec3,
-    /// Transmitted share of the light that is not reflected.
+    /// Fraction of the light not reflected that is transmitted.
     pub(super) transmission: f32,
     /// Index of refraction.
     pub(super) ior: f32,
@@ -109,8 +110,8 @@ pub(super) struct Glass {
 }
 
 impl Glass {
-    /// Share of light that is scattered instead of transmitted, and specular part. Normals are on the side of
-    /// `outgoing`, the inside of the solid if `is_inside`.
+    /// Fraction of the light that is scattered instead of transmitted, and the specular part. Normals are on
+    /// the side of `outgoing`, which is the inside of the body if `is_inside`.
     pub(super) fn at(
         &self,
         outgoing: Vec3,
@@ -147,8 +148,8 @@ impl Glass {
         (through * (1.0 - self.transmission), specular)
     }
 
-    /// The face of a pane that light enters by, of a face's reflectance `R` at the angle. With `a` the
-    /// transmittance inside on the way from face to face, the pane transmits `(1 - R)^2 a / (1 - R^2 a^2)`
+    /// Specular part of the face of a pane where light enters. `R` is a face's reflectance at this angle.
+    /// With the transmittance `a` inside, from face to face, the pane transmits `(1 - R)^2 a / (1 - R^2 a^2)`
     /// and reflects `R + (1 - R)^2 R a^2 / (1 - R^2 a^2)`.
     #[inline(never)]
     fn pane(&self, outgoing: Vec3, reflectance: f32, cosine_inside: f32) -> (f32, Specular) {
@@ -168,7 +169,7 @@ impl Glass {
         (through * (1.0 - self.transmission), specular)
     }
 
-    /// The face of a pane that light leaves by.
+    /// Specular part of the face of a pane where light leaves.
     fn passed_on(&self, outgoing: Vec3) -> (f32, Specular) {
         let transmitted = self.base * self.transmission;
         let specular = Specular { transmitted, behind: -outgoing, straight: 1.0, ..Specular::NONE };
@@ -177,7 +178,7 @@ impl Glass {
 }
 
 /// Fresnel reflectance of unpolarised light at a dielectric, and cosine of the refracted direction; 1 and 0
-/// under total internal reflection. `index` is the ratio of the indices of refraction, behind over in front.
+/// under total internal reflection. `index` is the index of refraction behind divided by that in front.
 fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
     let sine_squared = (1.0 - cosine * cosine) / (index * index);
     let cosine_squared = 1.0 - sine_squared;
@@ -237,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_lost_at_clear_glass() {
+    fn clear_glass_conserves_energy() {
         for bounds in [Bounds::Solid, Bounds::ThinWall, Bounds::Pane] {
             for degrees in [0.0, 30.0, 60.0, 89.0] {
                 let specular = at(degrees, false, Glass { bounds, absorption: Vec3::ZERO, ..GLASS });
@@ -248,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn a_thin_wall_lets_light_through_as_a_slab_does_and_does_not_bend_it() {
+    fn a_thin_wall_transmits_like_a_slab_and_keeps_the_direction() {
         let wall = at(30.0, false, Glass { bounds: Bounds::ThinWall, ..GLASS });
         let face = at(30.0, false, GLASS).reflected.x;
         // The sum over all reflections inside the slab.
@@ -258,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pane_is_all_reflections_within_a_slab_and_does_not_bend_light() {
+    fn a_pane_sums_all_reflections_within_a_slab_and_keeps_the_direction() {
         let depth = Vec3::new(0.0, 0.3, 2.0);
         let tint = Vec3::new(0.9, 0.7, 1.0);
         let pane = Glass { base: tint, absorption: depth, bounds: Bounds::Pane, ..GLASS };

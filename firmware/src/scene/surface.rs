@@ -1,5 +1,5 @@
-//! Surfaces: a triangle's material at the point where a ray meets it, textures applied, seen from the ray's
-//! side.
+//! Surfaces: the material of a triangle at the point where a ray hits it, with textures applied, seen from
+//! the ray's side.
 
 use glam::Vec3;
 use photoncard_shared::layout::{
@@ -18,10 +18,10 @@ use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origi
 use crate::memory::MemoryPort;
 use crate::vector::{max, max_component, min, unit};
 
-/// Random numbers of [`read_surface`].
+/// Number of random numbers that [`read_surface`] takes.
 pub const SURFACE_CHOICES: u32 = 4;
 
-/// Surface at the hit of a ray, on the side of the ray's origin.
+/// Surface where a ray hits it, on the side of the ray's origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     /// Position, metres.
@@ -30,30 +30,30 @@ pub struct Surface {
     pub normal: Vec3,
     /// Unit normal of the triangle on the side of the ray's origin.
     pub geometric_normal: Vec3,
-    /// Unit vector back along the ray.
+    /// Unit vector against the ray's direction.
     pub outgoing: Vec3,
-    /// The reflection of this side, without its perfectly specular part; black on the back of a one-sided
-    /// surface.
+    /// Reflection of this side without its perfectly specular part; black on the back of a one-sided surface.
     pub reflection: Reflection,
     /// The perfectly specular part.
     pub specular: Specular,
-    /// Absorption coefficient of the glass that the ray came through, 1/m; zero in air.
+    /// Absorption coefficient of the glass that the ray passed through, 1/m; zero in air.
     pub absorption: Vec3,
     /// Radiance that this side emits, W/(sr m^2).
     pub emission: Vec3,
-    /// Index of the emitter that the surface belongs to, if it is one.
+    /// Index of the emitter that the surface belongs to; `None` if it is not an emitter.
     pub emitter: Option<u32>,
-    /// Probability with which the surface's layer was taken, 1 for a surface of one layer: reflection and
-    /// emission are over it.
+    /// Probability with which the surface's layer was chosen; 1 for a surface of one layer. Reflection and
+    /// emission are divided by it.
     pub probability: f32,
-    /// Share of the surface that is there, 1 without partial coverage: rays meet it with this probability.
+    /// Fraction of the surface that is present; 1 without partial coverage. A ray hits the surface with this
+    /// probability.
     pub coverage: f32,
-    /// `true` for the other side of a surface, seen through it. Photons are stored on the side where they
-    /// arrive.
+    /// True if this is the other side of a surface, seen through it. Photons are stored on the side where
+    /// they arrive.
     pub is_behind: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
-    /// Greatest absolute coordinate that `position` was computed from, metres: it bounds the rounding error.
+    /// Maximum absolute coordinate from which `position` was computed, metres. It bounds the rounding error.
     pub magnitude: f32,
 }
 
@@ -81,20 +81,20 @@ impl Surface {
         }
     }
 
-    /// The surface without smooth shading, as photons are stored on it and gathers search them.
+    /// Removes smooth shading. Photons are stored on such surfaces, and gathers search on them.
     #[inline(always)]
     pub fn flat(self) -> Self {
         Self { normal: self.geometric_normal, ..self }
     }
 
-    /// The reflection seen from the ray's origin.
+    /// Reflection seen from the ray's origin.
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
         let Self { normal, outgoing, reflection, .. } = *self;
         Reflector { normal, outgoing, reflection }
     }
 
-    /// Reflection and emission times a throughput.
+    /// Multiplies reflection and emission by a throughput.
     #[inline(always)]
     pub fn dimmed(mut self, throughput: Vec3) -> Self {
         self.reflection = self.reflection.dimmed(throughput);
@@ -102,7 +102,7 @@ impl Surface {
         self
     }
 
-    /// Turns to the other side as it is seen through the surface: the side of the ray is mirrored.
+    /// Replaces the surface by its other side, seen through it. The ray's side is mirrored.
     fn see_through(&mut self) {
         let front = -self.normal;
         self.geometric_normal = -self.geometric_normal;
@@ -110,25 +110,25 @@ impl Surface {
         self.is_behind = true;
     }
 
-    /// A point just off the surface, from which a ray does not meet it again.
+    /// Point just off the surface, from which a ray does not hit it again.
     #[inline(always)]
     pub fn offset_origin(&self) -> Vec3 {
         offset_origin(self.position, self.geometric_normal, self.magnitude)
     }
 
-    /// A point just off the other side, from which a ray does not meet the surface again.
+    /// Point just off the other side, from which a ray does not hit the surface again.
     pub fn offset_behind(&self) -> Vec3 {
         offset_origin(self.position, -self.geometric_normal, self.magnitude)
     }
 
-    /// `true` for a direction above both shading and geometric normal's horizon. Light from other directions
-    /// is excluded, so that smooth normals leak none.
+    /// Returns true if a direction is above the horizons of both the shading and the geometric normal. Light
+    /// from other directions is excluded, so that smooth shading leaks no light.
     #[inline(always)]
     pub fn is_above(&self, direction: Vec3) -> bool {
         self.normal.dot(direction) > 0.0 && self.geometric_normal.dot(direction) > 0.0
     }
 
-    /// The mirror direction of the ray, a unit vector away from the surface.
+    /// Mirror direction of the ray: a unit vector away from the surface.
     pub fn mirrored(&self) -> Vec3 {
         if self.specular.beside != Vec3::ZERO {
             return self.specular.beside;
@@ -137,9 +137,9 @@ impl Surface {
     }
 }
 
-/// Reads the surface where a ray meets a triangle into `surface`: in place, as a chip copies its 230 bytes
-/// one by one. `random` gives [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of its layers; the base
-/// is the layer of 0.
+/// Reads the surface where a ray hits a triangle into `surface`. It is written in place, because a chip would
+/// copy its 230 bytes one by one. `random` returns [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of
+/// the layers; number 0 at its lowest value chooses the base.
 ///
 /// # Errors
 /// If the triangle's material is not in the image.
@@ -158,7 +158,7 @@ pub fn read_surface(
     Ok(())
 }
 
-/// Surface of a triangle at barycentric `weights`, at a distance of 0: [`read_surface`].
+/// Surface of a triangle at the point with barycentric `weights`, at distance 0 ([`read_surface`]).
 #[inline(always)]
 pub(super) fn surface_of(
     scene: &SceneImage,
@@ -195,13 +195,14 @@ pub(super) fn surface_of(
     Ok(())
 }
 
-/// `true` for a material without textures, vertex attributes and layers.
+/// Returns true for a material without textures, vertex attributes and layers.
 #[inline(always)]
 fn is_plain(material: &Material) -> bool {
     material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0 && material.layers.is_none()
 }
 
-/// Applies vertex attributes, textures and material to a surface that emits as the material does.
+/// Applies vertex attributes, textures and material to a surface. Its emission is already that of the
+/// material.
 #[inline(never)]
 fn finish(
     scene: &SceneImage,
@@ -246,13 +247,13 @@ fn finish(
     Ok(())
 }
 
-/// Minimum probability of each of two parts with normals of their own.
+/// Minimum probability of either of two parts that have different normals.
 const MIN_PART: f32 = 1.0 / 8.0;
 
-/// Gives a surface the shading normals of its parts, instead of the one of its corners or texture: the
-/// Lambertian part has that one, a lobe or a mirror the bent one. Of a narrow lobe and a Lambertian part
-/// whose normals differ, one is taken by a random number in [0, 1), over its probability. A wide lobe, for
-/// which photons are stored, shares a normal with the Lambertian part.
+/// Sets the shading normals of a surface's parts from the normal of its corners or texture: the Lambertian
+/// part keeps that normal, a lobe or a mirror has the bent one. If a narrow lobe and the Lambertian part have
+/// different normals, `random`, in [0, 1), chooses one of them, and its reflection is divided by the
+/// probability. A wide lobe, for which photons are stored, shares a normal with the Lambertian part.
 #[inline(never)]
 fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
     let Surface { normal, geometric_normal, outgoing, reflection, .. } = *surface;

@@ -11,7 +11,6 @@ use crate::vector::{max, min};
 
 const TEXTURES_PER_LINE: u32 = Texture::PER_LINE as u32;
 
-/// Bytes of a texel.
 const TEXEL_BYTES: u32 = 4;
 
 /// Reads texture `index`.
@@ -24,10 +23,10 @@ pub fn read_texture(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Texture::read(bytes))
 }
 
-/// Value of a texture at texture coordinates: linear red, green, blue and alpha.
+/// Value of a texture at texture coordinates: linear RGBA.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn sample_texture(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -57,7 +56,7 @@ pub fn sample_texture(
     Ok(sum)
 }
 
-/// Position along one axis of a texture, between the centres of two texels.
+/// Two neighbouring texels on one axis, between whose centres a position lies.
 struct TexelPair {
     /// Indices of the two texels.
     texels: [u32; 2],
@@ -93,7 +92,7 @@ impl TexelPair {
         Self { texels: [wrapped(first), wrapped(first + 1)], fraction: at - first as f32 }
     }
 
-    /// The two texels with their weights.
+    /// Both texels with their weights.
     fn texels(&self) -> [(u32, f32); 2] {
         let [first, second] = self.texels;
         [(first, 1.0 - self.fraction), (second, self.fraction)]
@@ -105,7 +104,7 @@ impl TexelPair {
     }
 }
 
-/// One texel, decoded.
+/// Reads and decodes a texel.
 fn texel(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -121,10 +120,10 @@ fn texel(
     Ok(decode_texel(texture.format, texel))
 }
 
-/// Minimum and maximum of each channel over all texels: linear red, green, blue and alpha.
+/// Minimum and maximum of each channel over all texels: linear RGBA.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub(super) fn channel_ranges(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -143,7 +142,7 @@ pub(super) fn channel_ranges(
     Ok(ranges)
 }
 
-/// Value of an encoded texel: linear red, green, blue and alpha.
+/// Decodes a texel to linear RGBA.
 pub fn decode_texel(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
     let linear = |channel: u8| f32::from(channel) * (1.0 / 255.0);
     let [red, green, blue, alpha] = texel;
@@ -170,12 +169,12 @@ pub fn decode_texel(format: TexelFormat, texel: [u8; 4]) -> [f32; 4] {
     }
 }
 
-/// Two linear channels of 16 bits.
+/// Decodes two linear channels of 16 bits.
 fn pair([a, b, c, d]: [u8; 4]) -> [f32; 2] {
     [[a, b], [c, d]].map(|code| f32::from(u16::from_le_bytes(code)) * (1.0 / 65_535.0))
 }
 
-/// The linear value of an sRGB code (IEC 61966-2-1).
+/// Linear value of an sRGB code (IEC 61966-2-1).
 fn srgb(code: u8) -> f32 {
     SRGB.get(usize::from(code)).copied().unwrap_or(1.0)
 }
@@ -200,7 +199,7 @@ const fn srgb_table() -> [f32; 256] {
     table
 }
 
-/// The fifth root of a number in (0, 1], by Newton's method from above.
+/// Fifth root of a number in (0, 1], by Newton's method from above.
 const fn fifth_root(number: f64) -> f64 {
     let mut root = 1.0;
     let mut step = 0;
@@ -236,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn pairs_are_of_sixteen_bits() {
+    fn channel_pairs_have_sixteen_bits() {
         let texel = |first: u16, second: u16| {
             let ([a, b], [c, d]) = (first.to_le_bytes(), second.to_le_bytes());
             [a, b, c, d]
@@ -262,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn places_are_between_the_middles_of_texels() {
+    fn positions_lie_between_texel_centres() {
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
             assert_eq!(between(0.5, wrap), [(1, 0.5), (2, 0.5)], "{wrap:?}");
             assert_eq!(between(0.375, wrap)[0], (1, 1.0), "{wrap:?}");
@@ -270,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn beyond_an_edge_is_what_the_wrap_says() {
+    fn coordinates_beyond_an_edge_follow_the_wrap_mode() {
         assert_eq!(between(0.0, Wrap::Repeat), [(3, 0.5), (0, 0.5)]);
         assert_eq!(between(1.0, Wrap::Repeat), [(3, 0.5), (0, 0.5)]);
         assert_eq!(between(-0.25, Wrap::Repeat), [(2, 0.5), (3, 0.5)]);
@@ -285,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn no_coordinate_leads_out_of_a_texture() {
+    fn every_coordinate_maps_to_texels_within_the_texture() {
         let mut coordinates = std::vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-40, -1e-40];
         coordinates.extend((0..20_000).map(|i| (i as f32 - 10_000.0) * 0.000_731));
         for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {

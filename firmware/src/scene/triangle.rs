@@ -1,8 +1,9 @@
-//! Ray against triangle, watertight: Woop, Benthin, Wald 2013, *Watertight ray/triangle intersection*.
+//! Watertight intersection of ray and triangle (Woop, Benthin, Wald 2013, *Watertight ray/triangle
+//! intersection*).
 //!
-//! A ray that passes an edge shared by two triangles meets at least one of them. Coordinates are sheared so
-//! that the ray runs along +z; the signs of three edge functions decide. Where one is zero in `f32` it is
-//! computed again in `f64`, in which the products are exact.
+//! A ray that passes an edge shared by two triangles hits at least one of them. Coordinates are sheared so
+//! that the ray runs along +z; the signs of three edge functions decide. An edge function that is zero in
+//! `f32` is computed again in `f64`, in which the products are exact.
 
 use glam::Vec3;
 use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, Triangle, VERTEX_LANES};
@@ -13,12 +14,12 @@ use crate::vector::{max, min};
 
 const _: () = assert!(LEAF_TRIANGLES == HALF_LANES && VERTEX_LANES <= LANES);
 
-/// Ray with the shear that is common to all triangles.
+/// Ray with the shear that all triangles share.
 #[derive(Clone, Copy, Debug)]
 pub struct RayFrame {
-    /// Permutation of the axes: the direction's greatest component is last.
+    /// Permutation of the axes that puts the direction's greatest component last.
     axes: [usize; 3],
-    /// Origin on the permuted axes.
+    /// Origin of the ray, on the permuted axes.
     origin: [f32; 3],
     shear: [f32; 3],
 }
@@ -28,11 +29,11 @@ pub struct RayFrame {
 pub struct Intersection {
     /// Distance along the ray, metres.
     pub distance: f32,
-    /// Barycentric coordinates: weights of the three corners, of sum 1.
+    /// Barycentric coordinates: the weights of the three corners, whose sum is 1.
     pub barycentric: [f32; 3],
 }
 
-/// Intersection with the triangle that was met.
+/// Intersection and the triangle that was hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance and barycentric coordinates.
@@ -53,7 +54,7 @@ fn component([x, y, z]: [f32; 3], axis: usize) -> f32 {
 }
 
 impl RayFrame {
-    /// Computes axes and shear of a ray.
+    /// Computes the axes and the shear of a ray.
     #[inline(always)]
     pub fn new(ray: &Ray) -> Self {
         let magnitude = ray.direction.abs();
@@ -74,8 +75,8 @@ impl RayFrame {
         Self { axes, origin: on_axes(ray.origin), shear: [x / z, y / z, 1.0 / z] }
     }
 
-    /// Corner relative to the origin, sheared, from its coordinates on the permuted axes; and its depth
-    /// before scaling.
+    /// Shears a corner, given relative to the origin on the permuted axes. Returns the corner and its
+    /// unscaled depth.
     #[inline(always)]
     fn shear(&self, [x, y, z]: [f32; 3]) -> ([f32; 2], f32) {
         let [origin_x, origin_y, origin_z] = self.origin;
@@ -84,7 +85,7 @@ impl RayFrame {
         ([x - origin_x - shear_x * depth, y - origin_y - shear_y * depth], depth)
     }
 
-    /// The triangles of a leaf, sheared, by its [`BvhLeaf::all_corners`].
+    /// Shears the triangles of a leaf. `corners` is the leaf's [`BvhLeaf::all_corners`].
     #[inline(always)]
     pub(super) fn leaf<'a>(&self, isa: impl Isa, leaf: BvhLeaf, corners: &'a Corners) -> ShearedLeaf<'a> {
         let [x, y, z] = self.axes;
@@ -122,7 +123,7 @@ impl RayFrame {
         ShearedLeaf { may_meet, across, up, depth, corners, edges: edge_lanes }
     }
 
-    /// Intersection with either side of a triangle at a distance in (0, `max_distance`].
+    /// Intersects either side of a triangle at a distance in (0, `max_distance`].
     #[inline(always)]
     pub fn intersect(&self, vertices: &[[f32; 3]; 3], max_distance: f32) -> Option<Intersection> {
         let [x, y, z] = self.axes;
@@ -131,7 +132,7 @@ impl RayFrame {
         self.intersect_on_axes([on_axes(a), on_axes(b), on_axes(c)], max_distance)
     }
 
-    /// [`Self::intersect`] with triangle `slot` of a leaf.
+    /// Does [`Self::intersect`] with triangle `slot` of a leaf.
     #[inline(always)]
     pub(super) fn intersect_slot(
         &self,
@@ -153,7 +154,7 @@ impl RayFrame {
         self.intersect_sheared(edges(a, b, c), corners, max_distance)
     }
 
-    /// Intersection by the edge functions and the sheared corners.
+    /// Computes the intersection from edge functions and sheared corners.
     #[inline(always)]
     fn intersect_sheared(
         &self,
@@ -182,15 +183,15 @@ impl RayFrame {
 /// Vertex indices of the first, second and third corners of a leaf's triangles.
 pub(super) type Corners = [[u32; LEAF_TRIANGLES]; 3];
 
-/// Triangles of a leaf in a ray's frame.
+/// Triangles of a leaf in the coordinates of a [`RayFrame`].
 pub(super) struct ShearedLeaf<'a> {
-    /// Bit mask of the triangles that the ray's line may meet: a superset of the hits of
+    /// Bit mask of the triangles that the ray's line may hit: a superset of the hits of
     /// [`RayFrame::intersect_slot`].
     pub(super) may_meet: u32,
-    /// Vertices across the ray.
+    /// Sheared x coordinates of the vertices.
     across: [f32; LANES],
     up: [f32; LANES],
-    /// Depths of the vertices, before scaling.
+    /// Unscaled depths of the vertices.
     depth: [f32; LANES],
     /// Vertex indices of the triangles' first, second and third corners.
     corners: &'a Corners,
@@ -199,7 +200,7 @@ pub(super) struct ShearedLeaf<'a> {
 }
 
 impl ShearedLeaf<'_> {
-    /// One corner of a triangle, and its depth.
+    /// Sheared position of a triangle's corner, and its depth.
     #[inline(always)]
     fn vertex(&self, corner: &[u32; LEAF_TRIANGLES], slot: usize) -> ([f32; 2], f32) {
         let index = corner.get(slot).copied().unwrap_or(0) as usize % LANES;
@@ -208,7 +209,7 @@ impl ShearedLeaf<'_> {
     }
 }
 
-/// Coordinates of one corner of each triangle, gathered from the leaf's vertices.
+/// Sheared coordinates of one corner of every triangle, permuted from the leaf's vertices.
 #[inline(always)]
 fn permute(
     isa: impl Isa,
@@ -219,7 +220,7 @@ fn permute(
     [isa.permute(across, vertices), isa.permute(up, vertices)]
 }
 
-/// Edge functions at the origin, each of the edge opposite to a corner.
+/// Edge functions at the origin, each for the edge opposite to a corner.
 #[inline(always)]
 fn edges(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> [f32; 3] {
     [cross(c, b), cross(a, c), cross(b, a)]

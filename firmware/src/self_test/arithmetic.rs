@@ -1,11 +1,11 @@
-//! Arithmetic that pictures depend on: its results are equal, bit for bit, on every processor.
+//! Arithmetic that pictures depend on. Its results are equal, bit for bit, on every processor.
 //!
-//! A host sends operands and computes the same. A chip whose results differ flushes denormal numbers to zero,
-//! rounds in another direction, or runs code in which a multiplication and an addition were fused.
+//! A host sends operands and computes the same expressions. A chip whose results differ flushes denormal
+//! numbers to zero, uses another rounding mode, or runs code with fused multiply-adds.
 
 use photoncard_shared::message::{OPERAND_BYTES, RESULT_BYTES, RESULTS};
 
-/// Expression of each result, with the operands `a`, `b` and `c`; `bits` is an operand as an integer.
+/// Expressions of the results, with the operands `a`, `b` and `c`. `bits` is an operand as an integer.
 pub const EXPRESSIONS: [&str; RESULTS] = [
     "a + b",
     "a - b",
@@ -30,13 +30,13 @@ pub const EXPRESSIONS: [&str; RESULTS] = [
     "a < b, a = b, a > b",
 ];
 
-/// Bits of a result. All NaNs are one: which one an operation gives depends on the processor, and no pixel on
-/// it.
+/// Bits of a result. All NaNs become one value, because the processor determines which NaN an operation
+/// returns, and no pixel depends on it.
 fn bits(value: f32) -> u32 {
     if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() }
 }
 
-/// The results of [`EXPRESSIONS`] for the operands `a`, `b` and `c`.
+/// Results of [`EXPRESSIONS`] for the operands `a`, `b` and `c`.
 pub fn compute([a, b, c]: [f32; 3]) -> [u32; RESULTS] {
     let [of_a, of_b, of_c] = [a, b, c].map(f32::to_bits);
     let long = ((u64::from(of_b) << 32) | u64::from(of_a)) as i64;
@@ -68,7 +68,7 @@ pub fn compute([a, b, c]: [f32; 3]) -> [u32; RESULTS] {
     ]
 }
 
-/// The results of a triple of operands, in the format of the wire.
+/// Results for a triple of operands, in the wire format.
 #[cold]
 #[inline(never)]
 pub fn compute_bytes(operands: &[u8; OPERAND_BYTES]) -> [u8; RESULT_BYTES] {

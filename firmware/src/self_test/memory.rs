@@ -1,4 +1,4 @@
-//! Test of card memory: each pattern is written over all of it, and read back.
+//! Test of card memory. Each pattern is written over the whole memory and read back.
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress};
 use photoncard_shared::message::{
@@ -7,15 +7,15 @@ use photoncard_shared::message::{
 
 use crate::memory::{CardMemory, outside};
 
-/// Lines written or read in one step: 8 KB.
+/// Number of lines written or read per step: 8 KB.
 const STEP_LINES: u32 = 64;
 
-/// Lines after which a test reports its progress: 1 MB, so that a memory of more than 9 KB/s makes progress
-/// within 120 s.
+/// Number of lines after which a test reports its progress: 1 MB, so that a memory faster than 9 KB/s makes
+/// progress within 120 s.
 const REPORT_LINES: u32 = 8192;
 
-/// Value that a pattern gives the word of an index. It is not inlined: each loop over words would be compiled
-/// once for each pattern.
+/// Value of the word `index` in a pattern. It is not inlined, because each loop over words would otherwise be
+/// compiled once per pattern.
 #[inline(never)]
 pub fn expected(pattern: MemoryPattern, index: u32) -> u32 {
     match pattern {
@@ -34,13 +34,13 @@ pub fn expected(pattern: MemoryPattern, index: u32) -> u32 {
     }
 }
 
-/// The byte of a word that [`MemoryPattern::ByteLanes`] replaces, and its new value.
+/// Byte of a word that [`MemoryPattern::ByteLanes`] replaces, and its new value.
 fn replaced(index: u32) -> (usize, u8) {
     let lane = index % 4;
     (lane as usize, (index >> (8 * lane)) as u8)
 }
 
-/// The bytes of a line in a pattern.
+/// Bytes of the line at `address` in a pattern.
 #[inline(never)]
 fn line(pattern: MemoryPattern, address: u32) -> [u8; LINE_BYTES] {
     let mut bytes = [0; LINE_BYTES];
@@ -51,16 +51,16 @@ fn line(pattern: MemoryPattern, address: u32) -> [u8; LINE_BYTES] {
     bytes
 }
 
-/// A memory test at work.
+/// A memory test in progress.
 pub struct MemoryTester {
     progress: MemoryTest,
 }
 
 impl MemoryTester {
-    /// A test of a memory.
+    /// Prepares a test of a memory.
     ///
     /// # Errors
-    /// [`FaultCode::LineRange`] if it has no lines.
+    /// [`FaultCode::LineRange`] if the memory has no lines.
     pub fn new(memory: &impl CardMemory) -> Result<Self, Fault> {
         let lines = memory.lines();
         if lines == 0 {
@@ -75,7 +75,7 @@ impl MemoryTester {
     /// at the end of the memory.
     ///
     /// # Errors
-    /// [`FaultCode::LineRange`] if the memory has fewer lines than it says.
+    /// [`FaultCode::LineRange`] if the memory has fewer lines than it reports.
     pub fn step(&mut self, memory: &mut impl CardMemory) -> Result<Option<MemoryTest>, Fault> {
         let progress = &mut self.progress;
         if let (true, Some(pattern)) = (progress.is_end_of_pattern(), progress.pattern.next()) {
@@ -102,7 +102,7 @@ impl MemoryTester {
         Ok(end)
     }
 
-    /// Compares the next lines. Returns the number of compared lines.
+    /// Compares the next lines with the pattern. Returns the number of lines compared.
     fn check(&mut self, memory: &impl CardMemory) -> Result<u32, Fault> {
         let MemoryTest { lines, pattern, checked, .. } = self.progress;
         let end = checked.saturating_add(STEP_LINES).min(lines);
@@ -128,7 +128,7 @@ fn replace_bytes(memory: &mut impl CardMemory, address: u32) -> Option<()> {
     })
 }
 
-/// Adds the wrong words of a line, of a higher address than those before.
+/// Adds the wrong words of a line. Its address must be above those of the lines before.
 #[cold]
 #[inline(never)]
 fn add(wrong: &mut WrongWords, address: u32, expected: &[u8; LINE_BYTES], stored: &Line) {

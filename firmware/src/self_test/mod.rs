@@ -1,4 +1,4 @@
-//! Self-test of a card, for the bring-up of a board: its memory, and its arithmetic.
+//! Self-test of a card's memory and arithmetic, for the bring-up of a board.
 
 pub mod arithmetic;
 mod memory;

@@ -1,31 +1,31 @@
-//! Kernels over sixteen lanes, the instructions that they ask for, and those of every processor.
+//! Kernels over sixteen lanes, the instructions that they need, and a portable implementation of these.
 
 use photoncard_shared::address::Line;
 
 /// Number of lanes of a kernel.
 pub const LANES: usize = 16;
-/// Half of [`LANES`]: the length of a permutation.
+/// Half of [`LANES`]: the number of lanes of a permutation.
 pub const HALF_LANES: usize = LANES / 2;
 
-/// An instruction set. A value of such a type is the proof that the processor has it.
+/// An instruction set. A value of an implementing type is the proof that the processor supports it.
 pub trait Isa: Copy {
-    /// Number of lanes to compute if `used` are needed: all, where they cost no more.
+    /// Number of lanes to compute if `used` are needed. It is all lanes if that costs no more.
     fn lanes(self, used: usize) -> usize;
 
-    /// Mask of the lanes below a bound, lane 0 in the lowest bit.
+    /// Mask of the lanes whose value is below a bound. Lane 0 is the lowest bit.
     fn below(self, values: &[u32; LANES], bound: u32) -> u32;
 
-    /// Moves the lanes of a mask to the front of `packed`, in order. The other lanes of `packed` are
+    /// Moves the lanes in a mask to the front of `packed`, in order. The remaining lanes of `packed` are
     /// meaningless.
     fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]);
 
     /// [`Isa::pack`] for 64-bit lanes.
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]);
 
-    /// The values with these indices; only the lower four bits of an index count.
+    /// Permutation: the values at these indices. Only the lower four bits of an index count.
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES];
 
-    /// Prefetches a line into the processor's cache, if the instruction set can.
+    /// Prefetches a line into the processor's cache, if the instruction set supports it.
     #[inline(always)]
     fn prefetch(self, _: &Line) {}
 }
@@ -35,12 +35,12 @@ pub trait Kernel {
     /// Result of the kernel.
     type Output;
 
-    /// Runs the kernel. This method and all that it calls must be `#[inline(always)]`; otherwise they are
+    /// Runs the kernel. This method and everything that it calls must be `#[inline(always)]`, or it is
     /// compiled without the instructions of `isa`.
     fn run(self, isa: impl Isa) -> Self::Output;
 }
 
-/// The fallback without vector intrinsics, for every processor.
+/// Fallback for every processor, without vector intrinsics.
 #[derive(Clone, Copy, Debug)]
 pub struct Portable;
 

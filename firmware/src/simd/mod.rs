@@ -1,10 +1,10 @@
-//! Vector instructions on sixteen lanes, chosen at run time.
+//! Vector instructions on sixteen lanes, selected at run time.
 //!
-//! A [`Kernel`] is written once, as loops over [`LANES`] lanes that all do the same. It is compiled for each
-//! [`Isa`] that the processor may have: the loops become vector instructions, and operations that compilers
-//! do not find in loops, to compare and to pack lanes, are methods of the `Isa`. Every lane rounds like a
-//! scalar and nothing is contracted, so that all give the same bits; [`Portable`] is the fallback for every
-//! processor.
+//! A [`Kernel`] is written once, as loops over [`LANES`] lanes that all do the same operation. It is compiled
+//! for each [`Isa`] that the processor may have. Compilers turn the loops into vector instructions;
+//! operations that they do not recognise in loops, such as comparing and packing lanes, are methods of the
+//! `Isa`. Every lane rounds like scalar code and no operations are fused, so that all instruction sets give
+//! the same bits. [`Portable`] is the fallback for every processor.
 
 mod kernel;
 #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
@@ -16,7 +16,7 @@ mod x86;
 
 pub use self::kernel::{HALF_LANES, Isa, Kernel, LANES, Portable};
 
-/// Runs a kernel with the best instruction set of the processor.
+/// Runs a kernel with the best instruction set that the processor supports.
 #[inline(always)]
 pub fn run<K: Kernel>(kernel: K) -> K::Output {
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
@@ -25,10 +25,10 @@ pub fn run<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 
-/// All instruction sets, for tests that they give the same bits.
+/// All instruction sets, to test that they give the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
-    /// [`Portable`].
+    /// The portable fallback ([`Portable`]).
     Portable,
     /// AVX2 of x86-64.
     #[cfg(all(target_arch = "x86_64", target_feature = "sse2"))]
@@ -64,7 +64,7 @@ mod tests {
 
     use super::*;
 
-    /// Results of all of an [`Isa`]'s own methods for one mask.
+    /// Results of every method of an [`Isa`] for one mask.
     struct All {
         mask: u32,
         bound: u32,

@@ -1,4 +1,4 @@
-//! AVX2 and AVX-512 of x86-64.
+//! Implementation of [`Isa`] by AVX2 and AVX-512 of x86-64.
 #![cfg_attr(not(test), expect(clippy::indexing_slicing, reason = "the tables have an entry for every index"))]
 
 use core::arch::x86_64::{
@@ -152,7 +152,7 @@ impl Isa for Avx512 {
     }
 }
 
-/// Indices of the lanes in each mask of eight, ascending.
+/// Indices of the set lanes in each mask of eight lanes, ascending.
 const LANES_OF: [[u8; 8]; 256] = {
     let mut lanes_of = [[0; 8]; 256];
     let mut mask = 0;
@@ -170,7 +170,7 @@ const LANES_OF: [[u8; 8]; 256] = {
     lanes_of
 };
 
-/// [`LANES_OF`] for four 64-bit lanes, each as two 32-bit halves.
+/// Table [`LANES_OF`] for four 64-bit lanes, each given as two 32-bit halves.
 const LONG_LANES_OF: [[u8; 8]; 16] = {
     let mut lanes_of = [[0; 8]; 16];
     let mut mask = 0;
@@ -189,7 +189,7 @@ const LONG_LANES_OF: [[u8; 8]; 16] = {
     lanes_of
 };
 
-/// Sign bit: flipped in both operands, it makes a signed comparison an unsigned one.
+/// Sign bit. Flipping it in both operands turns a signed comparison into an unsigned one.
 const SIGN: u32 = 1 << 31;
 
 impl Isa for Avx2 {
@@ -269,7 +269,7 @@ impl Isa for Avx2 {
     }
 }
 
-/// Lane indices of a permutation, widened from bytes.
+/// Widens the lane indices of a permutation from bytes to 32 bits.
 ///
 /// # Safety
 /// The processor must have AVX2.

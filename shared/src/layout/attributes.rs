@@ -2,7 +2,7 @@
 
 use super::{Record, read_f32, read_u32, write_f32, write_u32};
 
-/// Entry of [`LeafAttributes`] of a leaf without attributes.
+/// Value of [`LeafAttributes`] that marks a leaf without attributes.
 pub const NO_ATTRIBUTES: u32 = u32::MAX;
 
 const NO_NORMALS: u32 = u32::MAX;
@@ -12,7 +12,8 @@ const COORDINATES: usize = 12;
 const COLOURS: usize = 36;
 const EMITTER: usize = 60;
 
-/// Position of the attributes of a leaf's triangles: consecutive records, slot by slot.
+/// Position of the attributes of a leaf's triangles. They are consecutive records, in the order of the
+/// triangles' slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeafAttributes {
     /// Index of the first record.
@@ -24,20 +25,20 @@ pub struct LeafAttributes {
 const TWO_SETS: u32 = 1 << 31;
 
 impl LeafAttributes {
-    /// Reads an entry; `None` if the leaf has no attributes.
+    /// Reads a stored entry; `None` if the leaf has no attributes.
     #[inline(always)]
     pub fn read(entry: u32) -> Option<Self> {
         let two_sets = entry & TWO_SETS != 0;
         (entry != NO_ATTRIBUTES).then_some(Self { first: entry & !TWO_SETS, two_sets })
     }
 
-    /// The entry of the leaf, as stored.
+    /// Encodes the entry of the leaf.
     pub fn to_entry(self) -> u32 {
         self.first | if self.two_sets { TWO_SETS } else { 0 }
     }
 
-    /// Index of the record that holds set 0 or 1 of a slot's texture coordinates. The record of set 0 holds
-    /// the other attributes.
+    /// Index of the record with texture coordinate set 0 or 1 of a slot. The record of set 0 also holds the
+    /// other attributes.
     #[inline(always)]
     pub fn record(self, slot: u32, set: u32) -> u32 {
         let index = if self.two_sets { 2 * slot + (set & 1) } else { slot };
@@ -45,17 +46,17 @@ impl LeafAttributes {
     }
 }
 
-/// The attributes of one triangle.
+/// Vertex attributes of one triangle, 64 bytes.
 ///
 /// | bytes | contents |
 /// |---|---|
-/// | 0..12 | unit normals, 32 bits each: octahedral, 16 bits an axis |
+/// | 0..12 | unit normals, 32 bits each: octahedral, 16 bits per axis |
 /// | 12..36 | texture coordinates, two `f32` each |
-/// | 36..60 | colours, linear RGBA of 16 bits a channel |
+/// | 36..60 | colours, linear RGBA, 16 bits per channel |
 /// | 60..64 | index of its emitter |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attributes {
-    /// Shading normals of the corners, on the front; `None` for the geometric normal.
+    /// Shading normals at the corners, on the front side; `None` for the geometric normal.
     pub normals: Option<[[f32; 3]; 3]>,
     /// Texture coordinates of the corners.
     pub coordinates: [[f32; 2]; 3],
@@ -70,7 +71,7 @@ impl Record for Attributes {
 }
 
 impl Attributes {
-    /// Attributes of a triangle that has none: no normals, white.
+    /// Attributes of a triangle that has none: no shading normals, white vertex colours.
     pub const NONE: Self =
         Self { normals: None, coordinates: [[0.0; 2]; 3], colours: [[1.0; 4]; 3], emitter: None };
 
@@ -121,11 +122,11 @@ impl Attributes {
     }
 }
 
-/// Quantisation steps of an octahedral coordinate: even, so that the axes are exact, and below 2^16 - 1, so
-/// that no code is [`NO_NORMALS`].
+/// Number of quantisation steps of an octahedral coordinate. It is even, so that the axes are exact, and
+/// below 2^16 - 1, so that no code equals [`NO_NORMALS`].
 const STEPS: f32 = 65534.0;
 
-/// Octahedral code of a unit vector, 16 bits an axis (Cigolle et al. 2014, *A survey of efficient
+/// Octahedral code of a unit vector, 16 bits per axis (Cigolle et al. 2014, *A survey of efficient
 /// representations for independent unit vectors*).
 pub(super) fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
     let sum = (abs(x) + abs(y) + abs(z)).max(f32::MIN_POSITIVE);
@@ -135,7 +136,7 @@ pub(super) fn encode_octahedral([x, y, z]: [f32; 3]) -> u32 {
     u | v << 16
 }
 
-/// The direction of an octahedral code: a vector of length 0.57 to 1.
+/// Decodes an octahedral code to a vector in its direction, of length 0.57 to 1.
 #[inline(always)]
 pub(super) fn decode_octahedral(code: u32) -> [f32; 3] {
     let [u, v] = [code & 0xffff, code >> 16].map(|a| a as f32 * (2.0 / STEPS) - 1.0);
@@ -193,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn slots_have_one_record_or_two() {
+    fn slots_have_one_record_per_texture_coordinate_set() {
         let one = LeafAttributes { first: 40, two_sets: false };
         let two = LeafAttributes { first: 40, two_sets: true };
         assert_eq!([one.record(3, 0), one.record(3, 1)], [43, 43]);

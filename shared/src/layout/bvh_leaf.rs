@@ -1,6 +1,6 @@
-//! Leaves of the bounding volume hierarchy: neighbouring triangles in one line, which are tested at once.
+//! Leaves of the bounding volume hierarchy: neighbouring triangles in one line, which are tested together.
 //!
-//! A shared vertex is stored once: a line holds eight triangles of a mesh, or three separate ones.
+//! A shared vertex is stored once, so that a line holds eight triangles of a mesh or three separate ones.
 
 use core::ops::Range;
 
@@ -11,7 +11,7 @@ use crate::address::LINE_BYTES;
 pub const LEAF_TRIANGLES: usize = 8;
 /// Maximum number of vertices of a leaf.
 pub const LEAF_VERTICES: usize = 9;
-/// Lanes of [`BvhLeaf::coordinates`]: the maximum of nine vertices, rounded up to whole vector registers.
+/// Number of lanes of [`BvhLeaf::coordinates`]: nine vertices, rounded up to whole vector registers.
 pub const VERTEX_LANES: usize = 12;
 
 const COORDINATE_BYTES: usize = 4 * LEAF_VERTICES;
@@ -24,47 +24,47 @@ const SECOND_MATERIAL: usize = MATERIALS + MATERIAL_BYTES * LEAF_MATERIALS;
 const COUNTS: usize = SECOND_MATERIAL + 1;
 const _: () = assert!(COUNTS + 1 == LINE_BYTES && 2 * COORDINATE_BYTES + 4 * VERTEX_LANES <= LINE_BYTES);
 
-/// Bound of the indices of materials: 2^22.
+/// Exclusive limit of material indices: 2^22.
 pub const MAX_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 2);
-/// Flag in a leaf's material index: its triangles may have cut-outs.
+/// Flag in a leaf's material index: triangles with this material may have cut-outs.
 const CUT_OUT: u32 = 2 * MAX_MATERIALS;
-/// Flag in a leaf's material index: its triangles are flat glass.
+/// Flag in a leaf's material index: triangles with this material are flat glass.
 const FLAT_GLASS: u32 = MAX_MATERIALS;
-/// Highest byte of a flag.
+/// Highest of the material index's bytes in `flag`.
 const fn in_last_byte(flag: u32) -> u8 {
     (flag >> (8 * (MATERIAL_BYTES - 1))) as u8
 }
 
-/// A leaf, one line.
+/// A leaf of the bounding volume hierarchy, one line.
 ///
 /// | bytes | contents |
 /// |---|---|
 /// | 0..108 | coordinates of nine vertices: all x, all y, all z, metres |
 /// | 108..120 | vertex indices of the triangles' first corners, four bits each; of the second corners; of the third |
-/// | 120..126 | indices of two materials; bit 23: their triangles may have cut-outs, bit 22: are flat glass |
+/// | 120..126 | indices of two materials, three bytes each; bit 23: triangles may have cut-outs, bit 22: triangles are flat glass |
 /// | 126 | bit `i`: triangle `i` has the second material |
 /// | 127 | bits 0-3 number of triangles, 4-7 number of vertices |
 #[derive(Clone, Copy)]
 pub struct BvhLeaf<'a>(pub &'a [u8; LINE_BYTES]);
 
-/// A triangle: corners, counter-clockwise seen from the front, and material.
+/// Triangle with its material. Its corners are counter-clockwise seen from the front.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle {
-    /// Corners, metres.
+    /// Positions of the corners, metres.
     pub vertices: [[f32; 3]; 3],
     /// Index of the material, below [`MAX_MATERIALS`].
     pub material: u32,
-    /// True if alpha (of the base texture or the vertex colours) may cut out parts of the triangle: glTF's
-    /// `MASK`.
+    /// True if glTF's alpha mode `MASK` may cut out parts of the triangle, by the alpha of the base texture
+    /// or of the vertex colours.
     pub cut_out: bool,
-    /// True for flat glass, which light passes without a change of direction: thin walls and panes, perfectly
-    /// smooth.
+    /// True if the triangle is flat glass: a perfectly smooth thin wall or pane, which light passes without a
+    /// change of direction.
     pub flat_glass: bool,
 }
 
 impl BvhLeaf<'_> {
-    /// Bytes that a triangle of known slot is in: all but the number of triangles and vertices, which a visit
-    /// of the leaf needs.
+    /// Range of the bytes needed to read one triangle of a known slot. It excludes the last byte, the numbers
+    /// of triangles and vertices.
     pub const OF_TRIANGLE: Range<u32> = 0..LINE_BYTES as u32 - 1;
 
     /// Number of triangles, at most [`LEAF_TRIANGLES`].
@@ -79,7 +79,7 @@ impl BvhLeaf<'_> {
         u32::from(self.byte(COUNTS) >> 4).min(LEAF_VERTICES as u32)
     }
 
-    /// One coordinate of all vertices, metres; lanes past the last vertex are meaningless.
+    /// Coordinate on one axis of every vertex, metres. Lanes past the last vertex are meaningless.
     #[inline(always)]
     pub fn coordinates(&self, axis: usize) -> [f32; VERTEX_LANES] {
         let bytes: Option<&[u8; 4 * VERTEX_LANES]> =
@@ -93,7 +93,7 @@ impl BvhLeaf<'_> {
         [self.corners(0), self.corners(1), self.corners(2)]
     }
 
-    /// Vertex index of one corner of every triangle: below nine, even in an unsound image.
+    /// Vertex index of one corner of every triangle. The indices are below nine even in a damaged image.
     #[inline(always)]
     fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
         let vertices = read_u32(self.0, CORNERS + 4 * corner);
@@ -130,7 +130,7 @@ impl BvhLeaf<'_> {
         read_f32(self.0, COORDINATE_BYTES * axis + 4 * vertex)
     }
 
-    /// Offset in the line of a triangle's material.
+    /// Offset of the material index of triangle `slot` in the line, bytes.
     #[inline(always)]
     fn material_of(&self, slot: usize) -> usize {
         let is_second = self.byte(SECOND_MATERIAL) >> (slot % LEAF_TRIANGLES) & 1;
@@ -149,13 +149,13 @@ impl BvhLeaf<'_> {
         self.last_byte(slot) & in_last_byte(FLAT_GLASS) != 0
     }
 
-    /// Last byte of a triangle's material index, with the flags.
+    /// Last byte of a triangle's material index, which contains the flags.
     #[inline(always)]
     fn last_byte(&self, slot: usize) -> u8 {
         self.byte(self.material_of(slot) + MATERIAL_BYTES - 1)
     }
 
-    /// Triangle `slot`, below [`LEAF_TRIANGLES`].
+    /// Reads triangle `slot`, which is below [`LEAF_TRIANGLES`].
     #[inline(always)]
     pub fn triangle(&self, slot: usize) -> Triangle {
         let at = self.material_of(slot);
@@ -175,8 +175,8 @@ impl BvhLeaf<'_> {
         self.0.get(index).copied().unwrap_or(0)
     }
 
-    /// The line of a leaf; `None` without triangles, with more triangles, vertices or materials than a leaf
-    /// can hold, or with a material index of [`MAX_MATERIALS`] or more.
+    /// Encodes a leaf. Returns `None` if there are no triangles, more triangles, vertices or materials than a
+    /// leaf can hold, or a material index of [`MAX_MATERIALS`] or more.
     pub fn encode(triangles: &[Triangle]) -> Option<[u8; LINE_BYTES]> {
         if triangles.is_empty() || triangles.len() > LEAF_TRIANGLES {
             return None;
@@ -227,7 +227,7 @@ impl<T: Copy + PartialEq, const MOST: usize> Distinct<T, MOST> {
         Self { items: [None; MOST], count: 0 }
     }
 
-    /// Index of an item, which is added if it is new; `None` if the set is full.
+    /// Index of an item, which is added if it is new; `None` if the item is new and the set is full.
     fn index(&mut self, item: T) -> Option<usize> {
         let index = self.items().position(|other| other == item).unwrap_or(self.count);
         *self.items.get_mut(index)? = Some(item);
@@ -256,7 +256,7 @@ mod tests {
         Triangle { vertices, material, cut_out: number.is_multiple_of(2), flat_glass: number % 2 == 1 }
     }
 
-    /// The triangles of two by two squares.
+    /// Triangles of a grid of two by two squares.
     fn mesh() -> Vec<Triangle> {
         let vertex = |x: u32, y: u32| [x as f32, y as f32, (x * y) as f32];
         let square = |x, y| {
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leaf_tells_two_materials_of_four_million_apart() {
+    fn a_leaf_distinguishes_two_materials_of_four_million() {
         let of = |material| Triangle { material, ..apart(1) };
         survive(&[of(MAX_MATERIALS - 1), of(0), of(MAX_MATERIALS - 1)]);
         assert!(BvhLeaf::encode(&[of(0), of(1), of(2)]).is_none());
@@ -318,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_a_line_holds_reading_it_ends() {
+    fn reading_a_leaf_of_arbitrary_bytes_does_not_panic() {
         let mut next = random(4);
         for _ in 0..2000 {
             let line: [u8; LINE_BYTES] = core::array::from_fn(|_| next() as u8);

@@ -1,16 +1,16 @@
-//! Inner nodes of the bounding volume hierarchy: the boxes of sixteen children, in one line.
+//! Inner nodes of the bounding volume hierarchy: the boxes of sixteen children in one line.
 //!
-//! The boxes are quantised to 8 bits an axis on a grid of the node, whose unit is a power of two on every
+//! The boxes are quantised to 8 bits per axis on a grid of the node, whose unit is a power of two on every
 //! axis (Ylitie, Karras, Laine 2017, *Efficient incoherent ray traversal on GPUs through compressed wide
-//! BVHs*). A child's box is larger than its contents by [`MARGIN`] units at least, more than the ray caster's
-//! rounding.
+//! BVHs*). A child's box exceeds its contents by at least [`MARGIN`] units, more than the ray caster's
+//! rounding error.
 
 use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
 use super::{read_vector, write_f32};
 use crate::address::LINE_BYTES;
 
-/// An inner node of the bounding volume hierarchy, one line: a [`WideNode`] whose sides are in the node's
-/// units from its corner, and
+/// An inner node of the bounding volume hierarchy, one line. It is a [`WideNode`] with further fields; sides
+/// of boxes are in the node's units, from the node's corner.
 ///
 /// | bytes | contents |
 /// |---|---|
@@ -22,8 +22,8 @@ pub struct BvhNode<'a>(pub &'a [u8; LINE_BYTES]);
 const UNITS: usize = 22;
 /// Minimum distance of a box's side from its contents, in the node's units.
 const MARGIN: f64 = 1.0 / 4096.0;
-/// Minimum of the biased exponents: 2^-95 m, far above the subnormal numbers, so that products with a unit
-/// are exact.
+/// Minimum of the units' biased exponents: 2^-95 m, far above the subnormal numbers, so that products with a
+/// unit are exact.
 const MIN_UNIT: u8 = 32;
 const EXPONENT_SHIFT: u32 = 23;
 
@@ -51,7 +51,7 @@ pub struct BvhAxis<'a> {
 }
 
 impl<'a> BvhNode<'a> {
-    /// Boxes of the children, by axis.
+    /// Boxes of all children, by axis.
     #[inline(always)]
     pub fn axes(&self) -> [BvhAxis<'a>; 3] {
         let node = WideNode(self.0);
@@ -64,7 +64,7 @@ impl<'a> BvhNode<'a> {
         [axis(0, x), axis(1, y), axis(2, z)]
     }
 
-    /// Box of a child, metres.
+    /// Box of child `child`, metres; `None` if absent.
     pub fn bounds(&self, child: usize) -> Option<NodeBox> {
         let [x, y, z] = self.axes().map(|axis| axis.sides(child));
         let sides = [x?, y?, z?];
@@ -72,7 +72,8 @@ impl<'a> BvhNode<'a> {
         Some(NodeBox { lower: side(|[lower, _]| lower), upper: side(|[_, upper]| upper) })
     }
 
-    /// The line of a node; `None` if there are no children or too many, or a box is not finite.
+    /// Encodes a node. Returns `None` if there are no children, more than [`NODE_CHILDREN`], or a box that is
+    /// not finite.
     pub fn encode(children: &[NodeBox], links: Links) -> Option<[u8; LINE_BYTES]> {
         let around = children.iter().copied().reduce(NodeBox::union)?;
         let mut line = [0; LINE_BYTES];
@@ -91,14 +92,14 @@ impl<'a> BvhNode<'a> {
     }
 }
 
-/// The grid of a node on one axis.
+/// Grid of a node on one axis.
 struct Grid {
     corner: f32,
     exponent: u8,
 }
 
 impl Grid {
-    /// The finest grid that covers an interval.
+    /// Returns the finest grid that covers an interval, metres.
     fn around(lower: f32, upper: f32) -> Option<Self> {
         if !lower.is_finite() || !upper.is_finite() {
             return None;
@@ -123,14 +124,14 @@ impl Grid {
         (f64::from(place) - f64::from(self.corner)) / self.unit()
     }
 
-    /// The greatest grid line at least [`MARGIN`] units below a coordinate.
+    /// Returns the greatest grid line that is at least [`MARGIN`] units below a coordinate.
     fn below(&self, place: f32) -> Option<u8> {
         let units = self.units(place) - MARGIN;
         // The conversion rounds down.
         (0.0..=255.0).contains(&units).then_some(units as u8)
     }
 
-    /// The least grid line at least [`MARGIN`] units above a coordinate.
+    /// Returns the least grid line that is at least [`MARGIN`] units above a coordinate.
     fn above(&self, place: f32) -> Option<u8> {
         let units = self.units(place) + MARGIN;
         let line = units as u64;
@@ -139,7 +140,7 @@ impl Grid {
 }
 
 impl NodeBox {
-    /// The smallest box around two boxes.
+    /// Returns the smallest box that contains both boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         let mut union = self;
@@ -158,7 +159,7 @@ impl NodeBox {
 }
 
 impl BvhAxis<'_> {
-    /// Lower and upper side of a child's box, metres.
+    /// Lower and upper side of the box of child `child`, metres.
     pub fn sides(&self, child: usize) -> Option<[f64; 2]> {
         let [lower, upper] = [*self.lower.get(child)?, *self.upper.get(child)?];
         Some([lower, upper].map(|side| f64::from(self.corner) + f64::from(side) * f64::from(self.unit)))
@@ -176,7 +177,7 @@ mod tests {
 
     const LINKS: Links = Links { leaves: 1, first_leaf: 100, first_node: 200 };
 
-    /// Boxes of about `size` around `center`; some of them flat, some of them points.
+    /// Boxes of about `size` around `center`. Some are flat, others are points.
     fn boxes(seed: u64, center: f32, size: f32) -> Vec<NodeBox> {
         let mut next = random(seed);
         let count = 1 + next() as usize % NODE_CHILDREN;
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_childs_box_holds_it_and_little_more() {
+    fn a_childs_box_contains_it_with_little_margin() {
         for size in [0.0, 1e-30, 1e-6, 1.0, 77.7, 1e6, 1e30] {
             for center in [0.0, 1e-3, -1.0, 1000.0, -1e7, 1e30] {
                 for seed in 1..40 {
@@ -212,7 +213,7 @@ mod tests {
         }
     }
 
-    /// A unit is at most twice the smallest possible, but where `f32` is too coarse for the corner.
+    /// Checks that a unit is at most twice the smallest possible, unless `f32` is too coarse for the corner.
     fn check_units(line: &[u8; LINE_BYTES], boxes: &[NodeBox]) {
         let around = boxes.iter().copied().reduce(NodeBox::union).expect("a child");
         for (axis, coded) in BvhNode(line).axes().iter().enumerate() {
@@ -224,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number_is_refused() {
+    fn boxes_that_are_not_finite_are_refused() {
         let nowhere = NodeBox { lower: [f32::NAN; 3], upper: [1.0; 3] };
         let everywhere = NodeBox { lower: [f32::NEG_INFINITY; 3], upper: [f32::INFINITY; 3] };
         assert!(BvhNode::encode(&[nowhere], LINKS).is_none());

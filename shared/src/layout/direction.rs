@@ -1,37 +1,37 @@
 //! Unit vectors in one or two bytes, by the octahedral map (Meyer et al. 2010, *On floating-point normal
-//! vectors*): the sphere is projected onto the octahedron `|x| + |y| + |z| = 1`, which is unfolded to a
+//! vectors*). The sphere is projected onto the octahedron `|x| + |y| + |z| = 1`, which is unfolded to a
 //! square.
 //!
-//! A coordinate has an odd number of codes, so that the six axes are exact.
+//! The number of codes of a coordinate is odd, so that the six axes are exact.
 
-/// Steps on either side of zero in a coordinate of a direction: 8 bits.
+/// Number of steps on either side of zero in a coordinate of a direction, which has 8 bits.
 const DIRECTION_STEPS: f32 = 127.0;
-/// Steps on either side of zero in a coordinate of a normal: 4 bits.
+/// Number of steps on either side of zero in a coordinate of a normal, which has 4 bits.
 const NORMAL_STEPS: f32 = 7.0;
 
-/// Octahedral code of a unit vector in two bytes; error at most 1 degree.
+/// Encodes a unit vector as an octahedral code of two bytes. The error is at most 1 degree.
 #[inline]
 pub fn encode_direction(vector: [f32; 3]) -> [u8; 2] {
     let [u, v] = unfold(vector);
     [quantise(u, DIRECTION_STEPS), quantise(v, DIRECTION_STEPS)]
 }
 
-/// The direction of a two-byte octahedral code, not normalised: `|x| + |y| + |z| = 1`.
+/// Decodes a two-byte octahedral code to a vector in its direction, with `|x| + |y| + |z| = 1`.
 #[inline(always)]
 pub fn decode_direction(bytes: [u8; 2]) -> [f32; 3] {
     let [u, v] = bytes.map(|byte| (byte as f32 - DIRECTION_STEPS) / DIRECTION_STEPS);
     fold(u, v)
 }
 
-/// Octahedral code of a unit normal in one byte; error at most 16 degrees: enough to distinguish adjacent
-/// surfaces.
+/// Encodes a unit normal as an octahedral code of one byte. The error is at most 16 degrees, small enough to
+/// distinguish adjacent surfaces.
 #[inline]
 pub fn encode_normal(vector: [f32; 3]) -> u8 {
     let [u, v] = unfold(vector);
     quantise(u, NORMAL_STEPS) << 4 | quantise(v, NORMAL_STEPS)
 }
 
-/// The normal of a one-byte octahedral code, not normalised: `|x| + |y| + |z| = 1`.
+/// Decodes a one-byte octahedral code to a vector in the normal's direction, with `|x| + |y| + |z| = 1`.
 #[inline(always)]
 pub fn decode_normal(byte: u8) -> [f32; 3] {
     let [u, v] = [byte >> 4, byte & 15].map(|half| (half as f32 - NORMAL_STEPS) / NORMAL_STEPS);
@@ -62,7 +62,7 @@ fn fold(u: f32, v: f32) -> [f32; 3] {
     [inward(u), inward(v), z]
 }
 
-/// Code 0 to `2 steps` of a value in [-1, 1], rounded to nearest; `steps` is the code of zero.
+/// Quantises a value in [-1, 1] to the nearest code, 0 to `2 steps`. The code of zero is `steps`.
 fn quantise(value: f32, steps: f32) -> u8 {
     (value * steps + steps + 0.5) as u8
 }
@@ -79,7 +79,7 @@ mod tests {
         dot(a, b) / libm_sqrt(dot(a, a) * dot(b, b))
     }
 
-    /// Newton's square root: tests of a `no_std` crate have none.
+    /// Square root by Newton's method, since tests of a `no_std` crate have none.
     fn libm_sqrt(x: f64) -> f64 {
         (0..60).fold(1.0, |root, _| 0.5 * (root + x / root))
     }

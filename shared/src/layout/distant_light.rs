@@ -5,9 +5,9 @@ use super::{Record, read_u32, read_vector, write_u32, write_vector};
 /// A distant light (`directional` of glTF's `KHR_lights_punctual`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistantLight {
-    /// Unit vector in which the light travels.
+    /// Unit vector along which the light travels.
     pub direction: [f32; 3],
-    /// Irradiance of a surface perpendicular to it, W/m^2.
+    /// Irradiance of a surface perpendicular to the light, W/m^2.
     pub irradiance: [f32; 3],
     /// Cumulative probability of the distant lights up to this one, in units of 2^-32; 2^32 - 1 at the last.
     pub threshold: u32,
@@ -30,7 +30,7 @@ impl DistantLight {
         }
     }
 
-    /// [`Self::threshold`](Self#structfield.threshold) of a record, without reading the rest.
+    /// Reads [`Self::threshold`](Self#structfield.threshold) from a record without reading the rest.
     #[inline(always)]
     pub fn threshold(bytes: &[u8; Self::BYTES]) -> u32 {
         read_u32(bytes, THRESHOLD_OFFSET)

@@ -1,4 +1,4 @@
-//! Emitters: the leaves of the light tree, of which light samples are taken.
+//! Emitters: the leaves of the light tree, from which light is sampled.
 
 use super::{DOUBLE_SIDED, Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
@@ -7,11 +7,11 @@ use super::{DOUBLE_SIDED, Record, read_f32, read_u32, read_vector, write_f32, wr
 pub struct Emitter {
     /// Shape and directional distribution.
     pub kind: EmitterKind,
-    /// Emitted radiance of a triangle, W/(sr m^2), to be multiplied by its emissive texture; intensity of a
-    /// point or spot light, W/sr.
+    /// For a triangle, the emitted radiance, W/(sr m^2), to be multiplied by the emissive texture. For a
+    /// point or spot light, the intensity, W/sr.
     pub emission: [f32; 3],
-    /// Bit trail of the emitter: its path from the root of the light tree, two bits a level for the child's
-    /// index, the root's in the lowest.
+    /// Bit trail (PBRT 4): the path from the root of the light tree to the emitter. Each level takes two
+    /// bits, the index of the child; the root's are the lowest.
     pub trail: u32,
 }
 
@@ -28,7 +28,7 @@ pub enum EmitterKind {
         triangle: u32,
         /// Index of the triangle's material.
         material: u32,
-        /// True if the radiance varies over the triangle, by an emissive texture or by alpha cut-outs.
+        /// True if the radiance varies over the triangle, because of an emissive texture or alpha cut-outs.
         varies: bool,
     },
     /// An isotropic point light.
@@ -41,11 +41,11 @@ pub enum EmitterKind {
     Spot {
         /// Position, metres.
         position: [f32; 3],
-        /// Unit vector of the axis, in which the light travels.
+        /// Unit vector along the axis, in the direction in which light travels.
         direction: [f32; 3],
-        /// `lightAngleScale` of the falloff.
+        /// `lightAngleScale` of the falloff, as in glTF `KHR_lights_punctual`.
         scale: f32,
-        /// `lightAngleOffset` of the falloff.
+        /// `lightAngleOffset` of the falloff, as in glTF `KHR_lights_punctual`.
         offset: f32,
     },
 }
@@ -90,7 +90,7 @@ impl Emitter {
         Self { kind, emission: read_vector(bytes, EMISSION), trail: read_u32(bytes, TRAIL) }
     }
 
-    /// The bit trail of a record, without reading the rest.
+    /// Reads the bit trail from a record without reading the rest.
     #[inline(always)]
     pub fn trail(bytes: &[u8; Self::BYTES]) -> u32 {
         read_u32(bytes, TRAIL)

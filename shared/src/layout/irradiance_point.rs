@@ -1,5 +1,5 @@
-//! Content of an irradiance point: irradiance and surface normal in eight bytes, the size of a photon's
-//! content, so that both kinds are stored in [`super::PhotonLeaf`]s.
+//! Content of an irradiance point: irradiance and surface normal in eight bytes. A photon's content has the
+//! same size, so that [`super::PhotonLeaf`] stores either kind.
 
 use super::PHOTON_CONTENT_BYTES;
 
@@ -11,9 +11,9 @@ use super::PHOTON_CONTENT_BYTES;
 /// | 48..56 | surface normal, [`super::encode_normal`], on the lit side |
 /// | 56..64 | shared exponent `e`: a component is `mantissa * 2^(e - 143)` |
 ///
-/// The largest component's mantissa is at least 2^15: the error of every component is at most 2^-16 of the
-/// largest. The 8-bit mantissas of [`super::Rgbe`] would not do: errors average out in a sum over a hundred
-/// photons, but not in a single point.
+/// The largest component's mantissa is at least 2^15, so that the error of every component is at most 2^-16
+/// of the largest. The 8-bit mantissas of [`super::Rgbe`] are too coarse: their errors average out in a sum
+/// over a hundred photons, but not in a single point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IrradiancePoint {
     /// Irradiance, photon power units/m^2.
@@ -30,7 +30,7 @@ const EXPONENT_SHIFT: u32 = NORMAL_SHIFT + 8;
 const EXPONENT_BIAS: i32 = 143;
 
 impl IrradiancePoint {
-    /// The point's bytes, rounded to nearest. Negative and NaN components are stored as 0, components above
+    /// Encodes the point, rounded to nearest. Negative and NaN components are stored as 0, components above
     /// `f32::MAX` as `f32::MAX`.
     #[inline]
     pub fn to_content(&self) -> [u8; PHOTON_CONTENT_BYTES] {
@@ -50,7 +50,7 @@ impl IrradiancePoint {
         bits.to_le_bytes()
     }
 
-    /// Reads a point's bytes; the irradiance is finite and not negative for any bytes.
+    /// Reads a point. The irradiance is finite and not negative for any bytes.
     #[inline(always)]
     pub fn read(content: [u8; PHOTON_CONTENT_BYTES]) -> Self {
         let bits = u64::from_le_bytes(content);
@@ -60,7 +60,7 @@ impl IrradiancePoint {
         Self { irradiance: [component(0), component(1), component(2)], normal: Self::normal_of(bits) }
     }
 
-    /// The normal's code in a point's bytes, read as a little-endian `u64`.
+    /// Normal code of a point whose bytes are the little-endian `u64` `bits`.
     #[inline(always)]
     pub fn normal_of(bits: u64) -> u8 {
         (bits >> NORMAL_SHIFT) as u8
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn every_component_is_right_to_a_65536th_of_the_greatest() {
+    fn every_component_is_accurate_to_a_65536th_of_the_greatest() {
         let mut next = random(5);
         for _ in 0..100_000 {
             let mut component = || f32::from_bits((next() as u32 >> 1).clamp(40 << 23, 250 << 23));
@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn extremes_stay_what_they_are_or_the_nearest_there_is() {
+    fn extreme_irradiance_is_kept_or_clamped() {
         assert_eq!(stored([0.0; 3]), [0.0; 3]);
         assert_eq!(stored([-1.0, f32::NAN, f32::NEG_INFINITY]), [0.0; 3]);
         assert_eq!(stored([1.0, 0.5, 0.25]), [1.0, 0.5, 0.25]);
@@ -123,7 +123,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_the_bytes_irradiance_is_a_number() {
+    fn irradiance_of_arbitrary_bytes_is_finite() {
         let mut next = random(9);
         for _ in 0..100_000 {
             let point = IrradiancePoint::read(next().to_le_bytes());

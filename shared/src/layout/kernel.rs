@@ -1,22 +1,22 @@
-//! Radii of caustic photons' kernels, in the five bits that hold the disc fraction of other photons.
+//! Kernel radii of caustic photons. Their code takes the five bits that hold the disc fraction of other
+//! photons.
 
 use super::photon::DISC_CODES;
 
-/// Last code of a kernel's radius: that of the maximum radius.
+/// Code of the maximum kernel radius.
 const LAST: u8 = DISC_CODES as u8 - 1;
-/// Bias of the exponent of an `f32`.
 const EXPONENT_BIAS: u32 = 127;
-/// Number of the mantissa's bits of an `f32`.
 const MANTISSA_BITS: u32 = 23;
 
-/// Area of the disc of a code over that of the last code: `2^(code - 31)`; only the lower five bits count.
+/// Area of the kernel's disc as a fraction of the maximum area: `2^(code - 31)`. Only the lower five bits of
+/// `code` count.
 #[inline(always)]
 pub fn kernel_share(code: u8) -> f32 {
     f32::from_bits((EXPONENT_BIAS - u32::from(LAST - (code & LAST))) << MANTISSA_BITS)
 }
 
-/// Code of the smallest disc whose area is at least `share` of that of the last code; the first or the last
-/// code beyond them.
+/// Code of the smallest disc whose area is at least the fraction `share` of the maximum area. Fractions out
+/// of range take the first or the last code.
 pub fn encode_kernel(share: f32) -> u8 {
     (0..LAST).find(|&code| kernel_share(code) >= share).unwrap_or(LAST)
 }
@@ -26,7 +26,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_are_powers_of_two_up_to_the_whole() {
+    fn kernel_areas_are_powers_of_two_up_to_one() {
         assert_eq!([0, 30, 31, 63].map(kernel_share), [1.0 / 2_147_483_648.0, 0.5, 1.0, 1.0]);
         assert_eq!(
             [0.0, 1e-20, 0.25, 0.26, 0.5, 0.51, 1.0, 7.0].map(encode_kernel),

@@ -3,28 +3,28 @@
 
 use super::{NO_TEXTURE, Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
-/// Layers of a material, which few materials have. Every texture multiplies the factor of its name.
+/// Layers of a material that has more than its base. Every texture multiplies the factor with its name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layers {
-    /// F0 of the dielectric before its limit of 1 and without `specularFactor`: F0 of the index of refraction
-    /// times `specularColorFactor`.
+    /// F0 of the dielectric: F0 of the index of refraction times `specularColorFactor`. It may exceed 1, and
+    /// excludes `specularFactor`.
     pub specular: [f32; 3],
-    /// Scale of x and y of the normal texture.
+    /// Scale of x and y of the normal map (glTF `normalTexture.scale`).
     pub normal_scale: f32,
     /// Factor of the coat, 0 to 1 (`KHR_materials_clearcoat`).
     pub coat: f32,
     /// Roughness of the coat, 0 to 1.
     pub coat_roughness: f32,
-    /// Scale of x and y of the coat's normal texture.
+    /// Scale of x and y of the coat's normal map.
     pub coat_normal_scale: f32,
     /// Colour of the sheen, 0 to 1 (`KHR_materials_sheen`).
     pub sheen: [f32; 3],
     /// Roughness of the sheen, 0 to 1.
     pub sheen_roughness: f32,
-    /// Share of the diffuse light that leaves at the other side, 0 to 1
+    /// Fraction of the diffuse light that leaves on the other side, 0 to 1
     /// (`KHR_materials_diffuse_transmission`).
     pub diffuse_transmission: f32,
-    /// Colour of the diffuse light that leaves at the other side, 0 to 1.
+    /// Colour of the diffuse light that leaves on the other side, 0 to 1.
     pub diffuse_transmission_colour: [f32; 3],
     /// Indices of the textures, in the order of [`LayerTexture::ALL`]; [`NO_TEXTURE`] if absent.
     pub textures: [u16; TEXTURE_COUNT],
@@ -34,27 +34,27 @@ pub struct Layers {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LayerTexture {
-    /// Tangent-space normal: red, green and blue of `2 c - 1`, linear.
+    /// Tangent-space normal `2 c - 1` of the linear colour `c`: red, green and blue.
     Normal,
-    /// `specularFactor`: alpha.
+    /// `specularFactor`: the alpha channel.
     Specular,
     /// `specularColorFactor`: red, green and blue, sRGB.
     SpecularColour,
-    /// Factor of the coat: red.
+    /// `clearcoatFactor`: the red channel.
     Coat,
-    /// Roughness of the coat: green.
+    /// `clearcoatRoughnessFactor`: the green channel.
     CoatRoughness,
     /// Tangent-space normal of the coat.
     CoatNormal,
     /// Colour of the sheen: red, green and blue, sRGB.
     Sheen,
-    /// Roughness of the sheen: alpha.
+    /// `sheenRoughnessFactor`: the alpha channel.
     SheenRoughness,
-    /// `transmissionFactor`: red.
+    /// `transmissionFactor`: the red channel.
     Transmission,
-    /// Share of diffuse transmission: alpha.
+    /// `diffuseTransmissionFactor`: the alpha channel.
     DiffuseTransmission,
-    /// Colour of diffuse transmission: red, green and blue, sRGB.
+    /// `diffuseTransmissionColorFactor`: red, green and blue, sRGB.
     DiffuseTransmissionColour,
 }
 
@@ -84,7 +84,7 @@ impl Record for Layers {
 const TEXTURES: usize = 64;
 
 impl Layers {
-    /// No layer beyond the base.
+    /// Layers of a material that has only its base.
     pub const NONE: Self = Self {
         specular: [0.0; 3],
         normal_scale: 1.0,

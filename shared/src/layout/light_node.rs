@@ -1,4 +1,4 @@
-//! Nodes of the light tree: bounds of the emitters below each of up to four children, in one line.
+//! Nodes of the light tree, one line each. A node bounds the emitters below each of up to four children.
 
 use super::attributes::{decode_octahedral, encode_octahedral};
 use super::{read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
@@ -10,14 +10,14 @@ pub const LIGHT_CHILDREN: usize = 4;
 /// [`super::Emitter::trail`](super::Emitter#structfield.trail).
 pub const LIGHT_TREE_LEVELS: usize = 16;
 
-/// Bounds of the emitters below a child of a [`LightNode`].
+/// Child of a [`LightNode`]: bounds and power of the emitters below it.
 ///
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | centre of the bounding sphere, metres |
 /// | 12..16 | radius of the bounding sphere, metres |
 /// | 16..20 | emitted power as a fraction of the node's |
-/// | 20..24 | axis of the bounding cone of the emission normals: octahedral, 16 bits an axis |
+/// | 20..24 | axis of the bounding cone of the emission normals: octahedral, 16 bits per axis |
 /// | 24..28 | cosine of the cone's half angle |
 /// | 28..32 | index of an emitter, with the highest bit set, or of a node; 2^32 - 1 for an absent child |
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,23 +26,23 @@ pub struct LightChild {
     pub centre: [f32; 3],
     /// Radius of the emitters' bounding sphere, metres.
     pub radius: f32,
-    /// Power of the emitters as a fraction of the node's.
+    /// Power of the emitters below the child as a fraction of the node's power.
     pub share: f32,
-    /// Axis of the bounding cone of the emission normals; a vector of length 0.57 to 1.
+    /// Axis of the bounding cone of the emission normals, of length 0.57 to 1.
     pub axis: [f32; 3],
-    /// Cosine of the cone's half angle; -1 for all directions, as with point lights and double-sided
-    /// triangles.
+    /// Cosine of the half angle of the bounding cone. It is -1, for all directions, if there are point lights
+    /// or double-sided triangles.
     pub cosine: f32,
-    /// The node or emitter itself.
+    /// Index of the child: a node or an emitter.
     pub link: LightLink,
 }
 
-/// Child of a light tree node.
+/// Kind and index of a light tree node's child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightLink {
-    /// The node of this index.
+    /// The child is the node with this index.
     Node(u32),
-    /// The emitter of this index.
+    /// The child is the emitter with this index.
     Emitter(u32),
 }
 
@@ -55,7 +55,7 @@ const NO_CHILD: u32 = u32::MAX;
 const LEAF: u32 = 1 << 31;
 
 impl LightNode<'_> {
-    /// Child `index`; `None` if absent.
+    /// Reads child `index`; `None` if absent.
     #[inline(always)]
     pub fn child(&self, index: usize) -> Option<LightChild> {
         let bytes: &[u8; CHILD_BYTES] = self.0.as_chunks().0.get(index)?;
@@ -74,7 +74,7 @@ impl LightNode<'_> {
         })
     }
 
-    /// The line of a node.
+    /// Encodes a node with these children.
     pub fn encode(children: [Option<LightChild>; LIGHT_CHILDREN]) -> [u8; LINE_BYTES] {
         let mut line = [0; LINE_BYTES];
         for (index, child) in children.into_iter().enumerate() {

@@ -5,46 +5,47 @@ use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write
 /// Flag of [`Material::flags`]: the back reflects and emits like the front (glTF `doubleSided`).
 pub const DOUBLE_SIDED: u32 = 1;
 /// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a thin wall, which transmits light without
-/// refraction (in glTF, no `KHR_materials_volume` or one of thickness 0).
+/// refraction. In glTF it has no `KHR_materials_volume`, or one of thickness 0.
 pub const THIN_WALLED: u32 = 2;
 /// Flag of [`Material::flags`]: some triangles of the material have [`super::Attributes`].
 pub const HAS_ATTRIBUTES: u32 = 4;
 
-/// Flag of [`Material::flags`]: the GGX lobe is narrow somewhere, and is followed by rays instead of being
+/// Flag of [`Material::flags`]: the GGX lobe is narrow at some texel. It is followed by rays instead of being
 /// estimated from photons.
 pub const NARROW_LOBE: u32 = 8;
 
-/// `a = roughness^2` below which a GGX lobe is narrow: half of its light is within 28 degrees, an eighth of
-/// the hemisphere. A material with a narrow lobe at some texel has [`NARROW_LOBE`] for all texels: photons
-/// are stored for the lobe everywhere on a surface or nowhere.
+/// Value of `a = roughness^2` below which a GGX lobe is narrow: half of its light is then within 28 degrees,
+/// an eighth of the hemisphere. A material whose lobe is narrow at some texel has [`NARROW_LOBE`] at all
+/// texels, because photons are stored for the lobe everywhere on a surface or nowhere.
 pub const NARROW_ALPHA: f32 = 0.25;
 
-/// Flag of [`Material::flags`]: [`Material::cutoff`] is a factor of alpha, the share of the surface that is
-/// there (glTF's `alphaMode` `BLEND`).
+/// Flag of [`Material::flags`]: glTF's `alphaMode` is `BLEND`. [`Material::cutoff`] is then a factor of
+/// alpha, the fraction of the surface that is present.
 pub const BLENDS: u32 = 64;
 
-/// Flag of [`Material::flags`]: the GGX lobe is brightened by the light that a rough microsurface reflects
-/// several times.
+/// Flag of [`Material::flags`]: the GGX lobe includes multiple scattering between microfacets (energy
+/// compensation).
 pub const COMPENSATED: u32 = 128;
 
 /// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a face of a pane, a slab with parallel faces whose
-/// thickness is small beside its extents. The face that light enters by has the reflectance and transmittance
-/// of the whole slab; the one that it leaves by passes it on.
+/// thickness is small beside its extents. The face where light enters has the reflectance and transmittance
+/// of the whole slab; the face where it leaves only passes it on.
 pub const PANE: u32 = 256;
 
 const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | BLENDS | COMPENSATED | PANE;
 
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
-/// Shift of the index of [`super::Layers`], plus 1.
+/// Shift in the flags word of the index of [`super::Layers`] plus 1.
 const LAYERS_SHIFT: u32 = 9;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
 
-/// Maximum exponent `n` of a Phong lobe: `cos^n alpha` is 1/2 at 0.7 degrees, a mirror to photons.
+/// Maximum exponent `n` of a Phong lobe. At this exponent `cos^n alpha` is 1/2 at 0.7 degrees, a mirror as
+/// far as photons can tell.
 pub const MAX_PHONG_EXPONENT: f32 = 10_000.0;
 
-/// Code of the index of an absent texture.
+/// Index that marks an absent texture.
 pub const NO_TEXTURE: u16 = u16::MAX;
 
 /// A material.
@@ -54,16 +55,16 @@ pub struct Material {
     pub reflectance: Reflectance,
     /// Emitted radiance, W/(sr m^2), to be multiplied by the emissive texture.
     pub emission: [f32; 3],
-    /// Union of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`], [`BLENDS`],
+    /// Combination of [`DOUBLE_SIDED`], [`THIN_WALLED`], [`HAS_ATTRIBUTES`], [`NARROW_LOBE`], [`BLENDS`],
     /// [`COMPENSATED`] and [`PANE`].
     pub flags: u32,
-    /// glTF's `alphaCutoff`: triangles with cut-outs are absent where the product of base texture and vertex
-    /// alpha is below it. With [`BLENDS`] the product of the three is their coverage.
+    /// glTF's `alphaCutoff`: a triangle with cut-outs is absent where alpha, the product of base texture and
+    /// vertex alpha, is below it. With [`BLENDS`], coverage is the cutoff times alpha.
     pub cutoff: f32,
-    /// Indices of the textures of base colour (or diffuse albedo), metallic-roughness (roughness in green,
-    /// metalness in blue) and emission; [`NO_TEXTURE`] if absent.
+    /// Indices of three textures: base colour or diffuse albedo; metallic-roughness, with roughness in green
+    /// and metalness in blue; emission. [`NO_TEXTURE`] if absent.
     pub textures: [u16; 3],
-    /// Index of the material's [`super::Layers`], below 2^23 - 1; `None` without.
+    /// Index of the material's [`super::Layers`], below 2^23 - 1; `None` without layers.
     pub layers: Option<u32>,
 }
 
@@ -96,16 +97,16 @@ pub enum Reflectance {
     Glass {
         /// Transmission colour, to be multiplied by the base texture.
         base: [f32; 3],
-        /// Absorption coefficient inside, 1/m; of a [`PANE`] its optical depth, the coefficient times the
-        /// thickness.
+        /// Absorption coefficient inside, 1/m. For a [`PANE`] it is the optical depth, the coefficient times
+        /// the thickness.
         absorption: [f32; 3],
-        /// Fraction, 0 to 1, of the light not reflected by the interface that is transmitted; a Lambertian
-        /// surface of the base colour reflects the rest.
+        /// Fraction, 0 to 1, of the light that passes the interface and is transmitted. A Lambertian surface
+        /// of the base colour reflects the rest.
         transmission: f32,
         /// Index of refraction.
         ior: f32,
-        /// Factor of the dielectric's Fresnel reflectance (`specularFactor` of `KHR_materials_specular`), 0
-        /// to 1 in steps of 1/255.
+        /// Factor, 0 to 1 in steps of 1/255, of the dielectric's Fresnel reflectance (`specularFactor` of
+        /// `KHR_materials_specular`).
         specular: f32,
         /// Metalness, 0 to 1; metal transmits nothing.
         metallic: f32,

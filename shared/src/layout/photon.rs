@@ -2,7 +2,7 @@
 
 use super::{Record, read_vector, write_vector};
 
-/// Bytes of a photon's content: power, direction and flags.
+/// Bytes of a photon's content: its power, direction and flags.
 pub const PHOTON_CONTENT_BYTES: usize = 8;
 
 /// A photon, and a node of the left-balanced kd-tree.
@@ -14,19 +14,20 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// | 16..18 | incoming direction, from the surface towards the origin of the photon, [`super::encode_direction`] |
 /// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
 ///
-/// The *disc fraction* is the area of the surfaces whose photons a gather around this photon sums up, over
-/// the area `pi r^2` of a flat disc of the gather's radius: 1 on a plain wall, less at edges and in corners,
+/// The *disc fraction* is a ratio of areas: the surfaces whose photons a gather around this photon adds up,
+/// over the flat disc `pi r^2` of the gather's radius. It is 1 on a plain wall, less at edges and in corners,
 /// more where surfaces are stacked. The density estimate divides by `pi r^2` times this fraction. Where walls
-/// hide parts of the disc from the photon ([`is_of_region`]), a gather counts photons of the region that its
-/// point sees alone, and divides by that region's area in the plane times the fraction. It is stored as a
-/// code of [`disc_fraction`].
+/// hide parts of the disc from the photon ([`is_of_region`]), a gather counts only photons of the region that
+/// its point sees, and divides by that region's area in the plane times the fraction. The fraction is stored
+/// as a code of [`disc_fraction`].
 ///
-/// In the caustic map these bits hold the code of the radius that the photon is spread over, of
+/// In the caustic map these five bits hold the radius of the photon's kernel, as a code of
 /// [`super::kernel_share`].
 ///
-/// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it, but
-/// importance sampling, which asks for the directions of indirect light, leaves it out. In the caustic map
-/// the flag marks light of a surface or of the environment, which gather rays of a narrow lobe meet as well.
+/// A *direct* photon came straight from a light, without a bounce. The radiance estimate includes it.
+/// Importance sampling leaves it out, because it needs the directions of indirect light. In the caustic map
+/// the flag marks light of an emissive surface or of the environment, which gather rays of a narrow lobe can
+/// hit as well.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photon {
     /// Position, metres.
@@ -47,27 +48,27 @@ pub struct Photon {
 
 /// Number of codes of the disc fraction.
 pub const DISC_CODES: usize = 1 << 5;
-/// Code of a disc fraction of 1 where all of the disc is visible.
+/// Code of the disc fraction 1 of a disc that is visible as a whole.
 pub const FULL_DISC: u8 = 13;
-/// First code of the fractions of a visible region.
+/// First code of the disc fractions of a visible region.
 const FIRST_REGION: u8 = 20;
-/// Code of a fraction of 1 of a visible region.
+/// Code of the disc fraction 1 of a visible region.
 const FULL_REGION: u8 = 25;
 
 const DISC_MASK: u8 = DISC_CODES as u8 - 1;
 const DISC_SHIFT: u32 = 10;
-/// Ratio of the fractions of consecutive codes from 0.4 to 1: `4^(1/9)`.
+/// Ratio of the disc fractions of consecutive codes from 0.4 to 1: `4^(1/9)`.
 const FINE_STEP: f64 = 1.166_529_039_576_120_8;
-/// Ratio of the fractions of consecutive codes above 1, and of those of a region: `4^(1/6)`.
+/// Ratio of the disc fractions of consecutive codes above 1, and of the codes of a visible region: `4^(1/6)`.
 const COARSE_STEP: f64 = 1.259_921_049_894_873_2;
-/// Ratio of the fractions of consecutive codes below 0.4.
+/// Ratio of the disc fractions of consecutive codes below 0.4.
 const SMALL_STEP: f64 = 1.4;
-/// Number of fine steps below 1.
+/// Number of steps of [`FINE_STEP`] below the disc fraction 1.
 const FINE_STEPS: u8 = 6;
 const DISC_FRACTIONS: [f32; DISC_CODES] = disc_fractions();
 
-/// Geometric series from 0.038 to 4 of a disc, and from 0.31 to 4 of a region: the relative error of rounding
-/// hardly varies.
+/// Disc fractions of all codes. They are geometric series, from 0.038 to 4 for a whole disc and from 0.31 to
+/// 4 for a visible region, so that the relative rounding error hardly varies.
 #[expect(clippy::indexing_slicing, reason = "computed when it is compiled")]
 const fn disc_fractions() -> [f32; DISC_CODES] {
     let mut fractions = [1.0; DISC_CODES];
@@ -98,22 +99,23 @@ const fn disc_fractions() -> [f32; DISC_CODES] {
     fractions
 }
 
-/// The disc fraction of a code; only the lower five bits count.
+/// Disc fraction of a code. Only the lower five bits of `code` count.
 #[inline(always)]
 pub fn disc_fraction(code: u8) -> f32 {
     DISC_FRACTIONS.get((code & DISC_MASK) as usize).copied().unwrap_or(1.0)
 }
 
-/// True if the fraction of a code is that of the region which the photon sees, as parts of its disc are
-/// hidden by walls.
+/// Returns true if the code's fraction is of a visible region: walls hide parts of the disc from the photon.
 #[inline(always)]
 pub fn is_of_region(code: u8) -> bool {
     code & DISC_MASK >= FIRST_REGION
 }
 
-/// Code of the disc fraction, or with `of_region` of the fraction of a visible region, dithered: `dither` in
-/// [0, 1) chooses between the two neighbouring codes such that the mean of `1 / disc_fraction(code)`, the
-/// factor of gathers, is `1 / fraction`. Fractions out of range take the first or last code.
+/// Code of a disc fraction, dithered; with `of_region`, of the fraction of a visible region.
+///
+/// `dither`, in [0, 1), chooses between the two neighbouring codes such that the mean of
+/// `1 / disc_fraction(code)`, the factor in a gather, is `1 / fraction`. Fractions out of range take the
+/// first or the last code.
 #[inline]
 pub fn encode_disc(fraction: f32, of_region: bool, dither: f32) -> u8 {
     let (first, end) = if of_region { (FIRST_REGION, DISC_CODES as u8) } else { (0, FIRST_REGION) };
@@ -145,32 +147,32 @@ impl Photon {
         }
     }
 
-    /// The position of a record, without reading the rest.
+    /// Reads the position from a record without reading the rest.
     #[inline(always)]
     pub fn position(bytes: &[u8; Self::BYTES]) -> [f32; 3] {
         read_vector(bytes, 0)
     }
 
-    /// The flags of a record, without reading the rest.
+    /// Reads the flags from a record without reading the rest.
     #[inline(always)]
     pub fn flags(bytes: &[u8; Self::BYTES]) -> u16 {
         u16::from_le_bytes([bytes[18], bytes[19]])
     }
 
-    /// The splitting axis in the flags.
+    /// Splitting axis in a record's flags.
     #[inline(always)]
     pub fn axis_of_flags(flags: u16) -> u8 {
         (flags & 3) as u8
     }
 
-    /// The photon's content: the record's last eight bytes, power, direction and flags.
+    /// Content of a photon: the last eight bytes of the record, which hold power, direction and flags.
     #[inline(always)]
     pub fn content(bytes: &[u8; Self::BYTES]) -> [u8; PHOTON_CONTENT_BYTES] {
         let [.., a, b, c, d, e, f, g, h] = *bytes;
         [a, b, c, d, e, f, g, h]
     }
 
-    /// A photon's content with another code of the disc fraction.
+    /// Replaces the disc fraction's code in a photon's content.
     #[must_use]
     pub fn content_with_disc(content: [u8; PHOTON_CONTENT_BYTES], disc: u8) -> [u8; PHOTON_CONTENT_BYTES] {
         let [a, b, c, d, e, f, low, high] = content;
@@ -179,19 +181,19 @@ impl Photon {
         [a, b, c, d, e, f, low, high]
     }
 
-    /// The surface normal's code in the flags.
+    /// Code of the surface normal in a record's flags.
     #[inline(always)]
     pub fn normal_of_flags(flags: u16) -> u8 {
         (flags >> 2) as u8
     }
 
-    /// The disc fraction's code in the flags.
+    /// Code of the disc fraction in a record's flags.
     #[inline(always)]
     pub fn disc_of_flags(flags: u16) -> u8 {
         (flags >> DISC_SHIFT) as u8 & DISC_MASK
     }
 
-    /// Returns whether the photon came straight from a light.
+    /// Returns whether a record's flags mark a photon that came straight from a light.
     #[inline(always)]
     pub fn direct_of_flags(flags: u16) -> bool {
         flags >> 15 != 0
@@ -212,19 +214,19 @@ impl Photon {
     }
 }
 
-/// RGBE (Ward 1991): three non-negative components of 8 bits with a shared exponent,
+/// RGBE colour (Ward 1991): three non-negative components with 8-bit mantissas and a shared exponent,
 /// `mantissa * 2^(exponent - 136)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rgbe(pub [u8; 4]);
 
 impl Rgbe {
-    /// Bias of the fourth byte, the exponent of a mantissa's unit: 128, and 8 for the mantissa's bits.
+    /// Bias of the exponent, the fourth byte: 128, plus 8 for the bits of a mantissa.
     pub const EXPONENT_BIAS: i32 = 136;
 
-    /// The RGBE code of a colour, dithered; negative and non-finite components are encoded as 0.
+    /// Encodes a colour, dithered. Negative and non-finite components are encoded as 0.
     ///
     /// The random bits of `dither` choose between the two neighbours of each component, so that the mean over
-    /// many encodings is the colour: rounding to nearest would have the same bias for all photons of one
+    /// many encodings is the colour. Rounding to nearest would have the same bias for all photons of one
     /// light.
     #[inline]
     pub fn encode(colour: [f32; 3], dither: u32) -> Self {
@@ -250,7 +252,7 @@ impl Rgbe {
         Self([round(r, 0), round(g, 11), round(b, 22), code.min(255) as u8])
     }
 
-    /// The colour of the code.
+    /// Decodes the colour.
     #[inline(always)]
     pub fn decode(self) -> [f32; 3] {
         let [r, g, b, exponent] = self.0;
@@ -301,7 +303,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_reciprocal_of_dithered_disc_fractions_is_right() {
+    fn the_mean_reciprocal_of_dithered_disc_fractions_is_unbiased() {
         let dithers = || (0..1000).map(|i| (i as f32 + 0.5) / 1000.0);
         for of_region in [false, true] {
             let codes = |fraction: f32| dithers().map(move |dither| encode_disc(fraction, of_region, dither));
@@ -324,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn rgbe_is_right_to_a_step_of_its_largest_component() {
+    fn rgbe_is_accurate_to_a_step_of_its_largest_component() {
         for exponent in -40..40 {
             for mantissa in 0..64 {
                 let largest = (1.0 + mantissa as f32 / 64.0) * power_of_two(exponent);
@@ -354,7 +356,7 @@ mod tests {
     }
 
     #[test]
-    fn rgbe_takes_what_is_not_a_colour_as_black() {
+    fn rgbe_encodes_negative_and_non_finite_components_as_black() {
         for colour in [[0.0; 3], [-1.0, f32::NAN, f32::NEG_INFINITY], [1e-45, 0.0, 0.0]] {
             assert_eq!(Rgbe::encode(colour, 0x9e37_79b9).decode(), [0.0; 3]);
         }

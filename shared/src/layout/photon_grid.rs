@@ -1,27 +1,27 @@
-//! The grid of the photons' positions: every layout of the photon map stores them exactly.
+//! Grid on which the positions of photons lie. Every layout of the photon map stores them exactly.
 
-/// Bits of a coordinate on the grid.
+/// Number of bits of a grid coordinate.
 pub const GRID_BITS: u32 = 20;
 pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
-/// Bound of the magnitude of `origin + q`: integers up to 2^24 are exact in `f32`.
+/// Maximum magnitude of `origin + q`. Integers up to 2^24 are exact in `f32`.
 const MAX_COORDINATE: f64 = (1 << 24) as f64;
 
-/// The grid of the photons' positions: `(origin + q) * cell` for grid coordinates `q` below 2^20, exact in
-/// `f32`. The longest side of the scene takes half of the 2^20 cells or more; fewer far from the origin,
-/// where `f32` is coarser.
+/// Grid of the photons' positions: grid coordinates `q` below 2^20 stand for the position
+/// `(origin + q) * cell`, exact in `f32`. The longest side of the scene takes at least half of the 2^20
+/// cells. Far from the origin, where `f32` is coarser, it takes fewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
-    /// Minimum corner, cells.
+    /// Minimum corner of the grid, in cells.
     pub origin: [i32; 3],
     /// Side of a cell, metres: a power of two.
     pub cell: f32,
 }
 
 impl PhotonGrid {
-    /// The grid with cells of 1 m from the origin.
+    /// Grid whose cells have a side of 1 m and begin at the origin.
     pub const UNIT: Self = Self { origin: [0; 3], cell: 1.0 };
 
-    /// The finest grid that covers a box, metres.
+    /// Returns the finest grid that covers a box, metres.
     pub fn around(lower: [f32; 3], upper: [f32; 3]) -> Self {
         let mut least = f64::from(f32::MIN_POSITIVE);
         for (lower, upper) in lower.into_iter().zip(upper) {
@@ -36,7 +36,7 @@ impl PhotonGrid {
         Self { origin, cell }
     }
 
-    /// The grid point nearest to a position, metres; positions outside the grid are clamped to it.
+    /// Returns the grid point nearest to a position, metres. Positions outside the grid are clamped to it.
     #[inline]
     pub fn nearest(&self, place: [f32; 3]) -> [u32; 3] {
         let [x, y, z] = place;
@@ -82,7 +82,7 @@ fn floor(value: f64) -> i32 {
     if f64::from(towards_zero) > value { towards_zero - 1 } else { towards_zero }
 }
 
-/// The smallest power of two >= `value`, clamped to the normal numbers of `f32`.
+/// Returns the smallest power of two that is at least `value`, clamped to the normal numbers of `f32`.
 pub fn power_of_two_above(value: f64) -> f32 {
     // From the exponent bits: the last digit of a logarithm differs between platforms.
     let bits = value.max(f64::MIN_POSITIVE).to_bits();

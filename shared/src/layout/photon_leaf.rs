@@ -1,8 +1,8 @@
-//! Leaves of the photon map: neighbouring photons, in one line.
+//! Leaves of the photon map: neighbouring photons in one line.
 //!
-//! A leaf is as exact as [`super::Photon`]: positions lie on the [`super::PhotonGrid`] in either layout, and
-//! a leaf stores them as 16-bit offsets from its corner. The offsets of one axis are contiguous, so that one
-//! vector instruction reads them all.
+//! A leaf is as exact as [`super::Photon`]. Positions lie on the [`super::PhotonGrid`] in either layout; a
+//! leaf stores them as 16-bit offsets from its corner. The offsets on one axis are contiguous, so that one
+//! vector instruction reads all of them.
 
 use super::photon::{PHOTON_CONTENT_BYTES, Photon};
 use super::photon_grid::{GRID_BITS, GRID_MASK};
@@ -26,22 +26,24 @@ pub struct PhotonLeaf<'a> {
     photons: u32,
 }
 
-/// One axis of a leaf.
+/// One axis of a leaf, as stored.
 #[derive(Clone, Copy)]
 struct LeafAxis {
     corner: u32,
-    /// Position in the line of the first photon's offset.
+    /// Offset in the line of the first photon's coordinate, bytes.
     first: u32,
     /// Mask of the offsets: all bits, or 0 if the axis does not vary.
     mask: u16,
 }
 
-/// One axis of a leaf's photons: the grid coordinate of photon `i` is `corner + (offsets[i] & mask)`.
+/// Coordinates of a leaf's photons on one axis. The grid coordinate of photon `i` is
+/// `corner + (offsets[i] & mask)`.
 #[derive(Clone, Copy)]
 pub struct LeafCoordinates<'a> {
     /// Grid coordinate of the leaf's corner.
     pub corner: u32,
-    /// Offset of each photon, little-endian; the lanes past the last photon hold other bytes of the line.
+    /// Offset of each photon from the corner, little-endian. Lanes past the last photon hold other bytes of
+    /// the line.
     pub offsets: &'a [[u8; 2]; LEAF_LANES],
     /// Mask of the offsets: all bits, or 0 if the axis does not vary.
     pub mask: u16,
@@ -49,17 +51,17 @@ pub struct LeafCoordinates<'a> {
 
 /// Maximum number of photons of a leaf.
 pub const LEAF_PHOTONS: usize = 12;
-/// Lanes of [`LeafCoordinates`].
+/// Number of lanes of [`LeafCoordinates`].
 pub const LEAF_LANES: usize = 16;
 
 const HEADER_BYTES: usize = 8;
 const AXES_BITS: u32 = 3;
 const COUNT_BITS: u32 = 4;
-/// Low bits of the corner's coordinate that are not stored, and zero, on a varying axis.
+/// Number of low bits, all zero, of the corner's coordinate that are not stored on a varying axis.
 const CORNER_ROUNDING: u32 = 3;
 const _: () = assert!(HEADER_BYTES + 2 * 2 * LEAF_PHOTONS + 2 * LEAF_LANES <= LINE_BYTES);
 
-/// Maximum number of photons of a leaf with `axes` varying axes.
+/// Maximum number of photons of a leaf whose coordinates vary on `axes` axes.
 pub const fn leaf_capacity(axes: usize) -> usize {
     let axes = if axes < 1 { 1 } else { axes };
     (LINE_BYTES - HEADER_BYTES) / (PHOTON_CONTENT_BYTES + 2 * axes)
@@ -111,27 +113,27 @@ impl<'a> PhotonLeaf<'a> {
         LeafCoordinates { corner, offsets: bytes.as_chunks().0.first_chunk().unwrap_or(NONE), mask }
     }
 
-    /// Grid point of photon `index`.
+    /// Grid point of photon number `index`.
     #[inline(always)]
     pub fn point(&self, index: u32) -> [u32; 3] {
         let [x, y, z] = self.coordinates();
         [x.coordinate(index), y.coordinate(index), z.coordinate(index)]
     }
 
-    /// Contents of the photons, in reverse: the first photon's is the last element.
+    /// Contents of the photons in reverse order: the first photon's is the last element.
     #[inline(always)]
     pub fn contents(&self) -> &'a [[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] {
         const NONE: &[[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] = &[[0; PHOTON_CONTENT_BYTES]; LEAF_LANES];
         self.line.as_chunks().0.first_chunk().unwrap_or(NONE)
     }
 
-    /// Content of photon `index`.
+    /// Content of photon number `index`.
     #[inline(always)]
     pub fn content(&self, index: u32) -> [u8; PHOTON_CONTENT_BYTES] {
         self.contents().iter().nth_back(index as usize).copied().unwrap_or_default()
     }
 
-    /// Varying axes of a leaf whose photons have this bounding box; at least one is marked.
+    /// Marks the axes on which photons in this bounding box vary; at least one is marked.
     fn varying(bounds: &GridBox) -> [bool; 3] {
         let ([a, b, c], [x, y, z]) = (bounds.lower, bounds.upper);
         let varies = [a != x, b != y, c != z];
@@ -149,7 +151,7 @@ impl<'a> PhotonLeaf<'a> {
         photons > 0 && photons <= leaf_capacity(axes) && sides.all(is_near)
     }
 
-    /// The line of a leaf; `None` if there are no photons or the leaf cannot hold them ([`Self::fits`]).
+    /// Encodes a leaf. Returns `None` if there are no photons or the leaf cannot hold them ([`Self::fits`]).
     pub fn encode(photons: &[([u32; 3], [u8; PHOTON_CONTENT_BYTES])]) -> Option<[u8; LINE_BYTES]> {
         let bounds = photons.iter().map(|(point, _)| GridBox::of(*point)).reduce(GridBox::union)?;
         if !Self::fits(&bounds, photons.len()) {
@@ -180,7 +182,8 @@ impl<'a> PhotonLeaf<'a> {
         Some(line)
     }
 
-    /// Sets the disc fraction's code of photon `index` in the line of a leaf; no effect past the last photon.
+    /// Replaces the disc fraction's code of photon `index` in the line of a leaf. Has no effect past the last
+    /// photon.
     pub fn set_disc(line: &mut [u8; LINE_BYTES], index: u32, disc: u8) {
         if index >= PhotonLeaf::read(line).photons() {
             return;
@@ -222,7 +225,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leaf_gives_back_its_photons_to_the_last_bit() {
+    fn a_leaf_stores_its_photons_exactly() {
         for widths in [[0, 0, 0], [14, 0, 15], [15, 15, 0], [11, 12, 13], [16, 16, 16], [1, 16, 0], [0, 0, 9]]
         {
             for count in 1..=LEAF_PHOTONS {
@@ -250,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn photons_too_far_from_each_other_are_refused_and_one_never_is() {
+    fn only_photons_too_far_from_each_other_are_refused() {
         let photon = |coordinate| ([coordinate, 5, 5], [7; 8]);
         assert!(PhotonLeaf::encode(&[photon(8), photon(8 + 0xffff)]).is_some());
         assert!(PhotonLeaf::encode(&[photon(8), photon(8 + 0x1_0000)]).is_none());
@@ -259,7 +262,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_a_line_holds_reading_it_ends() {
+    fn reading_a_photon_leaf_of_arbitrary_bytes_does_not_panic() {
         let mut next = random(2);
         for _ in 0..2000 {
             let line: [u8; LINE_BYTES] = core::array::from_fn(|_| next() as u8);

@@ -1,15 +1,16 @@
-//! Inner nodes of the photon map: the boxes of sixteen children, in one line.
+//! Inner nodes of the photon map: the boxes of sixteen children in one line.
 //!
-//! The boxes are quantised conservatively to 8 bits an axis on a grid of the node: a child's box contains all
-//! its photons. One side of all children's boxes is contiguous, so that one vector instruction reads it.
+//! The boxes are quantised to 8 bits per axis on a grid of the node. Rounding is conservative: a child's box
+//! contains all its photons. The sides of all children's boxes on one axis are contiguous, so that one vector
+//! instruction reads them.
 
 use super::photon_grid::GRID_MASK;
 use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides};
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// An inner node of a photon map, one line: a [`WideNode`] whose sides are in the node's units from its
-/// corner, and
+/// An inner node of a photon map, one line. It is a [`WideNode`] with further fields; sides of boxes are in
+/// the node's units, from the node's corner.
 ///
 /// | bytes | contents |
 /// |---|---|
@@ -19,9 +20,9 @@ use crate::address::LINE_BYTES;
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
-/// Position of the photon share.
+/// Offset of the photon share in the line, bytes.
 const SHARE: usize = 22;
-/// Maximum of [`NodeCoordinates::exponent`]: the one of a box as large as the grid.
+/// Maximum of [`NodeCoordinates::exponent`], for a box as large as the grid.
 const MAX_EXPONENT: u32 = 13;
 
 /// An axis-aligned box on the [`super::PhotonGrid`], bounds inclusive.
@@ -33,7 +34,7 @@ pub struct GridBox {
     pub upper: [u32; 3],
 }
 
-/// One axis of the children's boxes: child `i` extends from `corner + (lower[i] << exponent)` to
+/// Children's boxes on one axis: child `i` extends from `corner + (lower[i] << exponent)` to
 /// `corner + (upper[i] << exponent)`.
 #[derive(Clone, Copy)]
 pub struct NodeCoordinates<'a> {
@@ -48,21 +49,22 @@ pub struct NodeCoordinates<'a> {
 }
 
 impl<'a> PhotonNode<'a> {
-    /// Square of the distance of the k-th photon over k, m^2, for most points among the node's photons: most
-    /// searches that begin here need not go farther. 0 in a node without leaves, and where nothing is known.
+    /// Squared distance of the k-th nearest photon divided by k, m^2: an upper estimate for most query points
+    /// among the node's photons, so that most searches that begin at this node need not go farther. 0 in a
+    /// node without leaves, and where the host has no estimate.
     #[inline(always)]
     pub fn photon_share(&self) -> f32 {
         let [low, high] = [SHARE, SHARE + 1].map(|at| u32::from(WideNode(self.0).byte(at)));
         f32::from_bits(low << 16 | high << 24)
     }
 
-    /// Sets the photon share in the line of a node, rounded up to 7 bits of a fraction.
+    /// Sets the photon share in the line of a node, rounded up to a mantissa of 7 bits.
     pub fn set_photon_share(line: &mut [u8; LINE_BYTES], share: f32) {
         let [_, _, low, high] = share.to_bits().saturating_add(0xffff).to_le_bytes();
         [line[SHARE], line[SHARE + 1]] = [low, high];
     }
 
-    /// Boxes of the children, by axis.
+    /// Boxes of all children, by axis.
     #[inline(always)]
     pub fn coordinates(&self) -> [NodeCoordinates<'a>; 3] {
         [self.coordinates_of(0), self.coordinates_of(1), self.coordinates_of(2)]
@@ -80,7 +82,7 @@ impl<'a> PhotonNode<'a> {
         }
     }
 
-    /// The line of a node; `None` if there are no children or too many.
+    /// Encodes a node. Returns `None` if there are no children or more than [`NODE_CHILDREN`].
     pub fn encode(children: &[GridBox], links: Links) -> Option<[u8; LINE_BYTES]> {
         let around = children.iter().copied().reduce(GridBox::union)?;
         let mut line = [0; LINE_BYTES];
@@ -108,12 +110,12 @@ impl<'a> PhotonNode<'a> {
 }
 
 impl GridBox {
-    /// The box of one point.
+    /// Box that contains only `point`.
     pub const fn of(point: [u32; 3]) -> Self {
         Self { lower: point, upper: point }
     }
 
-    /// The smallest box around two boxes.
+    /// Returns the smallest box that contains both boxes.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         let mut union = self;
@@ -133,7 +135,7 @@ impl GridBox {
 }
 
 impl NodeCoordinates<'_> {
-    /// Lower and upper side of a child's box, grid coordinates.
+    /// Lower and upper side of the box of child `child`, grid coordinates.
     pub fn sides(&self, child: usize) -> Option<[u32; 2]> {
         let [lower, upper] = [*self.lower.get(child)?, *self.upper.get(child)?];
         Some([lower, upper].map(|side| self.corner + (u32::from(side) << self.exponent)))
@@ -159,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn a_childs_box_holds_it_and_little_more() {
+    fn a_childs_box_contains_it_with_little_margin() {
         for bits in 0..=20 {
             for count in 1..=NODE_CHILDREN {
                 let boxes = boxes(count as u64, count, bits);
@@ -185,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn whatever_a_line_holds_reading_it_ends() {
+    fn reading_a_photon_node_of_arbitrary_bytes_does_not_panic() {
         let mut next = random(2);
         for _ in 0..2000 {
             let line: [u8; LINE_BYTES] = core::array::from_fn(|_| next() as u8);

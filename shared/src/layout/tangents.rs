@@ -1,47 +1,47 @@
-//! Tangents of triangles' corners, the x axes of normal maps.
+//! Tangents at triangle corners: the x axes of normal maps.
 
 use super::attributes::{decode_octahedral, encode_octahedral};
 use super::{Attributes, LEAF_TRIANGLES, LeafAttributes, Record, read_u32, write_u32};
 
-/// Code of a corner without a tangent.
+/// Code that marks a corner without a tangent.
 const NO_TANGENT: u32 = u32::MAX;
 const SIGNS: usize = 12;
 
-/// The tangents of one triangle, 16 bytes.
+/// Tangents at the corners of one triangle, 16 bytes.
 ///
 /// | bytes | contents |
 /// |---|---|
-/// | 0..12 | tangents, 32 bits each: octahedral, 16 bits an axis; all ones for none |
+/// | 0..12 | tangents, 32 bits each: octahedral, 16 bits per axis; all ones for none |
 /// | 12..16 | bits 0 to 2: the corner's sign is -1 |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tangents {
-    /// Directions, of length 0.57 to 1; zero at a corner without a tangent, where a normal map has no effect.
+    /// Tangents, of length 0.57 to 1. A corner without a tangent has zero: a normal map has no effect there.
     pub directions: [[f32; 3]; 3],
     /// 1 or -1: the bitangent is the sign times `normal x tangent` (glTF's `TANGENT.w`).
     pub signs: [f32; 3],
 }
 
 impl Tangents {
-    /// Bytes of one triangle.
+    /// Bytes of one triangle's tangents.
     const BYTES: usize = 16;
 
-    /// Triangles in a record of the size of [`Attributes`].
+    /// Number of triangles per record, which is as large as [`Attributes`].
     const PER_RECORD: usize = Attributes::BYTES / Self::BYTES;
 
-    /// Records before the first [`Attributes`] of a leaf with tangents.
+    /// Number of records with tangents before the first [`Attributes`] of a leaf.
     pub const RECORDS: usize = LEAF_TRIANGLES / Self::PER_RECORD;
 
-    /// Corners without tangents.
+    /// Tangents of a triangle that has none.
     pub const NONE: Self = Self { directions: [[0.0; 3]; 3], signs: [1.0; 3] };
 
-    /// Index of the record with the tangents of a slot of a leaf. Only leaves with a material that needs them
-    /// have such records.
+    /// Index of the record with the tangents of triangle `slot` of a leaf. Such records exist only in leaves
+    /// with a material that needs them.
     #[inline(always)]
     pub fn locate(leaf: LeafAttributes, slot: u32) -> u32 {
         leaf.first.wrapping_sub(Self::RECORDS as u32).wrapping_add(Self::record(slot))
     }
 
-    /// Reads the tangents of a slot of a leaf from the record at [`Self::locate`].
+    /// Reads the tangents of triangle `slot` from the record at [`Self::locate`].
     #[inline(always)]
     pub fn read(bytes: &[u8; Attributes::BYTES], slot: u32) -> Self {
         let at = Self::offset(slot);
@@ -55,7 +55,7 @@ impl Tangents {
         }
     }
 
-    /// The records of a leaf's tangents, slot by slot.
+    /// Encodes the tangents of a leaf's triangles, in the order of their slots.
     pub fn to_records(leaf: &[Self]) -> [[u8; Attributes::BYTES]; Self::RECORDS] {
         let mut records = [[0; Attributes::BYTES]; Self::RECORDS];
         for (slot, tangents) in (0..).zip(leaf) {
@@ -76,7 +76,7 @@ impl Tangents {
         write_u32(bytes, at + SIGNS, signs);
     }
 
-    /// Record of a slot, 0 to [`Self::RECORDS`] - 1.
+    /// Number of the record that holds triangle `slot`, 0 to [`Self::RECORDS`] - 1.
     #[inline(always)]
     fn record(slot: u32) -> u32 {
         slot / Self::PER_RECORD as u32
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_leaf_of_few_triangles_has_as_many_records() {
+    fn a_leaf_has_a_fixed_number_of_tangent_records() {
         let one = Tangents { directions: [[0.0, 1.0, 0.0]; 3], signs: [-1.0; 3] };
         let records = Tangents::to_records(&[one]);
         assert_eq!((records.len(), Tangents::read(&records[0], 0)), (Tangents::RECORDS, one));

@@ -1,27 +1,28 @@
-//! Textures: image, sampler and coordinate transform (glTF `KHR_texture_transform`).
+//! Textures: an image, a sampler and a coordinate transform (glTF `KHR_texture_transform`).
 
 use super::{Record, read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// Texels in one line: a tile of the image, row-major, so that neighbours share a line.
+/// Number of texels per line. A line is a tile of the image, row-major, so that neighbours share a line.
 pub const TEXELS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
-/// Columns of a tile.
+/// Number of columns of a tile.
 pub const TILE_WIDTH: u32 = 8;
-/// Rows of a tile.
+/// Number of rows of a tile.
 pub const TILE_HEIGHT: u32 = TEXELS_PER_LINE / TILE_WIDTH;
 
-/// A texture. Its tiles are row-major; tiles at the right and lower border are padded to full size.
+/// A texture. The tiles of its image are row-major; tiles at the right and lower border are padded to full
+/// size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
-    /// First line of its texels, counted from the start of [`crate::image::SectionKind::Texels`].
+    /// First line of the texels, counted from the start of [`crate::image::SectionKind::Texels`].
     pub first_line: u32,
-    /// Width and height, texels: 1 to 65535.
+    /// Width and height of the image, texels: 1 to 65535.
     pub size: [u16; 2],
     /// Wrap modes of u and v.
     pub wrap: [Wrap; 2],
     /// True for nearest-neighbour filtering, false for bilinear.
     pub nearest: bool,
-    /// Index of the set of texture coordinates: 0 or 1, of the two that a triangle may have.
+    /// Texture coordinate set, 0 or 1; a triangle has up to two sets.
     pub set: u32,
     /// Encoding of the texels.
     pub format: TexelFormat,
@@ -34,29 +35,29 @@ pub struct Texture {
 /// Wrap mode of a texture coordinate outside [0, 1], as in a glTF sampler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Wrap {
-    /// `REPEAT`.
+    /// glTF's `REPEAT`.
     #[default]
     Repeat,
-    /// `MIRRORED_REPEAT`.
+    /// glTF's `MIRRORED_REPEAT`.
     Mirror,
-    /// `CLAMP_TO_EDGE`.
+    /// glTF's `CLAMP_TO_EDGE`.
     Clamp,
 }
 
-/// Encoding of a texel, four bytes.
+/// Encoding of a texel in four bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TexelFormat {
-    /// RGBA, 8 bits a channel: red, green and blue by the sRGB transfer function, alpha linear.
+    /// RGBA with 8 bits per channel: red, green and blue in sRGB, alpha linear.
     Srgb,
-    /// RGBA, 8 bits a channel, linear.
+    /// RGBA with 8 bits per channel, linear.
     Linear,
-    /// OpenGL's `RGB9_E5`: red, green and blue of nine bits each, a shared exponent of five; alpha is 1.
+    /// OpenGL's `RGB9_E5`: red, green and blue with 9 bits each and a shared exponent of 5 bits. Alpha is 1.
     SharedExponent,
-    /// Two linear channels of 16 bits, little-endian: the first is red and blue, the second green; alpha is
+    /// Two linear channels of 16 bits, little-endian. The first is red and blue, the second green. Alpha is
     /// 1.
     LinearPair,
-    /// Red and green of a normal map, linear, 16 bits each, little-endian. Blue is that of a unit normal on
-    /// the front, for normals of `2 channel - 1`; alpha is 1.
+    /// Normal map with red and green linear, 16 bits each, little-endian. Blue is computed so that the normal
+    /// `2 channel - 1` has unit length and points to the front. Alpha is 1.
     NormalPair,
 }
 
@@ -120,13 +121,14 @@ impl Texture {
         bytes
     }
 
-    /// Number of lines of its texels.
+    /// Number of lines of the texels.
     pub fn lines(&self) -> u32 {
         let [width, height] = self.size.map(u32::from);
         width.div_ceil(TILE_WIDTH) * height.div_ceil(TILE_HEIGHT)
     }
 
-    /// Line of a texel, counted from the start of the section, and the texel's index in the line.
+    /// Returns the line of a texel, counted from the start of the section, and the texel's index in that
+    /// line.
     #[inline(always)]
     pub fn locate(&self, column: u32, row: u32) -> (u32, usize) {
         let tiles_across = u32::from(self.size[0]).div_ceil(TILE_WIDTH);
@@ -176,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn every_texel_has_a_place_of_its_own_in_the_textures_lines() {
+    fn every_texel_has_its_own_position_in_the_textures_lines() {
         let texture = texture();
         let mut places = BTreeSet::new();
         for row in 0..6 {

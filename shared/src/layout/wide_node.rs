@@ -1,5 +1,5 @@
-//! The common part of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node of up to sixteen children.
-//! Children that are leaves come before children that are nodes; the indices of either kind are consecutive.
+//! Common part of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node with up to sixteen children.
+//! Leaves come before inner nodes; the indices of each kind are consecutive.
 
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
@@ -17,13 +17,13 @@ const _: () = assert!(SIDES + 6 * NODE_CHILDREN == LINE_BYTES);
 /// Child of an inner node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
-    /// The leaf of this index.
+    /// The leaf with this index.
     Leaf(u32),
-    /// The inner node of this index.
+    /// The inner node with this index.
     Node(u32),
 }
 
-/// The common part of inner nodes: children and their boxes.
+/// Common part of inner nodes: indices and boxes of the children.
 ///
 /// | bytes | contents |
 /// |---|---|
@@ -38,11 +38,11 @@ pub struct WideNode<'a>(pub &'a [u8; LINE_BYTES]);
 /// Indices of the children of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Links {
-    /// Number of children that are leaves; they come first.
+    /// Number of children that are leaves. They come before the others.
     pub leaves: u32,
-    /// Index of the first leaf.
+    /// Index of the first child that is a leaf.
     pub first_leaf: u32,
-    /// Index of the first node.
+    /// Index of the first child that is an inner node.
     pub first_node: u32,
 }
 
@@ -81,7 +81,7 @@ impl<'a> WideNode<'a> {
 }
 
 impl Links {
-    /// Child `index`.
+    /// Kind and index of child number `index`.
     #[inline(always)]
     pub fn child(&self, index: u32) -> Child {
         // Wraps in unsound images only.
@@ -93,7 +93,7 @@ impl Links {
     }
 }
 
-/// Writes the links of a node; `None` if there are no children or too many.
+/// Writes the indices of the children into the line of a node; `None` if there are no children or too many.
 pub(super) fn write_links(line: &mut [u8; LINE_BYTES], children: usize, links: Links) -> Option<()> {
     if children == 0 || children > NODE_CHILDREN || links.leaves as usize > children {
         return None;

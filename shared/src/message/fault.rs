@@ -1,15 +1,15 @@
-//! Faults: why a card could not do a command, by number on the wire and in words for people.
+//! Faults: reasons why a card could not execute a command, as numbers on the wire and as texts for people.
 
 use core::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Why a card could not do a command, and a number that says where.
+/// Reason why a card could not execute a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fault {
-    /// The fault.
+    /// Kind of fault.
     pub code: FaultCode,
-    /// Where: a line, a record, a value; see the code.
+    /// Number that locates the fault, such as a line or a record; [`FaultCode`] defines its meaning.
     pub detail: u32,
 }
 
@@ -18,81 +18,82 @@ pub struct Fault {
 pub enum FaultCode {
     /// A payload is not a command; detail: its bytes.
     Message,
-    /// The command does not fit the state of the session; detail: 0.
+    /// The command is not allowed in this state of the session; detail: 0.
     Order,
-    /// The image does not fit in the card's memory; detail: the lines there are.
+    /// The image does not fit in the card's memory; detail: the number of lines of the memory.
     ImageTooLarge,
-    /// Lines are not whole, not of the image, or too many; detail: the first.
+    /// The data of a write is not whole lines, exceeds the image, or has too many lines; detail: number of
+    /// the first line.
     Lines,
-    /// Chunks are not of what is written, or too many; detail: the first.
+    /// Chunks were requested that are not written, or too many; detail: number of the first chunk.
     Chunks,
     /// The image's checksum differs; detail: the lower half of the checksum found.
     ImageChecksum,
-    /// The image's header is not sound; detail: the image's layout version for a wrong version, else 0.
+    /// The image's header is invalid; detail: the image's layout version if that is wrong, else 0.
     ImageHeader,
-    /// A frame parameter is outside the budget, not a number, or asks for what the image does not have;
-    /// detail: the number of the [`Parameter`].
+    /// A frame parameter is outside the budget, is not a number, or needs something that the image does not
+    /// have; detail: number of the [`Parameter`].
     Parameter,
-    /// A tile is empty, outside the picture or above the budget; detail: its number.
+    /// A tile is empty, outside the picture or larger than the budget allows; detail: the tile's number.
     Tile,
-    /// More tiles than the budget's; detail: the tile's number.
+    /// More tiles were sent than the budget allows; detail: the tile's number.
     TooManyTiles,
-    /// A line outside the card's memory was asked for; detail: the line.
+    /// A line outside the card's memory was requested; detail: the line.
     LineRange,
-    /// A record outside its section was asked for; detail: its index.
+    /// A record outside its section was requested; detail: the record's index.
     Record,
-    /// A bounding volume hierarchy that is deeper than the stack, or no tree; detail: the node.
+    /// The bounding volume hierarchy is deeper than the stack, or not a tree; detail: the node.
     Depth,
-    /// Operands are not whole triples, none, or too many; detail: their bytes.
+    /// The operands are not whole triples, none, or too many; detail: their length, bytes.
     Operands,
-    /// The chip's program or its on-chip memory is at fault; detail: the number of the [`Invariant`].
+    /// The chip's program or its on-chip memory is defective; detail: number of the [`Invariant`].
     Internal,
 }
 
-/// Invariants of a chip whose program is right, by the numbers that [`FaultCode::Internal`] carries. Where
-/// one does not hold light would be lost, and a fault is sent in its place.
+/// Invariants of a correct chip, numbered as in [`FaultCode::Internal`]. If one is violated, the card sends a
+/// fault instead of losing light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Invariant {
-    /// There is a tile in flight for each pass, completion and gather.
+    /// Each pass, completion and gather belongs to a tile in flight.
     Flight,
-    /// A tile in flight has a block left when one begins.
+    /// A tile in flight that begins a block has one left.
     Block,
-    /// A block of several pixels can be halved, and one of one pixel fits into the irradiance cache.
+    /// A block of several pixels can be halved, and the records of a block of one pixel fit into the
+    /// irradiance cache.
     Halves,
     /// The buffers of a tile hold all pixels of a block.
     Pixels,
-    /// Each pixel with gather rays has sums of its own.
+    /// Each pixel with gather rays has sums.
     Sums,
-    /// There is room for each gather point, and each has its rays.
+    /// The buffer has room for each gather point, and each gather point has rays.
     Points,
-    /// A gather's irradiance record is being gathered.
+    /// The irradiance record that a gather belongs to is being gathered.
     Record,
-    /// A gather that ends is one of those that its tile waits for.
+    /// A gather that ends is counted among the gathers that its tile waits for.
     Waiting,
-    /// A surface that was seen is seen again.
+    /// A surface that was seen once is seen again by the same ray.
     Surface,
-    /// There is room for each ray of a bundle.
+    /// A bundle has room for each of its rays.
     Bundle,
-    /// There is room for each part of a reply.
+    /// A reply has room for each of its parts.
     Reply,
 }
 
 impl Invariant {
-    /// The fault of a card where this does not hold.
+    /// Fault that reports a violation of this invariant.
     pub const fn fault(self) -> Fault {
         Fault { code: FaultCode::Internal, detail: self as u32 }
     }
 }
 
-/// The fields of [`FrameParameters`](super::FrameParameters), by the numbers that [`FaultCode::Parameter`]
-/// carries.
+/// Fields of [`FrameParameters`](super::FrameParameters), numbered as in [`FaultCode::Parameter`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Parameter {
-    /// Pixels of the picture in a row.
+    /// Width of the picture.
     Width,
-    /// Rows of the picture.
+    /// Height of the picture.
     Height,
     /// Origin and axes of the camera.
     Camera,
@@ -100,37 +101,37 @@ pub enum Parameter {
     Seed,
     /// Number of the first sample of a pixel.
     FirstSample,
-    /// Samples a pixel.
+    /// Samples per pixel.
     Samples,
-    /// Samples a pixel of the whole picture.
+    /// Planned samples per pixel of the whole picture.
     PlannedSamples,
-    /// Final gather rays a sample.
+    /// Final gather rays per sample.
     GatherRays,
-    /// Shadow rays a sample.
+    /// Shadow rays per sample.
     ShadowRays,
-    /// Photons that a gather looks for.
+    /// Number of photons of a gather.
     Neighbors,
-    /// Greatest distance of a gather.
+    /// Maximum radius of a gather.
     MaxDistance,
-    /// Choice of the directions of gather rays.
+    /// Importance sampling of gather rays.
     Sampling,
-    /// Relative error of interpolated irradiance.
+    /// Error bound of interpolated irradiance.
     IrradianceError,
-    /// Direction bins.
+    /// Number of direction bins.
     Bins,
-    /// Time of the gathers.
+    /// Time and order of gathers.
     Drain,
-    /// Gathers that wait.
+    /// Maximum number of waiting gathers.
     Queue,
     /// Source of the radiance at the ends of gather rays.
     Radiance,
-    /// Gathers of caustics.
+    /// Gathers in the caustic map.
     Caustics,
-    /// Layers of the pixels.
+    /// Presence of pixel layers.
     Layers,
     /// Pixel filter.
     Filter,
-    /// Tiles in flight.
+    /// Maximum number of tiles in flight.
     InFlight,
     /// Keeping of irradiance records.
     KeepRecords,
@@ -166,12 +167,12 @@ impl Parameter {
         Self::AdaptiveThreshold,
     ];
 
-    /// The fault of a card that cannot render with this parameter's value.
+    /// Fault that reports that the card cannot render with this parameter's value.
     pub const fn fault(self) -> Fault {
         Fault { code: FaultCode::Parameter, detail: self as u32 }
     }
 
-    /// The parameter's name in messages to people.
+    /// Name of the parameter in texts for people.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Width => "width",
@@ -252,7 +253,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_parameter_has_the_number_of_its_place() {
+    fn parameters_are_numbered_by_their_position() {
         for (number, parameter) in (0..).zip(Parameter::ALL) {
             assert_eq!(parameter as u32, number, "{parameter:?}");
         }

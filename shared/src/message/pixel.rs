@@ -1,20 +1,21 @@
-//! Pixels: sums over samples, in which chips send them, and the values that they stand for.
+//! Pixels: sums over samples, as chips send them, and the mean values that they represent.
 //!
-//! Sums are integers: those of several renders of a pixel, of different samples, add up to the sums of all
-//! samples, to the bit.
+//! Sums are integers. If a pixel is rendered several times with different samples, the sums of these renders
+//! add up exactly to the sums of all samples.
 
-/// 2^40: fractions of a radiance unit in a sum of light.
+/// Number of steps of a sum of light per radiance unit: 2^40.
 const LIGHT_STEPS: f64 = (1_u64 << 40) as f64;
-/// Fractions of 1 in a sum of albedo.
+/// Number of steps of a sum of albedos per 1.
 pub const ALBEDO_STEPS: u32 = 1 << 19;
-/// Fractions of 1 in a sum of normals.
+/// Number of steps of a sum of normals per 1.
 pub const NORMAL_STEPS: u32 = 1 << 18;
-/// Fractions of the depth unit in a sum of depths.
+/// Number of steps of a sum of depths per depth unit.
 pub const DEPTH_STEPS: u32 = 1 << 16;
-/// Number of a pixel's first samples, its probes, in a frame with adaptive sampling: the number of paths of
-/// each later sample is chosen by their variance.
+/// Number of probes: a pixel's first samples in a frame with adaptive sampling. Their variance determines the
+/// number of paths of each later sample.
 pub const PROBES: u32 = 4;
-/// Weight of a probe's light, in samples: fixed, so that the choice of the number of paths has no bias.
+/// Weight of a probe's light relative to a later sample. It is fixed, so that the choice of the number of
+/// paths adds no bias.
 pub const WEIGHT_OF_PROBE: f32 = 0.5;
 
 /// Number of samples in a sum.
@@ -27,24 +28,25 @@ pub struct SampleCount {
 }
 
 impl SampleCount {
-    /// Count of samples from `first` on, with or without adaptive sampling.
+    /// Counts `samples` samples from number `first` on, with or without adaptive sampling.
     pub fn of_range(first: u32, samples: u32, is_adaptive: bool) -> Self {
         let probes = PROBES.saturating_sub(first).min(samples);
         Self { samples, probes: if is_adaptive { probes } else { 0 } }
     }
 
-    /// Weight of the light of all samples, where a sample that is no probe has 1; 1/2 for none.
+    /// Sum of the weights of all samples' light. A sample that is not a probe has weight 1. Without samples
+    /// it is 1/2.
     pub fn weight_of_light(self) -> f64 {
         (f64::from(self.samples) - f64::from(1.0 - WEIGHT_OF_PROBE) * f64::from(self.probes)).max(0.5)
     }
 }
 
-/// Values of a pixel: means over its samples.
+/// Values of a pixel, averaged over its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pixel {
     /// Radiance towards the eye, W/(sr m^2).
     pub radiance: [f32; 3],
-    /// Mean albedo of the visible surfaces, 0 to 1 a channel; 0 if no sample sees a surface.
+    /// Mean albedo of the visible surfaces, 0 to 1 per channel; 0 if no sample sees a surface.
     pub albedo: [f32; 3],
     /// Mean of the visible surfaces' unit normals, in world space, on the side of the eye; 0 if no sample
     /// sees a surface.
@@ -56,20 +58,19 @@ pub struct Pixel {
 /// Layers of a pixel: the components of its radiance, and its number of final gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PixelLayers {
-    /// Direct light, W/(sr m^2): visible emission, and light of emitters by shadow rays and by the pixel's
-    /// own gather rays.
+    /// Direct light, W/(sr m^2): visible emission, and light of emitters found by shadow rays and by the
+    /// pixel's own gather rays.
     pub direct: [f32; 3],
     /// Indirect light, W/(sr m^2): radiance estimates at the ends of gather rays, and interpolated
-    /// irradiance, which includes the emission met by the irradiance records' rays.
+    /// irradiance. The latter includes emission that rays of the irradiance records hit.
     pub indirect: [f32; 3],
     /// Caustics, W/(sr m^2): radiance estimates in the caustic map.
     pub caustic: [f32; 3],
-    /// Number of the pixel's samples with a final gather of their own instead of interpolated irradiance.
+    /// Number of the pixel's samples with a final gather instead of interpolated irradiance.
     pub gathers: f32,
 }
 
-/// Units of the sums of an image's pixels; the header's
-/// [`Header::sum_scale`](crate::image::Header::sum_scale).
+/// Units of the sums in an image's pixels ([`Header::sum_scale`](crate::image::Header::sum_scale)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SumScale {
     /// Unit of light, W/(sr m^2), a power of two.
@@ -81,42 +82,42 @@ pub struct SumScale {
 /// Sums of a pixel over its samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PixelSums {
-    /// Radiance, 2^-40 radiance units; at least 0, saturating. With layers it is the sum of the three
-    /// components.
+    /// Sum of radiance, in steps of 2^-40 radiance units, at least 0; it saturates. With layers it is the sum
+    /// of the three components.
     pub light: [i64; 3],
-    /// Albedo, multiples of 1 / [`ALBEDO_STEPS`].
+    /// Sum of albedos, in steps of 1 / [`ALBEDO_STEPS`].
     pub albedo: [u32; 3],
-    /// Normals, multiples of 1 / [`NORMAL_STEPS`].
+    /// Sum of normals, in steps of 1 / [`NORMAL_STEPS`].
     pub normal: [i32; 3],
-    /// Depth, multiples of 1 / [`DEPTH_STEPS`] depth units.
+    /// Sum of depths, in steps of 1 / [`DEPTH_STEPS`] depth units.
     pub depth: i64,
-    /// Samples that see a surface.
+    /// Number of samples that see a surface.
     pub surfaces: u32,
     /// Components of the light; `None` in a frame without layers.
     pub layers: Option<LayerSums>,
 }
 
-/// Sums of the components of a pixel's light, in the units of [`PixelSums::light`], and its number of final
+/// Sums of the components of a pixel's light, in the units of [`PixelSums::light`], and the number of final
 /// gathers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LayerSums {
-    /// [`PixelLayers::direct`].
+    /// Sum of [`PixelLayers::direct`].
     pub direct: [i64; 3],
-    /// [`PixelLayers::indirect`].
+    /// Sum of [`PixelLayers::indirect`].
     pub indirect: [i64; 3],
-    /// [`PixelLayers::caustic`].
+    /// Sum of [`PixelLayers::caustic`].
     pub caustic: [i64; 3],
     /// [`PixelLayers::gathers`].
     pub gathers: u32,
 }
 
-/// Bytes of albedo, normal, depth and number of surfaces.
+/// Bytes of a pixel's albedo, normal, depth and number of surfaces.
 const VIEW_BYTES: usize = 12 + 12 + 8 + 4;
 /// Bytes of a sum of light.
 const LIGHT_BYTES: usize = 24;
-/// Bytes of a pixel without layers: view and light.
+/// Bytes of a pixel without layers.
 pub const PIXEL_BYTES: usize = VIEW_BYTES + LIGHT_BYTES;
-/// Bytes of a pixel with layers: view, the components of light, and the number of gathers.
+/// Bytes of a pixel with layers.
 pub const LAYERED_PIXEL_BYTES: usize = VIEW_BYTES + 3 * LIGHT_BYTES + 4;
 /// Maximum length of the pixels in one [`super::Reply::Pixels`], bytes.
 pub const PIXELS_BYTES: usize = 16 * PIXEL_BYTES;
@@ -126,7 +127,7 @@ pub const fn record_bytes(layers: bool) -> usize {
     if layers { LAYERED_PIXEL_BYTES } else { PIXEL_BYTES }
 }
 
-/// Reader of little-endian numbers; zeros after the end.
+/// Reader of little-endian numbers. It returns zeros after the end.
 struct Numbers<'a>(&'a [u8]);
 
 impl Numbers<'_> {
@@ -141,12 +142,12 @@ impl Numbers<'_> {
     }
 }
 
-/// Sums of the channels or axes of two vectors by `add`.
+/// Applies `add` to each pair of components of two vectors.
 fn added<T>([a, b, c]: [T; 3], [p, q, r]: [T; 3], add: fn(T, T) -> T) -> [T; 3] {
     [add(a, p), add(b, q), add(c, r)]
 }
 
-/// Sum of light, saturating.
+/// Sum of two sums of light, saturating.
 fn added_light(light: [i64; 3], more: [i64; 3]) -> [i64; 3] {
     added(light, more, i64::saturating_add)
 }
@@ -158,21 +159,21 @@ impl LayerSums {
 }
 
 impl PixelSums {
-    /// Sums of no sample.
+    /// Sums over no samples.
     pub const NOTHING: Self =
         Self { light: [0; 3], albedo: [0; 3], normal: [0; 3], depth: 0, surfaces: 0, layers: None };
 
-    /// Sums without layers.
+    /// Replaces the light, and removes the layers.
     pub fn with_light(self, light: [i64; 3]) -> Self {
         Self { light, layers: None, ..self }
     }
 
-    /// Sums with layers, whose sum is the light.
+    /// Replaces the layers. The light becomes their sum.
     pub fn with_layers(self, layers: LayerSums) -> Self {
         Self { light: layers.light(), layers: Some(layers), ..self }
     }
 
-    /// Reads sums; `None` if `bytes` is not of a length of [`record_bytes`].
+    /// Reads sums; `None` if the length of `bytes` is not one of [`record_bytes`].
     #[inline]
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let has_layers = bytes.len() == LAYERED_PIXEL_BYTES;
@@ -197,7 +198,7 @@ impl PixelSums {
         })
     }
 
-    /// Appends the bytes of the sums by `append`, [`record_bytes`] in all.
+    /// Passes the encoded sums to `append`, [`record_bytes`] bytes in total.
     pub fn write(&self, append: &mut impl FnMut(&[u8])) {
         let Self { light, albedo, normal, depth, surfaces, layers } = self;
         append(albedo.map(u32::to_le_bytes).as_flattened());
@@ -214,7 +215,7 @@ impl PixelSums {
         }
     }
 
-    /// Sums of the samples of both. Layers that one of the two lacks are left out.
+    /// Sums over the samples of both operands. Layers are dropped unless both have them.
     #[must_use]
     pub fn plus(&self, more: &Self) -> Self {
         let view = Self {
@@ -235,7 +236,7 @@ impl PixelSums {
         }
     }
 
-    /// Sums without layers that stand for values nearest to those of a pixel.
+    /// Sums without layers whose values are nearest to those of a pixel.
     pub fn nearest(pixel: &Pixel, count: SampleCount, scale: &SumScale) -> Self {
         let Pixel { radiance, albedo, normal, depth } = *pixel;
         let sees = depth.is_finite();
@@ -252,7 +253,7 @@ impl PixelSums {
         }
     }
 
-    /// The sums with layers that stand for values nearest to `layers`; the light is the layers' sum.
+    /// Adds layers whose values are nearest to `layers`. The light becomes their sum.
     #[must_use]
     pub fn with_nearest_layers(self, layers: &PixelLayers, count: SampleCount, scale: &SumScale) -> Self {
         let [direct, indirect, caustic] =
@@ -260,7 +261,7 @@ impl PixelSums {
         self.with_layers(LayerSums { direct, indirect, caustic, gathers: layers.gathers as u32 })
     }
 
-    /// Values of the pixel, means over the samples.
+    /// Values of the pixel, averaged over the samples.
     #[inline]
     pub fn pixel(&self, count: SampleCount, scale: &SumScale) -> Pixel {
         let per_sample = 1.0 / f64::from(count.samples.max(1));
@@ -275,7 +276,7 @@ impl PixelSums {
         }
     }
 
-    /// Values of the layers, means over the samples; `None` in a frame without layers.
+    /// Values of the layers, averaged over the samples; `None` in a frame without layers.
     pub fn pixel_layers(&self, count: SampleCount, scale: &SumScale) -> Option<PixelLayers> {
         let LayerSums { direct, indirect, caustic, gathers } = self.layers?;
         let [direct, indirect, caustic] = [direct, indirect, caustic].map(|sum| radiance(sum, count, scale));
@@ -283,13 +284,13 @@ impl PixelSums {
     }
 }
 
-/// Sum of light whose mean is nearest to a radiance.
+/// Sum of light whose mean is nearest to `radiance`.
 fn light_of(radiance: [f32; 3], count: SampleCount, scale: &SumScale) -> [i64; 3] {
     let steps = LIGHT_STEPS / f64::from(scale.radiance) * count.weight_of_light();
     radiance.map(|value| rounded(f64::from(value) * steps).max(0))
 }
 
-/// The nearest integer, away from zero in the middle.
+/// Rounds to the nearest integer; halves are rounded away from zero.
 fn rounded(value: f64) -> i64 {
     (if value < 0.0 { value - 0.5 } else { value + 0.5 }) as i64
 }
@@ -322,7 +323,7 @@ mod tests {
     }
 
     #[test]
-    fn sums_of_parts_are_those_of_the_whole_in_any_order() {
+    fn sums_of_sample_ranges_add_up_to_the_whole_in_any_order() {
         for layers in [false, true] {
             let [one, two, three] = [1, 2, 3].map(|number| sums(number, layers));
             assert_eq!(one.plus(&two), three);

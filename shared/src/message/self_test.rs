@@ -1,4 +1,4 @@
-//! Messages of a card's self-test: progress of the test of its memory.
+//! Messages of a card's self-test.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,21 +7,22 @@ use crate::address::LINE_BYTES;
 /// Words of 32 bits in a line.
 pub const WORDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
-/// Pattern of a memory test: the contents of every 32-bit word, a function of the word's index. Each pattern
-/// is written over the whole memory and then read back, so that what a data cache holds of it is evicted in
-/// between.
+/// Pattern of a memory test. It defines the content of every 32-bit word as a function of the word's index.
+/// Each pattern is written over the whole memory and then read back, so that a data cache cannot hide errors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum MemoryPattern {
-    /// One bit set, another in each word of a line: data lines that are stuck at 0, or connected.
+    /// One bit is set, at a different position in each word of a line. Finds data lines that are stuck at 0
+    /// or connected.
     WalkingOne,
-    /// One bit clear, another in each word of a line: data lines that are stuck at 1, or connected.
+    /// One bit is clear, at a different position in each word of a line. Finds data lines that are stuck at 1
+    /// or connected.
     WalkingZero,
-    /// The word's own index: address lines that are stuck, connected or missing, and memory that is mirrored.
+    /// The word's own index. Finds address lines that are stuck, connected or missing, and mirrored memory.
     Address,
-    /// The complement of the word's index: every bit has the other value.
+    /// The complement of the word's index: the pattern [`Self::Address`] with every bit inverted.
     Complement,
-    /// The complement of the word's index, of which one byte is then replaced by a store of that byte alone:
-    /// byte lanes.
+    /// The complement of the word's index, one byte of which is then written by a store of that byte alone.
+    /// Finds defects of byte lanes.
     ByteLanes,
 }
 
@@ -30,7 +31,7 @@ impl MemoryPattern {
     pub const ALL: [Self; 5] =
         [Self::WalkingOne, Self::WalkingZero, Self::Address, Self::Complement, Self::ByteLanes];
 
-    /// The next pattern of the test, if any.
+    /// The pattern after this one; `None` after the last.
     pub fn next(self) -> Option<Self> {
         Self::ALL.get(self as usize + 1).copied()
     }
@@ -47,7 +48,7 @@ impl MemoryPattern {
     }
 }
 
-/// A word that holds another value than was written.
+/// A word whose value differs from the written one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WrongWord {
     /// Index of the word, from the start of card memory.
@@ -58,45 +59,45 @@ pub struct WrongWord {
     pub found: u32,
 }
 
-/// Wrong words of one pattern.
+/// Summary of the wrong words of one pattern.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct WrongWords {
     /// Number of wrong words, at most `u32::MAX`.
     pub count: u32,
-    /// Bits that differ in any of them.
+    /// Union of the bits that differ in any wrong word.
     pub bits: u32,
-    /// The wrong word of the lowest index.
+    /// The wrong word with the lowest index.
     pub first: Option<WrongWord>,
 }
 
-/// Progress of a memory test. The test is over with the last pattern's last line.
+/// Progress of a memory test. The test ends with the last line of the last pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct MemoryTest {
-    /// Lines of the memory.
+    /// Number of lines of the memory.
     pub lines: u32,
-    /// Pattern at work.
+    /// Pattern that is being written or checked.
     pub pattern: MemoryPattern,
-    /// Lines that hold the pattern.
+    /// Number of lines that hold the pattern.
     pub written: u32,
-    /// Lines that were read back.
+    /// Number of lines that were read back.
     pub checked: u32,
-    /// Wrong words in them.
+    /// Wrong words in the lines read back.
     pub wrong: WrongWords,
 }
 
 impl MemoryTest {
-    /// True at the end of the pattern.
+    /// Returns true at the end of the pattern.
     pub fn is_end_of_pattern(&self) -> bool {
         self.checked == self.lines
     }
 
-    /// True at the end of the test.
+    /// Returns true at the end of the test.
     pub fn is_over(&self) -> bool {
         self.is_end_of_pattern() && self.pattern.next().is_none()
     }
 }
 
-/// Bytes of the three operands of one [`super::Command::Compute`] case: `f32`, little-endian.
+/// Bytes of one case of [`super::Command::Compute`]: three operands, `f32`, little-endian.
 pub const OPERAND_BYTES: usize = 12;
 
 /// Maximum number of operand triples of one [`super::Command::Compute`].

@@ -1,4 +1,4 @@
-//! The state of one session of a transport.
+//! State of one session of a transport.
 
 use heapless::Vec;
 
@@ -7,10 +7,10 @@ use crate::frame::{Frame, FrameHeader, FrameKind, MAX_FRAME, MAX_PAYLOAD, write_
 /// Maximum number of messages in flight in one direction.
 pub const WINDOW: usize = 4;
 
-/// Number of messages taken after which an acknowledgement is sent without a probe.
-const TOLD_UNASKED: u16 = WINDOW as u16 / 2;
+/// Number of taken messages after which an acknowledgement is sent without a request.
+const MAX_UNACKNOWLEDGED: u16 = WINDOW as u16 / 2;
 
-/// Counts of damage and repetition on a link, as one end sees them.
+/// Statistics of damage and repetition on a link, as one end observes them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LineStatistics {
     /// Damaged frames received.
@@ -23,10 +23,10 @@ pub struct LineStatistics {
     pub probes: u64,
 }
 
-/// Event of a received frame.
+/// Event that a received frame causes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
-    /// A whole frame of this session.
+    /// The frame is complete and belongs to this session.
     Heard,
     /// The other end does not know this session.
     Unknown,
@@ -35,11 +35,11 @@ pub enum Event {
 /// Delivery state of an outgoing message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Passage {
-    /// To be sent, again if `again`.
+    /// To be sent; `again` if it was sent before.
     Waiting { again: bool },
-    /// Sent, with the number of its transmission.
+    /// Sent, by the transmission with this number.
     Sent { transmission: u16 },
-    /// Arrived, but not taken by the other end.
+    /// Arrived at the other end, but not taken there.
     Held,
 }
 
@@ -50,23 +50,23 @@ struct Outgoing {
     passage: Passage,
 }
 
-/// A received message that is not taken; empty unless `has_come`.
+/// A received message that is not taken. It is empty unless `has_come`.
 struct Incoming {
     payload: Vec<u8, MAX_PAYLOAD>,
     has_come: bool,
 }
 
-/// Frame to be sent besides messages.
+/// Frame without a message that is to be sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Control {
     Acknowledge,
     Probe,
     Answer,
-    /// A frame of the unknown session of this number arrived.
+    /// Reply to a frame of the unknown session with this number.
     Unknown(u32),
 }
 
-/// End of a link.
+/// Role of an end of a link.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum End {
     Host,
@@ -78,37 +78,37 @@ pub(super) struct LinkSession {
     end: End,
     /// Number of the session; `None` before the first.
     number: Option<u32>,
-    /// `true` once the first message of the session was sent.
+    /// True once the first message of the session was sent.
     has_opened: bool,
-    /// Messages in flight, at their number modulo [`WINDOW`].
+    /// Unacknowledged messages, indexed by their number modulo [`WINDOW`].
     outgoing: [Outgoing; WINDOW],
     /// Number of the first message that is not acknowledged.
     oldest: u16,
     /// Number of the next message.
     next: u16,
-    /// Number of frames with messages, and probes, sent.
+    /// Number of transmissions so far: frames with messages, and probes.
     transmissions: u16,
-    /// Number of messages that the other end had sent at its last answer: missing ones below it are lost.
-    /// Taken by the next probe.
+    /// Number of messages that the other end had sent by its last answer; missing ones with lower numbers are
+    /// lost. The next probe reports it.
     lost_below: Option<u16>,
-    /// Payload of the last probe of the other end.
+    /// Payload of the other end's last probe, which the answer returns.
     asked: [u8; 2],
-    /// Received messages, at their number modulo [`WINDOW`].
+    /// Received messages that are not taken, indexed by their number modulo [`WINDOW`].
     incoming: [Incoming; WINDOW],
-    /// Number of the message to be taken next.
+    /// Number of the message that is to be taken next.
     expected: u16,
-    /// Messages taken since the last acknowledgement.
-    untold: u16,
+    /// Number of messages taken since the last acknowledgement.
+    unacknowledged: u16,
     control: Option<Control>,
     statistics: LineStatistics,
 }
 
-/// `true` if number `a` is before `b`, modulo 2^16.
+/// Returns true if number `a` is before `b`, modulo 2^16.
 fn is_before(a: u16, b: u16) -> bool {
     (a.wrapping_sub(b) as i16) < 0
 }
 
-/// Slot of a message's number in the window.
+/// Slot of message `number` in the window.
 fn slot<T>(slots: &mut [T; WINDOW], number: u16) -> &mut T {
     let [a, b, c, d] = slots;
     match number % WINDOW as u16 {
@@ -134,7 +134,7 @@ impl LinkSession {
             asked: [0; 2],
             incoming: [const { Incoming { payload: Vec::new(), has_come: false } }; WINDOW],
             expected: 0,
-            untold: 0,
+            unacknowledged: 0,
             control: None,
             statistics: LineStatistics { damaged: 0, repeated: 0, duplicates: 0, probes: 0 },
         }
@@ -143,7 +143,7 @@ impl LinkSession {
     pub(super) fn begin(&mut self, number: u32) {
         self.number = Some(number);
         self.has_opened = false;
-        [self.oldest, self.next, self.transmissions, self.expected, self.untold] = [0; 5];
+        [self.oldest, self.next, self.transmissions, self.expected, self.unacknowledged] = [0; 5];
         self.lost_below = None;
         self.control = None;
         self.incoming.iter_mut().for_each(|incoming| incoming.has_come = false);
@@ -153,7 +153,7 @@ impl LinkSession {
         self.next.wrapping_sub(self.oldest)
     }
 
-    /// Number of messages taken at either end, modulo 2^16.
+    /// Sum of the numbers of messages taken at both ends, modulo 2^16.
     pub(super) fn passed(&self) -> u16 {
         self.oldest.wrapping_add(self.expected)
     }
@@ -173,9 +173,9 @@ impl LinkSession {
         true
     }
 
-    /// Returns whether taken messages are not yet acknowledged.
-    pub(super) fn has_untold(&self) -> bool {
-        self.untold > 0
+    /// Returns whether messages were taken that are not yet acknowledged.
+    pub(super) fn has_unacknowledged(&self) -> bool {
+        self.unacknowledged > 0
     }
 
     /// Counts a damaged frame.
@@ -193,7 +193,7 @@ impl LinkSession {
         }
     }
 
-    /// Visits the messages in flight, from the oldest.
+    /// Visits the unacknowledged messages, from the oldest.
     fn each_on_its_way(&mut self, mut visit: impl FnMut(u16, &mut Outgoing)) {
         for offset in 0..self.on_their_way() {
             let number = self.oldest.wrapping_add(offset);
@@ -201,7 +201,7 @@ impl LinkSession {
         }
     }
 
-    /// Marks sent messages for repetition if `is_lost` holds for their number and transmission.
+    /// Marks sent messages for repetition if `is_lost` is true of their number and transmission.
     pub(super) fn lose(&mut self, is_lost: impl Fn(u16, u16) -> bool) {
         self.each_on_its_way(|number, message| {
             if let Passage::Sent { transmission } = message.passage
@@ -212,7 +212,7 @@ impl LinkSession {
         });
     }
 
-    /// Writes the next frame. Messages are first, so that answers and probes follow them.
+    /// Writes the next frame. Messages come before answers and probes.
     pub(super) fn write_next(&mut self, wire: &mut Vec<u8, MAX_FRAME>) {
         if let Some(Control::Unknown(number)) = self.control {
             self.control = None;
@@ -231,10 +231,10 @@ impl LinkSession {
             write_frame(&FrameHeader { kind: message.kind, ..header }, &message.payload, wire);
             self.statistics.repeated += u64::from(again);
             self.transmissions = self.transmissions.wrapping_add(1);
-            self.untold = 0;
+            self.unacknowledged = 0;
             return;
         }
-        if self.untold >= TOLD_UNASKED {
+        if self.unacknowledged >= MAX_UNACKNOWLEDGED {
             self.ask_for(Control::Acknowledge);
         }
         let mut payload: &[u8] = &[];
@@ -254,7 +254,7 @@ impl LinkSession {
             }
         };
         write_frame(&self.header(kind, sequence), payload, wire);
-        self.untold = 0;
+        self.unacknowledged = 0;
     }
 
     fn header(&self, kind: FrameKind, sequence: u16) -> FrameHeader {
@@ -264,7 +264,7 @@ impl LinkSession {
         FrameHeader { kind, session, sequence, acknowledged: self.expected, held }
     }
 
-    /// Returns whether a message of the window, which begins with the expected one, has arrived.
+    /// Returns whether message `number`, within the window from the expected one, has arrived.
     fn has_come(&self, number: u16) -> bool {
         self.incoming.get(number as usize % WINDOW).is_some_and(|incoming| incoming.has_come)
     }
@@ -301,7 +301,7 @@ impl LinkSession {
         Some(Event::Heard)
     }
 
-    /// Takes the acknowledgements of a header, and marks the messages that they show lost.
+    /// Processes the acknowledgements of a header, and marks messages as lost that they prove lost.
     fn learn(&mut self, header: &FrameHeader) {
         let taken = header.acknowledged.wrapping_sub(self.oldest);
         if taken > self.on_their_way() {
@@ -330,8 +330,8 @@ impl LinkSession {
         }
     }
 
-    /// Marks messages lost by an answer: sent before the probe and not arrived at the other end, or sent by
-    /// the other end before the answer and not arrived here.
+    /// Marks lost messages by an answer: those sent before the probe that have not arrived at the other end,
+    /// and those sent by the other end before the answer that have not arrived here.
     fn conclude(&mut self, probe: u16, sent: u16) {
         self.lose(|_, transmission| is_before(transmission, probe));
         let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);
@@ -364,7 +364,7 @@ impl LinkSession {
             return None;
         }
         self.expected = self.expected.wrapping_add(1);
-        self.untold = self.untold.saturating_add(1);
+        self.unacknowledged = self.unacknowledged.saturating_add(1);
         Some(&incoming.payload)
     }
 }

@@ -1,25 +1,26 @@
-//! Optimization of a binary tree: parts are taken out and inserted where the tree's surface area is least
-//! (Meister, Bittner 2017, *Parallel reinsertion for bounding volume hierarchy optimization*).
+//! Optimization of a binary tree by reinsertion: parts are removed and inserted where the tree's surface area
+//! becomes least (Meister, Bittner 2017, *Parallel reinsertion for bounding volume hierarchy optimization*).
 //!
-//! Rounds, order and results are those of obvhs, whose search for the best place is called here for many
-//! parts at once. The tree does not depend on the number of threads.
+//! Rounds, order and results are those of obvhs, whose search for the best position is called here for many
+//! parts in parallel. The tree does not depend on the number of threads.
 
 use obvhs::bvh2::reinsertion::{Reinsertion, find_reinsertion, reinsert_node};
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 use rayon::prelude::*;
 use rdst::{RadixKey, RadixSort};
 
-/// Number of rounds, of which the n-th, from 0 on, tries `1 / (2 n + 1)` of the parts of the first.
+/// Number of rounds. Round n, counted from 0, tries `1 / (2 n + 1)` of the number of parts that round 0
+/// tries.
 const ROUNDS: usize = 16;
 
-/// Part of a tree that may be reinserted.
+/// Part of a tree that can be reinserted.
 #[derive(Clone, Copy)]
 struct Candidate {
     area: f32,
     node: u32,
 }
 
-/// Descending area.
+/// Sorts by descending area.
 impl RadixKey for Candidate {
     const LEVELS: usize = 4;
 
@@ -29,7 +30,7 @@ impl RadixKey for Candidate {
     }
 }
 
-/// Optimizes a tree, in rounds. `share`: of all nodes, those that the first round tries.
+/// Optimizes a tree in rounds. The first round tries the fraction `share` of all nodes.
 pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
     if tree.nodes.first().is_none_or(Bvh2Node::is_leaf) {
         return;
@@ -55,7 +56,7 @@ pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
     }
 }
 
-/// Best places of the `count` largest of the tree's first nodes, those first that save the most area.
+/// Best positions for the `count` nodes with the largest areas, sorted by descending gain of area.
 fn reinsertions(tree: &Bvh2, count: usize) -> Vec<Reinsertion> {
     let first = tree.nodes.iter().zip(0..).take(2 * (count + 1)).skip(1);
     let mut candidates: Vec<Candidate> =

@@ -1,4 +1,4 @@
-//! Query of the hierarchy for the triangles that may intersect a ball.
+//! Query of the hierarchy for triangles that may intersect a ball.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -11,33 +11,33 @@ use photoncard_shared::message::{Fault, FaultCode};
 
 use super::lanes::{cross, dot, greatest, least, minus};
 
-/// Ball around photons, metres.
+/// Ball around photons, in metres.
 #[derive(Clone, Copy)]
 pub(super) struct Ball {
     pub(super) centre: Vec3,
     pub(super) radius: f32,
 }
 
-/// Triangles of a leaf in a ball's coordinates: relative to its centre, in units of its radius.
+/// Triangles of a leaf in the coordinates of a ball: relative to its centre, in units of its radius.
 pub(super) struct LeafNearBall {
-    /// By corner, axis and slot.
+    /// Corners, indexed by corner, axis and slot.
     corners: [[[f32; LEAF_TRIANGLES]; 3]; 3],
-    /// Bit mask of the triangles that have an area, and whose bounding boxes and planes are within distance 1
-    /// of the origin.
+    /// Bit mask of the triangles that have an area and whose bounding box and plane are within distance 1 of
+    /// the origin.
     near: u32,
-    /// Bit mask of the triangles with a coordinate beyond [`MAX_EXTENT`].
+    /// Bit mask of the triangles with a coordinate above [`MAX_EXTENT`].
     large: u32,
 }
 
-/// Maximum coordinate of corners, in radii: beyond it rounding would be too coarse near the ball.
+/// Maximum coordinate of a corner, in radii of the ball. Above it, rounding is too coarse near the ball.
 const MAX_EXTENT: f32 = 1e4;
 
 /// A triangle that may intersect a ball, in the ball's coordinates.
 pub(super) struct NearTriangle {
-    /// Index in the image.
+    /// Index of the triangle in the image.
     pub(super) index: u32,
     pub(super) corners: [Vec3; 3],
-    /// True if a corner is so far away that rounding would be too coarse near the ball.
+    /// True if a corner is so far away that rounding is too coarse near the ball.
     pub(super) is_large: bool,
 }
 
@@ -89,8 +89,8 @@ impl Kernel for NearTriangles<'_> {
     }
 }
 
-/// True if a triangle has an area, and its bounding box and its plane are within distance 1 of the origin;
-/// and true if it is large.
+/// Returns whether a triangle has an area and its bounding box and plane are within distance 1 of the origin,
+/// and whether it is large.
 #[inline(always)]
 fn place([a, b, c]: &[[[f32; LEAF_TRIANGLES]; 3]; 3], slot: usize) -> (bool, bool) {
     let (mut outside, mut extent) = ([0.0; 3], 0.0);
@@ -107,8 +107,8 @@ fn place([a, b, c]: &[[[f32; LEAF_TRIANGLES]; 3]; 3], slot: usize) -> (bool, boo
     ((dot(outside, outside) <= 1.0) & (size > 0.0) & (distance * distance <= size), extent > MAX_EXTENT)
 }
 
-/// Calls `visit` for all triangles that may intersect a ball, until one call returns false. Returns whether
-/// all calls returned true.
+/// Calls `visit` for all triangles that may intersect a ball, until a call returns false. Returns whether all
+/// calls returned true.
 #[inline(always)]
 pub(super) fn for_each_near(
     scene: &SceneImage,
@@ -153,7 +153,7 @@ pub(super) fn for_each_near(
     Ok(true)
 }
 
-/// Line `index` of a section.
+/// Reads line `index` of a section.
 pub(super) fn line<'a>(
     scene: &SceneImage,
     memory: Lines<'a>,
@@ -165,7 +165,7 @@ pub(super) fn line<'a>(
     memory.0.get(address.0 as usize).map(|line| &line.0).ok_or(fault)
 }
 
-/// Bit mask of the children of a node whose boxes may intersect a ball.
+/// Kernel that finds the children of a node whose boxes may intersect a ball, as a bit mask.
 struct NearChildren<'a> {
     node: BvhNode<'a>,
     centre: Vec3,

@@ -1,4 +1,4 @@
-//! Blocks of sixteen triangles, and the intersection of a ray with them.
+//! Blocks of sixteen triangles, and their intersection with a ray.
 
 use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
@@ -6,11 +6,11 @@ use photoncard_firmware::simd::{Isa, Kernel, LANES};
 use super::lanes::{LaneVector, at, cross, dot, greatest, least, minus};
 use super::sides::Sides;
 
-/// Sixteen triangles. Unused lanes have coinciding corners, which no ray or chord meets.
+/// Sixteen triangles. Unused lanes have coincident corners, which no ray or chord hits.
 #[derive(Default)]
 pub(super) struct Block {
     pub(super) corners: [LaneVector; 3],
-    /// Indices in the image.
+    /// Indices of the triangles in the image.
     pub(super) indices: [u32; LANES],
     pub(super) sides: [Sides; LANES],
     /// Bit mask of the triangles whose back faces the inside of a solid.
@@ -18,7 +18,7 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// True if the block has a triangle with these corners.
+    /// Returns true if the block contains a triangle with these corners.
     pub(super) fn holds(&self, corners: &[Vec3; 3]) -> bool {
         let [a, b, c] = &self.corners;
         let [p, q, r] = corners.map(|corner| corner.to_array());
@@ -26,9 +26,10 @@ impl Block {
     }
 }
 
-/// Planes through a point and each edge of a triangle, and six times the volume of their tetrahedron.
+/// Planes through a point and each edge of a triangle, and six times the volume of the tetrahedron.
 ///
-/// The planes of an edge that two triangles share are opposite to the last bit: no ray passes between them.
+/// For an edge that two triangles share, their planes are opposite to the last bit, so that no ray passes
+/// between them.
 #[inline(always)]
 fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32) {
     let corner = |corner: usize| minus(at(&block.corners[corner], lane), point);
@@ -45,7 +46,7 @@ pub(super) struct FirstOnWay<'a> {
 }
 
 impl Kernel for FirstOnWay<'_> {
-    /// Distance and corners of the triangle.
+    /// Distance and corners of the nearest triangle.
     type Output = Option<(f32, [Vec3; 3])>;
 
     #[inline(always)]

@@ -1,8 +1,8 @@
 //! Parallel chords of a ball.
 //!
-//! The area of a surface is the area of its projection over the cosine between their normals, `A = A_p /
-//! cos`. Evenly spread chords therefore measure it: each stands for an equal share of the disc across them,
-//! and each crossing for that share over its cosine.
+//! The area of a surface is its projected area divided by the cosine between the normals, `A = A_p / cos`.
+//! Evenly spread chords measure it: each stands for an equal part of the disc perpendicular to them, and each
+//! crossing for that part divided by its cosine.
 
 use glam::Vec3;
 use photoncard_firmware::simd::LANES;
@@ -14,12 +14,13 @@ pub(super) const BATCHES: usize = 12;
 /// Number of chords through a ball.
 pub(super) const CHORDS: usize = BATCHES * LANES;
 
-/// Sixteen neighbouring chords: their points in the disc across them, and the bounds of these points.
+/// Sixteen neighbouring chords: their points in the disc perpendicular to them, and the bounds of these
+/// points.
 #[derive(Clone, Copy)]
 pub(super) struct Batch {
     pub(super) x: Lane,
     pub(super) y: Lane,
-    /// Squared distances from the middle of the disc.
+    /// Squared distances from the centre of the disc.
     pub(super) squares: Lane,
     pub(super) lower: [f32; 2],
     pub(super) upper: [f32; 2],
@@ -58,7 +59,8 @@ pub(super) struct Chords {
 }
 
 impl Chords {
-    /// Chords over a disc of radius 1 by the sunflower spiral (Vogel 1979): each stands for an equal area.
+    /// Chords over a disc of radius 1, by the sunflower spiral (Vogel 1979). Each chord stands for an equal
+    /// area.
     pub(super) fn new() -> Self {
         let mut points: Vec<[f32; 2]> = (0..CHORDS)
             .map(|index| {
@@ -84,23 +86,24 @@ impl Chords {
     }
 }
 
-/// Frame along a surface normal, with a reference point outside all solids, in a ball's coordinates.
+/// Coordinate frame along a surface normal, in a ball's coordinates. It has a reference point outside all
+/// solids.
 pub(super) struct ChordFrame {
-    /// Two axes across the chords, and the normal along them.
+    /// Two axes perpendicular to the chords, and the normal along them.
     pub(super) axes: [Vec3; 3],
-    /// Reference point outside all solids, along the axes.
+    /// Reference point outside all solids, in coordinates along the axes.
     pub(super) open: Vec3,
 }
 
 impl ChordFrame {
-    /// Components along the axes of a vector from the ball's centre.
+    /// Coordinates along the axes of a vector from the ball's centre.
     pub(super) fn along(&self, place: Vec3) -> Vec3 {
         let [x, y, z] = self.axes.map(|axis| axis.dot(place));
         Vec3::new(x, y, z)
     }
 }
 
-/// Sorts points so that every sixteen consecutive ones are neighbours.
+/// Sorts points such that every run of sixteen consists of neighbours.
 fn gather_neighbors(points: &mut [[f32; 2]], axis: usize) {
     if points.len() > LANES {
         points.sort_by(|a, b| a[axis].total_cmp(&b[axis]));

@@ -1,9 +1,9 @@
-//! Crossings of chords and triangles, and which of them lie outside all solids.
+//! Crossings of chords with triangles, and whether they lie outside all solids.
 //!
-//! All crossings of a chord count, not only the first, except those inside a solid and those without light
+//! All crossings of a chord count, not only the first, except crossings inside a solid, and unlit crossings
 //! below others ([`super::evidence`]). The *depth* of a point is the number of solids that contain it. It
-//! follows from the front and back faces that are crossed on a path from a reference point outside all
-//! solids, a little above the photon.
+//! follows from the front and back faces crossed on a path from a reference point outside all solids, a
+//! little above the photon.
 
 use std::cmp::Reverse;
 
@@ -14,23 +14,23 @@ use super::lanes::Lane;
 use super::sides::Sides;
 use super::surfaces::OpenSurfaces;
 
-/// Number of layers above which the crossings of each chord are sorted by themselves.
+/// Number of layers above which the crossings are sorted chord by chord.
 const MAX_LAYERS: usize = 64;
 
 /// Crossings of sixteen chords with one triangle.
 #[derive(Clone)]
 pub(super) struct Layer {
-    /// Sort keys by [`key`]; 0 for a chord that does not meet the triangle.
+    /// Sort keys of the crossings ([`key`]); 0 for a chord that does not hit the triangle.
     keys: [u32; LANES],
-    /// Area of surface per area of the disc, `1 / cos`.
+    /// Surface area per area of the disc, `1 / cos`.
     slope: f32,
     face: u32,
     /// Index of the triangle in the image.
     pub(super) triangle: u32,
 }
 
-/// Sort key of a crossing: greater for higher ones, and at one height for fronts. It is not 0, as heights are
-/// within 1.
+/// Sort key of a crossing. It is greater for greater heights and, at equal heights, for front faces. It is
+/// never 0, because heights are within 1.
 #[inline(always)]
 fn key(height: f32, is_front: bool) -> u32 {
     let bits = height.to_bits();
@@ -39,18 +39,18 @@ fn key(height: f32, is_front: bool) -> u32 {
     ascending.wrapping_sub(LOWEST) << 1 | u32::from(is_front)
 }
 
-/// Integer below those of all heights above -2.
+/// Integer below the keys of all heights above -2.
 const LOWEST: u32 = 1 << 30;
 
-/// Height of a crossing with a key.
+/// Height of the crossing with this key.
 #[inline(always)]
 fn height(key: u32) -> f32 {
     let ascending = (key >> 1).wrapping_add(LOWEST);
     f32::from_bits(if ascending >> 31 == 0 { !ascending } else { ascending & !(1 << 31) })
 }
 
-/// The side of a triangle that a chord meets on its way down: bits 0 to 7 are the code of its normal, bit 8
-/// is set if no photons are stored there, and bits 9 and 10 are one more than the change of depth.
+/// Side of a triangle that a chord hits on its way down. Bits 0 to 7 are the code of the side's normal; bit 8
+/// is set if no photons are stored there; bits 9 and 10 are the change of depth plus 1.
 #[inline(always)]
 fn face(sides: Sides, is_front: bool) -> u32 {
     let normal = sides.normal(is_front).map_or(1 << 8, u32::from);
@@ -73,7 +73,7 @@ fn stores_photons(face: u32) -> bool {
 }
 
 impl Layer {
-    /// Crossings at some heights of the chords for which `misses` is 0.
+    /// Crossings at the heights of those chords for which `misses` is 0.
     #[inline(always)]
     pub(super) fn new(
         (heights, misses): (&Lane, &[u32; LANES]),
@@ -98,11 +98,11 @@ impl Layer {
     }
 }
 
-/// Crossings of all chords.
+/// Crossings of all chords with the triangles in a ball.
 pub(super) struct Crossings {
-    /// Layers of each batch.
+    /// Layers of crossings, by batch of chords.
     pub(super) layers: [Vec<Layer>; BATCHES],
-    /// Depth of each chord at [`Self::height`], minus the depth of the reference point.
+    /// Depth of each chord at [`Self::height`], relative to the depth of the reference point.
     pub(super) depths: [[i32; LANES]; BATCHES],
     /// Height of the reference point.
     height: f32,
@@ -127,8 +127,8 @@ impl Crossings {
         self.depths[chord / LANES][chord % LANES] = depth;
     }
 
-    /// Collects the crossings outside all solids, by chords. Those below another one of their chord are put
-    /// into `covered`.
+    /// Collects the crossings outside all solids, chord by chord. Crossings below another one of their chord
+    /// are collected in `covered`.
     pub(super) fn open_surfaces(
         &mut self,
         chords: &Chords,
@@ -141,10 +141,10 @@ impl Crossings {
     }
 }
 
-/// One crossing of each of sixteen chords: those with equally many crossings above.
+/// One crossing per chord of a batch: the crossings that have equally many others above them.
 #[derive(Clone, Copy)]
 struct Level {
-    /// Sort keys; 0 for a chord without such a crossing.
+    /// Sort keys; 0 for a chord that has no such crossing.
     keys: [u32; LANES],
     /// Bits of the slopes.
     slopes: [u32; LANES],
@@ -162,7 +162,7 @@ impl Level {
         Self { keys, slopes: [slope.to_bits(); LANES], faces: [face; LANES], open: 0 }
     }
 
-    /// Exchanges the crossings of the chords where that of `self` is not above that of `other`.
+    /// For each chord, exchanges the crossings of `self` and `other` unless that of `self` is above.
     #[inline(always)]
     fn sort(&mut self, other: &mut Self) {
         for lane in 0..LANES {
@@ -200,7 +200,7 @@ fn sort(isa: impl Isa, layers: &[Layer], levels: &mut Vec<Level>) {
     }
 }
 
-/// [`sort`] for many layers: chord by chord.
+/// Sorts many layers into levels, chord by chord.
 fn sort_each(layers: &[Layer], levels: &mut Vec<Level>) {
     let mut order = Vec::new();
     for lane in 0..LANES {
@@ -242,8 +242,8 @@ impl Kernel for OpenAll<'_> {
     }
 }
 
-/// Finds the crossings outside all solids. `depths` are those of the chords at the reference point, of which
-/// `reference` is the height as an integer.
+/// Finds the crossings outside all solids. `depths` are the depths of the chords at the reference point;
+/// `reference` is the height of that point as an integer.
 #[inline(always)]
 fn open(isa: impl Isa, levels: &mut [Level], depths: &mut [i32; LANES], reference: u32) {
     for level in levels.iter() {
@@ -265,19 +265,19 @@ fn open(isa: impl Isa, levels: &mut [Level], depths: &mut [i32; LANES], referenc
     }
 }
 
-/// Crossing below another one of its chord.
+/// Crossing below another crossing of its chord.
 pub(super) struct Covered {
     pub(super) place: [f32; 3],
     pub(super) slope: f32,
-    /// Code of the normal.
+    /// Code of the surface normal.
     pub(super) normal: u8,
-    /// Distance of the crossing above.
+    /// Distance to the crossing above.
     pub(super) gap: f32,
-    /// Heights nearer to it than to the crossings above and below.
+    /// Interval of heights that are nearer to this crossing than to those above and below it.
     pub(super) heights: [f32; 2],
 }
 
-/// Appends the crossings outside all solids to the surfaces, those below others to `covered`.
+/// Adds the crossings outside all solids to the surfaces, or to `covered` if they are below others.
 #[inline(always)]
 fn collect(batch: &Batch, levels: &[Level], surfaces: &mut OpenSurfaces, covered: &mut Vec<Covered>) {
     let mut left = levels.iter().fold(0, |open, level| open | level.open);

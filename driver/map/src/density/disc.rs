@@ -1,15 +1,15 @@
 //! Disc fractions: the boundary correction of the density estimate.
 //!
 //! A gather divides by the area of a flat disc. Its search covers a sphere, however, and finds the photons of
-//! all surfaces in it, of which those with a similar normal count. Near an edge or in a corner these surfaces
-//! have less area than the disc, and the estimate would be too dark: on a Cornell box by some 2 % of all
-//! indirect light. On steps, or between balusters, they may have more, and it would be too bright. This
-//! module measures the area once for every photon, for the radius of a gather at the photon, along chords of
-//! the sphere ([`super::chords`]). A gather then divides by this area ([`photoncard_firmware::photon`]).
+//! all surfaces in it; photons with a similar normal count. Near an edge or in a corner these surfaces have
+//! less area than the disc, and the estimate would be too dark: on a Cornell box by some 2 % of all indirect
+//! light. On steps or between balusters they can have more area, and the estimate would be too bright. This
+//! module measures the area once per photon, with the radius of a gather at the photon, along chords of the
+//! sphere ([`super::chords`]). A gather then divides by this area ([`photoncard_firmware::photon`]).
 //!
-//! Most photons lie inside a large flat surface, with a fraction of 1: such leaves are recognized by the
-//! triangles around them. The photons of other leaves share the search for the radius, the query for
-//! triangles and the chords.
+//! Most photons lie inside a large flat surface and have the fraction 1. Leaves with only such photons are
+//! recognized by the triangles around them. The photons of any other leaf share the search for the radius,
+//! the query for triangles, and the chords.
 
 use glam::Vec3;
 use photoncard_firmware::photon::{MIN_NORMAL_COSINE, VisibleRegion};
@@ -33,45 +33,44 @@ use super::surroundings::{PlainWall, Surroundings};
 use crate::pack::CardImage;
 use crate::photon::PhotonError;
 
-/// Number of leaves of one task.
+/// Number of leaves that one task measures.
 const LEAVES_PER_TASK: usize = 64;
 /// Minimum cosine between the normals of photons that share chords.
 const MIN_SHARED_COSINE: f32 = 0.85;
-/// Height of the reference point above a photon, in radii, if no surface is nearer.
+/// Height of the reference point above a photon, in radii of a gather, if no surface is nearer.
 const OPEN_HEIGHT: f32 = 0.1;
-/// Radius of the sphere in which nothing must be hidden for a gather of all photons, over that of a photon's
-/// gather: the gather's point lies beside the photon.
+/// Radius of the sphere in which a gather looks for hidden surfaces, divided by the radius of a gather at the
+/// photon. It exceeds 1 because the point of a gather lies beside the photon.
 const MARGIN: f32 = 1.15;
-/// Greatest difference of the hidden shares of area and light in that sphere for which a gather takes all
-/// photons.
+/// Maximum difference between the hidden fraction of area and the hidden fraction of light, within
+/// [`MARGIN`], at which a gather uses all photons instead of those in its visible region.
 const MAX_DIFFERENCE: f32 = 0.06;
-/// Greatest difference in the ball around photons, over the area of one photon's sphere, for which none of
-/// them is taken to have more than [`MAX_DIFFERENCE`].
+/// Maximum of that difference around all photons of a group, relative to the area of one photon's sphere, at
+/// which no photon of the group is measured individually.
 const NEAR_DIFFERENCE: f32 = 0.03;
-/// Radius of gathers over that of a disc with as many photons as a leaf, estimated by the greatest distance
-/// from its middle.
+/// Factor for estimating the radius of gathers from a leaf: it is multiplied by the distance of the farthest
+/// photon from the middle and by the square root of k over the number of photons.
 const BY_SPREAD: f32 = 1.2;
-/// Maximum distance at which a photon shows that a surface has light, over the radius of a gather.
+/// Maximum distance at which a photon shows that a surface is lit, divided by the radius of a gather.
 const EVIDENT: f32 = 0.7;
 /// Distance behind a hit at which a ray continues, in radii of the ball.
 const STEP: f32 = 1e-5;
 
-/// Fraction of a photon's disc, or of the region that it sees.
+/// Disc fraction of a photon, of its whole disc or of the region that it sees.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Fraction {
     fraction: f32,
     is_of_region: bool,
 }
 
-/// Fraction of a photon on a plain wall.
+/// Disc fraction of a photon on a plain wall.
 const WHOLE: Fraction = Fraction { fraction: 1.0, is_of_region: false };
 
 /// Encoded disc fractions of a leaf's photons.
 type Codes = [u8; LEAF_PHOTONS];
-/// Photons of one leaf.
 type DiscPhotons = heapless::Vec<DiscPhoton, LEAF_PHOTONS>;
 
-/// Measures the disc fraction of every photon for gathers of `neighbors` photons at some distances, and
+/// Measures the disc fraction of every photon, for gathers of `neighbors` photons within some distances, and
 /// writes it into the image. `go_on` is called before each task.
 ///
 /// # Errors
@@ -118,22 +117,22 @@ struct Meter<'a> {
     usual: f32,
     surroundings: Surroundings,
     evidence: Evidence,
-    /// True if [`Self::evidence`] is of the present ball.
+    /// True if [`Self::evidence`] belongs to the current ball.
     has_evidence: bool,
-    /// True if [`Self::surroundings`] holds all triangles of the ball.
+    /// True if [`Self::surroundings`] contains all triangles in the ball.
     is_complete: bool,
     chords: Chords,
     crossings: Crossings,
     covered: Vec<Covered>,
     surfaces: OpenSurfaces,
-    /// Photons in the ball, as points with their powers.
+    /// Photons in the ball, as surface points whose areas are the photons' powers.
     lights: OpenSurfaces,
 }
 
-/// A photon whose disc is measured.
+/// A photon whose disc fraction is measured.
 #[derive(Clone, Copy)]
 struct DiscPhoton {
-    /// Index in its leaf.
+    /// Index of the photon in its leaf.
     photon: usize,
     position: Vec3,
     /// Code of the surface normal.
@@ -147,7 +146,7 @@ impl DiscPhoton {
     }
 }
 
-/// Photons whose gathers have about equal radii, metres.
+/// Photons whose gathers have about the same radius, in metres.
 struct Cluster {
     ball: Ball,
     radius: f32,
@@ -181,7 +180,7 @@ impl<'a> Meter<'a> {
         }
     }
 
-    /// Encoded fractions of the leaves `first..end`, without leaves whose fractions are all 1.
+    /// Encoded fractions of the leaves `first..end`. Leaves whose fractions are all 1 are omitted.
     fn measure_leaves(&mut self, first: usize, end: usize) -> Result<Vec<(usize, Codes)>, Fault> {
         let grid = self.searcher.scene.header.photon_grid;
         let mut measured = Vec::new();
@@ -204,7 +203,6 @@ impl<'a> Meter<'a> {
         Ok(measured)
     }
 
-    /// Disc fractions of the photons of a leaf.
     fn measure(&mut self, mut photons: DiscPhotons) -> Result<[Fraction; LEAF_PHOTONS], Fault> {
         let mut fractions = [WHOLE; LEAF_PHOTONS];
         if self.are_usual(&photons) && self.is_plain(&photons, self.usual)? {
@@ -221,14 +219,16 @@ impl<'a> Meter<'a> {
         Ok(fractions)
     }
 
-    /// True if gathers at the photons of a leaf, by their own density, have less than the usual radius.
+    /// Returns true if gathers at the photons of a leaf have at most the usual radius, as their own density
+    /// suggests.
     fn are_usual(&self, photons: &[DiscPhoton]) -> bool {
         let share = self.searcher.neighbors() as f32 / photons.len() as f32;
         let spread = middle(photons).map_or(0.0, |middle| spread(photons, middle));
         BY_SPREAD * spread * share.sqrt() <= self.usual
     }
 
-    /// True if the spheres around `photons` contain no surface but the plane that all of them lie on.
+    /// Returns true if the spheres around `photons` contain no surface but the plane on which all of them
+    /// lie.
     fn is_plain(&mut self, photons: &[DiscPhoton], radius: f32) -> Result<bool, Fault> {
         let Some(middle) = middle(photons) else { return Ok(true) };
         if photons.iter().any(|photon| photon.normal != middle.normal) {
@@ -244,7 +244,8 @@ impl<'a> Meter<'a> {
         self.surroundings.is_plain(scene, *memory, self.sides, ball, wall)
     }
 
-    /// Disc fractions of photons within `radius`, the radius of their gathers, of the photon `middle`.
+    /// Measures the disc fractions of those photons that are within `radius` of the photon `middle`. `radius`
+    /// is the radius of their gathers.
     fn measure_cluster(
         &mut self,
         mut photons: DiscPhotons,
@@ -274,7 +275,7 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Disc fractions of photons with similar normals.
+    /// Measures the disc fractions of photons with similar normals.
     fn measure_group(
         &mut self,
         group: &[DiscPhoton],
@@ -319,7 +320,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Areas of surfaces within two radii around a photon: what its gathers count, and what it sees.
+    /// Measures the areas within two radii around a photon: the surfaces that its gathers count, and those
+    /// that it sees.
     fn seen(
         &self,
         surfaces: &OpenSurfaces,
@@ -336,8 +338,8 @@ impl<'a> Meter<'a> {
         run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift })
     }
 
-    /// Adds surfaces below others where photons show that they have light. One within the grid's error below
-    /// another is the same.
+    /// Adds surfaces that lie below others if photons show that they are lit. A surface that is closer to the
+    /// one above than the grid's error is not added.
     fn add_covered(&mut self, photon: Vec3, frame: &ChordFrame, cluster: &Cluster) -> Result<(), Fault> {
         if self.covered.is_empty() {
             return Ok(());
@@ -356,7 +358,7 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Finds the photons in the ball of a cluster, once.
+    /// Finds the photons in the ball of a cluster, unless they are known.
     fn find_evidence(&mut self, ball: Ball) -> Result<(), Fault> {
         let Searcher { scene, memory, .. } = &self.searcher;
         if !std::mem::replace(&mut self.has_evidence, true) {
@@ -365,7 +367,7 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// True if light that photons of a group do not see may differ from the light that they see, by the first
+    /// Returns true if hidden and visible light may differ for the photons of a group. Decided for the first
     /// of them.
     fn may_differ(
         &mut self,
@@ -410,7 +412,7 @@ impl<'a> Meter<'a> {
         })
     }
 
-    /// Removes crossings of triangles where these are cut out.
+    /// Removes the crossings at cut-outs of triangles.
     fn leave_out_cut_outs(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
         let Self { sides, searcher: Searcher { scene, memory, .. }, crossings, .. } = self;
         let [tangent, bitangent, normal] = frame.axes;
@@ -432,8 +434,8 @@ impl<'a> Meter<'a> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Frame along the normal of a photon. The reference point is above the photon with no surface in
-    /// between: at [`OPEN_HEIGHT`], or halfway to the nearest surface above.
+    /// Coordinate frame along the normal of a photon. The reference point is above the photon, with no
+    /// surface in between: at [`OPEN_HEIGHT`], or halfway to the nearest surface above.
     fn frame(&self, photon: &DiscPhoton, cluster: &Cluster) -> Result<ChordFrame, Fault> {
         let Cluster { ball, radius, .. } = *cluster;
         let normal = self.exact_normal(photon, radius)?;
@@ -447,7 +449,7 @@ impl<'a> Meter<'a> {
         Ok(ChordFrame { open: frame.along((open - ball.centre) / ball.radius), ..frame })
     }
 
-    /// Normal of the surface that a photon lies on, from a short ray: the stored code is coarse.
+    /// Normal of the surface that a photon lies on, found by a short ray because the stored code is coarse.
     fn exact_normal(&self, photon: &DiscPhoton, radius: f32) -> Result<Vec3, Fault> {
         let coded = photon.coded_normal();
         let above =
@@ -456,8 +458,8 @@ impl<'a> Meter<'a> {
         Ok(found.filter(|normal| normal.dot(coded) >= MIN_NORMAL_COSINE).unwrap_or(coded))
     }
 
-    /// Height above a photon at which rays start, metres: a small part of the radius, and more than the grid
-    /// may have moved the photon below its surface.
+    /// Height above a photon at which rays start, metres. It is a small part of the radius, but larger than
+    /// the distance by which the grid may have moved the photon below its surface.
     fn lift(&self, radius: f32) -> f32 {
         1e-3 * radius + self.searcher.scene.header.photon_grid.cell
     }
@@ -480,7 +482,7 @@ impl<'a> Meter<'a> {
         }))
     }
 
-    /// [`Surroundings::cross`] by rays, for more triangles than a list may hold.
+    /// Does [`Surroundings::cross`] by rays, if there are more triangles than a list can hold.
     fn cross_by_rays(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
         self.crossings.clear(frame.open.z);
         let Searcher { scene, memory, .. } = &self.searcher;
@@ -514,8 +516,8 @@ impl<'a> Meter<'a> {
 }
 
 impl Fraction {
-    /// Fraction of a photon's disc, or of its region where light behind walls differs from that before them:
-    /// by more than photons differ by chance.
+    /// Chooses between the fraction of a photon's disc and that of its visible region. The latter is used if
+    /// hidden and visible light differ by more than the photons' random variation.
     fn new(areas: &Areas, powers: &Areas) -> Self {
         let chance = areas.hidden * (1.0 - areas.hidden) / powers.points.max(1.0);
         let differs = (areas.hidden - powers.hidden).abs() > MAX_DIFFERENCE + 1.5 * chance.sqrt();
@@ -523,7 +525,7 @@ impl Fraction {
     }
 }
 
-/// The photon nearest to the mean position: on a curved surface the mean itself lies off the surface.
+/// Photon nearest to the mean position. On a curved surface the mean itself lies off the surface.
 fn middle(photons: &[DiscPhoton]) -> Option<DiscPhoton> {
     nearest(photons, photons.iter().map(|photon| photon.position).sum::<Vec3>() / photons.len() as f32)
 }
@@ -538,15 +540,15 @@ fn spread(photons: &[DiscPhoton], middle: DiscPhoton) -> f32 {
     photons.iter().map(|photon| photon.position.distance(middle.position)).fold(0.0, f32::max)
 }
 
-/// Removes and returns the chosen photons.
+/// Removes and returns the photons for which `is_chosen` is true.
 fn split_off(photons: &mut DiscPhotons, is_chosen: impl Fn(&DiscPhoton) -> bool) -> DiscPhotons {
     let chosen = photons.iter().filter(|photon| is_chosen(photon)).copied().collect();
     photons.retain(|photon| !is_chosen(photon));
     chosen
 }
 
-/// Encoded fractions of a leaf. The dithers of its photons are spread evenly (golden ratio), so that the
-/// rounding errors of neighbours cancel.
+/// Encodes the fractions of a leaf. The dither values of its photons are spread evenly (golden ratio), so
+/// that the rounding errors of neighbours cancel.
 fn codes(fractions: &[Fraction; LEAF_PHOTONS], leaf: usize) -> Codes {
     const GOLDEN_RATIO: u32 = 0x9e37_79b9;
     let first = hash(leaf as u32);

@@ -1,9 +1,9 @@
-//! Photons as evidence of light: whether light reaches a surface that another one covers.
+//! Photons as evidence whether light reaches a surface that another one covers.
 //!
-//! A wall behind a picture, a floor under a carpet or the inside of a box of double-sided sheets is a surface
-//! without light, that no photon meets. The boards of a shelf and the slats of a blind have light. Geometry
-//! does not tell them apart: meshes are open, touch each other, and stand apart by less than a millimetre.
-//! The photons of the map do.
+//! A wall behind a picture, a floor under a carpet, or the inside of a box of double-sided sheets is a
+//! surface without light, which no photon hits. The boards of a shelf and the slats of a blind are lit.
+//! Geometry cannot distinguish them: meshes are open, touch each other, or are less than a millimetre apart.
+//! The photons of the map can.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -20,34 +20,34 @@ use super::chords::ChordFrame;
 use super::lanes::{Lane, LaneVector, set};
 use super::surfaces::OpenSurfaces;
 
-/// A photon's place, power and surface.
+/// Position, power and surface normal of a photon.
 struct Place {
     position: Vec3,
-    /// Sum of the channels, in units of the map.
+    /// Sum of the power's channels, in the map's units.
     power: f32,
-    /// Code of the normal.
+    /// Code of the surface normal.
     code: u8,
     normal: Vec3,
 }
 
-/// Photons around a ball's centre.
+/// Photons around the centre of a ball.
 #[derive(Default)]
 pub(super) struct Evidence {
     places: Vec<Place>,
     stack: Vec<Child>,
-    /// Photons on surfaces across the chords, in the ball's coordinates along the frame's axes; unused lanes
-    /// are far away.
+    /// Photons on surfaces that face along the chords, in the ball's coordinates along the frame's axes.
+    /// Unused lanes are infinitely far away.
     along: Vec<LaneVector>,
-    /// Squared distances of the photons of a photon's own surface, m^2.
+    /// Squared distances of the photons on the measured photon's own surface, m^2.
     own: Vec<f32>,
-    /// Square of the distance across the chords within which a photon is evidence.
+    /// Squared distance perpendicular to the chords within which a photon is evidence.
     near: f32,
 }
 
-/// Number of photons of a surface expected near a chord: where it has as much light as the measured one, one
+/// Number of photons of a surface expected near a chord. If the surface is as bright as the measured one, one
 /// chord in 150 has none.
 const SEVERAL: usize = 5;
-/// Maximum tangent of the angle between a photon's surface and the way to another photon of it.
+/// Maximum tangent of the angle between a photon's surface and the direction to another photon on it.
 const OWN_SLOPE: f32 = 0.25;
 
 impl Evidence {
@@ -74,7 +74,7 @@ impl Evidence {
         Ok(())
     }
 
-    /// Puts the children of a node that may intersect a ball on the stack.
+    /// Pushes the children of a node that may intersect a ball onto the stack.
     fn enter(&mut self, scene: &SceneImage, line: &[u8; LINE_BYTES], ball: Ball) {
         let grid = scene.header.photon_grid;
         let (node, wide) = (PhotonNode(line), WideNode(line));
@@ -89,7 +89,7 @@ impl Evidence {
         }
     }
 
-    /// Adds the photons of a leaf in a ball.
+    /// Adds the photons of a leaf that lie in a ball.
     fn add(&mut self, scene: &SceneImage, line: &[u8; LINE_BYTES], ball: Ball) {
         let leaf = PhotonLeaf::read(line);
         for photon in 0..leaf.photons() {
@@ -104,8 +104,9 @@ impl Evidence {
         }
     }
 
-    /// Chooses the photons on surfaces across the chords of a frame, as evidence within a distance in which a
-    /// photon's own surface has several; at most `most` metres.
+    /// Chooses the photons on surfaces that face along the chords of a frame, and the distance within which
+    /// they are evidence: that of several photons on the measured photon's own surface, at most `most`
+    /// metres.
     pub(super) fn choose(&mut self, ball: Ball, frame: &ChordFrame, (photon, most): (Vec3, f32)) {
         self.along.clear();
         self.own.clear();
@@ -132,7 +133,7 @@ impl Evidence {
         self.near = near / (ball.radius * ball.radius);
     }
 
-    /// Puts the photons into `lights` as points of a surface whose areas are their powers.
+    /// Adds the photons to `lights` as surface points whose areas are the photons' powers.
     pub(super) fn powers(&self, ball: Ball, frame: &ChordFrame, lights: &mut OpenSurfaces) {
         lights.clear();
         for place in &self.places {
@@ -141,7 +142,7 @@ impl Evidence {
         }
     }
 
-    /// True if there is a photon near a chord at some heights.
+    /// Returns true if there is a photon near a chord within an interval of heights.
     pub(super) fn is_near(&self, [x, y]: [f32; 2], [lower, upper]: [f32; 2]) -> bool {
         self.along.iter().any(|[along_x, along_y, heights]: &[Lane; 3]| {
             let mut any = false;

@@ -1,9 +1,8 @@
-//! Numbers and vectors in sixteen lanes, and arithmetic on the vector of one lane.
+//! Numbers and vectors in sixteen lanes, and arithmetic on the vector in one lane.
 
 use glam::Vec3;
 use photoncard_firmware::simd::LANES;
 
-/// One number per lane.
 pub(super) type Lane = [f32; LANES];
 
 /// Components of sixteen vectors.

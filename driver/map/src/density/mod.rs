@@ -1,8 +1,8 @@
-//! Preparation of the density estimate on the host.
+//! Prepares the density estimate on the host.
 //!
-//! Both results depend on the image and the number of neighbours: distances of gathers, from the density of
-//! the photons (`search`), and for every photon its disc fraction, the area of surface within the radius of a
-//! gather over the area of a flat disc (`disc`).
+//! It computes two results from the image and the number of neighbours. `search` finds the distances of
+//! gathers from the density of the photons. `disc` computes the disc fraction of every photon: the area of
+//! surface within the radius of a gather, divided by the area of a flat disc.
 
 mod ball;
 mod block;

@@ -1,21 +1,21 @@
-//! Rays against the whole scene, for balls with more triangles than a list may hold.
+//! Rays traced through the whole scene, used for balls with more triangles than a list can hold.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{Ray, SceneImage, closest_hit};
 use photoncard_shared::message::Fault;
 
-/// Intersection of a ray with a triangle.
+/// Hit of a ray on a triangle.
 pub(super) struct Met {
     /// Distance from the ray's origin, metres.
     pub(super) distance: f32,
-    /// Unit normal of the front face.
+    /// Unit normal of the triangle's front.
     pub(super) normal: Vec3,
     /// Index of the triangle in the image.
     pub(super) triangle: u32,
 }
 
-/// Nearest triangle along a ray.
+/// Finds the nearest triangle along a ray.
 pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -> Result<Option<Met>, Fault> {
     let Some(hit) = closest_hit(scene, &mut memory, ray)? else { return Ok(None) };
     let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
@@ -23,7 +23,7 @@ pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -
     Ok(Some(Met { distance: hit.intersection.distance, normal, triangle: hit.index }))
 }
 
-/// All triangles on the segment between two points; after each hit the ray continues `step` behind it.
+/// Finds all triangles on the segment between two points. After each hit the ray continues `step` behind it.
 pub(super) fn all_on_way(
     scene: &SceneImage,
     memory: Lines,

@@ -1,4 +1,4 @@
-//! Maximum distance of gathers, from searches of the photon map on the host.
+//! Determines the maximum distance of gathers by searching the photon map on the host.
 
 use glam::Vec3;
 use photoncard_firmware::kind::ReferenceCandidates;
@@ -13,15 +13,15 @@ use rayon::prelude::*;
 use crate::pack::CardImage;
 use crate::photon::Importons;
 
-/// Square of the distance within which searches in a node look first, over that of its sample.
+/// Factor of a sample's squared distance that gives the first squared search radius in its node.
 const MOST: f32 = 1.4;
-/// Share of the sampled photons whose k-th neighbour lies within the usual distance.
+/// Fraction of the sampled photons whose k-th neighbour lies within the usual distance.
 const USUAL_SHARE: f64 = 0.95;
-/// Automatic maximum distance over the greatest distance of a sampled photon's k-th neighbour: there may be
-/// greater ones.
+/// Factor of the greatest sampled distance that gives the automatic maximum distance, because photons that
+/// are not sampled may have greater distances.
 const BEYOND_SAMPLES: f32 = 1.5;
 
-/// A search of the photon map, with its buffer.
+/// Search of the photon map, with its buffer.
 pub(super) struct Searcher<'a> {
     pub(super) scene: SceneImage,
     pub(super) memory: Lines<'a>,
@@ -37,7 +37,7 @@ impl<'a> Searcher<'a> {
         Self { scene, memory, buffer: Box::default(), map: PhotonMap::Indirect, neighbors, max_distance }
     }
 
-    /// Number of photons of a gather.
+    /// Number k of photons of a gather.
     pub(super) fn neighbors(&self) -> u32 {
         self.neighbors
     }
@@ -55,32 +55,32 @@ impl<'a> Searcher<'a> {
 pub(crate) struct GatherDistances {
     /// Distance within which most photons have k neighbours.
     pub(crate) usual: f32,
-    /// Maximum distance of gathers: all sampled photons have k neighbours within, so that the radius of a
+    /// Maximum distance of gathers. All sampled photons have k neighbours within it, so that the radius of a
     /// gather follows the density at its point.
     pub(crate) greatest: f32,
 }
 
-/// Distances of photons' k-th neighbours, one in each node of a photon map that has leaves.
+/// Distances of the k-th neighbours of sampled photons, one photon per node of a photon map with leaves.
 pub(crate) struct SampledDistances {
     neighbors: u32,
     samples: Vec<Sample>,
 }
 
-/// The distance of one photon's k-th neighbour.
+/// Distance of the k-th neighbour of one photon.
 struct Sample {
-    /// Node whose leaf holds the photon.
+    /// Index of the node whose leaf holds the photon.
     node: usize,
     position: Vec3,
     normal: u8,
-    /// The distance, metres; [`UNLIMITED`] in a map of fewer photons.
+    /// Distance, metres; [`UNLIMITED`] in a map with fewer photons.
     distance: f32,
 }
 
-/// Distance that exceeds any other, and whose square is finite.
+/// Distance that exceeds any other and whose square is finite.
 const UNLIMITED: f32 = 1e18;
 
 impl SampledDistances {
-    /// Distances in the photon map of an image, `k = neighbors`.
+    /// Samples the photon map of an image for `k = neighbors`.
     ///
     /// # Errors
     /// If the image is malformed.
@@ -101,7 +101,7 @@ impl SampledDistances {
         Ok(Self { neighbors, samples: samples?.into_iter().flatten().collect() })
     }
 
-    /// Writes into each node how dense its photons are, by which gathers narrow their searches.
+    /// Writes the photon density into each node, so that gathers can narrow their searches.
     pub(crate) fn write_shares(&self, image: &mut CardImage) {
         let nodes = image.section_mut(SectionKind::PhotonNodes);
         for sample in self.samples.iter().filter(|sample| sample.distance < UNLIMITED) {
@@ -110,7 +110,7 @@ impl SampledDistances {
         }
     }
 
-    /// Distances of gathers; with importons, among photons where there are any.
+    /// Distances of gathers. With importons, only photons near an importon count, if there are any.
     pub(crate) fn of_gathers(&self, image: &CardImage, importons: Option<&Importons>) -> GatherDistances {
         let is_used = |sample: &&Sample| {
             importons.is_none_or(|importons| importons.indirect.is_used(sample.position, sample.normal))
@@ -130,7 +130,7 @@ impl SampledDistances {
 }
 
 impl Sample {
-    /// The sample of a photon of a leaf below a node.
+    /// Samples a photon in a leaf below a node.
     fn new(searcher: &mut Searcher, image: &CardImage, node: usize, leaf: u32) -> Result<Self, Fault> {
         let fault = Fault { code: FaultCode::Record, detail: leaf };
         let line = image.section(SectionKind::PhotonLeaves).get(leaf as usize).ok_or(fault)?;

@@ -1,5 +1,5 @@
-//! Intersection of chords and triangles: sixteen triangles are projected along the chords, then sixteen
-//! chords are tested against one triangle.
+//! Intersection of chords and triangles. Sixteen triangles at a time are projected along the chords; then
+//! sixteen chords at a time are tested against one triangle.
 
 use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
@@ -55,23 +55,23 @@ impl Kernel for CrossAll<'_> {
 /// Sixteen triangles in the coordinates of a frame, and their projections along the chords.
 struct Shadows {
     corners: [LaneVector; 3],
-    /// Line of each edge, `x a + y b + c`, positive inside.
+    /// Line equation of each edge, `x a + y b + c`, positive inside.
     edges: [LaneVector; 3],
-    /// Value of each edge's line that points inside exceed: those exactly on a shared edge belong to one of
-    /// its two triangles.
+    /// Threshold of each edge's line equation for points inside. It assigns points exactly on a shared edge
+    /// to one of its two triangles.
     bounds: [Lane; 3],
-    /// Height of the plane, `x a + y b + c`.
+    /// Equation of the triangle's plane: height `x a + y b + c`.
     heights: LaneVector,
     slopes: Lane,
-    /// 1 where the front is up, else 0.
+    /// 1 if the front faces up, else 0.
     is_front: Lane,
-    /// Infinite for triangles that no chord meets, else 0.
+    /// Infinite for triangles that no chord hits, else 0.
     steep: Lane,
     lower: [Lane; 2],
     upper: [Lane; 2],
 }
 
-/// Minimum cosine between chord and normal: chords miss steeper triangles.
+/// Minimum cosine between chord and normal. Chords miss steeper triangles.
 const MIN_COSINE: f32 = 1e-4;
 
 impl Shadows {
@@ -87,7 +87,7 @@ impl Shadows {
         upper: [[0.0; LANES]; 2],
     };
 
-    /// Projects the triangles of a block. Short loops over lanes compile to few vector instructions each.
+    /// Projects the triangles of a block. Short loops over lanes compile to few vector instructions.
     #[inline(always)]
     fn cast(&mut self, block: &Block, frame: &ChordFrame) {
         for corner in 0..3 {
@@ -123,7 +123,7 @@ impl Shadows {
         }
     }
 
-    /// Computes the triangles' planes.
+    /// Computes the planes of the triangles.
     #[inline(always)]
     fn cast_planes(&mut self) {
         let [a, b, c] = &self.corners;
@@ -149,7 +149,7 @@ impl Shadows {
         }
     }
 
-    /// Bit mask of the triangles that chords of a batch may meet.
+    /// Bit mask of the triangles that chords of a batch may hit.
     #[inline(always)]
     fn near(&self, isa: impl Isa, batch: &Batch) -> u32 {
         let mut apart = [0; LANES];
@@ -162,7 +162,7 @@ impl Shadows {
         isa.below(&apart, 1)
     }
 
-    /// Bit mask of the triangles that the plane at a height cuts.
+    /// Bit mask of the triangles that the horizontal plane at `height` cuts.
     #[inline(always)]
     fn cut(&self, isa: impl Isa, height: f32) -> u32 {
         let mut apart = [0; LANES];
@@ -173,8 +173,8 @@ impl Shadows {
         isa.below(&apart, 1)
     }
 
-    /// Heights at which a batch of chords meets a triangle's plane, and 1 for the chords that do not meet the
-    /// triangle within the ball, else 0.
+    /// Heights at which the chords of a batch hit the plane of a triangle; and 0 for the chords that hit the
+    /// triangle within the ball, else 1.
     #[inline(always)]
     fn cross(&self, triangle: usize, batch: &Batch) -> (Lane, [u32; LANES]) {
         let edges = [0, 1, 2].map(|edge: usize| at(&self.edges[edge], triangle));
@@ -195,7 +195,8 @@ impl Shadows {
     }
 }
 
-/// Components of sixteen vectors along a direction. A loop for each product: compilers vectorise each.
+/// Components of sixteen vectors along a direction. Each product has a loop of its own, because compilers
+/// vectorise such loops.
 #[inline(always)]
 fn along([a, b, c]: [f32; 3], [x, y, z]: &LaneVector) -> Lane {
     let mut sum = [0.0; LANES];
@@ -211,8 +212,8 @@ fn along([a, b, c]: [f32; 3], [x, y, z]: &LaneVector) -> Lane {
     sum
 }
 
-/// Cut of a triangle by the horizontal plane through the reference point: a segment from `start` to `end`,
-/// relative to that point, with the front on its left.
+/// Section of a triangle with the horizontal plane through the reference point: a segment from `start` to
+/// `end`, relative to that point, with the front on its left.
 struct Cut {
     start: [f32; 2],
     end: [f32; 2],
@@ -234,8 +235,8 @@ impl Cut {
         Some(Self { start: start?, end: end? })
     }
 
-    /// Changes the depth of each chord whose path from the reference point crosses the cut: +1 where it
-    /// enters by the front, else -1.
+    /// Changes the depth of each chord whose path from the reference point crosses the segment: by +1 if it
+    /// crosses from the front, else by -1.
     #[inline(always)]
     fn count(&self, chords: &Chords, open: Vec3, depths: &mut [[i32; LANES]; BATCHES]) {
         let ([a, b], [c, d]) = (self.start, self.end);

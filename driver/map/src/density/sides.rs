@@ -1,4 +1,5 @@
-//! Front and back of every triangle: the normals that photons are stored with, and the boundaries of solids.
+//! Front and back of every triangle: the normals with which photons are stored, and whether the triangle
+//! bounds a solid.
 
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
@@ -21,12 +22,12 @@ pub(super) struct Sides {
     /// True if the back faces the inside of a solid. The back of a double-sided sheet is as open as its
     /// front.
     pub(super) is_solid: bool,
-    /// True if parts of the triangle are not there, by its texture.
+    /// True if the triangle's texture cuts out parts of it.
     pub(super) has_cut_outs: bool,
 }
 
 impl Sides {
-    /// Code of the normal on a side where photons are stored.
+    /// Code of the normal of a side; `None` if no photons are stored there.
     #[inline(always)]
     pub(super) fn normal(&self, is_front: bool) -> Option<u8> {
         self.normals[usize::from(!is_front)]
@@ -40,15 +41,15 @@ pub(super) struct SideTable {
     pub(super) has_cut_outs: bool,
 }
 
-/// Properties of a material that decide on its triangles' sides.
+/// Properties of a material that determine the sides of its triangles.
 #[derive(Clone, Copy)]
 struct Finish {
     reflects: bool,
-    /// Light may pass: glass, partial coverage, diffuse transmission.
+    /// True if light can pass, because of glass, partial coverage or diffuse transmission.
     transmits: bool,
     emits: bool,
     is_double_sided: bool,
-    /// Partial coverage is no cut-out: photons stored there count for it.
+    /// True with partial coverage. It is not a cut-out, because the photons stored there account for it.
     blends: bool,
 }
 
@@ -103,16 +104,16 @@ impl SideTable {
         Ok(table)
     }
 
-    /// Sides of a triangle; the default, on which no photons are stored, if there is no such triangle.
+    /// Sides of a triangle. Without such a triangle, the default, on which no photons are stored.
     #[inline(always)]
     pub(super) fn of(&self, triangle: u32) -> Sides {
         self.sides.get(triangle as usize).copied().unwrap_or_default()
     }
 
-    /// Marks double-sided triangles that form closed surfaces as solid: no light enters, unless they emit it
-    /// themselves or transmit it. A surface is closed if at each of its edges it goes on with another
-    /// triangle in the opposite direction. Where meshes touch and more than two triangles share an edge,
-    /// those bound a solid together that no other lies between.
+    /// Marks double-sided triangles that form closed surfaces as solid, because no light enters, unless they
+    /// emit or transmit light. A surface is closed if each of its edges is shared with another triangle, in
+    /// the opposite direction. Where meshes touch and more than two triangles share an edge, neighbours by
+    /// angle, with no other solid between them, bound a solid together.
     fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -194,9 +195,9 @@ impl Sides {
     }
 }
 
-/// Triangles around an edge, each with the one that bounds a solid together with it, by their angles; `None`
-/// where its back is open. A triangle is `true` if it has the edge in its direction, then its index and its
-/// corners.
+/// Pairs the triangles around an edge, by their angles, with the triangle that bounds a solid together with
+/// them; `None` if the back is open. Each item of `triangles` has a flag whether the triangle has the edge in
+/// its direction, the index, and the corners.
 fn around_edge(
     edge: [[u32; 3]; 2],
     triangles: impl Iterator<Item = (bool, usize, [[u32; 3]; 3])>,

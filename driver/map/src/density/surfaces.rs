@@ -1,4 +1,5 @@
-//! Surfaces outside all solids, as points on chords, and the disc fraction that they give.
+//! Surfaces outside all solids, represented by points on chords, and the disc fraction that follows from
+//! them.
 
 use std::sync::OnceLock;
 
@@ -9,10 +10,10 @@ use photoncard_firmware::simd::{Isa, Kernel, LANES};
 use super::chords::{Batch, Chords};
 use super::lanes::Lane;
 
-/// Number of codes of normals.
+/// Number of normal codes.
 const CODES: usize = 1 << u8::BITS;
 
-/// Normals that a gather counts to one surface, by their codes.
+/// Table of normal codes that a gather counts as one surface.
 pub(super) struct SameSurfaces([OnceLock<[bool; CODES]>; CODES]);
 
 impl SameSurfaces {
@@ -20,7 +21,7 @@ impl SameSurfaces {
         Self([const { OnceLock::new() }; CODES])
     }
 
-    /// For each code of a normal, true if a gather counts it to the surface of a photon whose normal has the
+    /// For each code of a normal, true if a gather counts it as the surface of a photon whose normal has the
     /// code `normal`.
     fn of(&self, normal: u8) -> &[bool; CODES] {
         self.0[usize::from(normal)].get_or_init(|| {
@@ -34,7 +35,7 @@ impl SameSurfaces {
     }
 }
 
-/// Points on surfaces outside all solids, each of which stands for the share of a chord.
+/// Points on surfaces outside all solids. Each stands for a chord's part of the area.
 #[derive(Default)]
 pub(super) struct OpenSurfaces {
     places: Vec<SurfaceLanes>,
@@ -47,7 +48,7 @@ struct SurfaceLanes {
     places: [Lane; 3],
     slopes: Lane,
     normals: [u8; LANES],
-    /// The slope if the point belongs to the chosen surface, else 0.
+    /// Slope if the point belongs to the chosen surface, else 0.
     areas: Lane,
 }
 
@@ -76,7 +77,7 @@ impl OpenSurfaces {
         }
     }
 
-    /// Chooses the points that a gather counts to the surface of a photon whose normal has the code `normal`.
+    /// Chooses the points that a gather counts as the surface of a photon whose normal has the code `normal`.
     pub(super) fn choose(&mut self, normal: u8, same: &SameSurfaces) {
         let same = same.of(normal);
         for lanes in &mut self.places {
@@ -88,14 +89,14 @@ impl OpenSurfaces {
     }
 }
 
-/// Kernel that computes a disc fraction: area of the chosen surface within the sphere around a photon over
-/// the area of its disc.
+/// Kernel that computes a disc fraction: the area of the chosen surface within the sphere around a photon,
+/// divided by the area of its disc.
 pub(super) struct FractionWithin<'a> {
     pub(super) chords: &'a Chords,
     pub(super) surfaces: &'a OpenSurfaces,
     pub(super) centre: Vec3,
     pub(super) radius: f32,
-    /// Maximum error of heights.
+    /// Maximum error of heights, in radii of the ball.
     pub(super) lift: f32,
 }
 
@@ -123,27 +124,29 @@ impl Kernel for FractionWithin<'_> {
     }
 }
 
-/// Area of the chosen surface around a photon.
+/// Areas of the chosen surface around a photon.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Areas {
-    /// Area within the photon's sphere over that of its disc.
+    /// Area within the photon's sphere, divided by the area of its disc.
     pub(super) fraction: f32,
-    /// Area within a larger sphere that the photon cannot see, over the area there.
+    /// Area within a larger sphere that the photon cannot see, divided by the whole area there.
     pub(super) hidden: f32,
-    /// Area of the visible region within the photon's sphere over that of the plane.
+    /// Area within the photon's sphere that lies in its visible region, divided by the region's area in the
+    /// plane.
     pub(super) of_region: f32,
     /// Number of points within the larger sphere.
     pub(super) points: f32,
 }
 
-/// Visible region of a photon, in a ball's coordinates: axes along those of the chords' frame, and sectors.
+/// Visible region of a photon, in a ball's coordinates: axes, given along those of the chords' frame, and
+/// sectors.
 pub(super) struct SeenRegion {
     pub(super) axes: [[f32; 3]; 3],
     pub(super) inner: Sectors,
     pub(super) outer: Sectors,
 }
 
-/// Kernel that measures the area of the chosen surface around a photon.
+/// Kernel that measures the areas of the chosen surface around a photon.
 #[derive(Clone, Copy)]
 pub(super) struct AreasWithin<'a> {
     pub(super) chords: &'a Chords,
@@ -151,9 +154,9 @@ pub(super) struct AreasWithin<'a> {
     pub(super) region: &'a SeenRegion,
     pub(super) centre: Vec3,
     pub(super) radius: f32,
-    /// Radius of the larger sphere.
+    /// Radius of the larger sphere, in radii of the ball.
     pub(super) outer_radius: f32,
-    /// Maximum error of heights.
+    /// Maximum error of heights, in radii of the ball.
     pub(super) lift: f32,
 }
 
@@ -203,8 +206,8 @@ impl Kernel for AreasWithin<'_> {
 }
 
 impl SurfaceLanes {
-    /// Ways to the points from a place. The grid may move a photon off its plane; heights within that error
-    /// count as 0, so that a plane has fraction 1.
+    /// Vectors from a position to the points. The grid can move a photon off its plane, so that heights
+    /// within that error count as 0 and a plane has the fraction 1.
     #[inline(always)]
     fn ways(&self, from: Vec3, lift: f32) -> [Lane; 3] {
         let [p, q, r] = from.to_array();
@@ -219,20 +222,20 @@ impl SurfaceLanes {
     }
 }
 
-/// Ways across a batch of chords from a place.
+/// Vectors from a position to the chords of a batch, perpendicular to the chords.
 #[inline(always)]
 fn batch_ways(batch: &Batch, from: Vec3) -> [Lane; 3] {
     let [p, q, _] = from.to_array();
     [batch.x.map(|x| x - p), batch.y.map(|y| y - q), [0.0; LANES]]
 }
 
-/// A part over the whole, or `without` where there is none.
+/// Ratio of a part to the whole; `without` if the whole is 0.
 #[inline(always)]
 fn share(part: f32, whole: f32, without: f32) -> f32 {
     if whole > 0.0 { part / whole } else { without }
 }
 
-/// 1 for points within a radius, by its square, else 0.
+/// 1 for points within a radius, given squared, else 0.
 #[inline(always)]
 fn within([x, y, z]: &[Lane; 3], limit: f32) -> Lane {
     let mut within = [0.0; LANES];

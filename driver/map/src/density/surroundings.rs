@@ -1,8 +1,8 @@
 //! Triangles in a ball, found once for all chords and short rays in it.
 //!
-//! A descent in the hierarchy for every ray would visit the same few leaves again and again. Here one descent
-//! finds all triangles in a ball; then sixteen of them are tested against one ray, or sixteen chords against
-//! one of them. Coordinates are relative to the ball's centre and in units of its radius.
+//! Traversing the hierarchy for every ray would visit the same few leaves many times. Instead, one traversal
+//! finds all triangles in a ball. Sixteen of them at a time are then tested against one ray, or sixteen
+//! chords against one of them. Coordinates are relative to the ball's centre and in units of its radius.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -19,17 +19,18 @@ use super::lanes::set;
 use super::shadows::CrossAll;
 use super::sides::SideTable;
 
-/// Maximum number of triangles of a list; with more, a descent for each ray is faster.
+/// Maximum number of triangles of a list. With more, a traversal per ray is faster.
 const MAX_TRIANGLES: usize = 4096;
-/// Number of triangles beyond which repeated triangles are left out: thousands of coinciding ones act as one.
+/// Number of triangles above which repeated triangles are omitted: thousands of coincident triangles act as
+/// one.
 const MAX_WITH_TWINS: usize = 512;
 /// Maximum number of triangles of a plain wall within a ball.
 const MAX_PLAIN: usize = 24;
-/// Minimum cosine between normals of one plane: a deviation of a thousandth of the radius at the ball's
-/// border.
+/// Minimum cosine between the normals of triangles of one plane. It allows a deviation of a thousandth of the
+/// radius at the ball's border.
 const MIN_PLAIN_COSINE: f32 = 1.0 - 5e-7;
 
-/// Triangles in a ball.
+/// List of the triangles in a ball.
 #[derive(Default)]
 pub(super) struct Surroundings {
     blocks: Vec<Block>,
@@ -40,8 +41,8 @@ pub(super) struct Surroundings {
 }
 
 impl Surroundings {
-    /// Finds the triangles in a ball. Returns false if they are too many or too large for a list; the list is
-    /// then incomplete, and not to be used.
+    /// Finds the triangles in a ball. Returns false if they are too many or too large for a list, which is
+    /// then incomplete and must not be used.
     ///
     /// # Errors
     /// If the image is malformed.
@@ -61,8 +62,8 @@ impl Surroundings {
         all
     }
 
-    /// True if all triangles in a ball form one plain wall around its centre, on the side of the wall's
-    /// normal. The list of triangles stays as it was.
+    /// Returns true if all triangles in a ball form one plain wall around its centre, which faces along the
+    /// wall's normal. The list of triangles does not change.
     ///
     /// # Errors
     /// If the image is malformed.
@@ -93,7 +94,7 @@ impl Surroundings {
         Ok(wall.holds(ball, normal) && covers(&triangles, normal))
     }
 
-    /// Adds a triangle. Returns false if the list is full or the triangle too large.
+    /// Adds a triangle. Returns false if the list is full or the triangle is too large.
     #[inline(always)]
     fn add(&mut self, triangle: &NearTriangle, sides: &SideTable) -> bool {
         let &NearTriangle { index, ref corners, is_large } = triangle;
@@ -118,8 +119,8 @@ impl Surroundings {
         true
     }
 
-    /// Nearest triangle from `origin` along a unit vector, if within `max_distance`: its distance, metres,
-    /// and its unit normal on the side of `origin`.
+    /// Nearest triangle from `origin` along a unit vector within `max_distance`: its distance, metres, and
+    /// its unit normal on the side of `origin`.
     pub(super) fn first_on_way(
         &self,
         origin: Vec3,
@@ -141,10 +142,10 @@ impl Surroundings {
     }
 }
 
-/// Candidate for a plain wall: a surface normal and points that should lie on it.
+/// Hypothesis of a plain wall: a surface normal, and points that should lie on it.
 #[derive(Clone, Copy)]
 pub(super) struct PlainWall<'a> {
-    /// Code of the normal.
+    /// Code of the wall's normal.
     pub(super) normal: u8,
     /// Maximum distance of photons from the wall, metres.
     pub(super) lift: f32,
@@ -153,14 +154,14 @@ pub(super) struct PlainWall<'a> {
 }
 
 impl PlainWall<'_> {
-    /// True if all positions are in the plane.
+    /// Returns true if all positions are in the plane.
     fn holds(&self, ball: Ball, normal: Vec3) -> bool {
         self.places.iter().all(|place| (*place - ball.centre).dot(normal).abs() <= self.lift)
     }
 }
 
-/// True if coplanar triangles cover the disc of radius 1 around the origin exactly once: one of them covers
-/// the origin, and each edge within the disc is shared with one other triangle.
+/// Returns true if coplanar triangles cover the disc of radius 1 around the origin exactly once: one triangle
+/// covers the origin, and each edge within the disc is shared with one other triangle.
 fn covers(triangles: &[[Vec3; 3]], normal: Vec3) -> bool {
     let edges = |[a, b, c]: [Vec3; 3]| [(a, b), (b, c), (c, a)];
     let is_left = |(a, b): (Vec3, Vec3)| (b - a).cross(-a).dot(normal) >= 0.0;

@@ -1,4 +1,4 @@
-//! Conversion of colours to one number.
+//! Conversion of colours to a single number.
 
 use glam::Vec3;
 

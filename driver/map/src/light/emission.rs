@@ -1,4 +1,4 @@
-//! Emission of triangles with an emissive texture: the texture's mean over the triangle.
+//! Emission of triangles with an emissive texture, averaged over the triangle.
 
 use std::sync::OnceLock;
 
@@ -8,10 +8,10 @@ use photoncard_scene::{Image, Material, Scene, Triangle, VertexAttributes};
 use super::footprint::Footprint;
 use super::pyramid::{Level, Pyramid, decode};
 
-/// Maximum distance from its centre at which a texel contributes to bilinear interpolation, texels.
+/// Maximum distance from a texel's centre at which it contributes to bilinear interpolation, texels.
 const REACH: f64 = 1.0;
 
-/// Emissive textures of a scene, for their means over triangles.
+/// Emissive textures of a scene, prepared for averaging over triangles.
 pub(super) struct EmissiveTextures<'s> {
     scene: &'s Scene,
     /// Pyramid of each image, built at its first use.
@@ -23,7 +23,7 @@ impl<'s> EmissiveTextures<'s> {
         Self { scene, pyramids: scene.images.iter().map(|_| OnceLock::new()).collect() }
     }
 
-    /// Mean emitted radiance over a triangle, W/(sr m^2): approximate, but zero only if no texel emits.
+    /// Mean emitted radiance of a triangle, W/(sr m^2). It is approximate, but zero only if no texel emits.
     pub(super) fn mean_radiance(&self, triangle: &Triangle, material: &Material) -> DVec3 {
         let emission = material.emission.as_dvec3();
         let Some(index) = material.emissive_texture else { return emission };
@@ -39,8 +39,8 @@ impl<'s> EmissiveTextures<'s> {
             * if is_seen { mean.value() } else { self.coarse_mean(texture.image as usize, image, &footprint) }
     }
 
-    /// Mean of a texture over a triangle that shows too many texels: of the finest level whose cells are few
-    /// enough, or of the whole image.
+    /// Mean of a texture over a triangle that covers too many texels: from the finest pyramid level with few
+    /// enough cells, or from the whole image.
     fn coarse_mean(&self, index: usize, image: &Image, footprint: &Footprint) -> DVec3 {
         let levels = &self.pyramids[index].get_or_init(|| Pyramid::new(image)).levels;
         for level in levels {
@@ -68,7 +68,7 @@ impl Mean {
         self.weight += weight;
     }
 
-    /// Weighted mean; zero without weight.
+    /// Weighted mean; zero if the weight is zero.
     fn value(&self) -> DVec3 {
         if self.weight > 0.0 { self.sum / self.weight } else { DVec3::ZERO }
     }
@@ -82,12 +82,12 @@ mod tests {
 
     use super::*;
 
-    /// Half a quad with a texture that is black except for the texel `lit`.
+    /// Half a quad whose texture is black except for the texel `lit`.
     fn scene(lit: usize) -> Scene {
         scene_of(64, lit)
     }
 
-    /// [`scene`] with a texture of `side` x `side` texels.
+    /// Variant of [`scene`] with a texture of `side` x `side` texels.
     fn scene_of(side: u32, lit: usize) -> Scene {
         let mut texels = vec![[0, 0, 0, 255]; side as usize * side as usize];
         texels[lit] = [255; 4];
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_texture_repeated_often_is_taken_as_a_whole() {
+    fn a_texture_repeated_often_is_averaged_as_a_whole() {
         let mut scene = scene(40 * 64 + 10);
         scene.textures[0].matrix = [[100.0, 0.0], [0.0, 100.0]];
         assert!((mean(&scene) / (3.0 / 4096.0) - 1.0).abs() < 1e-6);
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_looks_at_few_texels_of_a_texture_of_any_size() {
+    fn a_triangle_visits_few_cells_of_a_texture_of_any_size() {
         let scene = scene(0);
         let footprint = Footprint::new(&Texture::new(0), &scene.attributes[0]);
         for side in [16, 64, 1024, 16_384] {

@@ -1,5 +1,5 @@
-//! Environment in the format of a card: an `RGB9_E5` texture, and a grid of cells that importance-samples its
-//! directions.
+//! Environment light in the format of a card: an `RGB9_E5` texture, and a grid of cells for importance
+//! sampling of directions.
 
 use std::f64::consts::PI;
 
@@ -14,9 +14,10 @@ use super::thresholds::thresholds;
 const MAX_COLUMNS: u32 = 128;
 /// Maximum number of rows of cells.
 const MAX_ROWS: u32 = 64;
-/// Share of the choices that is uniform over the sphere, so that cells with hardly any light are not missed.
+/// Fraction of the choices that is uniform over the sphere, so that cells with hardly any light are sampled
+/// too.
 const EVEN: f64 = 1.0 / 64.0;
-/// Upper bound of the brightest texel after scaling; the format holds up to 65408.
+/// Upper bound of the brightest texel after scaling. The format's maximum is 65408.
 const BRIGHTEST: f32 = 32768.0;
 
 /// Environment map in the format of a card.
@@ -24,31 +25,32 @@ const BRIGHTEST: f32 = 32768.0;
 pub(crate) struct EnvironmentMap {
     /// Width and height of the map, texels.
     size: [u32; 2],
-    /// Texels, rows from the top.
+    /// Texels in rows from the top.
     texels: Vec<[u8; 4]>,
-    /// Radiance of a texel of value 1, W/(sr m^2).
+    /// Radiance of a texel with value 1, W/(sr m^2).
     pub(crate) radiance: [f32; 3],
     /// Cells for importance sampling.
     pub(crate) cells: Cells,
-    /// Fluence rate: integral of the radiance over the sphere, W/m^2, mean of the channels.
+    /// Fluence rate, W/m^2: the integral of the radiance over the sphere, averaged over channels.
     pub(crate) fluence: f64,
-    /// Maximum radiance of any channel of any texel, W/(sr m^2).
+    /// Maximum radiance over all channels and texels, W/(sr m^2).
     pub(crate) brightest: f32,
 }
 
-/// A grid of cells of equal angles, weighted by the light that comes through each.
+/// A grid of cells of equal angles, weighted by the light that comes through each cell.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
     pub(crate) columns: u32,
     pub(crate) rows: u32,
-    /// Weights of the cells, row by row: mean radiance of the channels times solid angle, W/m^2; all above 0.
+    /// Weights of the cells in row-major order, W/m^2: radiance averaged over channels, times solid angle.
+    /// All are above 0.
     pub(crate) weights: Vec<f64>,
-    /// Divided cells, in the order of their numbers.
+    /// Subdivided cells, in the order of their numbers.
     pub(crate) divided: Vec<Parts>,
 }
 
 impl EnvironmentMap {
-    /// The map of an environment; `None` if the environment is black or not finite.
+    /// Map of an environment; `None` if the environment is black or not finite.
     pub(super) fn new(environment: &Environment) -> Option<Self> {
         let scaled;
         let environment = match environment.strength {
@@ -84,7 +86,7 @@ impl EnvironmentMap {
         })
     }
 
-    /// Record of the map's texture, whose texels begin at line `first_line` of their section.
+    /// Record of the map's texture. Its texels begin at line `first_line` of their section.
     pub(crate) fn texture(&self, first_line: u32) -> layout::Texture {
         layout::Texture {
             first_line,
@@ -98,13 +100,12 @@ impl EnvironmentMap {
         }
     }
 
-    /// The texel at a column and a row.
     pub(crate) fn texel(&self, column: u32, row: u32) -> [u8; 4] {
         self.texels[row as usize * self.size[0] as usize + column as usize]
     }
 }
 
-/// Power of two that texels are divided by, so that the brightest is near the maximum of the format.
+/// Power of two by which texels are divided, so that the brightest is near the format's maximum.
 fn scale(brightest: f32) -> f32 {
     // A division by a power of two is exact unless its result is subnormal.
     let exponent = libm::ilogbf(brightest / BRIGHTEST).clamp(-126, 126) + 1;
@@ -112,7 +113,7 @@ fn scale(brightest: f32) -> f32 {
 }
 
 impl Cells {
-    /// The cells of an environment that is not black.
+    /// Cells of an environment that is not black.
     fn new(environment: &Environment) -> Self {
         let Environment { width, height, .. } = *environment;
         let [columns, rows] = [width.min(MAX_COLUMNS), height.min(MAX_ROWS)];
@@ -146,8 +147,8 @@ impl Cells {
         Self { columns, rows, weights, divided }
     }
 
-    /// Thresholds of the rows, then of the cells of each row ([`thresholds`]); and those of the parts of
-    /// divided cells.
+    /// Thresholds of the rows, then of the cells in each row ([`thresholds`]), then of the parts of
+    /// subdivided cells.
     pub(super) fn thresholds(&self) -> Vec<u32> {
         let mut all = of_grid(&self.weights, self.columns);
         if !self.divided.is_empty() {
@@ -158,19 +159,19 @@ impl Cells {
         all
     }
 
-    /// The parts of a cell, if it is divided.
+    /// Parts of a cell; `None` if it is not subdivided.
     pub(crate) fn parts(&self, row: u32, column: u32) -> Option<&Parts> {
         let cell = row * self.columns + column;
         self.divided.binary_search_by_key(&cell, |parts| parts.cell).ok().map(|index| &self.divided[index])
     }
 
-    /// Solid angle of a cell of a row, sr.
+    /// Solid angle of each cell in a row, sr.
     pub(crate) fn solid_angle(&self, row: u32) -> f64 {
         solid_angle_of_row(row, self.rows) / f64::from(self.columns)
     }
 }
 
-/// Thresholds of the rows of a grid, then of the cells of each row.
+/// Thresholds of the rows of a grid, then of the cells in each row.
 fn of_grid(weights: &[f64], columns: u32) -> Vec<u32> {
     let rows = weights.chunks(columns as usize);
     let sums: Vec<f64> = rows.clone().map(|row| row.iter().sum()).collect();
@@ -192,7 +193,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn texels_of_any_brightness_are_held() {
+    fn texels_of_any_brightness_are_stored_accurately() {
         for brightest in [1e-30_f32, 1e-3, 1.0, 3e4, 1e20, f32::MAX] {
             let scaled = brightest / scale(brightest);
             assert!((1.0..=65_408.0).contains(&scaled) || brightest < 1e-29, "{brightest}: {scaled}");
@@ -200,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_weigh_what_comes_through_them() {
+    fn weights_of_cells_are_the_light_through_them() {
         // A bright texel at the border of the map, whose light is spread over both sides.
         let mut texels = vec![[0.0; 3]; 512 * 256];
         texels[100 * 512] = [3.0, 6.0, 9.0];
@@ -237,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn cells_with_a_sun_are_divided_and_others_not() {
+    fn only_cells_with_a_sun_are_subdivided() {
         let found = divided(&sky(1024, |column, row| if (column, row) == (300, 101) { 1e6 } else { 0.0 }));
         let [parts] = &found[..] else { panic!("{} cells are divided", found.len()) };
         assert_eq!(parts.cell, 101 / 8 * 128 + 300 / 8);
@@ -252,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_cells_are_divided_than_the_card_has_room_for() {
+    fn subdivided_cells_do_not_exceed_their_maximum() {
         let found =
             divided(&sky(1024, |column, row| if column % 32 == 4 && row % 32 == 4 { 1e6 } else { 0.0 }));
         assert!(found.len() <= 16 && found.is_sorted_by_key(|parts| parts.cell));

@@ -1,36 +1,38 @@
-//! Divided cells of an environment: those whose light comes through small parts of them, such as a sun of one
-//! texel.
+//! Subdivided cells of an environment: cells whose light comes through small parts of them, such as a sun of
+//! one texel.
 
 use std::f64::consts::PI;
 
 use photoncard_scene::Environment;
 use rayon::prelude::*;
 
-/// Rows and columns of the parts of a cell.
+/// Number of rows and of columns into which a cell is subdivided.
 pub(crate) const SIDE: u32 = 32;
-/// Maximum number of divided cells: their thresholds take 4.2 kB each.
+/// Maximum number of subdivided cells. The thresholds of each take 4.2 kB.
 const MAX_DIVIDED: usize = 16;
-/// Minimum light of a cell that is as bright as its brightest texel, over the light of all: the variance of a
-/// light sample that the cell makes, relative to the square of its mean.
+/// Minimum light of a subdivided cell, if all of it were as bright as its brightest texel, divided by all
+/// light. This ratio is the variance that the cell adds to a light sample, relative to the squared mean.
 const LEAST_VARIANCE: f64 = 1.0 / 16.0;
-/// Minimum of the greatest light of a part, over the mean, of a cell that is divided.
+/// Minimum contrast of a subdivided cell: the light of its brightest part divided by the mean of its parts.
 const LEAST_CONTRAST: f64 = 4.0;
-/// Share of the choices within a cell that is even, so that parts with hardly any light are not missed.
+/// Fraction of the choices within a cell that is uniform, so that parts with hardly any light are sampled
+/// too.
 const EVEN: f64 = 1.0 / 64.0;
 
-/// The parts of a cell, of equal solid angle, weighted by the light that comes through each.
+/// Parts of a cell. They have equal solid angle and are weighted by the light that comes through each.
 #[derive(Clone, Debug)]
 pub(crate) struct Parts {
-    /// Number of the cell, row by row.
+    /// Row-major number of the cell.
     pub(crate) cell: u32,
-    /// Weights, row by row, W/m^2: their sum is that of the cell; all above 0.
+    /// Weights in row-major order, W/m^2. Their sum is the weight of the cell; all are above 0.
     pub(crate) weights: Vec<f64>,
-    /// Greatest mean radiance of the channels found in each part, W/(sr m^2).
+    /// Maximum radiance found in each part, averaged over channels, W/(sr m^2).
     pub(crate) brightest: Vec<f64>,
 }
 
 impl Parts {
-    /// The parts of the cells that are divided, by the weights of all cells, in the order of their numbers.
+    /// Parts of the cells to be subdivided, in the order of the cells' numbers. `weights` are the weights of
+    /// all cells.
     pub(super) fn of_cells(
         environment: &Environment,
         [columns, rows]: [u32; 2],
@@ -62,7 +64,7 @@ impl Parts {
         divided.into_iter().map(|(_, parts)| parts).collect()
     }
 
-    /// The parts of a cell of a weight, and the light of the greatest over the mean.
+    /// Parts of a cell with its weight, and the contrast: the greatest light of a part divided by the mean.
     fn new(environment: &Environment, [columns, rows]: [u32; 2], (cell, weight): (u32, f64)) -> (f64, Self) {
         let [row, column] = [cell / columns, cell % columns];
         let border = |row: u32| libm::cos(PI * f64::from(row) / f64::from(rows));
@@ -98,8 +100,8 @@ impl Parts {
     }
 }
 
-/// Radiance of the brightest texel of each cell, mean of the channels, with the texels that interpolation
-/// brings into it.
+/// Radiance of the brightest texel of each cell, averaged over channels, including texels that interpolation
+/// carries into the cell.
 fn brightest(environment: &Environment, [columns, rows]: [u32; 2]) -> Vec<f64> {
     let Environment { width, height, .. } = *environment;
     let mut brightest = vec![0.0_f64; (columns * rows) as usize];
@@ -119,8 +121,8 @@ fn brightest(environment: &Environment, [columns, rows]: [u32; 2]) -> Vec<f64> {
     brightest
 }
 
-/// Mean radiance of the channels at texture coordinates `(u, v)`, interpolated bilinearly as on a card, W/(sr
-/// m^2).
+/// Radiance at texture coordinates `(u, v)`, averaged over channels and interpolated bilinearly as on a card,
+/// W/(sr m^2).
 pub(super) fn luminance(environment: &Environment, [u, v]: [f64; 2]) -> f64 {
     let [width, height] = [environment.width, environment.height].map(i64::from);
     let [x, y] = [u * width as f64 - 0.5, v * height as f64 - 0.5];

@@ -1,17 +1,18 @@
-//! Footprint of a triangle on its texture: the texels that show on the triangle.
+//! Footprint of a triangle on its texture: the texels that are visible on the triangle.
 
 use photoncard_scene::{Texture, VertexAttributes, Wrap};
 
-/// A triangle in the coordinates of a texture.
+/// A triangle in texture coordinates.
 pub(super) struct Footprint {
     wrap: [Wrap; 2],
-    /// Transformed texture coordinates of the corners: 0 to 1 is the image, from its upper left corner.
+    /// Transformed texture coordinates of the corners. The image extends from 0 to 1, from its upper left
+    /// corner.
     corners: [[f64; 2]; 3],
 }
 
-/// Bound of the coordinates, cells: beyond it rounding blurs neighbouring cells.
+/// Maximum magnitude of coordinates, cells. Above it, rounding blurs neighbouring cells.
 const FARTHEST: f64 = 1e12;
-/// Maximum number of cells of the bounding rectangle of a triangle that is visited cell by cell.
+/// Maximum number of cells in the bounding rectangle of a triangle whose cells are visited individually.
 const MAX_CELLS: f64 = 8192.0;
 
 impl Footprint {
@@ -28,9 +29,9 @@ impl Footprint {
     }
 
     /// Calls `visit` for every cell that contributes to the triangle's surface, with the cell's index and
-    /// whether its centre lies on the triangle; for cells of a repeated image repeatedly. `size` is the
-    /// image's grid, columns and rows; a cell contributes up to `reach` cells from its centre. Returns
-    /// `false`, and visits none, if the cells are too many.
+    /// whether its centre lies on the triangle. A cell of a repeated image is visited repeatedly. `size` is
+    /// the number of columns and rows of the image's grid; a cell contributes up to `reach` cells from its
+    /// centre. Returns false, and visits no cell, if there are too many.
     pub(super) fn for_each_cell(
         &self,
         size: [u32; 2],
@@ -69,8 +70,8 @@ impl Footprint {
     }
 }
 
-/// The interval `[left, right]` that a triangle covers between `top` and `bottom`; `None` if it does not
-/// reach there.
+/// Horizontal interval `[left, right]` that a triangle covers between `top` and `bottom`; `None` if it does
+/// not reach there.
 fn across([a, b, c]: [[f64; 2]; 3], top: f64, bottom: f64) -> Option<[f64; 2]> {
     let mut sides: Option<[f64; 2]> = None;
     let mut include = |x: f64| {
@@ -90,7 +91,7 @@ fn across([a, b, c]: [[f64; 2]; 3], top: f64, bottom: f64) -> Option<[f64; 2]> {
     sides
 }
 
-/// Column or row of the image at a coordinate that may lie beyond the image's borders.
+/// Column or row of the image at a coordinate that can lie beyond the image's borders.
 fn wrapped(place: i64, size: u32, wrap: Wrap) -> u32 {
     let size = i64::from(size);
     let texel = match wrap {
@@ -109,7 +110,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn images_go_on_beyond_their_borders() {
+    fn images_wrap_beyond_their_borders() {
         let all = |wrap: Wrap| [-5, -1, 0, 3, 4, 8].map(|place| wrapped(place, 4, wrap));
         assert_eq!(all(Wrap::Repeat), [3, 3, 0, 3, 0, 0]);
         assert_eq!(all(Wrap::Mirror), [3, 0, 0, 3, 3, 0]);

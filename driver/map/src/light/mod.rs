@@ -1,5 +1,6 @@
-//! Lights of a scene in the format of a card: emissive triangles, points and spots in a light tree, distant
-//! lights, and the environment; with the probabilities of choosing each for shadow rays and for photons.
+//! Lights of a scene in the format of a card. Emissive triangles, point lights and spot lights are in a light
+//! tree; distant lights and the environment are beside it. The module also computes the probabilities with
+//! which shadow rays and photons choose each of them.
 
 mod colour;
 mod emission;
@@ -44,19 +45,20 @@ pub(crate) struct Lights {
     power: f64,
 }
 
-/// Leaf of the light tree: an emissive triangle, a point light or a spot.
+/// Leaf of the light tree: an emissive triangle, a point light or a spot light.
 #[derive(Debug)]
 struct SceneEmitter {
-    /// Index of the triangle in the scene; `usize::MAX` for a light without extent.
+    /// Index of the triangle in the scene; `usize::MAX` for a light without an area.
     triangle: usize,
     record: Emitter,
     bounds: Bounds,
-    /// Power in the strongest channel, watts; an upper bound, with the emissive texture assumed white.
+    /// Power in the strongest channel, watts. It is an upper bound, because the emissive texture is assumed
+    /// to be white.
     strongest: f64,
 }
 
 impl Lights {
-    /// The lights of a scene.
+    /// Collects the lights of a scene.
     pub(crate) fn new(scene: &Scene) -> Self {
         let mut emitters = area_emitters(scene);
         let mut of_triangles = Vec::new();
@@ -108,7 +110,7 @@ impl Lights {
         })
     }
 
-    /// Nodes of the light tree, the root first.
+    /// Nodes of the light tree, from the root.
     pub(crate) fn nodes(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.tree.nodes.iter().copied()
     }
@@ -118,17 +120,17 @@ impl Lights {
         &self.distant
     }
 
-    /// The environment, if any light comes from it.
+    /// The environment; `None` if it emits no light.
     pub(crate) fn environment(&self) -> Option<&EnvironmentMap> {
         self.environment.as_ref()
     }
 
-    /// Thresholds of the environment's cells; none without an environment.
+    /// Thresholds of the environment's cells; empty without an environment.
     pub(crate) fn cell_thresholds(&self) -> Vec<u32> {
         self.environment.as_ref().map_or(Vec::new(), |environment| environment.cells.thresholds())
     }
 
-    /// Lights section of the header; `texture` is the index of the environment's texture.
+    /// Lights in the header of the image. `texture` is the index of the environment's texture.
     pub(crate) fn header(&self, texture: u32) -> image::Lights {
         let environment = self.environment.as_ref();
         let cells = environment.map_or([1; 2], |map| [map.cells.columns, map.cells.rows]);
@@ -143,13 +145,13 @@ impl Lights {
         }
     }
 
-    /// Power of all lights that reaches the scene, watts, mean of the channels.
+    /// Power of all lights that reaches the scene, watts, averaged over channels.
     pub(crate) fn power(&self) -> f64 {
         self.power
     }
 }
 
-/// The emissive triangles of a scene, in its order.
+/// Emissive triangles of a scene, in the scene's order.
 fn area_emitters(scene: &Scene) -> Vec<SceneEmitter> {
     let textures = EmissiveTextures::new(scene);
     let emitter = |(index, triangle): (usize, &Triangle)| {
@@ -220,15 +222,14 @@ impl SceneEmitter {
     }
 }
 
-/// Angular falloff of a spot's intensity: `clamp(cos * scale + offset, 0, 1)^2`.
+/// Angular falloff of a spot light's intensity: `clamp(cos * scale + offset, 0, 1)^2`.
 struct Spot {
     scale: f32,
     offset: f32,
 }
 
 impl Spot {
-    /// The falloff that `KHR_lights_punctual` recommends, between the cosines of the inner and the outer
-    /// cone.
+    /// Falloff recommended by `KHR_lights_punctual`, between the cosines of the inner and the outer cone.
     fn new(inner_cosine: f32, outer_cosine: f32) -> Self {
         let scale = 1.0 / (inner_cosine - outer_cosine).max(0.001);
         Self { scale, offset: -outer_cosine * scale }

@@ -1,37 +1,38 @@
-//! Image pyramids of emissive textures (Williams, "Pyramidal Parametrics", 1983): the mean over many texels
-//! as the mean over few cells.
+//! Image pyramids of emissive textures (Williams, "Pyramidal Parametrics", 1983). The mean over many texels
+//! is approximated by the mean over few cells.
 
 use glam::Vec3;
 use photoncard_firmware::scene::decode_texel;
 use photoncard_scene::{Encoding, Image};
 
-/// Cells of a level, along each axis, that become one cell of the next level.
+/// Number of cells along each axis that are combined to one cell of the next level.
 const STEP: u32 = 4;
 
-/// Image at several resolutions coarser than its own.
+/// Image at several resolutions below its own.
 pub(super) struct Pyramid {
-    /// Levels from fine to coarse; the last is one cell.
+    /// Levels from fine to coarse. The last level is one cell.
     pub(super) levels: Vec<Level>,
 }
 
-/// Means of an image over a grid of cells of about equal size.
+/// Means of an image over the cells of a grid. The cells have about equal size.
 pub(super) struct Level {
     /// Number of columns and of rows.
     pub(super) size: [u32; 2],
-    /// Linear RGB of the cells, rows from the top.
+    /// Linear RGB of the cells, in rows from the top.
     pub(super) cells: Vec<Vec3>,
 }
 
 impl Level {
-    /// Maximum distance from its centre at which a cell contributes, cells. Interpolation carries a texel at
-    /// the border half a texel farther; and where [`STEP`] does not divide a side, a cell has the whole cells
-    /// of the finer level that begin in it, which reach beyond its border by up to 0.67 cells.
+    /// Maximum distance from a cell's centre at which it contributes, cells. Interpolation carries a texel at
+    /// the border half a texel farther. If [`STEP`] does not divide a side, a cell contains the whole cells
+    /// of the finer level that begin in it, which extend beyond its border by up to 0.67 cells.
     pub(super) const REACH: f64 = 1.5;
-    /// Weight of a cell whose centre is not on the triangle: small, but not 0, as it may be the only one that
-    /// emits.
+    /// Weight of a cell whose centre is not on the triangle. It is small, but not 0, because the cell may be
+    /// the only one that emits.
     pub(super) const OUTSIDE: f64 = 1.0 / 16.0;
 
-    /// Level above a finer grid of `finer_size` columns and rows; `finer` returns the grid's cells by index.
+    /// Level above a finer grid of `finer_size` columns and rows. `finer` returns a cell of that grid by
+    /// index.
     fn new(finer_size: [u32; 2], finer: impl Fn(usize) -> Vec3) -> Self {
         let size = finer_size.map(|side| side.div_ceil(STEP));
         let range = |axis: usize, cell: u32| {
@@ -56,7 +57,7 @@ impl Level {
 }
 
 impl Pyramid {
-    /// The pyramid of an image.
+    /// Builds the pyramid of an image.
     pub(super) fn new(image: &Image) -> Self {
         let texel = |index: usize| decode(image.encoding, image.texels[index]);
         let mut levels = vec![Level::new([image.width, image.height], texel)];
@@ -69,7 +70,7 @@ impl Pyramid {
     }
 }
 
-/// The linear RGB of a texel.
+/// Decodes a texel to linear RGB.
 pub(super) fn decode(encoding: Encoding, texel: [u8; 4]) -> Vec3 {
     let [red, green, blue, _] = decode_texel(encoding.into(), texel);
     Vec3::new(red, green, blue)

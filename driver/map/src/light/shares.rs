@@ -1,4 +1,4 @@
-//! Probabilities of light samples for emitters, the environment and distant lights.
+//! Probabilities with which light samples choose emitters, the environment, and distant lights.
 
 use glam::{DVec3, Vec3};
 use photoncard_scene::Scene;
@@ -6,8 +6,8 @@ use photoncard_shared::layout::DistantLight;
 
 use super::{EnvironmentMap, mean};
 
-/// Probabilities of choosing the emitters, the environment or the distant lights: their sum is exactly 1, or
-/// each is 0.
+/// Probabilities of choosing the emitters, the environment, or the distant lights. Their sum is exactly 1, or
+/// all are 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shares {
     pub(super) emitters: f32,
@@ -15,13 +15,13 @@ pub(super) struct Shares {
     pub(super) distant: f32,
 }
 
-/// Denominator of the shares, a power of two, so that their sums are exact in `f32`.
+/// Denominator of the shares. It is a power of two, so that their sums are exact in `f32`.
 const PARTS: f64 = 65536.0;
 
 impl Shares {
-    /// Shares `0.5 power / total + 0.5 / kinds`, over the kinds that have power: half of the samples do not
-    /// follow power, since lights that are strong for the whole scene may be hidden from most of what is
-    /// seen.
+    /// Computes the shares `0.5 power / total + 0.5 / kinds`, where `kinds` is the number of kinds with any
+    /// power. Half of the samples do not follow power, because lights that are strong for the whole scene may
+    /// be hidden from most of what is visible.
     pub(super) fn new(powers: [f64; 3]) -> Self {
         let total: f64 = powers.iter().sum();
         let kinds = powers.iter().filter(|&&power| power > 0.0).count() as f64;
@@ -41,7 +41,8 @@ impl Shares {
     }
 }
 
-/// Powers of emitters, the environment and distant lights that enter the bounding box of a scene, watts.
+/// Power that enters the scene's bounding box from emitters, from the environment and from distant lights,
+/// watts.
 pub(super) fn powers(
     scene: &Scene,
     emitters: f64,
@@ -59,7 +60,7 @@ pub(super) fn powers(
     [emitters, environment, distant.sum()]
 }
 
-/// Projected area of a box of a size along a direction, m^2.
+/// Projected area of a box of size `size` along a direction, m^2.
 pub(super) fn projected_area(size: DVec3, direction: DVec3) -> f64 {
     let DVec3 { x, y, z } = direction.abs();
     x * size.y * size.z + y * size.z * size.x + z * size.x * size.y
@@ -90,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn a_box_shows_a_quarter_of_its_surface_on_a_mean() {
+    fn the_mean_projected_area_of_a_box_is_a_quarter_of_its_surface() {
         let size = DVec3::new(1.0, 2.0, 3.0);
         let mut sum = 0.0;
         for i in 0..200 {

@@ -16,40 +16,40 @@ use super::{Lights, mean};
 /// A source of photons.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Source {
-    /// An emitter, by its index.
+    /// The emitter with this index.
     Emitter(u32),
     /// A distant light.
     Distant {
-        /// Unit vector in which light travels.
+        /// Unit vector along which the light travels.
         direction: Vec3,
         /// Irradiance of a surface that faces the light, W/m^2.
         irradiance: Vec3,
     },
-    /// A cell of the environment, from column 0, row 0 at the upper left.
+    /// A cell of the environment. Columns and rows are counted from the upper left.
     Cell {
-        /// Left border and width of the cell, as fractions of the map's width.
+        /// Left border and width of the cell as fractions of the map's width.
         across: [f32; 2],
-        /// Cosines of the polar angles, from +y, of the cell's upper and lower border.
+        /// Cosines of the polar angles of the cell's upper and lower border, measured from +y.
         cosines: [f32; 2],
         /// Solid angle of the cell, sr.
         solid_angle: f32,
     },
 }
 
-/// All sources of a scene, with the probabilities of choosing them.
+/// All sources of a scene, and the probabilities of choosing them.
 #[derive(Clone, Debug)]
 pub(crate) struct Sources {
     list: Vec<Source>,
     thresholds: Vec<u32>,
-    /// Lower and upper corner of the box that light from infinitely far enters through, a little larger than
-    /// the scene's bounds.
+    /// Lower and upper corner of the box through which infinitely distant light enters. It is slightly larger
+    /// than the scene's bounds.
     pub(crate) bounds: [Vec3; 2],
-    /// Targets that photons are aimed at; empty if they are not aimed.
+    /// Targets at which photons are aimed; empty if photons are not aimed.
     pub(crate) targets: Targets,
-    /// Power of all sources, watts, mean of the channels; 0 if photons may be aimed.
+    /// Power of all sources, watts, averaged over channels; 0 if photons can be aimed.
     pub(crate) power: f64,
-    /// Maximum over the sources of power in the strongest channel over probability, watts: the unit of
-    /// photons' powers is derived from it. A photon that is not aimed may be stronger, where photons are.
+    /// Maximum over the sources of the power in the strongest channel divided by the probability, watts. The
+    /// unit of photon powers is derived from it. If some photons are aimed, the others can be stronger.
     pub(crate) strongest: f32,
 }
 
@@ -62,32 +62,32 @@ pub(crate) struct ChosenSource {
     pub(crate) rest: f32,
 }
 
-/// Minimum share of an emitter's light that is assumed to go towards the targets.
+/// Minimum fraction of an emitter's light that is assumed to go towards the targets.
 const MIN_AIMED_SHARE: f64 = 1e-3;
-/// Margin of the box beyond the scene's bounds, relative to the longest side or a tenth of the maximum
+/// Margin of the box beyond the scene's bounds, relative to the longest side or to a tenth of the maximum
 /// coordinate, whichever is larger.
 const MARGIN: f32 = 1e-4;
 
 impl Sources {
-    /// The sources of a scene, for photons in all directions.
+    /// Sources of a scene whose photons are emitted in all directions.
     pub(crate) fn new(scene: &Scene, lights: &Lights) -> Self {
         Self::towards(scene, lights, Targets::default())
     }
 
-    /// The sources of a scene, for photons that are aimed at specular surfaces; `None` if there are none.
+    /// Sources of a scene whose photons are aimed at specular surfaces; `None` if there are no such surfaces.
     pub(crate) fn of_caustics(scene: &Scene, lights: &Lights) -> Option<Self> {
         let targets = Targets::specular(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
     }
 
-    /// The sources of a scene, for photons in all directions, most of them aimed at surfaces that are no
-    /// lamps: the lights may be far from these. `None` if there are none.
+    /// Sources of a scene most of whose photons are aimed at surfaces that are not lamps, because the lights
+    /// may be far from them; `None` if there are no such surfaces.
     pub(crate) fn aimed(scene: &Scene, lights: &Lights) -> Option<Self> {
         let targets = Targets::lit(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
     }
 
-    /// These sources with photons aimed at other targets as well as in all directions.
+    /// Variant of these sources whose photons are partly aimed at other targets.
     pub(crate) fn aimed_at(&self, targets: Targets) -> Self {
         let strongest = self.strongest / (1.0 - targets.share);
         Self { targets, strongest, power: 0.0, ..self.clone() }
@@ -127,7 +127,7 @@ impl Sources {
         }
     }
 
-    /// Source at `number / 2^64` of the cumulative distribution; `None` if there are no sources.
+    /// Chooses the source at `number / 2^64` of the cumulative distribution; `None` if there are no sources.
     pub(crate) fn choose(&self, number: u64) -> Option<ChosenSource> {
         let target = (number >> 32) as u32;
         let index = self.thresholds.partition_point(|&threshold| threshold < target);
@@ -143,14 +143,15 @@ impl Sources {
     }
 }
 
-/// Approximate share of an emitter's light that goes towards the targets: their solid angle at the emitter's
-/// centre over `4 pi`, and at least [`MIN_AIMED_SHARE`], as other points of the emitter may see more of them.
+/// Approximate fraction of an emitter's light that goes towards the targets: the solid angle of the targets
+/// at the emitter's centre over `4 pi`. It is at least [`MIN_AIMED_SHARE`], because other points of the
+/// emitter may see more of the targets.
 fn aimed_share(targets: &Targets, corners: &[DVec3]) -> f64 {
     let middle = corners.iter().sum::<DVec3>() / corners.len().max(1) as f64;
     (f64::from(targets.solid_angle(middle.as_vec3())) / (4.0 * PI)).clamp(MIN_AIMED_SHARE, 1.0)
 }
 
-/// Lower and upper threshold of a source, of 2^32.
+/// Lower and upper threshold of a source, in units of 2^-32.
 fn share(thresholds: &[u32], index: usize) -> (u32, u32) {
     let lower = index.checked_sub(1).map_or(0, |before| thresholds[before]);
     (lower, thresholds[index])
@@ -162,7 +163,7 @@ fn enlarged((lower, upper): (Vec3, Vec3)) -> [Vec3; 2] {
     [lower - margin, upper + margin]
 }
 
-/// Sources with their powers and their powers in the strongest channel, watts, as they are collected.
+/// Sources being collected, with their powers and their powers in the strongest channel, watts.
 #[derive(Default)]
 struct AllSources {
     list: Vec<Source>,
@@ -177,7 +178,7 @@ impl AllSources {
         self.strongest.push(strongest);
     }
 
-    /// Adds the cells of the environment. `shown(direction)` is the area that a cell's light passes through;
+    /// Adds the cells of the environment. `shown(direction)` is the area through which a cell's light passes;
     /// `same` is this area if it is equal for all directions.
     fn add_cells(&mut self, lights: &Lights, shown: impl Fn(DVec3) -> f64, same: Option<f64>, size: DVec3) {
         let Some(map) = lights.environment() else { return };
@@ -211,7 +212,7 @@ impl AllSources {
         }
     }
 
-    /// Adds the parts of a divided cell, as [`Self::add_cells`].
+    /// Adds the parts of a subdivided cell, like [`Self::add_cells`].
     fn add_parts(
         &mut self,
         cells: &Cells,
@@ -245,7 +246,7 @@ mod tests {
     use photoncard_scene::{Environment, PunctualKind, PunctualLight};
 
     #[test]
-    fn numbers_find_each_source_by_its_power() {
+    fn sources_are_chosen_in_proportion_to_their_power() {
         let light = |intensity: f32| PunctualLight {
             name: "lamp".into(),
             kind: PunctualKind::Point { position: Vec3::ZERO },

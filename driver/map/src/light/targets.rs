@@ -1,8 +1,8 @@
-//! Targets of photons: spheres around some of a scene's surfaces.
+//! Targets at which photons are aimed: spheres around some of a scene's surfaces.
 //!
-//! A sphere is chosen in proportion to the solid angle that it subtends, and a direction uniformly within
-//! this angle. Where spheres overlap, a direction may be chosen through any of them: its density is the
-//! number of spheres in this direction over the sum of the solid angles of all spheres.
+//! A sphere is chosen in proportion to the solid angle that it subtends, and then a direction uniformly
+//! within this angle. Where spheres overlap, a direction can be chosen through any of them: its density is
+//! the number of spheres in this direction divided by the sum of the solid angles of all spheres.
 
 use std::f32::consts::PI;
 
@@ -13,7 +13,7 @@ use photoncard_scene::{Material, Scene};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Sphere {
     centre: Vec3,
-    /// Metres.
+    /// Radius, metres.
     radius: f32,
 }
 
@@ -21,38 +21,40 @@ pub(crate) struct Sphere {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Targets {
     spheres: Vec<Sphere>,
-    /// Probability of aiming at a sphere; other photons are emitted in all directions.
+    /// Probability of aiming a photon at a sphere. Other photons are emitted in all directions.
     pub(crate) share: f32,
 }
 
-/// A sampled direction or point, with the inverse of its density.
+/// A sampled direction or point, and the inverse of its density.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Aim {
-    /// The direction, a unit vector, or the point, metres.
+    /// Unit vector of the direction, or position of the point, metres.
     pub(crate) towards: Vec3,
     /// Inverse of the density: sr for directions, m^2 for points.
     pub(crate) measure: f32,
 }
 
-/// Share of the aimed photons where photons may be needed elsewhere as well.
+/// Fraction of the photons that are aimed, where photons may be needed elsewhere too.
 const AIMED_SHARE: f32 = 0.9;
-/// Share of the photons that are aimed at boxes.
+/// Fraction of the photons that are aimed at boxes.
 const BOX_SHARE: f32 = 0.5;
-/// Minimum emission of a lamp over the greatest emission.
+/// Minimum emission of a lamp, relative to the greatest emission in the scene.
 const LAMP_SHARE: f32 = 0.01;
 /// Maximum number of spheres.
 const MAX_SPHERES: usize = 32;
-/// Margin of a sphere for rounding: relative to its radius; its square relative to the maximum coordinate.
+/// Margin of a sphere for rounding. It applies to the radius, relatively, and to the square of the radius,
+/// relative to the maximum coordinate.
 const MARGIN: f32 = 1e-3;
 
 impl Targets {
-    /// All surfaces of a scene that reflect or transmit specularly: all caustic photons meet one.
+    /// Targets around all surfaces of a scene that reflect or transmit specularly. Every caustic photon hits
+    /// one of them.
     pub(super) fn specular(scene: &Scene) -> Self {
         Self::around(scene, &scene.specular_materials(), 1.0)
     }
 
-    /// All surfaces of a scene but lamps, that is uniform emitters of at least [`LAMP_SHARE`] of the greatest
-    /// emission: what these reflect of other light hardly shows.
+    /// Targets around all surfaces of a scene except lamps, whose reflection of other light is hardly
+    /// visible. Lamps are uniform emitters with at least [`LAMP_SHARE`] of the greatest emission.
     pub(super) fn lit(scene: &Scene) -> Self {
         let emission = |material: &Material| material.emission.max_element();
         let greatest = scene.materials.iter().map(emission).fold(0.0, f32::max);
@@ -63,18 +65,18 @@ impl Targets {
         Self::around(scene, &is_lit, AIMED_SHARE)
     }
 
-    /// Surfaces of the chosen materials.
+    /// Targets around the surfaces of the chosen materials.
     fn around(scene: &Scene, is_chosen: &[bool], share: f32) -> Self {
         let triangles = scene.triangles.iter().filter(|triangle| is_chosen[triangle.material as usize]);
         Self::holding(triangles.map(|triangle| triangle.vertices).collect(), share)
     }
 
-    /// Boxes, by their lower and upper corners; half of the photons are aimed at them.
+    /// Targets around boxes, given by their lower and upper corners. Half of the photons are aimed at them.
     pub(crate) fn boxes(boxes: impl IntoIterator<Item = [Vec3; 2]>) -> Self {
         Self::holding(boxes.into_iter().map(|[lower, upper]| [lower, upper, lower]).collect(), BOX_SHARE)
     }
 
-    /// Spheres that hold all of the triangles.
+    /// Targets around all of the triangles.
     fn holding(all: Vec<[Vec3; 3]>, share: f32) -> Self {
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
         while parts.len() < MAX_SPHERES {
@@ -99,13 +101,13 @@ impl Targets {
         self.spheres.is_empty()
     }
 
-    /// Sum of the solid angles that the spheres subtend at a point, sr; overlaps count repeatedly.
+    /// Sum of the solid angles that the spheres subtend at a point, sr. Overlaps count repeatedly.
     pub(super) fn solid_angle(&self, from: Vec3) -> f32 {
         self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()).sum()
     }
 
-    /// Chooses by a number in [0, 1) whether to aim at a sphere. The remainder of the number is rescaled to
-    /// [0, 1).
+    /// Decides by a number in [0, 1) whether to aim at a sphere. Also returns the remainder of the number,
+    /// rescaled to [0, 1).
     pub(crate) fn is_aimed(&self, number: f32) -> (bool, f32) {
         if number < self.share {
             (true, number / self.share)
@@ -114,33 +116,34 @@ impl Targets {
         }
     }
 
-    /// Density of the direction or the place of a photon that is aimed with the probability [`Self::share`];
-    /// `aimed` and `free` are the densities with and without an aim.
+    /// Density of a photon's direction or position if it is aimed with the probability [`Self::share`].
+    /// `aimed` and `free` are the densities of aimed and of other photons.
     pub(crate) fn mixed(&self, aimed: f32, free: f32) -> f32 {
         self.share * aimed + (1.0 - self.share) * free
     }
 
-    /// Density of a direction from a point by [`Self::direction`], 1/sr.
+    /// Density with which [`Self::direction`] samples a direction from a point, 1/sr.
     pub(crate) fn direction_density(&self, from: Vec3, towards: Vec3) -> f32 {
         let all = self.solid_angle(from);
         let covering = self.spheres.iter().filter(|sphere| sphere.cone(from).holds(towards)).count();
         if all > 0.0 { covering as f32 / all } else { 0.0 }
     }
 
-    /// Density of a line of a direction by [`Self::place`], 1/m^2: `place` is a point of it.
+    /// Density with which [`Self::place`] samples the line with this direction through the point `place`,
+    /// 1/m^2.
     pub(crate) fn place_density(&self, direction: Vec3, place: Vec3) -> f32 {
         let all = self.area();
         let covering = self.spheres.iter().filter(|sphere| sphere.is_met(place, direction)).count();
         if all > 0.0 { covering as f32 / all } else { 0.0 }
     }
 
-    /// Sum of the projected areas of the spheres, `pi r^2`, m^2; overlaps count repeatedly.
+    /// Sum of the projected areas `pi r^2` of the spheres, m^2. Overlaps count repeatedly.
     pub(super) fn area(&self) -> f32 {
         self.spheres.iter().map(Sphere::disc_area).sum()
     }
 
-    /// Samples a direction from a point through a sphere by a point of the unit square. `None` without
-    /// spheres.
+    /// Samples a direction from a point through a sphere, by a point of the unit square; `None` if there are
+    /// no spheres.
     pub(crate) fn direction(&self, from: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.solid_angle(from);
         let (index, c) = choose(c, all, self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()))?;
@@ -150,8 +153,9 @@ impl Targets {
         Some(Aim { towards, measure: all / (1 + covering) as f32 })
     }
 
-    /// Samples a line of a direction through a sphere by a point of the unit square: its point in the plane
-    /// through the origin that is normal to the direction. `None` without spheres.
+    /// Samples a line with a given direction through a sphere, by a point of the unit square. Returns the
+    /// line's point in the plane through the origin perpendicular to the direction; `None` if there are no
+    /// spheres.
     pub(crate) fn place(&self, direction: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.area();
         let (index, c) = choose(c, all, self.spheres.iter().map(Sphere::disc_area))?;
@@ -166,8 +170,8 @@ impl Targets {
     }
 }
 
-/// Index of the share of `all` that a number in [0, 1) falls in, and the remainder of the number, rescaled to
-/// [0, 1).
+/// Chooses one of `shares`, whose sum is `all`, by a number in [0, 1). Returns its index and the remainder of
+/// the number, rescaled to [0, 1).
 fn choose(number: f32, all: f32, shares: impl Iterator<Item = f32>) -> Option<(usize, f32)> {
     let mut left = number * all;
     let mut last = None;
@@ -186,12 +190,12 @@ fn choose(number: f32, all: f32, shares: impl Iterator<Item = f32>) -> Option<(u
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolidCone {
     pub(crate) axis: Vec3,
-    /// `1 - cos` of the angle, 0 to 2.
+    /// Value `1 - cos` of the angle, 0 to 2.
     pub(crate) height: f32,
 }
 
 impl SolidCone {
-    /// All directions.
+    /// Cone of all directions.
     pub(crate) const ALL: Self = Self { axis: Vec3::Z, height: 2.0 };
 
     /// Solid angle, `2 pi (1 - cos)`, sr.
@@ -215,7 +219,7 @@ impl SolidCone {
 }
 
 impl Sphere {
-    /// Cone of directions from a point to the sphere; all directions from within.
+    /// Cone of directions from a point to the sphere. From a point inside, all directions.
     fn cone(&self, from: Vec3) -> SolidCone {
         let way = self.centre - from;
         let sine_squared = self.radius * self.radius / way.length_squared();
@@ -228,7 +232,7 @@ impl Sphere {
         }
     }
 
-    /// Returns whether the line of a direction through a point meets the sphere.
+    /// Returns whether the line with direction `direction` through `place` hits the sphere.
     fn is_met(&self, place: Vec3, direction: Vec3) -> bool {
         (place - self.centre).reject_from_normalized(direction).length_squared() < self.radius * self.radius
     }
@@ -238,7 +242,7 @@ impl Sphere {
     }
 }
 
-/// Some triangles with their bounding sphere.
+/// Some triangles and their bounding sphere.
 struct Part {
     triangles: Vec<[Vec3; 3]>,
     sphere: Sphere,
@@ -257,7 +261,7 @@ impl Part {
         Some(Self { triangles, sphere: Sphere { centre, radius }, may_be_split })
     }
 
-    /// Two halves of the part along its longest axis, if their spheres have less projected area together than
+    /// Halves the part along its longest axis, if the halves' spheres together have less projected area than
     /// its own.
     fn split(&self) -> Option<[Self; 2]> {
         let middle = |[a, b, c]: &[Vec3; 3]| (a + b + c) / 3.0;
@@ -322,7 +326,7 @@ mod tests {
     }
 
     #[test]
-    fn the_mean_of_the_measures_is_the_area_that_the_spheres_show_from_afar() {
+    fn the_mean_of_the_measures_is_the_projected_area_of_the_spheres() {
         let targets = targets();
         let count = 100_000;
         let aims = (0..count).filter_map(|i| targets.place(Vec3::Z, [random(i, 0), random(i, 1)]));
@@ -336,7 +340,7 @@ mod tests {
     }
 
     #[test]
-    fn a_row_of_mirrors_has_spheres_of_its_own_parts() {
+    fn a_row_of_mirrors_is_covered_by_several_spheres() {
         let mirror = photoncard_scene::Material::new(
             "mirror",
             photoncard_scene::Reflection::MetallicRoughness {

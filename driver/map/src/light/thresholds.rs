@@ -1,10 +1,10 @@
-//! Discrete distributions in integers: cumulative shares of 2^32 in proportion to weights.
+//! Discrete distributions in integers: cumulative shares of 2^32, in proportion to weights.
 
-/// The sum of all shares, 2^32.
+/// Sum of all shares: 2^32.
 pub(super) const ALL: f64 = 4_294_967_296.0;
 
-/// Cumulative shares of 2^32 in proportion to weights. Each share is at least 1, so that every index can be
-/// chosen; the last threshold is 2^32 - 1. If all weights are 0 the shares are equal.
+/// Computes cumulative shares of 2^32 in proportion to weights. Each share is at least 1, so that every index
+/// can be chosen. The last threshold is 2^32 - 1. If all weights are 0, the shares are equal.
 pub(crate) fn thresholds(weights: &[f64]) -> Vec<u32> {
     let total: f64 = weights.iter().sum();
     let spare = ALL - 1.0 - weights.len() as f64;
@@ -37,7 +37,7 @@ mod tests {
     }
 
     #[test]
-    fn without_weight_all_are_alike() {
+    fn shares_without_weights_are_equal() {
         let shares = thresholds(&[0.0; 4]);
         assert_eq!(shares.iter().map(|share| (share >> 24) + 1).collect::<Vec<_>>(), [64, 128, 192, 256]);
     }

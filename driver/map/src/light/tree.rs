@@ -1,10 +1,10 @@
-//! Construction of the light tree: a hierarchy of emitters with bounds of their positions, their directions
-//! and their power.
+//! Construction of the light tree: a hierarchy of emitters with bounds of their positions, directions and
+//! power.
 //!
 //! Emitters are split in two by the surface area orientation heuristic (Conty Estevez, Kulla 2018,
 //! *Importance sampling of many lights with adaptive tree splitting*), in bins along each axis, and each half
-//! again: a node has four children. A split that would make the tree deeper than a trail can encode is
-//! replaced by a split at the median.
+//! is split again, so that a node has four children. A split that would make the tree deeper than a bit trail
+//! can encode is replaced by a median split.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -12,36 +12,36 @@ use glam::DVec3;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::layout::{LIGHT_CHILDREN, LIGHT_TREE_LEVELS, LightChild, LightLink, LightNode};
 
-/// Bounds and power of an emitter.
+/// Bounds and power of one emitter.
 #[derive(Clone, Debug)]
 pub(super) struct Bounds {
-    /// Corners of a triangle, or a point, metres.
+    /// Corners of a triangle, or position of a point or spot light, metres.
     pub(super) corners: Vec<DVec3>,
-    /// Bounding cone of the normals that the emitter emits about.
+    /// Bounding cone of the emission normals.
     pub(super) cone: Cone,
-    /// Power, watts, mean of the channels.
+    /// Power averaged over channels, watts.
     pub(super) power: f64,
 }
 
 /// A light tree in the records of a card.
 #[derive(Debug, Default)]
 pub(super) struct LightTree {
-    /// Nodes, the root first; none without emitters.
+    /// Nodes, from the root; empty without emitters.
     pub(super) nodes: Vec<[u8; LINE_BYTES]>,
-    /// Trail to each emitter: the number of the child on each level, two bits each, the root's in the lowest
-    /// bits.
+    /// Bit trail of each emitter: the index of the child at each level, two bits each, the root's in the
+    /// lowest bits.
     pub(super) trails: Vec<u32>,
 }
 
-/// Bins of a split along each axis.
+/// Number of bins along each axis in which splits are evaluated.
 const BINS: usize = 12;
-/// Margin of a cone's angle for the rounding of its axis and cosine, radians.
+/// Margin of a cone's angle, radians, for rounding of its axis and cosine.
 const CONE_MARGIN: f64 = 5e-4;
 /// Margin of a sphere's radius for rounding, relative to the maximum coordinate.
 const SPHERE_MARGIN: f64 = 1e-6;
 
 impl LightTree {
-    /// The tree of some emitters.
+    /// Builds the tree of emitters.
     pub(super) fn new(emitters: &[Bounds]) -> Self {
         let mut tree = Self { nodes: Vec::new(), trails: vec![0; emitters.len()] };
         let mut order: Vec<u32> = (0..emitters.len() as u32).collect();
@@ -51,7 +51,8 @@ impl LightTree {
         tree
     }
 
-    /// Appends the node of some emitters, on a level and reached by a trail. Returns the node's index.
+    /// Appends the node of the emitters in `order`, at a level, reached by a bit trail. Returns the node's
+    /// index.
     fn node(&mut self, emitters: &[Bounds], order: &mut [u32], level: usize, trail: u32) -> u32 {
         let index = self.nodes.len();
         self.nodes.push([0; LINE_BYTES]);
@@ -76,12 +77,12 @@ impl LightTree {
     }
 }
 
-/// Maximum number of emitters in a tree of `levels` levels.
+/// Maximum number of emitters in a tree with `levels` levels.
 fn capacity(levels: usize) -> usize {
     LIGHT_CHILDREN.saturating_pow(levels as u32)
 }
 
-/// Splits some emitters into up to four parts of at most `most`.
+/// Splits emitters into up to four parts of at most `most` each.
 fn quarters<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mut [u32]; LIGHT_CHILDREN] {
     let [left, right] = halves(emitters, order, most.saturating_mul(2));
     let [a, b] = halves(emitters, left, most);
@@ -89,7 +90,7 @@ fn quarters<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o 
     [a, b, c, d]
 }
 
-/// Splits some emitters into two parts of at most `most`.
+/// Splits emitters into two parts of at most `most` each.
 fn halves<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mut [u32]; 2] {
     if order.len() < 2 {
         let middle = order.len();
@@ -125,7 +126,7 @@ impl Bounds {
     }
 }
 
-/// Split along an axis: bins up to and including `last` are on the lower side.
+/// Split along an axis. Bins up to and including `last` are on the lower side.
 struct Split {
     axis: usize,
     lower: f64,
@@ -134,7 +135,7 @@ struct Split {
 }
 
 impl Split {
-    /// The split of minimum cost; `None` if the centres of all emitters coincide.
+    /// Split of minimum cost; `None` if the centres of all emitters coincide.
     fn best(emitters: &[Bounds], order: &[u32]) -> Option<Self> {
         let middles = || order.iter().map(|&emitter| emitters[emitter as usize].middle());
         let lower = middles().reduce(DVec3::min)?;
@@ -174,20 +175,20 @@ impl Split {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Cone {
     axis: DVec3,
-    /// Radians, up to pi.
+    /// Angle, radians, up to pi.
     angle: f64,
 }
 
 impl Cone {
-    /// All directions.
+    /// Cone of all directions.
     pub(super) const ALL: Self = Self { axis: DVec3::Y, angle: PI };
 
-    /// The directions within an angle, radians, of a unit vector.
+    /// Cone of the directions within an angle, radians, of a unit vector.
     pub(super) fn new(axis: DVec3, angle: f64) -> Self {
         Self { axis, angle }
     }
 
-    /// Smallest cone that contains both, except for rounding.
+    /// Smallest cone that contains both cones, except for rounding.
     fn union(self, other: Self) -> Self {
         let [wide, narrow] = if self.angle >= other.angle { [self, other] } else { [other, self] };
         let between = libm::acos(wide.axis.dot(narrow.axis).clamp(-1.0, 1.0));
@@ -204,8 +205,8 @@ impl Cone {
         Self { axis, angle }
     }
 
-    /// The orientation measure `M_Omega` of Conty Estevez and Kulla, for Lambertian emission (`theta_e = pi /
-    /// 2`): the solid angle of the emitted directions, weighted by the cosine beyond the cone of normals.
+    /// Orientation measure `M_Omega` of Conty Estevez and Kulla for Lambertian emission (`theta_e = pi / 2`):
+    /// the solid angle of the emitted directions, weighted by the cosine beyond the cone of normals.
     fn measure(self) -> f64 {
         let reach = (self.angle + FRAC_PI_2).min(PI);
         let (sin, cos) = libm::sincos(self.angle);
@@ -221,7 +222,7 @@ struct Summary {
     count: usize,
     lower: DVec3,
     upper: DVec3,
-    /// Maximum distance of a corner from the box's centre, metres; computed by [`Self::new`] alone, 0 in
+    /// Maximum distance of a corner from the box's centre, metres. Only [`Self::new`] computes it; it is 0 in
     /// partial summaries.
     radius: f64,
     cone: Cone,
@@ -243,7 +244,7 @@ impl Summary {
         Self { count: 1, lower, upper, radius: 0.0, cone: bounds.cone, power: bounds.power }
     }
 
-    /// The summary of some emitters, radius included.
+    /// Summary of emitters, including the radius.
     fn new(emitters: &[Bounds], order: &[u32]) -> Self {
         let each = || order.iter().map(|&emitter| &emitters[emitter as usize]);
         let mut summary = each().fold(Self::NONE, |sum, bounds| sum.union(&Self::of(bounds)));
@@ -281,7 +282,7 @@ impl Summary {
         self.power * self.cone.measure() * area
     }
 
-    /// Record of the emitters as a child of a node of `power` watts.
+    /// Record of the emitters as a child of a node with `power` watts.
     fn child(&self, power: f64, link: LightLink) -> LightChild {
         let middle = self.middle();
         let greatest = self.lower.abs().max(self.upper.abs()).max_element();
@@ -319,7 +320,7 @@ mod tests {
         (0..count).map(triangle).collect()
     }
 
-    /// Follows the trail of an emitter; `check` is called for every child on it. Returns the number of
+    /// Follows the bit trail of an emitter and calls `check` for every child on it. Returns the number of
     /// levels.
     fn follow(tree: &LightTree, emitter: u32, check: &mut dyn FnMut(&LightChild)) -> usize {
         let (mut node, mut trail) = (0, tree.trails[emitter as usize]);
@@ -340,7 +341,7 @@ mod tests {
     }
 
     #[test]
-    fn every_trail_leads_to_its_emitter_through_bounds_that_hold_it() {
+    fn every_trail_leads_to_its_emitter_through_bounds_that_contain_it() {
         let emitters = triangles(3000);
         let tree = LightTree::new(&emitters);
         for (index, bounds) in (0..).zip(&emitters) {
@@ -361,7 +362,7 @@ mod tests {
     }
 
     #[test]
-    fn the_children_of_a_node_share_all_of_its_power() {
+    fn shares_of_the_children_of_a_node_sum_to_one() {
         let tree = LightTree::new(&triangles(500));
         for line in &tree.nodes {
             let children = (0..LIGHT_CHILDREN).filter_map(|index| LightNode(line).child(index));
@@ -371,7 +372,7 @@ mod tests {
     }
 
     #[test]
-    fn no_trail_is_too_long_where_splits_would_be_uneven() {
+    fn trails_fit_where_splits_would_be_uneven() {
         // Each at a tenth of the previous distance: the best split separates one at a time.
         let point = |i: i32| Bounds {
             corners: vec![DVec3::X * 10.0_f64.powi(-i)],
@@ -386,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn no_emitters_have_no_tree_and_one_has_a_root() {
+    fn a_tree_of_one_emitter_has_a_root_and_one_of_none_is_empty() {
         assert!(LightTree::new(&[]).nodes.is_empty());
         let one = LightTree::new(&triangles(1));
         assert_eq!(one.nodes.len(), 1);

@@ -9,7 +9,6 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{Header, HeaderError, Lights, Section, SectionKind};
 use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, WideNode};
 
-/// Sections of lights.
 const LIGHT_SECTIONS: [SectionKind; 4] = [
     SectionKind::Emitters,
     SectionKind::LightNodes,
@@ -17,10 +16,10 @@ const LIGHT_SECTIONS: [SectionKind; 4] = [
     SectionKind::EnvironmentCells,
 ];
 
-/// Card image.
+/// A card image in host memory.
 #[derive(Clone)]
 pub struct CardImage {
-    /// Header, as encoded in the first lines.
+    /// Header, also encoded in the first lines.
     pub(super) header: Header,
     pub(super) lines: Vec<Line>,
 }
@@ -32,10 +31,10 @@ impl AsRef<[Line]> for CardImage {
 }
 
 impl CardImage {
-    /// Image of lines that were read from a file.
+    /// Makes an image of lines read from a file.
     ///
     /// # Errors
-    /// If they do not begin with a header of as many lines.
+    /// If the lines do not begin with a header that states their number.
     pub fn of_lines(lines: Vec<Line>) -> Result<Self, &'static str> {
         let header = lines.first_chunk().map(Header::read);
         let header = match header {
@@ -49,41 +48,41 @@ impl CardImage {
         Ok(Self { header, lines })
     }
 
-    /// All lines, the header's first.
+    /// All lines, starting with the header's.
     pub fn lines(&self) -> &[Line] {
         &self.lines
     }
 
-    /// Bytes of the image.
+    /// Size of the image, bytes.
     pub fn bytes(&self) -> u64 {
         self.lines.len() as u64 * LINE_BYTES as u64
     }
 
-    /// The image as a chip sees it.
+    /// Views the image as a chip does.
     pub fn view(&self) -> (SceneImage, Lines<'_>) {
         (SceneImage { header: self.header }, Lines(&self.lines))
     }
 
-    /// The lines of a section.
+    /// Lines of a section.
     pub fn section(&self, kind: SectionKind) -> &[Line] {
         &self.lines[self.range(kind)]
     }
 
-    /// The lines of a section, mutable.
+    /// Lines of a section, mutable.
     pub(crate) fn section_mut(&mut self, kind: SectionKind) -> &mut [Line] {
         let range = self.range(kind);
         &mut self.lines[range]
     }
 
-    /// Indices of a section's lines.
+    /// Range of a section's lines in the image.
     fn range(&self, kind: SectionKind) -> Range<usize> {
         let Section { first_line, records } = self.header.section(kind);
         let first = first_line as usize;
         first..first + records.div_ceil(kind.records_per_line()) as usize
     }
 
-    /// The image with its lights out: no surface and no environment emits, and there are no lights to sample.
-    /// Photons stay, so that a render of it shows the light of the photon map alone.
+    /// Copy of the image in which no surface and no environment emits, and there are no lights to sample.
+    /// Photons remain, so that a render shows only the light of the photon map.
     #[must_use]
     pub fn without_emission(&self) -> Self {
         let mut dark = self.clone();

@@ -1,4 +1,4 @@
-//! Vertex attributes of triangles as records of the card image.
+//! Encodes vertex attributes of triangles as records of the card image.
 
 use photoncard_scene::{NO_ATTRIBUTES, Scene, Triangle, VertexAttributes};
 use photoncard_shared::layout::{self, LeafAttributes, Record, Tangents};
@@ -6,7 +6,7 @@ use photoncard_shared::layout::{self, LeafAttributes, Record, Tangents};
 use crate::bvh::LeafTriangles;
 use crate::light::Lights;
 
-/// Vertex attributes of the triangles of all leaves. Leaves without attributes have no records.
+/// Vertex attributes of the triangles in all leaves. Leaves without attributes have no records.
 pub(super) struct PackedCorners {
     /// Entry of each leaf; empty if no leaf has attributes.
     pub(super) leaves: Vec<u32>,
@@ -15,7 +15,8 @@ pub(super) struct PackedCorners {
 }
 
 impl PackedCorners {
-    /// Attributes of a scene whose triangles are in `leaves`. `uncovered` are [`Scene::uncovered_materials`].
+    /// Encodes the attributes of a scene whose triangles are in `leaves`. `uncovered` are
+    /// [`Scene::uncovered_materials`].
     pub(super) fn new(
         scene: &Scene,
         lights: &Lights,
@@ -32,7 +33,7 @@ impl PackedCorners {
         packed
     }
 
-    /// Appends the records of a leaf. Returns its entry.
+    /// Appends the records of a leaf. Returns the leaf's entry.
     fn append(
         &mut self,
         scene: &Scene,
@@ -67,7 +68,7 @@ impl PackedCorners {
     }
 }
 
-/// Tangents of a triangle; none if it has no normal map.
+/// Tangents of a triangle; [`Tangents::NONE`] if it has no normal map.
 fn tangents(scene: &Scene, triangle: &Triangle) -> Tangents {
     let attributes = scene.attributes.get(triangle.attributes as usize);
     let tangents = attributes.and_then(|attributes| scene.tangents.get(attributes.tangents as usize));
@@ -77,8 +78,8 @@ fn tangents(scene: &Scene, triangle: &Triangle) -> Tangents {
     })
 }
 
-/// Record of vertex attributes with one set of texture coordinates; `emitter` is the triangle's emitter, if
-/// any.
+/// Record of vertex attributes with one set of texture coordinates. `emitter` is the index of the triangle's
+/// emitter, if it emits.
 fn record(attributes: &VertexAttributes, set: usize, emitter: Option<u32>) -> layout::Attributes {
     layout::Attributes {
         normals: attributes.normals.map(|normals| normals.map(|normal| normal.to_array())),

@@ -8,46 +8,46 @@ use crate::bvh::HierarchyError;
 /// Error of a scene that does not fit a card.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum PackError {
-    /// Error of the bounding volume hierarchy.
+    /// The bounding volume hierarchy cannot be built.
     #[error(transparent)]
     #[diagnostic(help("simplify the scene's geometry"))]
     Hierarchy(#[from] HierarchyError),
-    /// Error of memory that packing needs and the system refuses.
+    /// The system refuses the memory that packing needs.
     #[error("packing {triangles} triangles takes {bytes} bytes of memory, which the system does not give")]
     #[diagnostic(help("simplify the scene's geometry, or {}", allocation::REMEDY))]
     Memory {
-        /// Triangles of the scene.
+        /// Number of triangles of the scene.
         triangles: usize,
-        /// Bytes of memory.
+        /// Size of the memory, bytes.
         bytes: u64,
     },
-    /// Error of more lines than a line address can number.
+    /// The image has more lines than a line address can number.
     #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
     #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]
     TooLarge {
-        /// Bytes of the image.
+        /// Size of the image, bytes.
         bytes: u64,
     },
-    /// Error of more textures than the index in a material's record can name.
+    /// There are more textures than a material's record can index.
     #[error("the scene has {textures} textures; a card image can index at most {}", NO_TEXTURE)]
     #[diagnostic(help("use one texture wherever image and sampler are equal, or split the scene"))]
     TooManyTextures {
-        /// Textures of the scene.
+        /// Number of textures of the scene.
         textures: usize,
     },
-    /// Error of an image that is larger than the card's memory.
+    /// The image is larger than the card's memory.
     #[error(
         "the card image takes {needed} bytes ({photons} of them photons), the card's DRAM budget is {available} bytes"
     )]
     #[diagnostic(help("{remedy}"))]
     Dram {
-        /// Bytes of the image.
+        /// Size of the image, bytes.
         needed: u64,
-        /// Bytes of the photon map alone.
+        /// Size of the photon map, bytes.
         photons: u64,
-        /// Bytes of the card's DRAM.
+        /// Size of the card's DRAM, bytes.
         available: u64,
-        /// Setting to lower, and its maximum.
+        /// Setting that can be lowered, with its maximum.
         remedy: String,
     },
 }

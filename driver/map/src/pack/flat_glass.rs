@@ -1,9 +1,9 @@
-//! Flat glass: thin walls, and solids of glass that are panes.
+//! Flat glass: thin walls, and glass solids that are panes.
 //!
-//! A pane is a slab with parallel faces. It bends no light that passes both, so that shadow rays may pass it
-//! as they pass a thin wall: its faces have records of a material of their own ([`PANE`]), which gives the
-//! light that enters the transmittance of the whole slab. Of a slab's refraction the lateral shift of the
-//! light is left out, and what its rim does.
+//! A pane is a slab with parallel faces. Light that passes both faces keeps its direction, so that shadow
+//! rays can pass a pane like a thin wall. The faces have a material record of their own ([`PANE`]), which
+//! gives light that enters the transmittance of the whole slab. The model ignores the lateral shift of the
+//! light by refraction, and the rim of the slab.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -14,37 +14,38 @@ use photoncard_shared::layout::{self, PANE, Reflectance, THIN_WALLED};
 
 use super::materials::{bare_record, transmission_of};
 
-/// Minimum share of a slab's area that is in its two faces.
+/// Minimum fraction of a slab's area that its two faces have.
 const FACES: f32 = 0.9;
-/// Minimum share of the smaller of two faces of equal area, and cosine of normals that are parallel.
+/// Minimum ratio of the areas of two faces taken as equal, and minimum cosine between normals taken as
+/// parallel.
 const EQUAL: f32 = 0.99;
-/// Maximum distance of a corner from its face, over the thickness.
+/// Maximum distance of a corner from its face's plane, divided by the thickness.
 const EVEN: f32 = 0.02;
-/// Rounding of a coordinate over the greatest one.
+/// Rounding error of a coordinate, relative to the greatest one.
 const ROUNDING: f32 = 1e-6;
-/// Steps of the thickness, per unit of its logarithm: panes of one step share a record.
+/// Number of steps per unit of the thickness's logarithm. Panes in one step share a record.
 const THICKNESS_STEPS: f32 = 100.0;
 
-/// A material of panes.
+/// Material record that panes share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Pane {
-    /// Index of the material in the scene.
+    /// Index of the panes' material in the scene.
     material: u32,
-    /// Thickness of the panes, metres; of those without absorption any.
+    /// Thickness of the panes, metres. Arbitrary for panes without absorption.
     thickness: f32,
 }
 
-/// Triangles with the indices of their materials in the card image: those of the scene, and after them those
+/// Triangles with the indices of their materials in the card image: first the scene's materials, then those
 /// of panes.
 pub(super) struct Glazing<'a> {
     pub(super) triangles: Cow<'a, [Triangle]>,
     panes: Vec<Pane>,
-    /// Indices into the panes by material and step of the thickness.
+    /// Index of a pane in `panes`, by material and step of the thickness.
     known: BTreeMap<(u32, i32), u32>,
 }
 
 impl<'a> Glazing<'a> {
-    /// The panes of a scene.
+    /// Finds the panes of a scene.
     pub(super) fn new(scene: &'a Scene) -> Self {
         let may_be_pane: Vec<bool> = scene.materials.iter().map(may_be_pane).collect();
         let is_glass = |triangle: &Triangle| may_be_pane[triangle.material as usize];
@@ -86,7 +87,7 @@ impl<'a> Glazing<'a> {
         scene.materials.len() as u32 + index
     }
 
-    /// The records of the materials of the image, from those of the scene's materials.
+    /// Material records of the image, given those of the scene's materials.
     pub(super) fn records(&self, mut records: Vec<layout::Material>) -> Vec<layout::Material> {
         for pane in &self.panes {
             records.push(pane.record(records[pane.material as usize]));
@@ -94,13 +95,13 @@ impl<'a> Glazing<'a> {
         records
     }
 
-    /// Property of the scene's materials, for each material of the image.
+    /// Extends a property of the scene's materials to all materials of the image.
     pub(super) fn of_materials(&self, of_scene: &[bool]) -> Vec<bool> {
         let of_panes = self.panes.iter().map(|pane| of_scene[pane.material as usize]);
         of_scene.iter().copied().chain(of_panes).collect()
     }
 
-    /// For each material of the image, whether its surfaces are flat glass.
+    /// Returns for each material of the image whether its surfaces are flat glass.
     pub(super) fn is_flat(&self, scene: &Scene) -> Vec<bool> {
         let of_scene = scene.materials.iter().map(|material| {
             let record = bare_record(material);
@@ -111,7 +112,7 @@ impl<'a> Glazing<'a> {
 }
 
 impl Pane {
-    /// The record of the pane's faces, from the one of the material's other surfaces.
+    /// Record of the pane's faces, given the record of the material's other surfaces.
     fn record(&self, mut record: layout::Material) -> layout::Material {
         record.flags |= PANE;
         if let Reflectance::Glass { absorption, .. } = &mut record.reflectance {
@@ -121,8 +122,8 @@ impl Pane {
     }
 }
 
-/// Returns whether slabs of a material are panes: it bounds volumes, and neither roughness nor a normal map
-/// nor a layer scatters light at it.
+/// Returns whether slabs of a material are panes: the material bounds volumes, and neither roughness nor a
+/// normal map nor a layer scatters light.
 fn may_be_pane(material: &Material) -> bool {
     let is_plain = |layers: &Layers| {
         layers.normal.is_none()
@@ -141,7 +142,7 @@ fn is_smooth(record: &layout::Material) -> bool {
     matches!(record.reflectance, Reflectance::Glass { roughness: 0.0, .. })
 }
 
-/// Returns whether the surfaces of triangles have one index of refraction.
+/// Returns whether all triangles have the same index of refraction.
 fn is_of_one_medium(scene: &Scene, triangles: &[&Triangle]) -> bool {
     let index = |triangle: &&Triangle| {
         transmission_of(&scene.materials[triangle.material as usize]).map(|transmission| transmission.ior)
@@ -149,7 +150,7 @@ fn is_of_one_medium(scene: &Scene, triangles: &[&Triangle]) -> bool {
     triangles.windows(2).all(|pair| index(&pair[0]) == index(&pair[1]))
 }
 
-/// Distance of the two faces of a slab; `None` for triangles of another form.
+/// Distance between the two faces of a slab; `None` if the triangles do not form a slab.
 fn thickness_of_slab(triangles: &[&Triangle]) -> Option<f32> {
     let largest = triangles.iter().max_by(|a, b| a.area().total_cmp(&b.area()))?;
     let axis = largest.scaled_normal().normalize_or_zero();
@@ -183,7 +184,7 @@ fn thickness_of_slab(triangles: &[&Triangle]) -> Option<f32> {
 mod tests {
     use super::*;
 
-    /// A box that faces outwards.
+    /// Box that faces outwards.
     fn block(sides: Vec3) -> Vec<Triangle> {
         let corner = |bits: usize| Vec3::from([0, 1, 2].map(|axis| (bits >> axis & 1) as f32 * sides[axis]));
         [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]]
@@ -200,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn a_slab_is_a_box_of_which_one_side_is_short_whichever_way_it_is_turned() {
+    fn a_box_with_one_short_side_is_a_slab_in_any_orientation() {
         let thin = block(Vec3::new(1.0, 0.02, 2.0));
         let close = |found: Option<f32>| found.is_some_and(|found| (found - 0.02).abs() < 1e-5);
         assert!(close(thickness(&thin)), "{:?}", thickness(&thin));
@@ -223,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_a_wedge_and_a_sheet_are_no_slabs() {
+    fn cubes_wedges_and_sheets_are_not_slabs() {
         assert_eq!(thickness(&block(Vec3::ONE)), None);
         let mut wedge = block(Vec3::new(1.0, 0.02, 1.0));
         for corner in wedge.iter_mut().flat_map(|triangle| &mut triangle.vertices) {

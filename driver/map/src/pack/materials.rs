@@ -1,4 +1,4 @@
-//! Materials as records of the card image.
+//! Encodes materials as records of the card image.
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
@@ -11,12 +11,12 @@ use photoncard_shared::layout::{
 
 use crate::light::Lights;
 
-/// The records of the layers of a scene's materials.
+/// Records of the layers of a scene's materials.
 pub(super) fn layers(scene: &Scene) -> Vec<[u8; layout::Layers::BYTES]> {
     scene.materials.iter().filter_map(|material| material.layers.as_deref()).map(layers_record).collect()
 }
 
-/// The records of a scene's materials; `uncovered` are [`Scene::uncovered_materials`].
+/// Records of a scene's materials. `uncovered` are [`Scene::uncovered_materials`].
 pub(super) fn records(scene: &Scene, lights: &Lights, uncovered: &[bool]) -> Vec<layout::Material> {
     let mut has_attributes = vec![false; scene.materials.len()];
     for (index, triangle) in (0..).zip(&scene.triangles) {
@@ -34,13 +34,13 @@ pub(super) fn records(scene: &Scene, lights: &Lights, uncovered: &[bool]) -> Vec
     materials.map(record_of).collect()
 }
 
-/// Record of a material without what follows from its scene.
+/// Record of a material without the flags that depend on its scene.
 pub(super) fn bare_record(material: &Material) -> layout::Material {
     // Read again: the chip has some values in steps.
     layout::Material::read(&record(material, 0, None).to_bytes())
 }
 
-/// Returns whether any triangle's material stores photons, as the chip decides from the image.
+/// Returns whether any triangle's material stores photons. The chip's code decides this from the image.
 pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Lines)) -> bool {
     let mut is_used = vec![false; scene.materials.len()];
     for triangle in &scene.triangles {
@@ -56,14 +56,14 @@ pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Line
     })
 }
 
-/// [`NARROW_LOBE`] if rays follow the material's lobe.
+/// Returns [`NARROW_LOBE`] if rays follow the material's lobe, else 0.
 fn lobe_flag(scene: &Scene, material: &Material) -> u32 {
     if scene.has_narrow_lobe(material) { NARROW_LOBE } else { 0 }
 }
 
-/// Record of a material; `flags` are those that follow from the scene: [`HAS_ATTRIBUTES`] if any of its
-/// triangles may have attributes, and [`NARROW_LOBE`]; `layers` is the index of its layers. `u16` indexes all
-/// textures of the scene.
+/// Record of a material. `flags` are the flags that depend on the scene: [`HAS_ATTRIBUTES`] if any of its
+/// triangles may have attributes, and [`NARROW_LOBE`]. `layers` is the index of its layers. All texture
+/// indices of the scene fit in `u16`.
 fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::Material {
     let transmission = transmission_of(material);
     flags |= if material.double_sided { DOUBLE_SIDED } else { 0 };
@@ -85,8 +85,8 @@ fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::M
     }
 }
 
-/// Maximum share of diffuse transmission. Photons are stored where the base reflects diffusely, at both
-/// sides.
+/// Maximum factor of diffuse transmission. Below 1 the base reflects diffusely, so that photons are stored on
+/// both sides.
 const MAX_DIFFUSE_TRANSMISSION: f32 = 63.0 / 64.0;
 
 fn texture(index: Option<u32>) -> u16 {
@@ -128,8 +128,8 @@ fn layers_record(layers: &Layers) -> [u8; layout::Layers::BYTES] {
     .to_bytes()
 }
 
-/// Alpha cutoff for the product of texture and vertex alpha: the material's cutoff over its alpha factor. Of
-/// partial coverage, that factor.
+/// Alpha cutoff that applies to the product of texture and vertex alpha: the material's cutoff divided by its
+/// alpha factor. With partial coverage it is the alpha factor.
 fn cutoff(material: &Material) -> f32 {
     if material.blends {
         return material.alpha;
@@ -140,7 +140,7 @@ fn cutoff(material: &Material) -> f32 {
     }
 }
 
-/// Transmission of a material that transmits light.
+/// Transmission of a material; `None` if it transmits no light.
 pub(super) fn transmission_of(material: &Material) -> Option<Transmission> {
     match material.reflection {
         Reflection::MetallicRoughness { transmission, metallic, .. }
@@ -152,7 +152,7 @@ pub(super) fn transmission_of(material: &Material) -> Option<Transmission> {
     }
 }
 
-/// Stated specular reflectance of a dielectric over the reflectance of its index of refraction.
+/// Ratio of a dielectric's specular reflectance, as stated, to that of its index of refraction.
 fn specular_share(dielectric: Vec3, ior: f32) -> f32 {
     let amplitude = (ior - 1.0) / (ior + 1.0);
     let of_index = amplitude * amplitude;
@@ -196,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn the_factor_of_alpha_goes_into_the_cutoff() {
+    fn the_alpha_factor_is_divided_out_of_the_cutoff() {
         let masked = |alpha, alpha_cutoff| {
             read(&Material { alpha, alpha_cutoff, ..Material::lambertian("leaf", Vec3::ONE) }).cutoff
         };
@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lets_light_through_is_glass_and_without_a_volume_a_thin_wall() {
+    fn transmissive_materials_are_glass_and_thin_walled_without_a_volume() {
         let of = |transmission| {
             read(&Material::new(
                 "window",

@@ -1,4 +1,4 @@
-//! Textures as records and texel lines of the card image.
+//! Encodes textures as records and texel lines of the card image.
 
 use photoncard_scene::{Image, Scene, Wrap};
 use photoncard_shared::address::Line;
@@ -7,10 +7,11 @@ use photoncard_shared::layout::{self, NO_TEXTURE, TEXELS_PER_LINE, TILE_HEIGHT, 
 use super::error::PackError;
 use crate::light::EnvironmentMap;
 
-/// Records of a scene's textures, the environment's last. Textures of one image share its texels.
+/// Records of a scene's textures, followed by the environment's. Textures with the same image share its
+/// texels.
 ///
 /// # Errors
-/// If they are more than a material's record can index.
+/// If there are more textures than a material's record can index.
 pub(super) fn records(
     scene: &Scene,
     environment: Option<&EnvironmentMap>,
@@ -41,7 +42,7 @@ pub(super) fn records(
     Ok(textures.chain(environment.map(|map| map.texture(first_line))).collect())
 }
 
-/// Lines of all images' texels, one image after the other, the environment's last.
+/// Lines of the texels of all images, one image after another, followed by the environment's.
 pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> impl Iterator<Item = Line> {
     let of_images = scene.images.iter().flat_map(|image| {
         tiles(bare(image), |x, y| image.texels[y as usize * image.width as usize + x as usize])
@@ -51,7 +52,7 @@ pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> impl
     of_images.chain(of_environment)
 }
 
-/// Lines of a texture; `texel` returns the texel at a column and a row.
+/// Lines of a texture. `texel` returns the texel at a column and a row.
 fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl Iterator<Item = Line> {
     let [width, height] = texture.size.map(u32::from);
     let across = width.div_ceil(TILE_WIDTH);
@@ -68,7 +69,7 @@ fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl 
     })
 }
 
-/// Texture of an image, with texels from line 0 on.
+/// Texture of an image whose texels begin at line 0.
 fn bare(image: &Image) -> layout::Texture {
     layout::Texture {
         first_line: 0,
@@ -102,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn every_texel_is_where_its_texture_says() {
+    fn every_texel_is_at_the_position_that_its_texture_computes() {
         let images = vec![image(13, 6), image(1, 1), image(8, 4), image(3, 70)];
         let textures = [0, 3, 1, 2, 3].map(Texture::new).to_vec();
         let scene = Scene { images, textures, ..Scene::default() };

@@ -1,4 +1,4 @@
-//! Construction of a card image: sections are appended one after another, in lines.
+//! Writes a card image section by section.
 
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{HEADER_LINES, Header, Section, SectionKind};
@@ -7,36 +7,36 @@ use photoncard_shared::layout::PhotonGrid;
 use super::card_image::CardImage;
 use super::error::PackError;
 
-/// Writer of a card image: appends sections after the last line.
+/// Writer of a card image. It appends sections after the last line.
 pub(crate) struct ImageWriter {
     header: Header,
     lines: Vec<Line>,
 }
 
 impl ImageWriter {
-    /// Writer of an image without sections. `header` holds its units and lights; lines and sections are
-    /// counted here.
+    /// Creates a writer of an image without sections. `header` has the units and lights; the writer sets the
+    /// numbers of lines and the sections.
     pub(super) fn new(header: Header) -> Self {
         Self { header, lines: vec![Line::ZERO; HEADER_LINES] }
     }
 
-    /// Writer that appends to a finished image.
+    /// Creates a writer that appends to a finished image.
     pub(crate) fn resume(CardImage { header, lines }: CardImage) -> Self {
         Self { header, lines }
     }
 
-    /// Sets the grid of photon positions, and the power of a stored photon of value 1, watts.
+    /// Sets the grid of photon positions and the photon power unit, watts.
     pub(crate) fn set_photons(&mut self, grid: PhotonGrid, power_unit: f32) {
         self.header.photon_grid = grid;
         self.header.photon_power_unit = power_unit;
     }
 
-    /// Sets the power of a stored caustic photon of value 1, watts.
+    /// Sets the caustic photons' power unit, watts.
     pub(crate) fn set_caustic_power_unit(&mut self, power_unit: f32) {
         self.header.caustic_power_unit = power_unit;
     }
 
-    /// Appends a section of records, none of which straddles two lines.
+    /// Appends a section of records. No record straddles two lines.
     ///
     /// # Errors
     /// [`PackError::TooLarge`] if there are more lines or records than 32 bits can count.
@@ -53,7 +53,7 @@ impl ImageWriter {
         Ok(())
     }
 
-    /// Appends a section of whole lines, counted as they are made.
+    /// Appends a section of whole lines. They are counted while they are appended.
     ///
     /// # Errors
     /// As [`Self::append`].
@@ -69,7 +69,8 @@ impl ImageWriter {
         Ok(())
     }
 
-    /// Appends a section of zeroed records, to be written in any order, and returns its lines.
+    /// Appends a section of zeroed records and returns its lines, so that the records can be written in any
+    /// order.
     ///
     /// # Errors
     /// As [`Self::append`].
@@ -85,7 +86,7 @@ impl ImageWriter {
         Ok(&mut self.lines[first..])
     }
 
-    /// Removes sections, which must be the last of the image.
+    /// Removes sections. They must be the last of the image.
     pub(crate) fn remove_last(&mut self, kinds: &[SectionKind]) {
         for &kind in kinds {
             let Section { first_line, records } = std::mem::take(&mut self.header.sections[kind as usize]);
@@ -105,7 +106,7 @@ impl ImageWriter {
     }
 }
 
-/// Section of `records` records in `lines` lines from line `first` on.
+/// Section of `records` records that takes `lines` lines from line `first` on.
 fn section(first: usize, records: usize, lines: usize) -> Result<Section, PackError> {
     let end = first + lines;
     let too_large = |_| PackError::TooLarge { bytes: end as u64 * LINE_BYTES as u64 };

@@ -1,6 +1,6 @@
-//! Photons of one path that lie together. A path that is caught between sheets meets them many times, and its
-//! photons would be all that a gather there finds. One photon with the power of several takes their place, so
-//! that a gather finds those of other paths.
+//! Merges photons of one path that lie close together. A path that is caught between sheets hits them many
+//! times, and a gather there would find only its photons. One photon with the power of several replaces them,
+//! so that a gather also finds those of other paths.
 
 use std::f64::consts::PI;
 
@@ -9,27 +9,29 @@ use rayon::prelude::*;
 use super::stored::StoredPhoton;
 use super::tracer::Traced;
 
-/// Number of photons whose neighbours are searched.
+/// Number of photons whose neighbours are searched to measure the density.
 const SAMPLED: usize = 32;
-/// Neighbour whose distance shows how dense photons are.
+/// Number of the neighbour whose distance measures the density.
 const NEIGHBOR: usize = 8;
-/// Share of the sampled photons that are at least as dense: a wide ground must not count.
+/// Fraction of the sampled photons whose density is at least the measured one. It is below 1/2 so that a wide
+/// ground does not dominate.
 const SHARE: f64 = 0.25;
-/// Number of a path's arrivals in one place that bring light: more are those between sheets that nearly
-/// touch, whose light nothing sees.
+/// Maximum number of a path's arrivals at one place that contribute power. More arrivals occur only between
+/// sheets that nearly touch, whose light is invisible.
 const MAX_ARRIVALS: u32 = 4;
 /// Minimum cosine between the normals of photons of one surface.
 const MIN_COSINE: f32 = 0.8;
 
-/// Distance on a surface within which a path has one photon.
+/// Distance on a surface within which a path keeps only one photon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Spacing {
-    /// Square of the distance, grid cells.
+    /// Squared distance, grid cells.
     squared: f64,
 }
 
 impl Spacing {
-    /// Side of the square that a photon has for itself in a map of `count` photons, by its first paths.
+    /// Derives the distance from the first paths: the side of the square that each photon occupies in a map
+    /// with `count` photons.
     pub(super) fn new(first: &[Traced], count: usize) -> Self {
         let photons = || first.iter().flat_map(|traced| &traced.photons);
         let found = photons().count();
@@ -41,7 +43,7 @@ impl Spacing {
         Self { squared }
     }
 
-    /// Traced paths with one photon where several lie within the distance, on surfaces of about one normal.
+    /// Merges photons of each path that lie within the distance on surfaces with similar normals.
     pub(super) fn merged(self, traced: Traced) -> Traced {
         let Traced { photons: all, ends } = traced;
         let (mut photons, mut merged_ends) = (Vec::with_capacity(all.len()), Vec::with_capacity(ends.len()));
@@ -68,7 +70,7 @@ impl Spacing {
         Traced { photons, ends: merged_ends }
     }
 
-    /// True for reflected photons that lie together on one surface.
+    /// Returns true if both photons were reflected and lie close together on one surface.
     fn is_one(self, kept: StoredPhoton, photon: StoredPhoton) -> bool {
         kept.distance_squared(photon) as f64 <= self.squared
             && !kept.is_direct()
@@ -77,7 +79,7 @@ impl Spacing {
     }
 }
 
-/// Area of a photon, square cells, by its nearest neighbours.
+/// Area per photon, square grid cells, from the nearest neighbours of `photon`.
 fn area(paths: &[Traced], photon: StoredPhoton) -> f64 {
     // The first is the photon itself.
     let mut nearest = [u64::MAX; NEIGHBOR + 1];
@@ -116,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn arrivals_of_a_path_in_one_place_are_one_photon_of_at_most_four_times_the_power() {
+    fn arrivals_of_a_path_at_one_place_merge_to_at_most_four_times_the_power() {
         let [up, aside] = [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]];
         for (arrivals, power) in [(1_u32, 1.0), (3, 3.0), (4, 4.0), (90, 4.0)] {
             let mut photons = vec![photon(500.0, up, true)];
@@ -133,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn photons_of_other_paths_and_places_stay() {
+    fn photons_of_other_paths_and_places_are_not_merged() {
         let up = [0.0, 1.0, 0.0];
         let photons: Vec<StoredPhoton> =
             [500.0, 511.0, 522.0, 500.0, 500.0].map(|x| photon(x, up, false)).into();
@@ -141,9 +143,9 @@ mod tests {
         assert_eq!((traced.photons, traced.ends), (photons, vec![3, 4, 5]));
     }
 
-    /// Photons eight cells apart, as they are on a floor.
+    /// Photons on a floor, eight cells apart.
     #[test]
-    fn the_spacing_is_that_of_all_photons() {
+    fn the_spacing_follows_from_the_number_of_photons_in_the_map() {
         let floor = |side: u32| -> Vec<StoredPhoton> {
             let at = |i: u32| StoredPhoton::at([100 + 8 * (i % side), 100, 100 + 8 * (i / side)], [0; 8]);
             (0..side * side).map(at).collect()

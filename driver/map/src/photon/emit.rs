@@ -1,9 +1,9 @@
 //! Emission: the first ray of a photon path, and its power.
 //!
-//! The first four random numbers of a path, for position and direction, are a low-discrepancy sequence in the
-//! number of the path (the additive recurrence of Roberts 2018, *The unreasonable effectiveness of
-//! quasirandom sequences*), shifted by the seed. Random numbers of bounces are hashes of (seed, path,
-//! bounce).
+//! The first four random numbers of a path, for position and direction, are points of a low-discrepancy
+//! sequence indexed by the path's number (the additive recurrence of Roberts 2018, *The unreasonable
+//! effectiveness of quasirandom sequences*), shifted by the seed. Random numbers of bounces are hashes of
+//! (seed, path, bounce).
 
 use std::f32::consts::{FRAC_1_PI, PI};
 
@@ -20,22 +20,21 @@ use photoncard_shared::message::Fault;
 use super::guide::{Guide, Point, Warped};
 use crate::light::{Aim, SolidCone, Source, Sources, Targets};
 
-/// Emitted photon: the first ray of a path, and its power.
+/// An emitted photon: the first ray of a path, and its power.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Emission {
     /// First ray of the path.
     pub(super) ray: Ray,
-    /// Power per channel, watts, as if it were the only path.
+    /// Power per channel, watts, if this were the only path.
     pub(super) power: Vec3,
-    /// True for light of a surface or of the environment, which rays may meet.
+    /// True if the light comes from a surface or from the environment, which rays can hit.
     pub(super) has_extent: bool,
 }
 
-/// 2^64 over the powers 1 to 4 of the root of `x^5 = x + 1`.
+/// Constants of the recurrence: 2^64 divided by the powers 1 to 4 of the root of `x^5 = x + 1`.
 const RECURRENCE: [u64; 4] =
     [0xdb4f_0b91_75ae_2165, 0xbbe0_5633_03a4_615f, 0xa0f2_ec75_a1fe_1575, 0x89e1_8285_7d9e_d688];
 
-/// Random numbers of one path.
 #[derive(Clone, Copy)]
 pub(super) struct PathRandom {
     seed: u32,
@@ -47,7 +46,7 @@ impl PathRandom {
         Self { seed, path }
     }
 
-    /// Low-discrepancy point of the emission, in units of 2^-64.
+    /// Low-discrepancy point for the emission, in units of 2^-64.
     fn emission(self) -> Point {
         std::array::from_fn(|dimension| {
             let shift = (hash(self.seed ^ hash(dimension as u32 + 1)) as u64) << 32;
@@ -55,14 +54,12 @@ impl PathRandom {
         })
     }
 
-    /// Random numbers of a bounce.
     pub(super) fn bounce(self, bounce: u32) -> BounceRandom {
         let path = hash(hash(self.seed ^ 0x2c1b_3c6d).wrapping_add(self.path as u32));
         BounceRandom { key: hash(hash(path.wrapping_add((self.path >> 32) as u32)).wrapping_add(bounce)) }
     }
 }
 
-/// Random numbers of one bounce.
 #[derive(Clone, Copy)]
 pub(super) struct BounceRandom {
     key: u32,
@@ -107,15 +104,15 @@ fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 / 16_777_216.0
 }
 
-/// Point that a path's emission is sampled from, with its weight.
+/// Point by which a path's emission is sampled, and its weight. A guide warps it.
 pub(super) fn emission_point(guide: Option<&Guide>, random: PathRandom) -> Warped {
     let point = random.emission();
     guide.map_or(Warped { point, weight: 1.0 }, |guide| guide.warp(point))
 }
 
-/// Emission of a path: samples a source by its power, a position and a direction. `None` if Russian roulette
-/// ends the path, the direction carries no light, or there are no sources. A guide warps the distribution of
-/// all of these.
+/// Samples the emission of a path: a source by its power, a position and a direction. Returns `None` if
+/// Russian roulette ends the path, the direction carries no light, or there are no sources. A guide warps the
+/// distribution of all choices.
 pub(super) fn emit(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -159,8 +156,8 @@ pub(super) fn emit(
     Ok(emission.map(|emission| Emission { power: emission.power * weight, ..emission }))
 }
 
-/// Russian roulette where an emitter is darker than its mean, as in dark parts of an emissive texture:
-/// photons of equal power have less variance.
+/// Applies Russian roulette if an emitter is darker than its mean, as in dark parts of an emissive texture,
+/// so that photons have equal power and less variance.
 fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emission> {
     let probability = (f64::from(emission.power.element_sum()) / (3.0 * mean_power)) as f32;
     // Differences by rounding are ignored.
@@ -170,7 +167,7 @@ fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emissi
     (roulette < probability).then(|| Emission { power: emission.power / probability, ..emission })
 }
 
-/// The way in which a photon's direction is chosen.
+/// Method by which a photon's direction is chosen: aimed or not.
 #[derive(Clone, Copy)]
 struct Way<'s> {
     targets: &'s Targets,
@@ -178,9 +175,9 @@ struct Way<'s> {
 }
 
 impl Way<'_> {
-    /// The emission with its power over the density of both ways (the balance heuristic of Veach 1997,
-    /// section 9.2.2), instead of over that of its own one. `densities` are those of aimed and of other
-    /// photons, for its ray.
+    /// Divides the emission's power by the mixture density of aimed and other photons (balance heuristic,
+    /// Veach 1997, section 9.2.2) instead of the density of its own method. `densities` returns the densities
+    /// of aimed and of other photons for a ray.
     fn balanced(&self, emission: Option<Emission>, densities: impl Fn(&Ray) -> [f32; 2]) -> Option<Emission> {
         let emission = emission?;
         if [0.0, 1.0].contains(&self.targets.share) {
@@ -194,7 +191,7 @@ impl Way<'_> {
     }
 }
 
-/// Emission of an emitter as the only source.
+/// Emission of an emitter, as if it were the only source.
 fn from_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -236,8 +233,8 @@ fn from_emitter(
     })
 }
 
-/// Emission from a point by a radiant intensity that lies in a cone, W/sr: towards the targets, or in the
-/// cone.
+/// Emission from a point with a radiant intensity, W/sr, that is confined to a cone. The direction is sampled
+/// towards the targets, or in the cone.
 fn from_point(
     way: Way,
     position: Vec3,
@@ -255,7 +252,8 @@ fn from_point(
     })
 }
 
-/// Emission of a point on a triangle, cosine-weighted, per square metre; from both sides if double-sided.
+/// Cosine-weighted emission of a point on a triangle, per square metre. A double-sided triangle emits from
+/// both sides.
 fn by_cosine(point: &EmitterPoint, double_sided: bool, [c, d]: [f32; 2]) -> Option<Emission> {
     let (sides, is_back, c) = if double_sided {
         (2.0, c >= 0.5, if c >= 0.5 { 2.0 * c - 1.0 } else { 2.0 * c })
@@ -285,7 +283,7 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     })
 }
 
-/// Emission from infinitely far along `direction`; `irradiance` is that of a surface facing the light.
+/// Emission from infinitely far along `direction`. `irradiance` is that of a surface facing the light.
 fn from_afar(
     bounds: [Vec3; 2],
     way: Way,
@@ -314,7 +312,7 @@ fn shown([lower, upper]: [Vec3; 2], direction: Vec3) -> Vec3 {
     direction.abs() * Vec3::new(size.y * size.z, size.z * size.x, size.x * size.y)
 }
 
-/// Returns whether the line of a ray meets a box.
+/// Returns whether the line of a ray hits a box.
 fn meets_box(bounds: [Vec3; 2], ray: &Ray) -> bool {
     let [a, b] = bounds.map(|corner| (corner - ray.origin) / ray.direction);
     // A component is NaN in the plane of a face.
@@ -323,8 +321,8 @@ fn meets_box(bounds: [Vec3; 2], ray: &Ray) -> bool {
     first <= last
 }
 
-/// Emission from infinitely far through the faces of the scene's bounding box, each in proportion to its
-/// projected area.
+/// Emission from infinitely far through the faces of the scene's bounding box. Faces are chosen in proportion
+/// to their projected areas.
 fn through_box(bounds: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
     let [lower, upper] = bounds;
     let size = upper - lower;

@@ -7,7 +7,7 @@ use crate::pack::PackError;
 /// Error that prevents a photon map.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum PhotonError {
-    /// Error of a photon grid that is too coarse for the maximum distance of gathers: the scene is too wide.
+    /// The photon grid is too coarse for the maximum distance of gathers, because the scene is too wide.
     #[error(
         "the scene is too wide: a cell of the grid of photon positions has a side of {cell} m, and a gather reaches only \
          {max_distance} m"
@@ -17,15 +17,15 @@ pub enum PhotonError {
          --photons"
     ))]
     TooWide {
-        /// Side of a cell of the grid, metres.
+        /// Side of a cell of the photon grid, metres.
         cell: f32,
         /// Maximum distance of a gather, metres.
         max_distance: f32,
     },
-    /// Error of a packed scene that is malformed.
+    /// A packed scene is malformed.
     #[error("the packed scene is malformed: {0:?}")]
     Unsound(Fault),
-    /// Error of an image that is too large with its photons.
+    /// The image with its photons is too large.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Pack(#[from] PackError),

@@ -1,43 +1,42 @@
-//! Guiding of emission: a warp of the unit hypercube that emission is sampled from, towards the points whose
-//! paths are useful.
+//! Guiding of emission: warps the unit hypercube from which emission is sampled, towards points whose paths
+//! are useful.
 //!
-//! The hypercube is halved again and again, each box along the dimension that separates useful from useless
-//! paths best. A point descends by hierarchical sample warping (Clarberg et al. 2005, *Wavelet importance
-//! sampling*): within a box its coordinate along the divided dimension is compared with the probability of
-//! the lower half, and rescaled. Points that are stratified in each dimension so remain stratified.
+//! The hypercube is halved repeatedly, each box along the dimension that best separates useful from useless
+//! paths. A point is transformed by hierarchical sample warping (Clarberg et al. 2005, *Wavelet importance
+//! sampling*): within a box, its coordinate along the split dimension is compared with the probability of the
+//! lower half, and rescaled. Points that are stratified in each dimension therefore stay stratified.
 
 /// Number of dimensions of the hypercube.
 pub(super) const DIMENSIONS: usize = 4;
 /// Point of the hypercube, in units of 2^-64.
 pub(super) type Point = [u64; DIMENSIONS];
 
-/// Share of the points that are uniform: an upper bound of the weights is its inverse.
+/// Fraction of the points that is uniform. Its inverse is an upper bound of the weights.
 pub(super) const UNIFORM_SHARE: f64 = 0.25;
-/// Minimum number of useful samples of a half on average.
+/// Minimum number of useful samples per half, on average.
 const MIN_USEFUL: usize = 8;
-/// Samples of the enclosing box that a box counts in addition to its own.
+/// Number of samples of the enclosing box that are added to a box's own.
 const PRIOR_SAMPLES: f64 = 4.0;
 /// Maximum number of halvings along a dimension.
 const MAX_HALVINGS: u32 = 20;
-/// 2^64.
+/// Number of values of a coordinate: 2^64.
 const ALL: f64 = 18_446_744_073_709_551_616.0;
 /// Upper bound of coordinates below 1.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// Point of the hypercube, and the use of the path that begins with it, as if it were not guided.
+/// Point of the hypercube, and the usefulness of the path that begins with it, without guiding.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
     pub(super) point: Point,
-    /// Sum of the uses of its photons.
+    /// Sum of the uses of the path's photons.
     pub(super) use_of_path: f64,
-    /// Sum of the squares of the uses of its photons, which are in different places: the variance that they
-    /// bring.
+    /// Sum of the squared uses of the path's photons: their variance, because they lie in different places.
     pub(super) squares: f64,
     /// Weight of the point.
     pub(super) weight: f32,
 }
 
-/// Warped point, with its weight: the density of uniform points over that of warped ones.
+/// A warped point and its weight, the ratio of the densities of uniform and of warped points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Warped {
     pub(super) point: Point,
@@ -47,13 +46,13 @@ pub(super) struct Warped {
 /// Division of the hypercube into boxes with probabilities.
 #[derive(Clone, Debug)]
 pub(super) struct Guide {
-    /// The whole first, and of each two halves the lower one right after the box they divide.
+    /// Boxes, beginning with the whole hypercube. The lower half of a box follows the box directly.
     boxes: Vec<Region>,
     spread: f64,
     gain: f64,
 }
 
-/// Region of the hypercube.
+/// A box of the hypercube.
 #[derive(Clone, Copy, Debug)]
 struct Region {
     /// Probability of the box.
@@ -69,10 +68,10 @@ struct Halves {
     upper: usize,
 }
 
-/// Sums over the samples of a box.
+/// Sums over the samples in a box.
 #[derive(Clone, Copy, Default)]
 struct Sums {
-    /// Number of samples of some use.
+    /// Number of samples with any use.
     useful: usize,
     /// Sum of the weights.
     weight: f64,
@@ -100,7 +99,7 @@ impl Sums {
 }
 
 impl Guide {
-    /// Guide by samples; `None` if none of them is of use.
+    /// Builds a guide from samples; `None` if none of them is useful.
     pub(super) fn new(mut samples: Vec<Sample>) -> Option<Self> {
         let all = Sums::of(&samples);
         if !(all.squares > 0.0 && all.squares.is_finite()) {
@@ -120,7 +119,7 @@ impl Guide {
         Some(Self { boxes, spread: total, gain: guided_use / (all.uses / all.weight) })
     }
 
-    /// Expected use of a guided path over that of a path that is not guided, by the samples.
+    /// Ratio of the expected uses of a guided and an unguided path, estimated from the samples.
     pub(super) fn gain(&self) -> f64 {
         self.gain
     }
@@ -130,12 +129,12 @@ impl Guide {
         self.spread
     }
 
-    /// Number of boxes that are not divided.
+    /// Number of boxes that are not split.
     pub(super) fn cells(&self) -> usize {
         self.boxes.iter().filter(|part| part.halves.is_none()).count()
     }
 
-    /// The warped point of a uniform one.
+    /// Warps a uniform point.
     pub(super) fn warp(&self, point: Point) -> Warped {
         // Within the box, from 0 to 1.
         let mut inner = point.map(|coordinate| (coordinate as f64 / ALL).min(BELOW_ONE));
@@ -162,17 +161,18 @@ impl Guide {
     }
 }
 
-/// Boxes as they are divided.
+/// Boxes during construction.
 struct Builder {
-    /// `share` is the root mean square of the use of the box's paths times its volume: the optimal density.
+    /// Boxes. `share` is the root mean square of the use of the box's paths times its volume, which is the
+    /// optimal density.
     boxes: Vec<Region>,
     /// Volume and mean use of each box.
     uses: Vec<(f64, f64)>,
 }
 
 impl Builder {
-    /// Adds a box with its division. `halvings` counts those along each dimension; `mean_square` is that of
-    /// the enclosing box. Returns the box's share.
+    /// Adds a box and splits it further. `halvings` counts the halvings along each dimension; `mean_square`
+    /// is that of the enclosing box. Returns the box's share.
     fn divide(
         &mut self,
         samples: &mut [Sample],
@@ -198,13 +198,13 @@ impl Builder {
     }
 }
 
-/// Returns whether a sample of a box is in its upper half along a dimension that was halved `halvings` times.
+/// Returns whether a sample of a box is in the upper half along a dimension that was halved `halvings` times.
 fn is_upper(sample: &Sample, dimension: usize, halvings: u32) -> bool {
     sample.point[dimension] >> (63 - halvings) & 1 == 1
 }
 
-/// Dimension along which the halves of a box differ most: the sum of their optimal shares is least. `None`
-/// for a box that is not divided, for too few of its samples are of use.
+/// Dimension along which the two halves differ most, such that the sum of their optimal shares is least;
+/// `None` if the box has too few useful samples to be split.
 fn best_dimension(samples: &[Sample], halvings: [u32; DIMENSIONS]) -> Option<usize> {
     if Sums::of(samples).useful < 2 * MIN_USEFUL {
         return None;
@@ -222,7 +222,7 @@ fn best_dimension(samples: &[Sample], halvings: [u32; DIMENSIONS]) -> Option<usi
         .map(|(dimension, _)| dimension)
 }
 
-/// The samples that fulfil a condition, and the others.
+/// Partitions samples into those that fulfil a condition, and the others.
 fn partitioned(samples: &mut [Sample], is_first: impl Fn(&Sample) -> bool) -> (&mut [Sample], &mut [Sample]) {
     let mut count = 0;
     for index in 0..samples.len() {
@@ -240,7 +240,7 @@ mod tests {
 
     use super::*;
 
-    /// Uniform points, a lattice of rank 1.
+    /// Uniform points: a rank-1 lattice.
     fn points(count: u32) -> impl Iterator<Item = Point> {
         let bits = |index: u32, dimension: u32| (hash(hash(index).wrapping_add(dimension)) as u64) << 32;
         (0..count).map(move |index| [0, 1, 2, 3].map(|dimension| bits(index, dimension)))
@@ -250,7 +250,7 @@ mod tests {
         point.map(|coordinate| coordinate as f64 / ALL)
     }
 
-    /// Use that lies in a corner of three of the dimensions.
+    /// Use that is concentrated in a corner of three dimensions.
     fn use_of(point: Point) -> f64 {
         let [a, b, _, d] = coordinates(point);
         if a < 0.3 && b > 0.6 && d < 0.5 { 1.0 + a } else { 0.0 }
@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn weighted_means_over_warped_points_are_those_over_uniform_ones() {
+    fn weighted_means_over_warped_points_equal_means_over_uniform_points() {
         let guide = guide();
         let count = 100_000;
         let functions: [fn(Point) -> f64; 3] =
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn warped_points_are_of_more_use_and_no_weight_is_great() {
+    fn warped_points_are_more_useful_and_have_bounded_weights() {
         let guide = guide();
         let mean = |warped: &dyn Fn(Point) -> Point| {
             points(50_000).map(|point| use_of(warped(point))).sum::<f64>() / 50_000.0
@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn without_use_there_is_no_guide() {
+    fn samples_without_use_give_no_guide() {
         let sample = |point| Sample { point, use_of_path: 0.0, squares: 0.0, weight: 1.0 };
         assert!(Guide::new(points(1000).map(sample).collect()).is_none());
     }

@@ -1,4 +1,4 @@
-//! Importons: places at which the picture of a camera uses photons, found by a pilot of eye paths.
+//! Importons: positions at which the picture of a camera uses photons, found by a pilot of eye paths.
 //!
 //! Photons are used where gather rays end and, for caustics, where eye paths end.
 
@@ -16,16 +16,16 @@ use super::emit::PathRandom;
 use crate::light::Targets;
 use crate::pack::PackedScene;
 
-/// Eye paths along each axis of the picture.
+/// Number of eye paths along each axis of the picture.
 const EYE_PATHS: u32 = 128;
-/// Eye paths along each axis of the picture of [`Importons::few`].
+/// Number of eye paths along each axis of the picture, for [`Importons::few`].
 const FEW_EYE_PATHS: u32 = 32;
-/// Gather rays of an eye path.
+/// Number of gather rays per eye path.
 const GATHER_RAYS: u32 = 4;
-/// Random numbers of eye paths are those of photon paths of another seed.
+/// Difference between the seeds of eye paths and of photon paths, so that their random numbers differ.
 const SEED: u32 = 0x1b56_c4e9;
 
-/// Importon: a place with the weight of its light in the picture.
+/// Importon: a position, and the weight of its light in the picture.
 #[derive(Clone, Copy, Debug)]
 struct Importon {
     position: Vec3,
@@ -36,23 +36,24 @@ struct Importon {
 
 /// Importons of the photon map and of the caustic map.
 pub(crate) struct Importons {
-    /// At the ends of gather rays, and of eye paths as many as of a gather ray.
+    /// Importons at the ends of gather rays and of eye paths. An eye path has as many as one of its gather
+    /// rays.
     pub(crate) indirect: ImportonGrid,
-    /// At the ends of eye paths.
+    /// Importons at the ends of eye paths.
     pub(crate) caustic: ImportonGrid,
 }
 
 impl Importons {
-    /// Importons of a camera. Photons are gathered within areas of `indirect` and `caustic` of the surface
-    /// that the picture uses.
+    /// Finds the importons of a camera. `areas` are the areas within which photons of the photon map and of
+    /// the caustic map are gathered, as fractions of the surface that the picture uses.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     pub(crate) fn new(packed: &PackedScene, camera: &Camera, areas: [f32; 2]) -> Result<Self, Fault> {
         Self::of(packed, camera, EYE_PATHS, areas)
     }
 
-    /// Fewer importons, within the least areas that they show.
+    /// Finds fewer importons, in grids with the smallest cells that they support.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -60,7 +61,7 @@ impl Importons {
         Self::of(packed, camera, FEW_EYE_PATHS, [0.0; 2])
     }
 
-    /// Importons of `paths` times `paths` eye paths.
+    /// Finds the importons of `paths` times `paths` eye paths.
     fn of(
         packed: &PackedScene,
         camera: &Camera,
@@ -99,19 +100,19 @@ impl Importons {
     }
 }
 
-/// Eye path of the pilot.
+/// Eye path of the pilot, with its random numbers.
 struct Walk<'a, M> {
     scene: &'a SceneImage,
     memory: &'a mut M,
     random: PathRandom,
-    /// Number of the next random numbers.
+    /// Number of the path's next random numbers.
     bounce: u32,
-    /// Side of an eye path's part of the picture, over that of the picture.
+    /// Side of an eye path's part of the picture, as a fraction of the picture's.
     side: f32,
 }
 
 impl<M: MemoryPort> Walk<'_, M> {
-    /// Adds the importons of an eye path and of its gather rays; `left` and `above` are the corner of its
+    /// Adds the importons of an eye path and of its gather rays. `left` and `above` are the corner of its
     /// part of the picture.
     fn look(
         &mut self,
@@ -141,7 +142,8 @@ impl<M: MemoryPort> Walk<'_, M> {
         Ok(())
     }
 
-    /// Surface at which a path ends, and the path's throughput; `None` if it leaves the scene or is lost.
+    /// Surface at which a path ends, and the path's throughput; `None` if the path leaves the scene or is
+    /// lost.
     fn follow(&mut self, ray: Ray, passes: Passes) -> Result<Option<(Surface, Vec3)>, Fault> {
         let mut path = SpecularPath::new(ray, Carried::Radiance, passes);
         let mut surface = Surface::NOWHERE;
@@ -161,7 +163,7 @@ impl<M: MemoryPort> Walk<'_, M> {
     }
 }
 
-/// Importon at the end of a path; `None` if nothing is reflected there.
+/// Importon at the end of a path; `None` if the surface reflects nothing there.
 fn importon(surface: &Surface, throughput: Vec3) -> Option<Importon> {
     let surface = surface.flat();
     let weight = (throughput * surface.reflector().albedo()).element_sum() / 3.0;
@@ -172,27 +174,27 @@ fn importon(surface: &Surface, throughput: Vec3) -> Option<Importon> {
     })
 }
 
-/// Cell of a grid: its coordinates, and the side of the axis that a surface's normal is nearest to.
+/// Cell of a grid: its coordinates, and the signed axis nearest to the surface normal.
 type Cell = ([i32; 3], u8);
 
-/// Weights of importons in cells of space and of directions of normals: photons on the other side of a wall
-/// are of no use.
+/// Grid of importon weights. A cell covers an interval of positions and of normal directions, because photons
+/// on the other side of a wall are useless.
 pub(crate) struct ImportonGrid {
     /// Side of a cell, metres.
     side: f32,
     cells: HashMap<Cell, f64>,
 }
 
-/// Importons that a cell of the surface has on average at the least.
+/// Minimum mean number of importons per cell that contains surface.
 const MIN_IMPORTONS: f32 = 8.0;
-/// Share of the weight of the cells that photons are aimed at.
+/// Fraction of the total weight that the cells at which photons are aimed contain.
 const AIMED_WEIGHT: f64 = 0.95;
-/// Share of the importons beyond each face of the box that the area of the surface is estimated by.
+/// Fraction of the importons beyond each face of the box from which the area of the surface is estimated.
 const OUTLIERS: f32 = 0.02;
 
 impl ImportonGrid {
-    /// Grid of importons, whose cells are as wide as the areas that photons are gathered from: `share` of the
-    /// surface.
+    /// Builds a grid of importons. Cells are as wide as the area from which photons are gathered, the
+    /// fraction `share` of the surface.
     fn new(importons: &[Importon], share: f32) -> Self {
         let share = share.max(MIN_IMPORTONS / importons.len().max(1) as f32);
         let side = (area(importons) * share).sqrt().max(f32::MIN_POSITIVE);
@@ -204,14 +206,14 @@ impl ImportonGrid {
         grid
     }
 
-    /// Use of a photon of power 1. The variance that a photon brings to the picture's pixels is the square of
-    /// its power times the density of importons around it, and the use is the square root.
+    /// Use of a photon of power 1. The variance that a photon adds to the picture's pixels is its squared
+    /// power times the density of importons around it; the use is the square root of that.
     pub(super) fn use_of(&self, photon: &Photon) -> f64 {
         let cell = self.cell(photon.position.into(), photon.normal);
         self.cells.get(&cell).copied().unwrap_or(0.0).sqrt()
     }
 
-    /// Targets of photons: the cells with the greatest weights, which have most of the weight.
+    /// Targets for photons: the cells with the greatest weights, which together have most of the weight.
     pub(super) fn targets(&self) -> Targets {
         let mut cells: Vec<(&Cell, f64)> = self.cells.iter().map(|(cell, &weight)| (cell, weight)).collect();
         cells.sort_by(|(a, first), (b, second)| second.total_cmp(first).then(a.cmp(b)));
@@ -227,7 +229,7 @@ impl ImportonGrid {
         }))
     }
 
-    /// Returns whether there are importons around a place on a surface, by the code of its normal.
+    /// Returns whether there are importons near a position on a surface whose normal has the code `normal`.
     pub(crate) fn is_used(&self, position: Vec3, normal: u8) -> bool {
         self.cells.contains_key(&self.cell(position, normal))
     }
@@ -241,7 +243,7 @@ impl ImportonGrid {
     }
 }
 
-/// Area of the faces of the box that holds most importons, m^2.
+/// Area of the faces of the box that contains most importons, m^2.
 fn area(importons: &[Importon]) -> f32 {
     let [x, y, z] = [0, 1, 2].map(|axis: usize| {
         let mut places: Vec<f32> = importons.iter().map(|importon| importon.position[axis]).collect();

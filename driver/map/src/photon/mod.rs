@@ -1,7 +1,7 @@
-//! The photon pass: paths are traced from the lights, and photons stored where they meet surfaces.
+//! Photon pass: traces paths from the lights and stores photons where they hit surfaces.
 //!
-//! Photons depend on the scene, the seed and their number alone, never on threads, tile or chip; and on the
-//! camera if, and only if, they are guided towards what it uses.
+//! Photons depend only on the scene, the seed and their number, not on threads, tiles or chips. They depend
+//! on the camera only if they are guided towards what it uses.
 
 mod crevices;
 mod emit;

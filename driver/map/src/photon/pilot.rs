@@ -1,4 +1,4 @@
-//! Pilots: first paths of other seeds than the map's, by which the sources and the guide of its paths are
+//! Pilots: paths with other seeds than the map's, from which the sources and the guide of its paths are
 //! chosen.
 
 use std::collections::BTreeMap;
@@ -17,44 +17,44 @@ use super::tracer::{PATHS_PER_TASK, Purpose, Traced, Tracer};
 use crate::light::Sources;
 use crate::pack::PackedScene;
 
-/// Guiding of photon paths.
+/// Statistics of the guiding of photon paths.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Guiding {
-    /// Number of paths of the pilot, which are traced besides those of the photons.
+    /// Number of paths that the pilot traced in addition to those of the photons.
     pub pilot_paths: u64,
-    /// Number of cells of the space of emissions.
+    /// Number of cells into which the space of emissions is divided.
     pub cells: usize,
-    /// Expected use of a path over that of a path of the same aim that is not guided.
+    /// Ratio of the expected uses of a guided and an unguided path with the same aim.
     pub gain: f64,
 }
 
-/// Number of tasks of the pilots for aimed and unaimed paths.
+/// Number of tasks of each pilot that compares aimed with unaimed paths.
 const AIM_TASKS: u64 = 4;
-/// Number of tasks of each pilot for the share of caustics.
+/// Number of tasks of each pilot that measures the share of caustics.
 const SHARE_TASKS: u64 = 8;
-/// Number of lower bits of a grid coordinate that a cell of the pilots for the share of caustics spans: 32 to
-/// 64 cells along the longest side of the scene.
+/// Number of lower bits of a grid coordinate that a cell in these pilots spans, such that the longest side of
+/// the scene has 32 to 64 cells.
 const CELL_BITS: u32 = GRID_BITS - 6;
-/// Maximum of the spread of guided paths, aimed at importons over not aimed, for which paths are aimed at
-/// them: a little above 1, as a pilot of unaimed paths misses rare ones of great use.
+/// Maximum ratio of the spreads of guided paths with and without aim at importons, at which paths are aimed.
+/// It is slightly above 1, because a pilot of unaimed paths misses rare paths of great use.
 const MAX_SPREAD_BY_AIM: f64 = 1.1;
-/// Minimum of the pilots' effective numbers of photons, aimed over unaimed, for which paths are aimed: 2, so
-/// that noise of the pilots changes nothing in rooms, where both are about equal.
+/// Minimum ratio of the effective numbers of photons of aimed and unaimed paths, at which paths are aimed. It
+/// is 2 so that noise does not decide in rooms, where both are about equal.
 const MIN_GAIN_BY_AIM: f64 = 2.0;
-/// Difference of the seeds of a map and of the first round of the pilot for its guide.
+/// Difference between the seeds of a map and of the first pilot round for its guide.
 const GUIDE_SEED: u32 = 0x7feb_352d;
-/// Number of rounds of the pilot for a guide, each guided by the one before: paths through a small window are
-/// rare in the first.
+/// Number of pilot rounds for a guide. Each round is guided by the one before, because paths through a small
+/// window are rare in the first round.
 const GUIDE_ROUNDS: u32 = 3;
-/// Number of photons for each path of a round.
+/// Number of photons of the map per path of a pilot round.
 const PHOTONS_PER_GUIDE_PATH: u64 = 8;
-/// Minimum number of tasks of a round, and number of those of the pilots for aimed and unaimed paths.
+/// Minimum number of tasks of a round. The pilots that compare paths with and without aim have as many.
 const MIN_GUIDE_TASKS: u64 = 32;
 /// Maximum number of tasks of a round.
 const MAX_GUIDE_TASKS: u64 = 128;
 
-/// Tracer of the photon map whose paths store more photons: of unaimed paths, or of aimed ones, where far
-/// more of these meet a surface.
+/// Tracer of the photon map that stores more photons: with unaimed paths, or with aimed paths if far more of
+/// these hit a surface.
 pub(super) fn tracer_of_more_photons(packed: &PackedScene, seed: u32) -> Result<Tracer<'_>, Fault> {
     let unaimed = Tracer::new(packed, packed.sources(), seed, Purpose::Indirect);
     let Some(sources) = packed.aimed_sources() else { return Ok(unaimed) };
@@ -65,12 +65,12 @@ pub(super) fn tracer_of_more_photons(packed: &PackedScene, seed: u32) -> Result<
     Ok(if of_aimed > MIN_GAIN_BY_AIM * of_unaimed { aimed } else { unaimed })
 }
 
-/// Effective number of the photons that the first paths store, by their powers.
+/// Effective number of the photons that the first paths store, from their powers.
 fn effective_photons(tracer: &Tracer, packed: &PackedScene) -> Result<f64, Fault> {
     Ok(effective_number(first_photons(tracer, packed, AIM_TASKS)?.into_iter().map(StoredPhoton::power)))
 }
 
-/// Photons that the paths of the first tasks store.
+/// Photons stored by the paths of the first `tasks` tasks.
 fn first_photons(tracer: &Tracer, packed: &PackedScene, tasks: u64) -> Result<Vec<StoredPhoton>, Fault> {
     let tasks: Result<Vec<Traced>, Fault> = (0..tasks)
         .into_par_iter()
@@ -79,8 +79,8 @@ fn first_photons(tracer: &Tracer, packed: &PackedScene, tasks: u64) -> Result<Ve
     Ok(tasks?.into_iter().flat_map(|traced| traced.photons).collect())
 }
 
-/// Share of the power that arrives at surfaces, of all bounces, that caustics bring where they are: the mean
-/// over their light; 1 if no other light arrives.
+/// Fraction of the power arriving at surfaces, over all bounces, that caustics contribute where they occur,
+/// averaged over their light; 1 if no other light arrives.
 pub(super) fn caustic_share(packed: &PackedScene, seed: u32) -> Result<f64, Fault> {
     let power_by = |sources: Option<&Sources>, purpose: Purpose| {
         // Paths of another seed, so that the number of paths does not depend on the photons of the map.
@@ -91,10 +91,10 @@ pub(super) fn caustic_share(packed: &PackedScene, seed: u32) -> Result<f64, Faul
     Ok(caustic.share_of(&power_by(packed.aimed_sources(), Purpose::Indirect)?))
 }
 
-/// Powers of photons by cells of space, in the order of the cells, so that sums are those of any machine.
+/// Photon powers by cell of space, ordered by cell, so that sums do not depend on the machine.
 struct CellPowers(BTreeMap<[u32; 3], CellPower>);
 
-/// Power of the photons of a cell, watts, and the sum of their squares.
+/// Power of the photons in a cell, watts, and sum of the squared powers.
 #[derive(Clone, Copy, Default)]
 struct CellPower {
     power: f64,
@@ -117,7 +117,7 @@ impl CellPowers {
         self.0.values().map(|cell| cell.power).sum()
     }
 
-    /// Mean share of this light of all light, where it is; at least its share of the whole.
+    /// Mean fraction of all light that this light has where it occurs; at least its fraction of the whole.
     fn share_of(&self, all: &Self) -> f64 {
         let (own, whole) = (self.power(), all.power());
         // Pairs of photons alone: a photon with itself would make any light of few photons seem focused.
@@ -130,14 +130,15 @@ impl CellPowers {
     }
 }
 
-/// Effective number of samples of weights w: `(sum w)^2 / sum w^2` (Kish 1965).
+/// Effective number of samples with weights w: `(sum w)^2 / sum w^2` (Kish 1965).
 fn effective_number(weights: impl Iterator<Item = f64>) -> f64 {
     let [sum, squares] =
         weights.fold([0.0; 2], |[sum, squares], weight| [sum + weight, squares + weight * weight]);
     if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }
 
-/// Of two tracers the second, which is aimed at importons, if its guided paths spread less in their use.
+/// Chooses one of two tracers: the second, which is aimed at importons, if the use of its guided paths
+/// spreads less.
 pub(super) fn more_useful<'s>(
     tracers: [Tracer<'s>; 2],
     packed: &PackedScene,
@@ -153,8 +154,8 @@ pub(super) fn more_useful<'s>(
     Ok(if of_second < MAX_SPREAD_BY_AIM * of_first { second } else { first })
 }
 
-/// Guide of a tracer's paths towards importons, for a number of photons; `None` if no path of the pilot is of
-/// use.
+/// Guides a tracer's paths towards importons, for a number of photons; `None` if no path of the pilot is
+/// useful.
 pub(super) fn guide(
     tracer: &Tracer,
     packed: &PackedScene,
@@ -177,7 +178,7 @@ pub(super) fn guide(
     }))
 }
 
-/// Samples of the use of the paths of some tasks.
+/// Samples the uses of the paths of `tasks` tasks.
 fn samples(
     pilot: &Tracer,
     packed: &PackedScene,
@@ -191,7 +192,7 @@ fn samples(
     Ok(samples?.concat())
 }
 
-/// Samples of the use of a task's paths.
+/// Samples the uses of the paths of one task.
 fn samples_of_task(
     pilot: &Tracer,
     packed: &PackedScene,

@@ -1,4 +1,4 @@
-//! Photons in host memory: sixteen bytes each, until they are written to the card image.
+//! Photons in host memory, sixteen bytes each, before they are written to the card image.
 
 use glam::Vec3;
 use photoncard_firmware::sampler::hash;
@@ -8,22 +8,22 @@ use photoncard_shared::layout::{
 
 /// A photon: its grid point, and its other values in encoded form.
 ///
-/// Photons are ordered by grid point, then by content: a total order.
+/// Photons have a total order, by grid point and then by content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct StoredPhoton {
-    /// Three coordinates of [`GRID_BITS`] bits each, x in the lowest.
+    /// Grid point: three coordinates of [`GRID_BITS`] bits each, x in the lowest bits.
     place: u64,
-    /// Bytes of a [`Photon`]'s record after its position.
+    /// Bytes that follow the position in a [`Photon`]'s record.
     content: u64,
 }
 
 const COORDINATE_MASK: u64 = (1 << GRID_BITS) - 1;
-/// Bit offset of the splitting axis in the content; the axis is zero outside a tree.
+/// Position of the splitting axis in the content, bits. The axis is zero outside a kd-tree.
 const AXIS_SHIFT: u32 = 48;
 const AXIS_MASK: u64 = 3 << AXIS_SHIFT;
 
 impl StoredPhoton {
-    /// Photon at the nearest point of a grid.
+    /// Photon at the grid point nearest to its position.
     pub(crate) fn new(grid: &PhotonGrid, photon: &Photon) -> Self {
         let content = Photon::content(&Photon { axis: 0, ..*photon }.to_bytes());
         Self::at(grid.nearest(photon.position), content)
@@ -35,7 +35,7 @@ impl StoredPhoton {
         Self { place: x | y << GRID_BITS | z << (2 * GRID_BITS), content: u64::from_le_bytes(content) }
     }
 
-    /// Coordinate of its grid point.
+    /// Coordinate of the grid point on an axis.
     #[inline(always)]
     pub(crate) fn coordinate(self, axis: usize) -> u32 {
         (self.place >> (GRID_BITS * axis as u32) & COORDINATE_MASK) as u32
@@ -47,34 +47,34 @@ impl StoredPhoton {
         [0, 1, 2].map(|axis| self.coordinate(axis))
     }
 
-    /// Bytes after the position.
+    /// Bytes that follow the position in the photon's record.
     pub(crate) fn content(self) -> [u8; PHOTON_CONTENT_BYTES] {
         self.content.to_le_bytes()
     }
 
-    /// Sum of its power's channels, in units of the map.
+    /// Sum of the power's channels, in the map's units.
     pub(crate) fn power(self) -> f64 {
         self.colour().into_iter().map(f64::from).sum()
     }
 
-    /// Its power, in units of the map.
+    /// Power, in the map's units.
     fn colour(self) -> [f32; 3] {
         let [a, b, c, d, ..] = self.content();
         Rgbe([a, b, c, d]).decode()
     }
 
-    /// Square of the distance to another photon, square grid cells.
+    /// Squared distance to another photon, square grid cells.
     pub(crate) fn distance_squared(self, other: Self) -> u64 {
         let differences = [0, 1, 2].map(|axis| self.coordinate(axis).abs_diff(other.coordinate(axis)));
         differences.into_iter().map(|difference| u64::from(difference) * u64::from(difference)).sum()
     }
 
-    /// True for a photon that comes from a light.
+    /// Returns true if the photon came straight from a light.
     pub(crate) fn is_direct(self) -> bool {
         Photon::direct_of_flags(self.flags())
     }
 
-    /// Unit normal of its surface.
+    /// Unit normal of the photon's surface.
     pub(crate) fn normal(self) -> Vec3 {
         Vec3::from(decode_normal(Photon::normal_of_flags(self.flags()))).normalize()
     }
@@ -84,7 +84,7 @@ impl StoredPhoton {
         u16::from_le_bytes([low, high])
     }
 
-    /// The photon with the power of another one besides its own.
+    /// The photon with the power of another photon added.
     #[must_use]
     pub(crate) fn with_power_of(self, other: Self) -> Self {
         let sum = Vec3::from(self.colour()) + Vec3::from(other.colour());
@@ -102,7 +102,7 @@ impl StoredPhoton {
         Self { content: self.content & !AXIS_MASK | (axis as u64) << AXIS_SHIFT, ..self }
     }
 
-    /// Record in card memory.
+    /// Record of the photon in card memory.
     pub(crate) fn record(self, grid: &PhotonGrid) -> [u8; Photon::BYTES] {
         let mut record = [0; Photon::BYTES];
         let (position, content) = record.split_at_mut(Photon::BYTES - PHOTON_CONTENT_BYTES);
@@ -124,14 +124,14 @@ pub struct Photons {
 }
 
 impl Photons {
-    /// Photons on the nearest points of a grid; `power_unit` is the power of a photon of value 1, watts.
+    /// Photons at the nearest points of a grid. `power_unit` is the power of a photon of value 1, watts.
     pub fn new(grid: PhotonGrid, power_unit: f32, photons: impl IntoIterator<Item = Photon>) -> Self {
         let list = photons.into_iter().map(|photon| StoredPhoton::new(&grid, &photon)).collect();
         Self { list, grid, power_unit }
     }
 
-    /// These photons with the first of others, a share of all, in place of as many of these: paths are
-    /// numbered, and independent of each other, so that those of the first numbers are traced anew.
+    /// Replaces the fraction `share` of these photons by the first photons of `others`. Paths are numbered
+    /// and independent, so that this equals tracing the paths with the first numbers anew.
     #[must_use]
     pub fn with_replaced(&self, others: &Self, share: f64) -> Self {
         let count = ((share * self.len() as f64) as usize).min(self.len()).min(others.len());
@@ -149,7 +149,7 @@ impl Photons {
         self.list.is_empty()
     }
 
-    /// Grid of the positions.
+    /// Grid of the photons' positions.
     pub fn grid(&self) -> PhotonGrid {
         self.grid
     }
@@ -169,7 +169,7 @@ impl Photons {
         &mut self.list
     }
 
-    /// Photons, decoded as from card memory.
+    /// Photons as they are decoded from card memory.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = Photon> {
         self.list.iter().map(|photon| Photon::read(&photon.record(&self.grid)))
     }

@@ -1,4 +1,4 @@
-//! The photon pass: paths until enough photons are stored.
+//! Photon pass: traces paths until enough photons are stored.
 
 use std::cell::LazyCell;
 
@@ -16,29 +16,29 @@ use crate::pack::PackedScene;
 
 /// Result of the photon pass.
 pub struct PhotonPass {
-    /// Photons in the order of their paths, as many as requested.
+    /// As many photons as requested, in the order of their paths.
     pub photons: Photons,
     /// Number of paths traced.
     pub paths: u64,
-    /// Guiding of the paths towards what a camera uses; `None` for paths that are not guided.
+    /// Guiding of the paths towards what a camera uses; `None` if paths are not guided.
     pub guiding: Option<Guiding>,
 }
 
 /// Number of paths after which at least one photon per thousand further paths must be stored.
 const FRUITLESS_PATHS: u64 = 1_000_000;
-/// Number of paths per stored caustic photon that are traced in any case.
+/// Number of paths per caustic photon that are traced in any case.
 const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
-/// Maximum number of further paths for caustics.
+/// Maximum number of additional paths for caustics.
 const MAX_PATHS_TO_CAUSTICS: f64 = 1_000_000.0;
-/// Minimum number of further paths for caustics.
+/// Minimum number of additional paths for caustics.
 const MIN_PATHS_TO_CAUSTICS: u64 = 125_000;
-/// Share of the power that surfaces receive from which on caustics are worth [`MAX_PATHS_TO_CAUSTICS`]: paths
-/// of smaller shares are proportionally fewer.
+/// Fraction of the power received by surfaces from which caustics get [`MAX_PATHS_TO_CAUSTICS`] additional
+/// paths. Smaller fractions get proportionally fewer.
 const FULL_CAUSTIC_SHARE: f64 = 0.1;
 
-/// Traces paths until `count` photons are stored; none if no surface stores photons, and fewer if most light
-/// passes all surfaces by, or ends on surfaces that store none. `progress` is called with the number
-/// of photons, and returns whether to go on.
+/// Traces paths until `count` photons are stored. It stores none if no surface stores photons, and fewer if
+/// most light misses all surfaces or ends on surfaces that store none. `progress` is called with the number
+/// of photons and returns whether to continue.
 ///
 /// # Errors
 /// If `progress` returns false.
@@ -51,7 +51,7 @@ pub fn trace(
     trace_for(packed, None, seed, count, progress)
 }
 
-/// [`trace`], with paths that are guided towards importons if there are any.
+/// Does [`trace`] with paths that are guided towards importons, if there are any.
 pub(crate) fn trace_for(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,
@@ -74,9 +74,9 @@ pub(crate) fn trace_for(
     Ok(traced)
 }
 
-/// Traces paths until `count` caustic photons are stored, or as many as they are worth: where fewer than one
-/// path in twenty stores a photon, their number follows from the share of light that caustics bring. `go_on`
-/// returns whether to go on.
+/// Traces paths until `count` caustic photons are stored or enough paths are traced. If fewer than one path
+/// in twenty stores a photon, the number of paths follows from the fraction of light that caustics
+/// contribute. `go_on` returns whether to continue.
 ///
 /// # Errors
 /// If `go_on` returns false.
@@ -89,7 +89,7 @@ pub fn trace_caustics(
     trace_caustics_for(packed, None, seed, count, go_on)
 }
 
-/// [`trace_caustics`], with paths that are guided towards importons if there are any.
+/// Does [`trace_caustics`] with paths that are guided towards importons, if there are any.
 pub(crate) fn trace_caustics_for(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,
@@ -112,15 +112,15 @@ pub(crate) fn trace_caustics_for(
     if go_on() { Ok(traced.photons) } else { Err(PhotonError::Stopped) }
 }
 
-/// Number of paths that caustics are worth, besides those in proportion to their photons, for their share of
-/// the light.
+/// Number of paths for caustics that contribute the fraction `share` of the light, in addition to those in
+/// proportion to their photons.
 fn paths_worth(share: f64) -> u64 {
     let full = (share / FULL_CAUSTIC_SHARE).min(1.0);
     MIN_PATHS_TO_CAUSTICS.max((full * MAX_PATHS_TO_CAUSTICS) as u64)
 }
 
-/// Traces paths until `count` photons are stored, or `further(photons, paths)`, the number of paths that may
-/// follow, is 0.
+/// Traces paths until `count` photons are stored or `further(photons, paths)`, the number of further paths
+/// allowed, is 0.
 fn trace_while(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,
@@ -180,8 +180,8 @@ fn trace_while(
     Ok(PhotonPass { photons, paths, guiding })
 }
 
-/// Tracer of the photons of a map, whose paths start at the sources of most use. `towards` are importons,
-/// with sources that are aimed at them.
+/// Tracer of the photons of a map. Its paths start at the most useful sources. `towards` are importons, with
+/// sources that are aimed at them.
 fn tracer<'s>(
     packed: &'s PackedScene,
     (seed, purpose): (u32, Purpose),
@@ -196,8 +196,8 @@ fn tracer<'s>(
     more_useful([tracer, Tracer::new(packed, aimed, seed, purpose)], packed, importons)
 }
 
-/// Number of tasks of the next round, from the photons per path so far; at most 64, so that progress shows.
-/// It does not affect which paths are traced.
+/// Number of tasks of the next round, from the photons per path so far. It is at most 64, so that progress is
+/// reported. It does not affect which paths are traced.
 fn next_tasks(missing: usize, stored: usize, paths: u64) -> u64 {
     let photons_per_path = if stored > 0 { stored as f64 / paths as f64 } else { 4.0 };
     let needed = (missing as f64 / photons_per_path) as u64;

@@ -1,4 +1,5 @@
-//! A photon path: Russian roulette on the albedo; a photon is stored at every surface that is not specular.
+//! Traces a photon path, with Russian roulette on the albedo. A photon is stored at every surface that is not
+//! specular.
 
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
@@ -15,21 +16,20 @@ use super::stored::StoredPhoton;
 use crate::light::Sources;
 use crate::pack::PackedScene;
 
-/// Number of paths of one task.
 pub(super) const PATHS_PER_TASK: u64 = 2048;
-/// Maximum number of bounces of a path; only surfaces without loss let a path reach it.
+/// Maximum number of bounces of a path. A path reaches it only between surfaces without loss.
 const MAX_BOUNCES: u32 = 512;
 
-/// Photons of a task's paths.
+/// Photons of the paths of a task.
 pub(super) struct Traced {
     /// Photons in the order of their paths.
     pub(super) photons: Vec<StoredPhoton>,
-    /// Number of photons at the end of each path.
+    /// Number of photons stored up to the end of each path.
     pub(super) ends: Vec<u32>,
 }
 
 impl Traced {
-    /// Number of paths until `count` photons are stored, the last path included; all paths if they store
+    /// Number of paths until `count` photons are stored, including the last path; all paths if they store
     /// fewer.
     pub(super) fn paths_until(&self, count: usize) -> u64 {
         let before = self.ends.partition_point(|&end| (end as usize) < count);
@@ -37,23 +37,23 @@ impl Traced {
     }
 }
 
-/// Map that photons are traced for.
+/// Map for which photons are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
-    /// The photon map: a photon at every surface that is not specular.
+    /// The photon map, which stores a photon at every surface that is not specular.
     Indirect,
-    /// The caustic map: a photon at the first such surface, of paths that specular surfaces have turned
-    /// before: flat glass, which shadow rays pass, does not.
+    /// The caustic map, which stores a photon at the first surface that is not specular, if specular surfaces
+    /// changed the path's direction before. Flat glass, which shadow rays pass, does not change it.
     Caustics,
 }
 
-/// Parameters of all paths.
+/// Parameters of all paths of a tracer.
 pub(super) struct Tracer<'s> {
     scene: SceneImage,
     sources: &'s Sources,
     pub(super) guide: Option<&'s Guide>,
     pub(super) grid: PhotonGrid,
-    /// Power of a photon of value 1 if the path were the only one, watts.
+    /// Power of a photon of value 1, watts, if its path were the only one.
     pub(super) path_unit: f32,
     pub(super) seed: u32,
     purpose: Purpose,
@@ -68,18 +68,18 @@ impl<'s> Tracer<'s> {
         Self { scene, sources, guide: None, grid, path_unit, seed, purpose }
     }
 
-    /// Tracer of paths of another seed.
+    /// Tracer with another seed.
     pub(super) fn with_seed(&self, seed: u32) -> Self {
         Self { seed, ..*self }
     }
 
-    /// Tracer of guided paths, whose photons may be stronger.
+    /// Tracer of guided paths, whose photons can be stronger.
     pub(super) fn guided(self, guide: Option<&'s Guide>) -> Self {
         let scale = if guide.is_some() { power_of_two_above(1.0 / UNIFORM_SHARE) } else { 1.0 };
         Self { guide, path_unit: self.path_unit * scale, ..self }
     }
 
-    /// Traces the paths of a task.
+    /// Traces the paths of a task, from path `first` on.
     pub(super) fn trace(&self, memory: &mut impl MemoryPort, first: u64) -> Result<Traced, Fault> {
         let mut traced = Traced { photons: Vec::new(), ends: Vec::with_capacity(PATHS_PER_TASK as usize) };
         for path in first..first + PATHS_PER_TASK {
@@ -157,8 +157,8 @@ impl<'s> Tracer<'s> {
         Ok(())
     }
 
-    /// Record of a photon that arrives at a surface. Of photons that reach the surface some meet its base,
-    /// and gathers are there as rarely: the record has the power of all.
+    /// Record of a photon that arrives at a surface. Its power is divided by the surface's layer probability
+    /// and coverage, because photons and gathers reach the base with that probability only.
     fn stored(&self, surface: &Surface, arrived: Vec3, direct: bool, dither: u32) -> StoredPhoton {
         let power = arrived / (surface.probability * surface.coverage);
         let photon = Photon {
@@ -174,7 +174,8 @@ impl<'s> Tracer<'s> {
     }
 }
 
-/// Returns whether photons of a light light a surface: rays of a narrow lobe meet lights with extent.
+/// Returns whether photons of a light are stored for a surface. Rays of a narrow lobe hit lights with an
+/// area, so that such a lobe needs photons only of other lights.
 fn is_lit(surface: &Surface, has_extent: bool) -> bool {
     let reflection = surface.reflection;
     !if has_extent { reflection.without_narrow_lobe() } else { reflection }.is_black()
@@ -183,9 +184,9 @@ fn is_lit(surface: &Surface, has_extent: bool) -> bool {
 /// Maximum of [`shading_share`].
 const MAX_SHADING_SHARE: f32 = 4.0;
 
-/// Correction of a photon's power for a shading normal `n` at a triangle with the normal `g`: `|n.i| |g.o| /
-/// (|n.o| |g.i|)` with the directions of incidence `i` and exitance `o` (Veach 1997, *Robust Monte Carlo
-/// methods for light transport simulation*, section 5.3).
+/// Correction of a photon's power for a shading normal `n` on a triangle with the normal `g`:
+/// `|n.i| |g.o| / (|n.o| |g.i|)`, where `i` is the direction of incidence and `o` of exitance (Veach 1997,
+/// *Robust Monte Carlo methods for light transport simulation*, section 5.3).
 fn shading_share(surface: &Surface, left: Vec3) -> f32 {
     let Surface { normal, geometric_normal, outgoing: arrived, .. } = *surface;
     if normal == geometric_normal {
@@ -196,8 +197,8 @@ fn shading_share(surface: &Surface, left: Vec3) -> f32 {
     if share < MAX_SHADING_SHARE { share } else { MAX_SHADING_SHARE }
 }
 
-/// Russian roulette: a photon survives with the probability `reflected / arrived` of its strongest channel,
-/// over which its power is divided.
+/// Applies Russian roulette: a photon survives with the probability `reflected / arrived` of its strongest
+/// channel. Its power is then divided by that probability.
 fn survive(arrived: Vec3, reflected: Vec3, roulette: f32) -> Option<Vec3> {
     let probability = (reflected.max_element() / arrived.max_element()).min(1.0);
     (roulette < probability).then(|| reflected / probability)

@@ -1,4 +1,4 @@
-//! Memory of a card that an image takes, and the settings to lower if it is too much.
+//! Checks whether an image fits a card's memory, and names the setting to lower if it does not.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
@@ -10,11 +10,11 @@ use super::settings::{PhotonLayout, PhotonSettings};
 use super::store::{CAUSTIC_SECTIONS, PHOTON_SECTIONS};
 use crate::pack::{CardImage, PackError, PackedScene};
 
-/// Approximate number of photons per line, lines of inner nodes included.
+/// Approximate number of photons per line, including the lines of inner nodes.
 const PHOTONS_OF_A_LEAF: usize = 9;
 
-/// Checks whether the image of a packed scene with a photon map of these settings may fit a card's memory.
-/// The lines of leaves are estimated; [`check_image`] counts them.
+/// Checks whether the image of a packed scene, with a photon map of these settings, can fit a card's memory.
+/// The number of leaf lines is estimated; [`check_image`] counts them.
 ///
 /// # Errors
 /// [`PackError::Dram`], with the setting to lower.
@@ -70,23 +70,22 @@ pub fn check_image(image: &CardImage, budget: &Budget) -> Result<(), PackError> 
     Err(PackError::Dram { needed, photons, available, remedy })
 }
 
-/// Size of a section's lines, bytes.
 fn bytes(image: &CardImage, kind: SectionKind) -> u64 {
     image.section(kind).len() as u64 * LINE_BYTES as u64
 }
 
-/// Returns whether a part is more than half of all.
+/// Returns whether a part is more than half of the whole.
 fn is_most(part: u64, all: u64) -> bool {
     part > all / 2
 }
 
-/// Remedy for photons that do not fit, or for texels if they take most of the image.
+/// Remedy if photons do not fit. It concerns texels if they take most of the image.
 fn lower(photons: &str, texels: u64, needed: u64) -> String {
     let textures = if is_most(texels, needed) { ", use smaller textures" } else { "" };
     format!("{photons}{textures}, or use a card with more memory")
 }
 
-/// Remedy for a scene that is too large without photons.
+/// Remedy if the scene is too large without photons.
 fn simplify(scene: u64, texels: u64) -> String {
     let part = if is_most(texels, scene) {
         format!(", {texels} of them texels: use smaller textures or a smaller environment")
@@ -106,7 +105,7 @@ mod tests {
     use super::*;
     use crate::photon_map::map_photons;
 
-    /// A triangle with a texture of `side` x `side` texels.
+    /// Triangle with a texture of `side` x `side` texels.
     fn textured(side: u32) -> PackedScene {
         let texels = vec![[0; 4]; (side * side) as usize];
         let image =
@@ -142,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn textures_are_to_be_smaller_where_they_take_the_memory() {
+    fn smaller_textures_are_suggested_where_textures_take_the_memory() {
         let large = textured(1024);
         assert!(remedy(&large, 0, 1 << 20).contains("4194304 of them texels: use smaller textures"));
         let with_photons = remedy(&large, 100_000, 5 << 20);
@@ -150,9 +149,9 @@ mod tests {
         assert!(!remedy(&textured(64), 1_000_000, 5 << 20).contains("textures"));
     }
 
-    /// If caustic photons take most of the memory, lowering the number of other photons would not help.
+    /// If caustic photons take most of the memory, fewer other photons would not help.
     #[test]
-    fn the_larger_of_the_photon_maps_is_to_be_lowered() {
+    fn fewer_photons_are_suggested_for_the_larger_of_the_maps() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/cornell-spheres.glb");
         let scene = photoncard_scene::gltf::load(path.as_ref()).expect("a shipped scene loads");
         for (photons, caustic_photons, expected) in

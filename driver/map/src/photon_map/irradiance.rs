@@ -1,10 +1,10 @@
-//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*): the chip's own density
-//! estimate at every photon, for a white diffuser, is stored in the image. A gather takes the irradiance of
-//! the nearest point on its surface.
+//! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*). The chip's density
+//! estimate for a white diffuser is computed at every photon and stored in the image. A gather then takes the
+//! irradiance of the nearest point on its surface.
 //!
-//! At a photon the density estimate is too high by one photon, the photon itself. The nearest point to a
-//! given position, however, is known to have no other between them, which lowers the estimate by one photon.
-//! For photons in random positions both cancel in the mean.
+//! At a photon the density estimate is too high by one photon, the photon itself. On the other hand, the
+//! nearest point to a given position is known to have no other point between them, which lowers the estimate
+//! by one photon. For photons in random positions the two errors cancel on average.
 
 use glam::Vec3;
 use photoncard_firmware::gather::HilbertCode;
@@ -23,15 +23,15 @@ use super::store::store_irradiance;
 use crate::pack::CardImage;
 use crate::photon::{PhotonError, StoredPhoton};
 
-/// Number of points of one task; `go_on` is called before each task.
+/// Number of points per task. `go_on` is called before each task.
 const POINTS_OF_A_TASK: usize = 256;
 
-/// Grid point and code of a surface normal.
+/// Grid point, and code of a surface normal.
 type SurfacePoint = ([u32; 3], u8);
 
 /// Adds irradiance points to an image with photons, for gathers of `neighbors` photons within `max_distance`,
-/// metres. They depend on the photons alone, not on the layout of their map. `go_on` is called before each
-/// task.
+/// metres. The points depend only on the photons, not on the layout of the photon map. `go_on` is called
+/// before each task.
 ///
 /// # Errors
 /// If the image is malformed or grows too large, or `go_on` returns false.
@@ -66,7 +66,7 @@ pub fn precompute_irradiance(
     }
 }
 
-/// The chip's density estimate, with its buffer.
+/// Density estimate of the chip, with its buffer.
 struct Estimator<'a> {
     scene: SceneImage,
     memory: Lines<'a>,
@@ -102,7 +102,7 @@ impl<'a> Estimator<'a> {
     }
 }
 
-/// Positions and surface normals of photons without repetition, sorted along a Hilbert curve for each normal.
+/// Distinct positions and surface normals of photons, sorted by normal and then along a Hilbert curve.
 fn surface_points(image: &CardImage) -> Result<Vec<SurfacePoint>, Fault> {
     let (scene, mut memory) = image.view();
     let grid = scene.header.photon_grid;

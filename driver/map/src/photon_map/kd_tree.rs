@@ -1,4 +1,4 @@
-//! The left-balanced kd-tree (Jensen 2001, ch. 6): a complete binary tree, stored without gaps in heap order.
+//! Left-balanced kd-tree (Jensen 2001, chapter 6): a complete binary tree, stored without gaps in heap order.
 
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{Photon, PhotonLeaf, Record};
@@ -10,8 +10,8 @@ use crate::photon::StoredPhoton;
 /// Number of photons below which a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
 
-/// Moves the photons of an image from leaves into a kd-tree; irradiance points and caustic photons are
-/// removed. Searches find the same photons in both layouts.
+/// Moves the photons of an image from leaves into a kd-tree, and removes irradiance points and caustic
+/// photons. Searches find the same photons in both layouts.
 ///
 /// # Errors
 /// [`PackError::TooLarge`] if there are more lines than an address can number.
@@ -34,7 +34,6 @@ pub fn to_kd_tree(image: CardImage) -> Result<CardImage, PackError> {
     Ok(image.finish())
 }
 
-/// Photons of an image's leaves.
 fn photons_of_leaves(image: &CardImage) -> Vec<StoredPhoton> {
     let leaves = || image.section(SectionKind::PhotonLeaves).iter().map(|line| PhotonLeaf::read(&line.0));
     let mut photons = Vec::with_capacity(leaves().map(|leaf| leaf.photons() as usize).sum());
@@ -44,16 +43,16 @@ fn photons_of_leaves(image: &CardImage) -> Vec<StoredPhoton> {
     photons
 }
 
-/// Number of nodes in the left subtree of a left-balanced tree of `count` nodes, at least one.
+/// Number of nodes in the left subtree of a left-balanced tree with `count` nodes, at least one.
 fn left_nodes(count: usize) -> usize {
     let last_level = 1 << count.ilog2();
     let in_last_level = count - (last_level - 1);
     (last_level / 2).saturating_sub(1) + in_last_level.min(last_level / 2)
 }
 
-/// Sorts photons into in-order: of every subtree first the left subtree, then the root, then the right
-/// subtree. Each is split along the longest side of its bounding box. The tree does not depend on the
-/// photons' initial order or on threads.
+/// Sorts photons into in-order: in every subtree the left subtree comes first, then the root, then the right
+/// subtree. Each subtree is split along the longest side of its bounding box. The tree depends neither on the
+/// photons' initial order nor on threads.
 fn balance(photons: &mut [StoredPhoton]) {
     if photons.len() < 2 {
         return;
@@ -79,8 +78,8 @@ fn longest_side(photons: &[StoredPhoton]) -> usize {
     (0..3).max_by_key(side).unwrap_or(0)
 }
 
-/// Calls `put` for every node of a balanced tree with its index in the heap, where the children of `i` are `2
-/// i + 1` and `2 i + 2`.
+/// Calls `put` for every node of a balanced tree, with its heap index; the children of `i` are `2 i + 1` and
+/// `2 i + 2`.
 fn for_each_in_heap(photons: &[StoredPhoton], put: &mut impl FnMut(usize, StoredPhoton)) {
     // Subtrees to visit: the heap index of each root, and the photons in-order.
     let mut waiting = vec![(0, photons)];
@@ -108,7 +107,7 @@ mod tests {
         (0..count).map(|i| StoredPhoton::at([0, 1, 2].map(|axis| coordinate(i, axis)), [0; 8])).collect()
     }
 
-    /// The tree in heap order.
+    /// Photons of a tree, in heap order.
     fn heap(count: u32) -> Vec<StoredPhoton> {
         let mut sorted = photons(count);
         balance(&mut sorted);

@@ -1,9 +1,9 @@
-//! Radii of the kernels of caustic photons, by the density of the light that each belongs to.
+//! Kernel radii of caustic photons, from the density of the light that each photon belongs to.
 //!
-//! Photons of one light have like directions: those that a ball scatters over a room are few, and lie among
-//! the many of a patch of sun. The radius of a photon is that within which a number of photons of its surface
-//! and of about its direction lie, so that neither a sparse light shows its photons nor a dense one is
-//! blurred by it.
+//! Photons of one light have similar directions. Photons that a ball scatters over a room are few and lie
+//! among the many photons of a patch of sunlight. The radius of a photon is the distance within which a given
+//! number of photons lie on its surface with about its direction, so that single photons of a sparse light
+//! are not visible, and a dense light is not blurred.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_kernel, kernel_share};
@@ -11,25 +11,25 @@ use photoncard_shared::layout::{Photon, decode_direction, decode_normal, encode_
 use super::neighbors::{Place, Places, arrange};
 use crate::photon::{Photons, StoredPhoton};
 
-/// Maximum number of neighbours by which the density is estimated: the radius is that of more of them, at
-/// this density.
+/// Maximum number of neighbours from which the density is estimated. A radius for more neighbours is
+/// extrapolated from this density.
 const MAX_PROBED: u32 = 64;
-/// Area of a kernel's disc over that of an even disc of equal variance: a kernel that falls to its edge sees
-/// fewer photons.
+/// Area of a kernel's disc relative to a uniform disc with equal variance. The kernel falls towards its edge
+/// and thus uses fewer photons effectively.
 const AREA: f32 = 4.0 / 3.0;
-/// Maximum radius over the diagonal of the scene: light that is sparser shows its photons, as faint spots of
-/// this size.
+/// Maximum radius relative to the diagonal of the scene. Photons of sparser light are visible, as faint spots
+/// of this size.
 const MAX_SHARE_OF_DIAGONAL: f32 = 0.1;
 /// Minimum radius, cells of the photon grid.
 const MIN_CELLS: f32 = 4.0;
-/// Ratio of the area of a photon's disc and that of its code, at which the code changes: the middle of two
-/// powers of two.
+/// Ratio of the area of a photon's disc to that of its code at which the code changes: the geometric mean of
+/// two powers of two.
 const ROUNDING: f32 = std::f32::consts::FRAC_1_SQRT_2;
-/// Cells by which the reach of a photon is rounded up.
+/// Number of cells by which a photon's reach is rounded up.
 const MARGIN_CELLS: u32 = 2;
 
-/// Gives each photon the code of its radius, in which about `neighbors` of its light lie, and changes the
-/// photons' order. Returns the radius of the last code, metres.
+/// Sets the radius code of each photon, such that about `neighbors` photons of its light lie within the
+/// radius, and changes the photons' order. Returns the radius of the last code, metres.
 pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f32 {
     let grid = photons.grid();
     arrange(photons.stored_mut());
@@ -48,7 +48,8 @@ pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f3
     greatest * grid.cell
 }
 
-/// Cells that a photon's disc reaches from its place; `greatest` is the radius of the last code.
+/// Number of cells that a photon's disc extends from its position. `greatest` is the radius of the last code,
+/// metres.
 pub(super) fn reach(photon: &StoredPhoton, greatest: f32) -> u32 {
     let [.., low, high] = photon.content();
     let code = Photon::disc_of_flags(u16::from_le_bytes([low, high]));
@@ -85,16 +86,16 @@ mod tests {
         }
     }
 
-    /// Places in a square of a side, at height 0.
+    /// Positions in a square of side `side`, at height 0.
     fn square(side: f32, count: u32) -> impl Iterator<Item = Vec3> {
         let number = |index: u32| (hash(index) >> 8) as f32 / 16_777_216.0;
         (0..count).map(move |index| Vec3::new(number(2 * index), 0.0, number(2 * index + 1)) * side)
     }
 
-    /// A thousand photons of a square metre are hidden in ten thousand of another light: each has the radius
-    /// of its own.
+    /// A thousand photons on a square metre are mixed with ten thousand photons of another light. Each must
+    /// get the radius of its own light.
     #[test]
-    fn a_radius_is_by_the_density_of_the_photons_own_light() {
+    fn a_radius_follows_the_density_of_the_photons_own_light() {
         let sun = square(1.0, 100_000).map(|place| photon(place, Vec3::Y));
         let sparse = square(1.0, 1000).map(|place| photon(place, Vec3::new(0.8, 0.6, 0.0)));
         let grid = PhotonGrid::around([0.0; 3], [1.0; 3]);
@@ -115,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn few_photons_have_a_share_of_the_diagonal() {
+    fn radii_of_few_photons_are_limited_by_the_diagonal() {
         let grid = PhotonGrid::around([0.0; 3], [1.0; 3]);
         let mut photons = Photons::new(grid, 1.0, [photon(Vec3::ZERO, Vec3::Y), photon(Vec3::X, Vec3::Y)]);
         assert_eq!(spread(&mut photons, 50, 2.0), 0.2);

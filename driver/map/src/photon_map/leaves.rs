@@ -1,10 +1,11 @@
-//! The line layout of the photon map: leaves of one line each, split where a search is least likely to visit
-//! both sides, and inner nodes of up to sixteen children, one line each.
+//! Line layout of the photon map: leaves of one line each, below inner nodes with up to sixteen children, one
+//! line each.
 //!
 //! Splitting planes are chosen by the voxel volume heuristic (Wald, Günther, Slusallek 2004, *Balancing
-//! considered harmful*): the probability that a search visits a box is proportional to its volume after
-//! enlargement by the search radius. Splits are rounded to whole leaves, so that lines are full. The binary
-//! tree is then folded into wide nodes of minimum expected visits, by the same probabilities.
+//! considered harmful*), such that a search is unlikely to visit both sides: the probability that a search
+//! visits a box is proportional to its volume, enlarged by the search radius. Splits are rounded to whole
+//! leaves, so that lines are full. The binary tree is then folded into wide nodes with the fewest expected
+//! visits, by the same probabilities.
 
 use std::num::NonZeroU8;
 
@@ -17,19 +18,19 @@ use crate::photon::StoredPhoton;
 
 /// Number of photons below which a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
-/// Maximum and minimum number of intervals of a side, whose borders are the candidate planes.
+/// Maximum number of intervals along a side. Their borders are the candidate planes.
 const INTERVALS: usize = 32;
 const MIN_INTERVALS: usize = 8;
-/// Maximum number of photons from which a plane is chosen; larger sets are sampled.
+/// Maximum number of photons from which a plane is chosen. Larger sets are sampled.
 const SAMPLED: usize = 4096;
-/// Number of photons above which a box is expected to contain several surfaces.
+/// Number of photons above which a box is assumed to contain several surfaces.
 const MANY: usize = 64;
 /// Depth of the binary tree below which subtrees are split at the median.
 const MAX_SKEWED: usize = 40;
-/// Greatest coordinate of a grid point.
+/// Maximum coordinate of a grid point.
 const LAST_POINT: u32 = (1 << GRID_BITS) - 1;
 
-/// Photons of a leaf: a range in the order of the tree.
+/// Photons of a leaf, as a range in the tree's order.
 #[derive(Clone, Copy)]
 struct Run {
     first: u32,
@@ -43,14 +44,14 @@ pub(super) struct PhotonTree<'a> {
 }
 
 impl<'a> PhotonTree<'a> {
-    /// Tree of photons, for searches of about `radius` cells. It does not depend on threads. `None` without
-    /// photons.
+    /// Builds a tree of photons for searches with a radius of about `radius` cells. It does not depend on
+    /// threads. `None` without photons.
     pub(super) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
         Self::of(photons, &Searches { radius, reach: &|_| 0 })
     }
 
-    /// Tree of photons whose boxes hold all points within the reach of a photon, cells, for searches at a
-    /// point.
+    /// Builds a tree of photons for searches at a point. Its boxes contain all points within the reach of
+    /// each photon, cells.
     pub(super) fn of_discs(photons: &'a mut [StoredPhoton], reach: Reach) -> Option<Self> {
         let mut reaches: Vec<u32> = photons.iter().map(reach).collect();
         if reaches.is_empty() {
@@ -70,7 +71,7 @@ impl<'a> PhotonTree<'a> {
         Some(Self { photons, folded })
     }
 
-    /// Lines of the nodes.
+    /// Lines of the inner nodes.
     pub(super) fn nodes(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.folded.nodes.iter().map(|node| {
             let boxes: Vec<GridBox> = node.children.iter().map(|extent| extent.0).collect();
@@ -79,7 +80,6 @@ impl<'a> PhotonTree<'a> {
         })
     }
 
-    /// Lines of the leaves.
     pub(super) fn leaves(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.folded.leaves.iter().map(|run| {
             let photons = self.photons.iter().skip(run.first as usize).take(run.count.get().into());
@@ -90,10 +90,10 @@ impl<'a> PhotonTree<'a> {
     }
 }
 
-/// Distance from a photon within which searches find it, cells.
+/// Function that returns the distance from a photon within which searches find it, cells.
 type Reach<'r> = &'r (dyn Fn(&StoredPhoton) -> u32 + Sync);
 
-/// Searches that a tree is built for.
+/// Kind of searches that a tree is built for.
 struct Searches<'r> {
     /// Radius of a typical search, cells.
     radius: f64,
@@ -101,7 +101,7 @@ struct Searches<'r> {
     reach: Reach<'r>,
 }
 
-/// Tree of photons whose first has the index `first`; `None` without photons.
+/// Builds the tree of photons. The first has the index `first`. `None` without photons.
 fn build(
     photons: &mut [StoredPhoton],
     first: u32,
@@ -149,7 +149,7 @@ impl Extent {
         Self(extent)
     }
 
-    /// Box of all grid points within the reach of the photons, along each axis.
+    /// Box of all grid points within the reach of the photons, on each axis.
     fn reached(photons: &[StoredPhoton], reach: Reach) -> Self {
         let mut extent = GridBox { lower: [u32::MAX; 3], upper: [0; 3] };
         for photon in photons {
@@ -183,7 +183,7 @@ impl Extent {
         leaf_capacity(if photons > MANY { axes.min(2) } else { axes })
     }
 
-    /// Axis of the split, and the number of photons below the plane: a whole number of leaves, if there is
+    /// Axis of the split, and number of photons below the plane. It is a whole number of leaves if there is
     /// more than one.
     fn split(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let (axis, below) = self.cheapest(photons, radius);
@@ -244,7 +244,7 @@ mod tests {
     /// Grid point and content of a photon.
     type Placed = ([u32; 3], [u8; PHOTON_CONTENT_BYTES]);
 
-    /// Lines of both sections.
+    /// Lines of the sections of nodes and leaves.
     struct PhotonLines {
         nodes: Vec<[u8; LINE_BYTES]>,
         leaves: Vec<[u8; LINE_BYTES]>,
@@ -259,7 +259,7 @@ mod tests {
         }
     }
 
-    /// Photons on the walls of a box; the content of each is its number.
+    /// Photons on the walls of a box. The content of each photon is its number.
     fn photons(count: u32, bits: u32) -> Vec<Placed> {
         (0..count)
             .map(|i| {
@@ -270,7 +270,7 @@ mod tests {
             .collect()
     }
 
-    /// Collects every photon below `child`, and checks that it lies within the boxes of all ancestors.
+    /// Collects all photons below `child`, and checks that each lies within the boxes of all ancestors.
     /// Returns the number of stack entries that a search needs.
     fn walk(lines: &PhotonLines, child: Child, room: GridBox, found: &mut Vec<Placed>) -> usize {
         let node = match child {

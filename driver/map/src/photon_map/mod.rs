@@ -1,7 +1,8 @@
-//! The photon map: photons, trees above them, caustics and irradiance points as sections of the card image.
+//! Photon map: writes photons, the trees above them, caustics and irradiance points as sections of the card
+//! image.
 //!
-//! The module uses [`crate::pack`], which writes sections, [`crate::photon`], which traces photons, and
-//! `density`, which measures the maximum distance of gathers and the disc fractions.
+//! It uses [`crate::pack`], which writes sections, [`crate::photon`], which traces photons, and `density`,
+//! which measures the maximum distance of gathers and the disc fractions.
 
 mod budget;
 mod irradiance;
@@ -35,8 +36,8 @@ use crate::photon::{
     ImportonGrid, Importons, PhotonError, PhotonPass, Photons, trace_caustics_for, trace_for,
 };
 
-/// Lower bound of the maximum distance of a gather, in cells of the photon grid, so that the grid does not
-/// show.
+/// Lower bound of the maximum distance of a gather, in cells of the photon grid, so that the grid is not
+/// visible.
 const MIN_CELLS: f32 = 8.0;
 
 /// Card image with its photon map, ready for gathers.
@@ -49,7 +50,7 @@ pub struct MappedImage {
     pub caustics: Option<CausticGather>,
     /// Number of paths traced from the lights.
     pub paths: u64,
-    /// Guiding of the paths; `None` for photons of any camera.
+    /// Guiding of the paths; `None` if photons are for any camera.
     pub guiding: Option<Guiding>,
     /// Time of each step.
     pub times: PhotonTimes,
@@ -68,8 +69,8 @@ pub struct PhotonTimes {
     pub estimating: Duration,
 }
 
-/// Traces photons in a packed scene and completes its image with the photon map. `progress` is called with
-/// the number of photons stored, also while the map is measured, and returns whether to go on.
+/// Traces photons in a packed scene and adds the photon map to its image. `progress` is called with the
+/// number of photons stored, also while the map is measured, and returns whether to continue.
 ///
 /// # Errors
 /// If the scene is too wide, the image grows too large, or `progress` returns false.
@@ -86,17 +87,17 @@ pub fn map_photons(
     Ok(mapped)
 }
 
-/// Photons of a scene, of both maps.
+/// Photons of both maps of a scene.
 pub struct TracedPhotons {
     /// The photons.
     pub photons: Photons,
     /// Number of paths traced from the lights.
     pub(crate) paths: u64,
-    /// Guiding of the paths; `None` for photons of any camera.
+    /// Guiding of the paths; `None` if photons are for any camera.
     pub(crate) guiding: Option<Guiding>,
-    /// Caustic photons, if requested and if any are found.
+    /// Caustic photons; `None` if none were requested or found.
     pub(crate) caustic: Option<Photons>,
-    /// Importons of the camera that the photons are for; `None` for photons of any camera.
+    /// Importons of the camera for which the photons are; `None` for any camera.
     pub(crate) importons: Option<Importons>,
 }
 
@@ -121,10 +122,10 @@ impl TracedPhotons {
         Ok(Self { photons, paths, guiding, caustic, importons })
     }
 
-    /// Share of the photons that are where the picture of a camera uses any, by few eye paths.
+    /// Fraction of the photons that the picture of a camera can use, estimated by few eye paths.
     ///
     /// # Errors
-    /// If the image is not sound.
+    /// If the image is invalid.
     pub fn used_share(&self, packed: &PackedScene, camera: &Camera) -> Result<f64, PhotonError> {
         let used = Importons::few(packed, camera)?.indirect;
         let is_used = |photon: &Photon| used.is_used(photon.position.into(), photon.normal);
@@ -133,7 +134,7 @@ impl TracedPhotons {
     }
 }
 
-/// Completes the image of a packed scene with its photons, as [`map_photons`].
+/// Adds the photon map to the image of a packed scene whose photons were traced, as [`map_photons`] does.
 pub fn map_traced(
     packed: PackedScene,
     traced: TracedPhotons,
@@ -186,7 +187,7 @@ pub fn map_traced(
     Ok(MappedImage { image, max_distance, caustics, paths, guiding, times })
 }
 
-/// Importons of the camera that photons are traced for, if it is one.
+/// Importons of the camera for which photons are traced; `None` for any camera.
 fn importons(packed: &PackedScene, settings: &PhotonSettings) -> Result<Option<Importons>, PhotonError> {
     // Disc of a gather over the surface, if photons are everywhere as dense.
     let share = |neighbors: u32, photons: usize| neighbors as f32 / photons.max(1) as f32;
@@ -198,8 +199,8 @@ fn importons(packed: &PackedScene, settings: &PhotonSettings) -> Result<Option<I
     importons.transpose().map_err(PhotonError::Unsound)
 }
 
-/// Caustic photons, if requested and if any are found. Without a caustic map gather rays carry the light of
-/// caustics.
+/// Traces caustic photons; `None` if none were requested or found. Without a caustic map, gather rays carry
+/// the light of caustics.
 fn caustics(
     packed: &PackedScene,
     importons: Option<&ImportonGrid>,

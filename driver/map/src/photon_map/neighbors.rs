@@ -1,4 +1,4 @@
-//! Distances of neighbours among photons of one surface and one light.
+//! Distances between neighbouring photons of one surface and one light.
 
 use std::collections::BinaryHeap;
 
@@ -11,12 +11,12 @@ use crate::photon::StoredPhoton;
 const MIN_DIRECTION_COSINE: f32 = 0.8;
 /// Minimum cosine between the normals of photons of one surface.
 const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
-/// Number of places of a leaf.
+/// Number of photons in a leaf.
 const LEAF: usize = 12;
-/// Share of a distance within which places of a leaf have it in common.
+/// Fraction of a distance within which the photons of a leaf share it.
 const SHARED_SHARE: f32 = 0.3;
 
-/// A photon's place, cells of the photon grid, and the unit vectors that neighbours share.
+/// Position of a photon, cells of the photon grid, and the unit vectors by which neighbours are compared.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     pub(super) position: Vec3,
@@ -31,7 +31,7 @@ impl Place {
     }
 }
 
-/// Box of some places.
+/// Bounding box of some positions.
 #[derive(Clone, Copy)]
 struct Bounds {
     lower: Vec3,
@@ -60,7 +60,7 @@ impl Bounds {
     }
 }
 
-/// Sorts photons such that [`Places`] of them are a kd-tree: each box is halved along its longest side.
+/// Sorts photons into the order of a kd-tree of [`Places`]: each box is halved along its longest side.
 pub(super) fn arrange(photons: &mut [StoredPhoton]) {
     let leaves = photons.len().div_ceil(LEAF);
     if leaves < 2 {
@@ -79,15 +79,15 @@ pub(super) fn arrange(photons: &mut [StoredPhoton]) {
     rayon::join(|| arrange(below), || arrange(above));
 }
 
-/// Places in a binary tree of boxes.
+/// Photon positions in a binary tree of boxes.
 pub(super) struct Places {
     places: Vec<Place>,
-    /// Boxes of each [`LEAF`] places, boxes of each two of these, and so on up to the root.
+    /// Boxes of runs of [`LEAF`] positions, then boxes of pairs of these, and so on up to the root.
     levels: Vec<Vec<Bounds>>,
 }
 
 impl Places {
-    /// The tree of places in the order of [`arrange`].
+    /// Builds the tree of positions in the order of [`arrange`].
     pub(super) fn new(places: Vec<Place>) -> Self {
         let mut levels: Vec<Vec<Bounds>> = vec![places.chunks(LEAF).map(Bounds::of).collect()];
         while let Some(below) = levels.last().filter(|below| below.len() > 1) {
@@ -96,15 +96,15 @@ impl Places {
         Self { places, levels }
     }
 
-    /// Distance of the neighbour of a number, from 1 on, of each place among those like it, or of one near
-    /// it; `limit` if there are fewer within it. For places that are [`SHARED_SHARE`] of such a distance
-    /// apart they differ by that share at most.
+    /// Distance of each photon's neighbour number `number`, counted from 1, among photons of its surface and
+    /// light; `limit` if there are fewer within it. A photon can have the distance of a nearby photon: if two
+    /// photons are [`SHARED_SHARE`] of such a distance apart, the distances differ by at most that fraction.
     pub(super) fn distances(&self, number: usize, limit: f32) -> Vec<f32> {
         let leaves = self.places.par_chunks(LEAF).enumerate();
         leaves.flat_map_iter(|(leaf, places)| self.distances_of_leaf(leaf, places, number, limit)).collect()
     }
 
-    /// [`Self::distances`] of the places of a leaf.
+    /// Does [`Self::distances`] for the photons of a leaf.
     fn distances_of_leaf(&self, leaf: usize, places: &[Place], number: usize, limit: f32) -> Vec<f32> {
         let mut found: Vec<(&Place, f32)> = Vec::new();
         let mut distances = Vec::with_capacity(places.len());
@@ -122,8 +122,8 @@ impl Places {
         distances
     }
 
-    /// Distance of a place's neighbour of a number, from 1 on, among those like it; `limit` if there are
-    /// fewer within it.
+    /// Distance of one photon's neighbour number `number`, counted from 1, among photons of its surface and
+    /// light; `limit` if there are fewer within it.
     fn distance_of_neighbor(&self, index: usize, number: usize, limit: f32) -> f32 {
         let own = &self.places[index];
         let mut limit = limit * limit;
@@ -170,7 +170,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_neighbor_is_that_of_a_search_of_all() {
+    fn neighbor_distances_equal_those_of_an_exhaustive_search() {
         let number = |index: u32| (hash(index) >> 8) as f32 / 16_777_216.0;
         let places: Vec<Place> = (0..2000)
             .map(|index| Place {

@@ -6,15 +6,16 @@ use crate::photon::{Photons, StoredPhoton};
 
 /// Number of photons around which [`typical_radius`] searches.
 const SAMPLED_PHOTONS: usize = 64;
-/// Number of photons among which it searches, if enough.
+/// Number of photons that [`typical_radius`] searches, if there are enough.
 const SAMPLED_NEIGHBORS: usize = 1 << 16;
-/// Minimum number of neighbours in the subset if it is smaller than `1 / MIN_STEP` of the photons.
+/// Minimum number of neighbours within the subset, unless the subset has at least `1 / MIN_STEP` of the
+/// photons.
 const MIN_NEIGHBORS: usize = 4;
-/// Inverse of a share of the photons that suffices, however few neighbours it contains.
+/// Inverse of the fraction of the photons that suffices, however few neighbours it contains.
 const MIN_STEP: usize = 32;
 
-/// Radius of a typical search for `neighbors` photons, in cells of the photon grid. Before there is a tree to
-/// search, it is estimated in a subset of the photons, for a proportionally smaller number of neighbours.
+/// Radius of a typical search for `neighbors` photons, in cells of the photon grid. As there is no tree to
+/// search yet, it is estimated in a subset of the photons, for a proportionally smaller number of neighbours.
 pub(super) fn typical_radius(photons: &Photons, neighbors: u32) -> f64 {
     let all = photons.stored();
     let neighbors = neighbors as usize;

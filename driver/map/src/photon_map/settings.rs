@@ -9,34 +9,34 @@ use serde::{Deserialize, Serialize};
 pub struct PhotonSettings {
     /// Seed of the photon paths.
     pub seed: u32,
-    /// Camera whose picture alone uses the photons, which are then guided towards what it uses; `None` for
+    /// Camera whose picture uses the photons; they are guided towards what it uses. `None` if photons are for
     /// any camera.
     pub camera: Option<Camera>,
     /// Number of photons to store.
     pub photons: usize,
-    /// Number of photons of a density estimate.
+    /// Number of photons per density estimate.
     pub neighbors: u32,
     /// Maximum distance of a gather, metres; `None` to derive it from the density of the photons.
     pub max_distance: Option<f32>,
     /// Number of caustic photons to store; 0 for no caustic map.
     pub caustic_photons: usize,
-    /// Number of photons of a density estimate in the caustic map.
+    /// Number of photons per density estimate in the caustic map.
     pub caustic_neighbors: u32,
     /// Layout of the map in card memory.
     pub layout: PhotonLayout,
-    /// Estimate of reflected radiance: [`Radiance::Precomputed`] adds irradiance points to the image.
+    /// Source of the reflected radiance. [`Radiance::Precomputed`] adds irradiance points to the image.
     pub radiance: Radiance,
 }
 
-/// Cameras that photons are traced for.
+/// Cameras that can use the photons.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PhotonsFor {
-    /// Any camera: photons depend on the scene alone.
+    /// Any camera. Photons depend only on the scene.
     #[default]
     Scene,
-    /// The camera of the picture: photons are guided towards what it uses, without bias.
+    /// The picture's camera. Photons are guided towards what it uses, without bias.
     Camera,
-    /// The camera of the picture where a pilot measures that it gains, and otherwise any.
+    /// The picture's camera if a pilot measures that guiding helps, otherwise any camera.
     Auto,
 }
 
@@ -47,19 +47,20 @@ choices!(PhotonsFor {
 });
 
 impl PhotonsFor {
-    /// The cameras without a pilot: any, where one would choose.
+    /// Replaces [`Self::Auto`] by [`Self::Scene`], for callers that run no pilot.
     #[must_use]
     pub fn resolved(self) -> Self {
         if self == Self::Auto { Self::Scene } else { self }
     }
 }
 
-/// Layout of the photon map in card memory. A gather finds the same photons in each.
+/// Layout of the photon map in card memory. A gather finds the same photons in both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PhotonLayout {
-    /// The left-balanced kd-tree of Jensen (2001), of 20-byte records: the dissertation's.
+    /// Left-balanced kd-tree of 20-byte records (Jensen 2001), as in the dissertation.
     Jensen,
-    /// Photons in leaves that fill a line of card memory each: smaller, and faster to search.
+    /// Leaves of photons, each of which fills a line of card memory. This layout is smaller and faster to
+    /// search.
     #[default]
     Lines,
 }

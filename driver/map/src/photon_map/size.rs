@@ -10,14 +10,14 @@ use crate::pack::CardImage;
 /// Size of a photon map in card memory, without caustics and irradiance points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhotonMapSize {
-    /// Photons in the map: `N_PM` of Table 7.1.
+    /// Number of photons in the map: `N_PM` of Table 7.1.
     pub photons: u64,
-    /// Bytes of the lines that they and their tree take.
+    /// Size of the photons and their tree, whole lines, bytes.
     pub bytes: u64,
 }
 
 impl PhotonMapSize {
-    /// Size of the photon map of an image, in either layout.
+    /// Measures the photon map of an image, in either layout.
     pub fn of(image: &CardImage) -> Self {
         let (scene, _) = image.view();
         let lines = |kind| image.section(kind).len();

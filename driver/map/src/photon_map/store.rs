@@ -1,4 +1,4 @@
-//! Photons and irradiance points as sections of a card image: leaves, and the nodes above them.
+//! Writes photons and irradiance points as sections of a card image: leaves, and the nodes above them.
 
 use photoncard_shared::image::SectionKind;
 
@@ -8,7 +8,7 @@ use super::radius::typical_radius;
 use crate::pack::{CardImage, ImageWriter, PackError, PackedScene};
 use crate::photon::Photons;
 
-/// Sections of the photon map, irradiance points included: the last of an image.
+/// Sections of the photon map, including irradiance points. They are the last sections of an image.
 pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::Photons,
     SectionKind::PhotonNodes,
@@ -19,10 +19,9 @@ pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::IrradianceLeaves,
 ];
 
-/// Sections of the caustic map.
 pub(super) const CAUSTIC_SECTIONS: [SectionKind; 2] = [SectionKind::CausticNodes, SectionKind::CausticLeaves];
 
-/// Completes the image of a scene with its photons, in leaves, for searches of about `neighbors` photons.
+/// Adds photons to the image of a scene, in leaves, for searches of about `neighbors` photons.
 ///
 /// # Errors
 /// [`PackError::TooLarge`] if there are more lines than an address can number.
@@ -40,7 +39,8 @@ pub fn store_photons(
     Ok(image.finish())
 }
 
-/// Adds a caustic map to an image: photons with the codes of their radii, whose last is `greatest`, metres.
+/// Adds a caustic map to an image. `photons` have the codes of their radii; the last code's radius is
+/// `greatest`, metres.
 ///
 /// # Errors
 /// As [`store_photons`].

@@ -9,12 +9,12 @@ fn shipped(name: &str) -> Scene {
     gltf::load(path.as_ref()).expect("a shipped scene loads")
 }
 
-/// The house under an even sky.
+/// The house under a uniform sky.
 fn house() -> Scene {
     Scene { environment: Some(Environment::constant(Vec3::ONE)), ..shipped("house.glb") }
 }
 
-/// Settings of small maps for the camera of a scene, or for any camera.
+/// Settings of small maps, for the camera of a scene or for any camera.
 fn settings(scene: &Scene, photons_for: PhotonsFor) -> PhotonSettings {
     let Camera { origin, forward, right, up, vertical_fov, .. } = &scene.cameras[0];
     let [right, up] = [right, up].map(|axis| (*axis * libm::tanf(0.5 * vertical_fov)).to_array());
@@ -50,7 +50,7 @@ fn an_image_is_the_same_on_any_number_of_threads() {
     }
 }
 
-/// Photons inside the house: their number, and their power on the floor and elsewhere, watts.
+/// Number of photons inside the house, and their power on the floor and elsewhere, watts.
 fn inside(packed: &PackedScene, settings: &PhotonSettings) -> (usize, [f64; 2]) {
     let photons = TracedPhotons::new(packed, settings, &|_| true).expect("the house is lit").photons;
     let is_inside =
@@ -65,7 +65,7 @@ fn inside(packed: &PackedScene, settings: &PhotonSettings) -> (usize, [f64; 2]) 
     (count, powers)
 }
 
-/// Means of the numbers and of the powers of [`inside`] over seeds, and the standard errors of the powers.
+/// Means over seeds of the numbers and powers from [`inside`], and standard errors of the powers.
 fn means(packed: &PackedScene, settings: PhotonSettings, seeds: u32) -> (f64, [[f64; 2]; 2]) {
     let all: Vec<_> = (0..seeds).map(|seed| inside(packed, &PhotonSettings { seed, ..settings })).collect();
     let seeds = f64::from(seeds);
@@ -79,7 +79,7 @@ fn means(packed: &PackedScene, settings: PhotonSettings, seeds: u32) -> (f64, [[
 }
 
 #[test]
-fn photons_for_a_camera_are_where_it_uses_them_and_bring_no_other_light() {
+fn guided_photons_are_where_the_camera_uses_them_and_bring_equal_light() {
     let scene = house();
     let packed = PackedScene::new(&scene).expect("packs");
     let [of_scene, of_camera] =

@@ -1,8 +1,8 @@
-//! Sizes that blocks of DWA compression state (`OpenEXR`, "DWAA and DWAB compression"), checked before they
-//! are decoded.
+//! Checks the sizes that blocks with DWA compression state (`OpenEXR`, "DWAA and DWAB compression") before
+//! they are decoded.
 //!
-//! The `exr` crate allocates as much as a block states. A few bytes could end the process, since a failed
-//! allocation aborts and cannot be caught like a panic.
+//! The `exr` crate allocates as much as a block states. A few bytes could therefore end the process, because
+//! a failed allocation aborts and cannot be caught like a panic.
 
 use std::io::Cursor;
 
@@ -12,23 +12,23 @@ use exr::meta::BlockDescription;
 use exr::meta::header::Header;
 use exr::prelude::Compression;
 
-/// Size of a picture that is read however few bytes it is compressed to.
+/// Uncompressed size up to which a picture is read, however small its file is, bytes.
 pub(super) const PLAIN_BYTES: u64 = 4 << 20;
 
-/// Samples of a block of the discrete cosine transform.
+/// Number of samples in a block of the discrete cosine transform.
 const SAMPLES: u64 = 64;
 
 /// Side of a block of the discrete cosine transform, pixels.
 const SIDE: usize = 8;
 
-/// Number of 64-bit counters at the begin of a block of pixels.
+/// Number of 64-bit counters at the beginning of a block of pixels.
 const COUNTERS: usize = 11;
 
 pub(super) fn is_dwa(compression: Compression) -> bool {
     matches!(compression, Compression::DWAA(_) | Compression::DWAB(_))
 }
 
-/// Memory of the transform of a block of pixels: 32-bit floats of three channels, bytes.
+/// Memory that the transform of a block of pixels takes, bytes: 32-bit floats of three channels.
 pub(super) fn transform_bytes(header: &Header) -> u64 {
     let [width, height] = padded(header);
     width.saturating_mul(height).saturating_mul(3 * size_of::<f32>() as u64)
@@ -57,8 +57,8 @@ pub(super) fn states_possible_sizes(bytes: &[u8]) -> Result<bool> {
     Ok(true)
 }
 
-/// Returns whether a block of pixels states no sizes beyond what its pixels take. Blocks without all counters
-/// are not decoded.
+/// Returns whether the sizes that a block of pixels states are at most what its pixels take. Blocks that lack
+/// some counters are not decoded.
 fn is_possible(header: &Header, pixels: &[u8]) -> bool {
     let mut counters = [0; COUNTERS];
     for (counter, bytes) in counters.iter_mut().zip(pixels.as_chunks().0) {

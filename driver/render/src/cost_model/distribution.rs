@@ -1,21 +1,20 @@
-//! Distribution of bytes that all chips receive, such as changed lines of the photon map, over the host's
-//! link.
+//! Distribution of data from the host to all chips, such as changed lines of the photon map.
 
 use super::{Machine, Symbols};
 
-/// Way of bytes from the host to all chips.
+/// Method by which data reach all chips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Distribution {
-    /// The host sends them to each chip: they pass its link once for each.
+    /// The host sends the data to each chip separately, so that they pass its link once per chip.
     Separate,
-    /// A tree of switches between host and chips, as in the dissertation's figure 7.1: they pass the host's
-    /// link once, and each switch forwards what it receives to all that hangs on it, at the speed of the
-    /// host's link, as soon as it holds a whole frame.
+    /// The data pass a tree of switches between host and chips (dissertation, figure 7.1). They pass the
+    /// host's link once. Each switch forwards a frame to all its links as soon as it has received it, at the
+    /// speed of the host's link.
     Tree,
 }
 
 impl Distribution {
-    /// Levels of switches between the host and `chips` chips, `ceil(log_f N)`: none for one chip.
+    /// Levels of switches between the host and `chips` chips, `ceil(log_f N)`; 0 for one chip.
     pub fn levels(chips: u64, symbols: &Symbols) -> u32 {
         let mut reached = 1.0;
         let mut levels = 0;
@@ -26,8 +25,8 @@ impl Distribution {
         levels
     }
 
-    /// Seconds until all chips hold `bytes` bytes `I`: `N I / B` separately, `I / B + ceil(log_f N) S_F / B`
-    /// by a tree. Nothing takes no time.
+    /// Seconds until all chips have received `bytes` bytes `I`: `N I / B` separately,
+    /// `I / B + ceil(log_f N) S_F / B` by a tree; 0 without data.
     pub fn seconds(self, bytes: f64, chips: u64, symbols: &Symbols, machine: &Machine) -> f64 {
         match self {
             _ if bytes <= 0.0 => 0.0,
@@ -36,7 +35,7 @@ impl Distribution {
         }
     }
 
-    /// Maximum number of bytes that all chips can receive in a time.
+    /// Maximum number of bytes that all chips can receive in a given time.
     pub fn bytes_within(self, seconds: f64, chips: u64, symbols: &Symbols, machine: &Machine) -> f64 {
         let carried = seconds * machine.link;
         match self {
@@ -45,7 +44,7 @@ impl Distribution {
         }
     }
 
-    /// Delay of the last byte by all levels of switches, in bytes of the link.
+    /// Delay of the last byte by all levels of switches, as the number of bytes sent over the link meanwhile.
     fn delayed(chips: u64, symbols: &Symbols) -> f64 {
         f64::from(Self::levels(chips, symbols)) * symbols.frame_bytes
     }
@@ -81,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn an_audited_upload_takes_what_was_computed_by_hand() {
+    fn an_upload_takes_the_time_computed_by_hand() {
         // 12.75 MB to each of 3 cards, 30 times a second: 1.15 GB/s.
         let seconds = Separate.seconds(12.75e6, 3, &Symbols::NOMINAL, &Machine::NOMINAL);
         let rate = 30.0 * seconds * Machine::NOMINAL.link;
@@ -90,7 +89,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn what_arrives_within_a_time_takes_that_time(
+        fn bytes_within_a_time_take_that_time(
             seconds in 0.01..10.0_f64, chips in 1..500_u64, fan_out in 2..20_u32,
         ) {
             let symbols = symbols(f64::from(fan_out));

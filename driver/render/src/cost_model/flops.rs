@@ -1,24 +1,25 @@
-//! Floating-point operations of a frame by Table 7.1: counted work at the table's constants.
+//! Floating-point operations of a frame by Table 7.1: counted work times the table's constants.
 
 use photoncard_shared::counters::Counters;
 use serde::Serialize;
 
 use super::{Cost, Symbols, Workload};
 
-/// Floating-point operations of each unit of the chip, on all chips together, by the constants of Table 7.1.
-/// The firmware's own operations are [`Arithmetic`](super::arithmetic::Arithmetic).
+/// Floating-point operations of each unit of the chip, summed over all chips, by the constants of Table 7.1.
+/// [`Arithmetic`](super::arithmetic::Arithmetic) has the operations of this firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Flops {
-    /// All rays.
+    /// Operations of all rays.
     pub ray_caster: f64,
-    /// Importance tables and the irradiance cache.
+    /// Operations of importance tables and the irradiance cache.
     pub controller: f64,
-    /// Searches of the photon map and all reflection.
+    /// Operations of photon searches and all reflection.
     pub gather_unit: f64,
 }
 
 impl Flops {
-    /// Operations of counted work with `gather_rays` gather rays a sample, each piece at the table's cost.
+    /// Operations of the work in `counters`, by the constants of Table 7.1. `gather_rays` is the number of
+    /// gather rays per sample.
     pub fn by_table(counters: &Counters, gather_rays: u32) -> Self {
         let symbols = Symbols { gather_rays: f64::from(gather_rays), ..Symbols::NOMINAL };
         let cost = Cost::new(&Workload::counted(counters), &symbols);

@@ -1,11 +1,11 @@
-//! The dissertation's cost model (chapter 7): a frame's demand of arithmetic and memory, and the chips that
-//! meet it.
+//! Cost model of the dissertation (chapter 7): arithmetic and memory traffic of a frame, and the number of
+//! chips that they need.
 //!
-//! [`Symbols`] are the parameters of Table 7.1, a [`Workload`] the counts of rays, gathers and bytes of one
-//! frame, a [`Cost`] the FLOPs and bytes that they take of each unit of the chip, and a [`Prediction`] the
-//! speed of a [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted, at the
-//! table's cost of each piece; [`arithmetic`] are those that the firmware does. A [`Distribution`] is the
-//! time of an upload to all chips. Formulas: `docs/scaling.md`.
+//! [`Symbols`] are the parameters of Table 7.1. A [`Workload`] counts the rays, gathers and bytes of one
+//! frame. A [`Cost`] is the FLOPs and bytes that they need in each unit of the chip, and a [`Prediction`] is
+//! the speed of a [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted, at the
+//! table's cost of each piece; [`arithmetic`] counts the operations of this firmware. A [`Distribution`]
+//! gives the time of an upload to all chips. `docs/scaling.md` has the formulas.
 
 pub mod arithmetic;
 mod distribution;
@@ -23,7 +23,7 @@ pub use workload::Workload;
 
 use self::arithmetic::{Arithmetic, ChipPart};
 
-/// Colour channels: a reflection function is evaluated for each.
+/// Number of colour channels. A reflection function is evaluated for each.
 const CHANNELS: f64 = 3.0;
 
 /// Cost of one frame in one unit of the chip, summed over all chips.
@@ -38,16 +38,17 @@ pub struct UnitCost {
 /// Cost of one frame in each unit of the chip, summed over all chips.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
-    /// The ray caster: all rays.
+    /// Cost of all rays in the ray caster.
     pub ray_caster: UnitCost,
-    /// The controller: importance tables and the irradiance cache. Both are on chip and take no DRAM.
+    /// Cost of importance tables and the irradiance cache in the controller. They are on chip and take no
+    /// DRAM.
     pub controller: UnitCost,
-    /// The photon gather unit: searches of the photon map, those for tables included, and all reflection.
+    /// Cost of photon searches, including those for tables, and of all reflection in the photon gather unit.
     pub gather_unit: UnitCost,
 }
 
 impl Cost {
-    /// Cost with the reflection evaluated in two stages: the first once where a gather ray ends, the second
+    /// Cost if reflection is evaluated in two stages: the first once at the end of a gather ray, the second
     /// for each photon.
     pub fn new(workload: &Workload, symbols: &Symbols) -> Self {
         let [stage_1, stage_2] = [symbols.reflection_stage_1, symbols.reflection_stage_2];
@@ -59,21 +60,22 @@ impl Cost {
         }
     }
 
-    /// Cost with the whole reflection function evaluated for every photon, without irradiance cache and
+    /// Cost if the whole reflection function is evaluated for every photon, without irradiance cache and
     /// importance tables.
     ///
-    /// For [`Workload::naive`] this is `T P [(1 + N_FG + N_S) C_RayCast + N_FG C_G + (N_FG k + N_FG + N_S) 3
-    /// (C_B1 + C_B2)]` FLOPs a frame, the dissertation's 7.4 TFLOPS at 30 frames/s. The dissertation's own
-    /// formula is not in the public excerpts: this one is a hypothesis that meets the figure.
+    /// For [`Workload::naive`] this is
+    /// `T P [(1 + N_FG + N_S) C_RayCast + N_FG C_G + (N_FG k + N_FG + N_S) 3 (C_B1 + C_B2)]` FLOPs per frame,
+    /// which gives the dissertation's 7.4 TFLOPS at 30 frames/s. The dissertation's own formula is not in the
+    /// public excerpts: this one is a hypothesis that meets the figure.
     pub fn naive(workload: &Workload, symbols: &Symbols) -> Self {
         let evaluations = workload.ray_gathers * workload.photons_per_gather + reflected_rays(workload);
         let reflection = evaluations * (symbols.reflection_stage_1 + symbols.reflection_stage_2);
         Self::of_units(workload, symbols, reflection)
     }
 
-    /// Cost by counted arithmetic: rays against boxes and triangles, and surfaces, in the ray caster;
-    /// searches and all reflection in the gather unit; directions, irradiance cache and pixels in the
-    /// controller.
+    /// Cost by counted arithmetic. The ray caster has rays against boxes and triangles, and surfaces; the
+    /// gather unit has searches and all reflection; the controller has directions, irradiance cache and
+    /// pixels.
     pub fn counted(workload: &Workload, arithmetic: &Arithmetic) -> Self {
         let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
         Self {
@@ -86,7 +88,7 @@ impl Cost {
         }
     }
 
-    /// Cost without the controller. `reflection`: FLOPs of all reflection functions, of one channel.
+    /// Cost without the controller. `reflection` is the FLOPs of all reflection functions, for one channel.
     fn of_units(workload: &Workload, symbols: &Symbols, reflection: f64) -> Self {
         Self {
             ray_caster: UnitCost {
@@ -111,13 +113,13 @@ impl Cost {
     }
 }
 
-/// Rays whose light is reflected at the point seen by the eye ray: gather and shadow rays.
+/// Number of rays whose light is reflected at the point seen by the eye ray: gather and shadow rays.
 fn reflected_rays(workload: &Workload) -> f64 {
     workload.gather_rays + workload.shadow_rays
 }
 
-/// FLOPs of importance tables and irradiance cache. The dissertation's formula is not in the public excerpts:
-/// the terms and their FLOPs are this project's.
+/// FLOPs of importance tables and irradiance cache. The dissertation's formula is not in the public excerpts;
+/// terms and FLOPs are those of this project.
 fn controller_flops(workload: &Workload, symbols: &Symbols) -> f64 {
     let table = workload.photons_per_gather * symbols.table_photon + symbols.table_cells * symbols.table_cell;
     let interpolation = symbols.records_per_pixel * symbols.interpolation;
@@ -138,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn every_symbol_of_a_cost_only_ever_adds() {
+    fn a_cost_grows_with_every_symbol() {
         let nominal = Symbols::NOMINAL;
         let total = |symbols: &Symbols| Cost::new(&Workload::nominal(symbols), symbols).total();
         let before = total(&nominal);
@@ -182,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn two_stages_save_the_first_for_all_photons_but_one() {
+    fn two_stages_evaluate_the_first_once_per_gather() {
         let symbols = Symbols::NOMINAL;
         let workload = Workload::naive(&symbols);
         let saved =
@@ -192,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn a_measured_frame_costs_what_it_counts() {
+    fn a_measured_frame_costs_its_counted_arithmetic() {
         let symbols = Symbols::NOMINAL;
         let workload = Workload { eye_rays: 2.0, survey_rays: 3.0, scene_bytes: 70.0, ..Workload::default() };
         let cost = Cost::new(&workload, &symbols);

@@ -1,37 +1,38 @@
-//! Predicted speed of a machine: tiles and frames a second, and chips for a frame rate, from a frame's cost.
+//! Predicts the speed of a machine from the cost of a frame: tiles and frames per second, and the chips
+//! needed for a frame rate.
 
 use std::fmt;
 
 use super::{Cost, Workload};
 
-/// Capacity of one chip, and of the host's link that all chips share.
+/// Capacity of one chip, and of the host's link, which all chips share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Machine {
     /// Usable DRAM bandwidth of a chip, bytes/s.
     pub bandwidth: f64,
-    /// Arithmetic of a chip, floating-point operations a second.
+    /// Arithmetic rate of a chip, floating-point operations/s.
     pub flops: f64,
-    /// Bandwidth of the host's link, bytes/s each way.
+    /// Bandwidth of the host's link in each direction, bytes/s.
     pub link: f64,
-    /// Latency of a read from DRAM, seconds, without the line's time on the bus.
+    /// Latency of a DRAM read, seconds, without the transfer time on the bus.
     pub latency: f64,
-    /// Maximum number of tasks in flight of each unit of a chip, rays or gathers.
+    /// Maximum number of tasks (rays or gathers) in flight per unit of a chip.
     pub tasks: u32,
 }
 
 impl Machine {
-    /// The chip that section 7.1 expects of 2010: 90 GB/s and 500 GFLOPS. The link is this project's choice:
-    /// 4 GB/s each way, the sixteen lanes of PCI Express 1.x in a workstation of 2007. So are 100 ns, a read
-    /// from DRAM of any year, and 128 tasks.
+    /// Chip that section 7.1 expects for 2010: 90 GB/s and 500 GFLOPS. Other values are this project's
+    /// choices: a link of 4 GB/s in each direction, the sixteen lanes of PCI Express 1.x in a workstation of
+    /// 2007; a latency of 100 ns, typical of DRAM of any year; and 128 tasks.
     pub const NOMINAL: Self = Self { bandwidth: 90e9, flops: 500e9, link: 4e9, latency: 100e-9, tasks: 128 };
 
-    /// Latency of a read in nanoseconds, to a thousandth of one.
+    /// Latency of a read in nanoseconds, rounded to a thousandth.
     pub fn latency_ns(&self) -> f64 {
         (self.latency * 1e12).round() / 1e3
     }
 }
 
-/// Bandwidth and arithmetic of a chip, in words.
+/// Bandwidth and arithmetic rate of a chip as text.
 impl fmt::Display for Machine {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         write!(f, "{} GB/s and {} GFLOPS", self.bandwidth / 1e9, self.flops / 1e9)
@@ -45,43 +46,43 @@ pub enum Resource {
     Bandwidth,
     /// Arithmetic of the chips.
     Computation,
-    /// Bandwidth of the host's link: more chips do not help.
+    /// Bandwidth of the host's link. More chips do not help then.
     HostLink,
 }
 
-/// Numbers of chips that a frame rate takes.
+/// Numbers of chips needed for a frame rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ChipsNeeded {
-    /// Chips needed for memory bandwidth alone.
+    /// Chips needed if only memory bandwidth mattered.
     pub bandwidth: u64,
-    /// Chips needed for arithmetic alone.
+    /// Chips needed if only arithmetic mattered.
     pub computation: u64,
-    /// Chips needed for both; `None` if the host's link cannot carry the frame rate whatever the number of
-    /// chips.
+    /// Chips needed for both memory bandwidth and arithmetic; `None` if the host's link cannot carry the
+    /// frame rate with any number of chips.
     pub overall: Option<u64>,
 }
 
-/// Upper bound of the speed at which a machine renders frames of some cost.
+/// Upper bound of the speed at which a machine renders frames of a given cost.
 ///
-/// Memory, arithmetic and link work at the same time, as in a pipeline that never waits, and tiles are dealt
-/// without loss. The rate of a resource that a frame does not use is infinite.
+/// Memory, arithmetic and link are assumed to work simultaneously, as in a pipeline without stalls, and tiles
+/// to be distributed without loss. The rate of a resource that a frame does not use is infinite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
-    /// Tiles a second that one chip's memory bandwidth allows.
+    /// Tiles per second that one chip's memory bandwidth allows.
     pub bandwidth_tiles_per_second: f64,
-    /// Tiles a second that one chip's arithmetic allows.
+    /// Tiles per second that one chip's arithmetic allows.
     pub computation_tiles_per_second: f64,
-    /// Frames a second that the host's link allows, whatever the number of chips.
+    /// Frames per second that the host's link allows with any number of chips.
     pub link_frames_per_second: f64,
-    /// Number of tiles of a frame.
+    /// Number of tiles per frame.
     pub tiles: f64,
 }
 
-/// Maximum relative error of a ratio of rates that counts as rounding.
+/// Maximum relative difference of rates that is attributed to rounding.
 const ROUNDING: f64 = 1e-9;
 
 impl Prediction {
-    /// Prediction for a frame on a machine.
+    /// Prediction for a frame with the workload `workload` and the cost `cost`.
     pub fn new(workload: &Workload, cost: &Cost, machine: &Machine) -> Self {
         let total = cost.total();
         // The link's directions do not disturb each other: the busier one limits.
@@ -97,18 +98,18 @@ impl Prediction {
         }
     }
 
-    /// Tiles a second of one chip: the lower of its two rates.
+    /// Tiles per second of one chip: the lower of its two rates.
     pub fn tiles_per_second(&self) -> f64 {
         self.bandwidth_tiles_per_second.min(self.computation_tiles_per_second)
     }
 
-    /// Frames a second of `chips` chips, limited by the host's link.
+    /// Frames per second of `chips` chips, limited by the host's link.
     pub fn frames_per_second(&self, chips: u64) -> f64 {
         self.chips_frames_per_second(chips).min(self.link_frames_per_second)
     }
 
-    /// The resource that limits `chips` chips. Of equal limits the chips' is named, as more chips help there;
-    /// of bandwidth and arithmetic bandwidth.
+    /// Resource that limits `chips` chips. If the chips and the link have equal limits, it is a resource of
+    /// the chips, because more chips would help; if bandwidth and arithmetic have, it is bandwidth.
     pub fn binding(&self, chips: u64) -> Resource {
         if self.link_frames_per_second < self.chips_frames_per_second(chips) {
             Resource::HostLink
@@ -119,8 +120,8 @@ impl Prediction {
         }
     }
 
-    /// Minimum numbers of chips for a frame rate, at least one. A rate that is met but for rounding (relative
-    /// error 1e-9) is met.
+    /// Minimum numbers of chips for a frame rate, at least one. A rate that is missed only by rounding
+    /// (relative error 1e-9) counts as met.
     pub fn chips_needed(&self, frames_per_second: f64) -> ChipsNeeded {
         let chips = |tiles_per_second: f64| {
             let ratio = frames_per_second * self.tiles / tiles_per_second;
@@ -132,7 +133,7 @@ impl Prediction {
         ChipsNeeded { bandwidth, computation, overall: is_carried.then(|| bandwidth.max(computation)) }
     }
 
-    /// Share of the host's link that a frame rate takes; above 1 the link cannot carry it.
+    /// Fraction of the host's link that a frame rate uses. Above 1 the link cannot carry it.
     pub fn link_load(&self, frames_per_second: f64) -> f64 {
         frames_per_second / self.link_frames_per_second
     }
@@ -208,7 +209,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_chips_needed_are_enough_and_no_more(
+        fn the_chips_needed_are_the_minimum(
             bytes in 1.0..1e13_f64, flops in 1.0..1e13_f64, target in 0.1..1000.0_f64,
         ) {
             let workload = Workload { tiles: 1024.0, ..Workload::default() };
@@ -230,7 +231,7 @@ mod tests {
         }
 
         #[test]
-        fn more_of_anything_is_never_slower(chips in 1..200_u64, factor in 1.0..4.0_f64) {
+        fn more_of_any_resource_is_never_slower(chips in 1..200_u64, factor in 1.0..4.0_f64) {
             let symbols = Symbols::NOMINAL;
             let workload = Workload::nominal(&symbols);
             let rate = |machine: &Machine, chips| {

@@ -1,4 +1,4 @@
-//! Symbols of the cost model: Table 7.1, and the few symbols that the table implies or leaves open.
+//! Symbols of the cost model: those of Table 7.1, and a few that the table implies or leaves open.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::frame::MAX_FRAME;
@@ -8,44 +8,44 @@ use photoncard_shared::message::PIXEL_BYTES;
 /// Source of a symbol's nominal value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// Table 7.1 of the dissertation.
+    /// Value from Table 7.1 of the dissertation.
     Table,
-    /// The dissertation or one of its papers, outside the table.
+    /// Value from the dissertation or one of its papers, outside the table.
     Published,
-    /// This project's choice: no publication states the value.
+    /// Value chosen by this project, because no publication states it.
     Ours,
 }
 
-/// Values of the cost model's symbols. Counts and ratios are `f64`, as they only ever enter products.
+/// Values of the cost model's symbols. Counts and ratios are `f64`, because they only occur in products.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Symbols {
-    /// `P`: pixels of a tile.
+    /// `P`: number of pixels of a tile.
     pub tile_pixels: f64,
-    /// `T`: tiles of a picture.
+    /// `T`: number of tiles of a picture.
     pub tiles: f64,
-    /// `F`: frames a second.
+    /// `F`: frames per second.
     pub frames_per_second: f64,
-    /// `N_FG`: final gather rays of a pixel that is not interpolated.
+    /// `N_FG`: number of final gather rays of a pixel that is not interpolated.
     pub gather_rays: f64,
-    /// `k`: photons that a gather searches for.
+    /// `k`: number of photons that a gather searches for.
     pub neighbors: f64,
-    /// `N_S`: shadow rays of a pixel.
+    /// `N_S`: number of shadow rays per pixel.
     pub shadow_rays: f64,
-    /// `C_J`: cells of an importance table, 4x8.
+    /// `C_J`: number of cells of an importance table, 4x8.
     pub table_cells: f64,
-    /// `N_PM`: photons in the indirect map.
+    /// `N_PM`: number of photons in the indirect map.
     pub photons: f64,
-    /// `R_IC`: share of the pixels that the irradiance cache interpolates, 0 to 1.
+    /// `R_IC`: fraction of the pixels that the irradiance cache interpolates, 0 to 1.
     pub interpolated_share: f64,
-    /// `L_IC`: irradiance records that an interpolated pixel uses.
+    /// `L_IC`: number of irradiance records that an interpolated pixel uses.
     pub records_per_pixel: f64,
-    /// `C_B1`: FLOPs of the first stage of the reflection function, for each gather and channel.
+    /// `C_B1`: FLOPs of the reflection function's first stage, per gather and channel.
     pub reflection_stage_1: f64,
-    /// `C_B2`: FLOPs of the second stage of the reflection function, for each photon and channel.
+    /// `C_B2`: FLOPs of the reflection function's second stage, per photon and channel.
     pub reflection_stage_2: f64,
-    /// `C_RayCast`: FLOPs of the intersection of a ray with the scene.
+    /// `C_RayCast`: FLOPs to intersect a ray with the scene.
     pub ray_cast: f64,
-    /// `C_G`: FLOPs of a search for the nearest 100 photons. A constant: it does not scale with `k`.
+    /// `C_G`: FLOPs of a search for the nearest 100 photons. It is a constant and does not scale with `k`.
     pub gather: f64,
     /// `S_B`: bytes of a partially evaluated reflection function.
     pub reflection_bytes: f64,
@@ -53,33 +53,33 @@ pub struct Symbols {
     pub photon_bytes: f64,
     /// `S_L`: bytes of a line of card memory.
     pub line_bytes: f64,
-    /// `B_G`: bytes of the photon map from DRAM for one gather, reordered.
+    /// `B_G`: bytes of the photon map read from DRAM per gather, with reordering.
     pub gather_dram: f64,
-    /// `B_N`: bytes of the photon map from DRAM for one gather, naive.
+    /// `B_N`: bytes of the photon map read from DRAM per gather, without reordering.
     pub naive_gather_dram: f64,
-    /// `B_R`: bytes of the scene from DRAM for one ray.
+    /// `B_R`: bytes of the scene read from DRAM per ray.
     pub ray_dram: f64,
-    /// `C_IC`: FLOPs of one record in an interpolation.
+    /// `C_IC`: FLOPs per record in an interpolation.
     pub interpolation: f64,
-    /// `C_IR`: FLOPs that a record adds to each final gather ray that makes it.
+    /// `C_IR`: FLOPs that an irradiance record adds to each of its final gather rays.
     pub record_ray: f64,
-    /// `C_T1`: FLOPs of one photon in an importance table.
+    /// `C_T1`: FLOPs per photon in an importance table.
     pub table_photon: f64,
-    /// `C_T2`: FLOPs of one cell of an importance table.
+    /// `C_T2`: FLOPs per cell of an importance table.
     pub table_cell: f64,
-    /// `B_P`: bytes of a pixel on the host's link.
+    /// `B_P`: bytes per pixel on the host's link.
     pub pixel_bytes: f64,
-    /// `B_T`: bytes of a tile command on the host's link.
+    /// `B_T`: bytes per tile command on the host's link.
     pub command_bytes: f64,
-    /// `f`: links below a switch of the tree between host and chips.
+    /// `f`: number of links below a switch of the tree between host and chips.
     pub fan_out: f64,
-    /// `S_F`: bytes that a switch holds before it forwards them.
+    /// `S_F`: bytes that a switch receives before it forwards them.
     pub frame_bytes: f64,
 }
 
 impl Symbols {
-    /// Nominal values of Table 7.1. The public excerpts of the table give only a range for `N_PM`: its lower
-    /// end is taken, which is also the driver's default.
+    /// Nominal values of Table 7.1. The public excerpts of the table give only a range for `N_PM`. Its lower
+    /// end is used, which is also the driver's default.
     pub const NOMINAL: Self = Self {
         tile_pixels: 256.0,
         tiles: 1024.0,
@@ -113,12 +113,12 @@ impl Symbols {
         frame_bytes: MAX_FRAME as f64,
     };
 
-    /// `R_FG = 1 - R_IC`: share of the pixels with a final gather of their own.
+    /// `R_FG = 1 - R_IC`: fraction of the pixels with a final gather.
     pub fn gathering_share(&self) -> f64 {
         1.0 - self.interpolated_share
     }
 
-    /// `T P`: pixels of a picture.
+    /// `T P`: number of pixels of a picture.
     pub fn pixels(&self) -> f64 {
         self.tiles * self.tile_pixels
     }
@@ -137,7 +137,7 @@ impl Symbols {
     /// Sets one symbol by an assignment such as `R_IC=0.5`.
     ///
     /// # Errors
-    /// If the text is not of the form `NAME=VALUE`, names no symbol, or has a value out of the symbol's
+    /// If the text does not have the form `NAME=VALUE`, names no symbol, or has a value outside the symbol's
     /// [range](Symbol::range).
     pub fn set(&mut self, assignment: &str) -> Result<(), SymbolError> {
         let Some((name, value)) = assignment.split_once('=') else {
@@ -161,29 +161,29 @@ impl Symbols {
     }
 }
 
-/// Gathers of a frame in the published bandwidths: 512 x 512 pixels of 100 rays each.
+/// Number of gathers per frame in the published bandwidths: 512 x 512 pixels with 100 rays each.
 const GATHERS: f64 = 512.0 * 512.0 * 100.0;
 
 /// Error of [`Symbols::set`].
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SymbolError {
-    /// The text is not of the form `NAME=VALUE`.
+    /// The text does not have the form `NAME=VALUE`.
     #[error("{0:?} sets no symbol; write it as in R_IC=0.5")]
     Form(String),
-    /// No symbol has the name.
+    /// No symbol has this name.
     #[error("there is no symbol {name:?}; the symbols are {valid}")]
     Unknown {
-        /// The name.
+        /// The unknown name.
         name: String,
-        /// The names of all symbols.
+        /// Names of all symbols.
         valid: String,
     },
-    /// The value is no number, or out of the symbol's range.
+    /// The value is not a number, or outside the symbol's range.
     #[error("{name} cannot be {value:?}; give a number from {least} to {most}")]
     Value {
-        /// The symbol's notation.
+        /// Notation of the symbol.
         name: &'static str,
-        /// The value as it was given.
+        /// The value as given.
         value: String,
         /// Minimum of the range.
         least: f64,
@@ -195,7 +195,7 @@ pub enum SymbolError {
 /// Description of one symbol.
 #[derive(Debug)]
 pub struct Symbol {
-    /// The dissertation's notation, subscripts after `_`.
+    /// Notation of the dissertation, with subscripts after `_`.
     pub notation: &'static str,
     /// Meaning of the symbol.
     pub description: &'static str,
@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_assignment_is_told_and_changes_nothing() {
+    fn a_wrong_assignment_is_an_error_and_changes_nothing() {
         let mut symbols = Symbols::NOMINAL;
         let mut error = |text: &str| symbols.set(text).unwrap_err().to_string();
         assert!(error("R_IC").contains("R_IC=0.5"));
@@ -342,7 +342,7 @@ mod tests {
     }
 
     #[test]
-    fn photons_fill_lines_of_six() {
+    fn photon_map_bytes_are_whole_lines_of_six_photons() {
         assert_eq!(Symbols { photons: 13.0, ..Symbols::NOMINAL }.photon_map_bytes(), 3.0 * 128.0);
     }
 }

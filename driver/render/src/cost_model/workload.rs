@@ -1,47 +1,48 @@
-//! Workload of one frame: the counts that Table 7.1's symbols imply, or that a run measured.
+//! Workload of one frame: counts that the symbols of Table 7.1 imply, or that a run measured.
 
 use photoncard_shared::counters::Counters;
 
 use super::Symbols;
 
-/// Counts of rays, gathers, samples and bytes of one frame, summed over all chips. *Nominal* is the value
-/// that Table 7.1's symbols imply.
+/// Counts of rays, gathers, samples and bytes of one frame, summed over all chips. *Nominal* values follow
+/// from the symbols of Table 7.1.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Workload {
-    /// Rays from the eye. Nominal: `T P`.
+    /// Number of eye rays. Nominal: `T P`.
     pub eye_rays: f64,
-    /// Rays towards emitters. Nominal: `T P N_S`.
+    /// Number of shadow rays. Nominal: `T P N_S`.
     pub shadow_rays: f64,
-    /// Final gather rays, also of irradiance records. Nominal: `T P R_FG N_FG`.
+    /// Number of final gather rays, including those of irradiance records. Nominal: `T P R_FG N_FG`.
     pub gather_rays: f64,
-    /// Rays that survey the surroundings of irradiance records. Nominal: 0, the table has no survey.
+    /// Number of rays that survey the surroundings of irradiance records. Nominal: 0, because the table has
+    /// no survey.
     pub survey_rays: f64,
-    /// Searches of the photon map where a gather ray ends. Nominal: `T P R_FG N_FG`, one a gather ray.
+    /// Number of photon searches at the ends of gather rays. Nominal: `T P R_FG N_FG`, one per gather ray.
     pub ray_gathers: f64,
-    /// Searches of the photon map that fill an importance table. Nominal: `T P R_FG`, one a pixel that
-    /// gathers.
+    /// Number of photon searches for importance tables. Nominal: `T P R_FG`, one per pixel with a final
+    /// gather.
     pub table_gathers: f64,
-    /// Photons that a gather returns and that are then reflected, or counted in a table. Nominal: `k`.
+    /// Number of photons that a gather returns, which are then reflected or counted in a table. Nominal: `k`.
     pub photons_per_gather: f64,
-    /// Samples whose irradiance is interpolated. Nominal: `T P R_IC`.
+    /// Number of samples whose irradiance is interpolated. Nominal: `T P R_IC`.
     pub interpolated_samples: f64,
-    /// Irradiance records that are made. Nominal: `T P R_FG`: every pixel that gathers leaves one.
+    /// Number of irradiance records created. Nominal: `T P R_FG`, one per pixel with a final gather.
     pub records: f64,
-    /// Bytes of the photon map from DRAM. Nominal: `B_G` a gather of either kind.
+    /// Bytes of the photon map read from DRAM. Nominal: `B_G` per photon search.
     pub photon_map_bytes: f64,
-    /// Bytes of the scene from DRAM. Nominal: `B_R` a ray.
+    /// Bytes of the scene read from DRAM. Nominal: `B_R` per ray.
     pub scene_bytes: f64,
-    /// Tiles of the picture. Nominal: `T`.
+    /// Number of tiles of the picture. Nominal: `T`.
     pub tiles: f64,
-    /// Bytes from the chips to the host: pixels. Nominal: `T P B_P`.
+    /// Bytes from the chips to the host (pixels). Nominal: `T P B_P`.
     pub bytes_to_host: f64,
-    /// Bytes from the host to the chips: tile commands. Nominal: `T B_T`. The card image is loaded before the
-    /// frame.
+    /// Bytes from the host to the chips (tile commands). Nominal: `T B_T`. The card image is loaded before
+    /// the frame.
     pub bytes_from_host: f64,
 }
 
 impl Workload {
-    /// Workload of Table 7.1's nominal frame, with all three techniques: `T P (1 + R_FG N_FG + N_S)` rays.
+    /// Workload of Table 7.1's nominal frame with all three techniques: `T P (1 + R_FG N_FG + N_S)` rays.
     pub fn nominal(symbols: &Symbols) -> Self {
         let pixels = symbols.pixels();
         let gathering_pixels = pixels * symbols.gathering_share();
@@ -58,7 +59,7 @@ impl Workload {
         workload
     }
 
-    /// Workload of a frame without the techniques, by Table 7.1: every pixel has a final gather of `N_FG`
+    /// Workload of a frame without the techniques, by Table 7.1: every pixel has a final gather with `N_FG`
     /// rays, and each photon gather reads `B_N` bytes.
     pub fn naive(symbols: &Symbols) -> Self {
         let rays = symbols.pixels() * symbols.gather_rays;
@@ -68,7 +69,7 @@ impl Workload {
         workload
     }
 
-    /// Part of the workload that is equal for interpolated and gathering pixels.
+    /// Part of the workload that interpolated pixels and pixels with a final gather have in common.
     fn of_pixels(symbols: &Symbols) -> Self {
         let pixels = symbols.pixels();
         Self {
@@ -82,7 +83,7 @@ impl Workload {
         }
     }
 
-    /// Workload from the counters of chips. Bytes and tiles, which [`Counters`] lack, are zero.
+    /// Workload from the counters of chips. Bytes and tiles are zero, because [`Counters`] lacks them.
     pub fn counted(counters: &Counters) -> Self {
         Self {
             eye_rays: counters.eye_rays as f64,
@@ -98,12 +99,12 @@ impl Workload {
         }
     }
 
-    /// Rays of all kinds.
+    /// Number of rays of all kinds.
     pub fn rays(&self) -> f64 {
         self.eye_rays + self.shadow_rays + self.gather_rays + self.survey_rays
     }
 
-    /// Searches of the photon map: where gather rays end, and for importance tables.
+    /// Number of photon searches: at the ends of gather rays, and for importance tables.
     pub fn gathers(&self) -> f64 {
         self.ray_gathers + self.table_gathers
     }
@@ -128,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frame_without_the_cache_casts_the_naive_frames_rays() {
+    fn a_nominal_frame_without_the_cache_casts_the_rays_of_the_naive_frame() {
         let symbols = Symbols { interpolated_share: 0.0, ..Symbols::NOMINAL };
         assert_eq!(Workload::nominal(&symbols).rays(), Workload::naive(&symbols).rays());
         assert_eq!(Workload::nominal(&symbols).interpolated_samples, 0.0);

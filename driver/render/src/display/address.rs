@@ -1,4 +1,4 @@
-//! Address of a display server: the argument of `--display-server`.
+//! Address of a display server, the argument of `--display-server`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -8,7 +8,7 @@ use photoncard_cards::link::host_name;
 /// Default port of tev.
 pub const DEFAULT_PORT: u16 = 14158;
 
-/// Address of a display server, `HOST:PORT`.
+/// Address of a display server in the form `HOST:PORT`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DisplayAddress {
     /// Name or IP address of the machine.

@@ -4,18 +4,18 @@ use std::io;
 
 use super::DisplayAddress;
 
-/// Error that keeps a picture, or a part of it, from being shown. The render goes on.
+/// Error that prevents a picture, or a part of it, from being shown. The render continues.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DisplayError {
-    /// No connection to the server can be made.
+    /// The server cannot be reached.
     #[error(
         "cannot reach the display server at {address}: {source}; start tev there, or leave --display-server out"
     )]
     Connect {
         /// Address of the server.
         address: DisplayAddress,
-        /// The operating system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The connection has ended.
@@ -23,13 +23,13 @@ pub enum DisplayError {
     Gone {
         /// Address of the server.
         address: DisplayAddress,
-        /// The operating system's error.
+        /// Error of the operating system.
         source: io::Error,
     },
     /// The server did not take all packets in time.
     #[error("the display server at {address} takes no more: {packets} packets of the picture are not shown")]
     Slow {
-        /// Address of the server.
+        /// Number of packets that the server did not take.
         address: DisplayAddress,
         /// Packets that the server has not taken.
         packets: usize,

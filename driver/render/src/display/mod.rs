@@ -1,9 +1,10 @@
-//! Client of a display server: a viewer, perhaps on another machine, that shows tiles as they are finished.
+//! Client of a display server. The server is a viewer, possibly on another machine, that shows tiles as soon
+//! as they are finished.
 //!
-//! The protocol is that of tev, the viewer for pictures of high dynamic range
-//! (<https://github.com/Tom94/tev>), which other renderers use as well: [`packet`] makes its packets,
-//! [`Display`] sends them. The server never answers. A server that cannot be reached, disconnects or is slow
-//! is reported once, and neither stops a render nor holds up its tiles.
+//! The protocol is that of tev, a viewer for pictures of high dynamic range (<https://github.com/Tom94/tev>),
+//! which other renderers support too. [`packet`] creates its packets, [`Display`] sends them. The server
+//! never answers. A server that cannot be reached, disconnects or is slow is reported once. It neither stops
+//! a render nor delays its tiles.
 
 mod address;
 mod error;

@@ -1,7 +1,8 @@
-//! The packets of tev's protocol, as its `README.md` and `src/Ipc.cpp` describe them.
+//! Packets of tev's protocol, which its `README.md` and `src/Ipc.cpp` describe.
 //!
-//! A packet is its length in bytes (`u32`, itself included), the number of an operation (one byte) and its
-//! arguments. Numbers are little-endian, strings end with a zero byte, a Boolean is a byte of 0 or 1.
+//! A packet consists of its length in bytes (`u32`, including these four), the number of an operation (one
+//! byte) and its arguments. Numbers are little-endian, strings end with a zero byte, a Boolean is a byte of 0
+//! or 1.
 //!
 //! ```text
 //! CreateImage    4   grab focus, image, width i32, height i32, channels i32, the channels' names
@@ -9,19 +10,19 @@
 //!                    offset of each channel i64, stride of each channel i64, f32 ...
 //! ```
 //!
-//! Offsets and strides count `f32`: pixel `p` of the rectangle, in rows, has in channel `c` the value
-//! `offset[c] + p * stride[c]`. Here a pixel's channels lie side by side. `CreateImage` replaces an image of
-//! equal name.
+//! Offsets and strides are in units of `f32`: value number `offset[c] + p * stride[c]` is channel `c` of the
+//! rectangle's pixel `p`, row by row. This client stores the channels of a pixel side by side. `CreateImage`
+//! replaces an image with the same name.
 
 use photoncard_picture::printable::printable;
 use photoncard_shared::message::Tile;
 
-/// Operation that creates an image, or replaces the image of equal name.
+/// Operation that creates an image, or replaces the image with the same name.
 pub const CREATE_IMAGE: u8 = 4;
 /// Operation that replaces the values of a rectangle in some channels.
 pub const UPDATE_IMAGE: u8 = 6;
 
-/// Packet that creates a black image of `width` x `height` pixels and gives it the viewer's focus.
+/// Creates a packet that creates a black image of `width` x `height` pixels and gives it the viewer's focus.
 pub fn create_image(image: &str, [width, height]: [u32; 2], channels: &[&str]) -> Vec<u8> {
     let mut packet = Packet::new(CREATE_IMAGE, true, image);
     packet.numbers([width, height]);
@@ -29,7 +30,8 @@ pub fn create_image(image: &str, [width, height]: [u32; 2], channels: &[&str]) -
     packet.end()
 }
 
-/// Packet that replaces a rectangle of an image. `values` are the channels of each pixel in turn, row by row.
+/// Creates a packet that replaces a rectangle of an image. `values` are the channels of each pixel in turn,
+/// row by row.
 pub fn update_image(
     image: &str,
     rectangle: &Tile,
@@ -46,7 +48,7 @@ pub fn update_image(
     packet.end()
 }
 
-/// A packet under construction, whose length [`Self::end`] writes.
+/// A packet under construction. [`Self::end`] writes its length.
 struct Packet(Vec<u8>);
 
 impl Packet {
@@ -57,12 +59,13 @@ impl Packet {
         packet
     }
 
-    /// A zero byte would end a text too soon; it does not print.
+    /// Appends a text and its terminating zero byte. Characters that do not print, such as zero bytes, are
+    /// escaped.
     fn text(&mut self, text: &str) {
         self.0.extend(printable(text).bytes().chain([0]));
     }
 
-    /// Appends numbers as `i32`: sides and coordinates of pictures are far below 2^31.
+    /// Appends numbers as `i32`. Sides and coordinates of pictures are far below 2^31.
     fn numbers(&mut self, numbers: impl IntoIterator<Item = u32>) {
         self.0.extend(numbers.into_iter().flat_map(u32::to_le_bytes));
     }
@@ -87,9 +90,9 @@ impl Packet {
 mod tests {
     use super::*;
 
-    /// Written down from the description of the protocol, byte by byte.
+    /// The expected bytes were written by hand from the description of the protocol.
     #[test]
-    fn packets_are_those_of_the_protocol() {
+    fn packets_have_the_bytes_of_the_protocol() {
         let mut created = vec![35, 0, 0, 0, 4, 1];
         created.extend(b"a.exr\0");
         created.extend([0, 1, 0, 0, 3, 0, 0, 0]);

@@ -1,4 +1,4 @@
-//! Queue of packets that a display shares with its thread.
+//! Queue of packets that a display shares with its sending thread.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -8,28 +8,28 @@ use photoncard_shared::message::Tile;
 
 use super::DisplayError;
 
-/// Queue of packets from the display to its thread, with progress and failure.
+/// Queue of packets from the display to its thread, with the state of sending.
 #[derive(Default)]
 pub(super) struct PacketQueue {
     packets: VecDeque<Vec<u8>>,
-    /// Bytes in the queue.
+    /// Number of bytes in the queue.
     waiting: usize,
-    /// True while a packet that was taken from the queue is not wholly sent.
+    /// True while a packet taken from the queue is not completely sent.
     is_sending: bool,
-    /// Number of bytes sent.
+    /// Number of bytes sent so far.
     pub(super) sent: u64,
-    /// Tiles that found no room in the queue.
+    /// Tiles that were not queued because there was no room.
     pub(super) missed: Vec<Tile>,
-    /// True once the display is dropped: nothing more is to be sent.
+    /// True after the display was dropped. Nothing more is sent then.
     pub(super) is_closed: bool,
-    /// True after a failure: nothing more can be sent.
+    /// True after a failure. Nothing more can be sent then.
     has_failed: bool,
     /// The failure, until [`Self::take_failure`] returns it.
     failure: Option<DisplayError>,
 }
 
 impl PacketQueue {
-    /// Returns whether packets are still sent.
+    /// Returns whether packets are still being sent.
     pub(super) fn is_open(&self) -> bool {
         !self.is_closed && !self.has_failed
     }
@@ -39,12 +39,13 @@ impl PacketQueue {
         self.packets.is_empty() && !self.is_sending
     }
 
-    /// Number of packets that are not wholly sent, and of tiles that found no room.
+    /// Number of packets that are not completely sent, plus tiles that were not queued.
     pub(super) fn left(&self) -> usize {
         self.packets.len() + usize::from(self.is_sending) + self.missed.len()
     }
 
-    /// Returns whether `bytes` more may wait, of `most` in all; a single packet always may.
+    /// Returns whether a packet of `bytes` bytes may be queued, if all queued packets may have `most` bytes.
+    /// An empty queue accepts any packet.
     pub(super) fn has_room(&self, bytes: usize, most: usize) -> bool {
         self.waiting == 0 || self.waiting + bytes <= most
     }
@@ -55,7 +56,7 @@ impl PacketQueue {
         self.packets.push_back(packet);
     }
 
-    /// Ends the display with an error and drops what waits. Only the first error is kept.
+    /// Ends the display with an error and drops the queue. Only the first error is kept.
     pub(super) fn fail(&mut self, error: DisplayError) {
         if self.is_open() {
             self.failure = Some(error);
@@ -66,13 +67,13 @@ impl PacketQueue {
         self.is_sending = false;
     }
 
-    /// The failure, if it was not returned before.
+    /// Takes the failure, if it was not taken before.
     pub(super) fn take_failure(&mut self) -> Option<DisplayError> {
         self.failure.take()
     }
 }
 
-/// The queue with its lock, and a condition variable for its changes.
+/// A queue with its lock, and a condition variable that signals changes.
 #[derive(Default)]
 pub(super) struct SharedQueue {
     queue: Mutex<PacketQueue>,
@@ -85,14 +86,14 @@ impl SharedQueue {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the queue, and wakes the other thread.
+    /// Changes the queue and wakes the other thread.
     pub(super) fn change<T>(&self, change: impl FnOnce(&mut PacketQueue) -> T) -> T {
         let result = change(&mut self.lock());
         self.changed.notify_all();
         result
     }
 
-    /// Waits until `is_ready` holds, at most for `most`. Returns whether it holds.
+    /// Waits until `is_ready` is true, for at most `most`. Returns whether it is.
     pub(super) fn wait_until(&self, most: Duration, is_ready: impl Fn(&PacketQueue) -> bool) -> bool {
         let is_not_ready = |queue: &mut PacketQueue| !is_ready(queue);
         let waited = self.changed.wait_timeout_while(self.lock(), most, is_not_ready);
@@ -100,7 +101,7 @@ impl SharedQueue {
         is_ready(&queue)
     }
 
-    /// The next packet to send, waited for; `None` once the display is closed or has failed.
+    /// Waits for the next packet to send; `None` after the display was closed or failed.
     pub(super) fn next(&self) -> Option<Vec<u8>> {
         let mut queue = self.lock();
         loop {
@@ -116,7 +117,7 @@ impl SharedQueue {
         }
     }
 
-    /// Counts bytes of the current packet as sent. Returns whether to go on.
+    /// Counts bytes of the current packet as sent. Returns whether to continue.
     pub(super) fn advance(&self, bytes: usize, is_last: bool) -> bool {
         self.change(|queue| {
             queue.sent += bytes as u64;

@@ -1,4 +1,4 @@
-//! Sender of packets to a display server, on a thread of its own.
+//! Sends packets to a display server on a separate thread.
 
 use std::error::Error;
 use std::io::{self, ErrorKind, Write};
@@ -18,25 +18,25 @@ use super::{DisplayAddress, DisplayError};
 
 /// Time limit of a connection attempt.
 const CONNECT_WAIT: Duration = Duration::from_secs(2);
-/// Time limit of a write, after which its thread looks whether the display was closed.
+/// Time limit of a write. After it the thread checks whether the display was closed.
 const WRITE_WAIT: Duration = Duration::from_millis(100);
-/// Maximum number of bytes of waiting packets: five million RGB pixels.
+/// Maximum number of bytes in the queue: five million RGB pixels.
 const MAX_WAITING: usize = 64 << 20;
-/// Time limit without progress once the picture is complete.
+/// Maximum time without progress after the picture is complete.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Time limit for all waiting packets once the picture is complete.
+/// Maximum time to send the queue after the picture is complete.
 const MAX_AT_END: Duration = Duration::from_secs(20);
 
-/// Settings of a display: the server, and the image's name there.
+/// Settings of a display: the server, and the name of the image there.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DisplaySettings {
     /// Address of the display server.
     pub address: DisplayAddress,
-    /// Name of the image on the server; an image of equal name is replaced.
+    /// Name of the image on the server. An image with the same name is replaced.
     pub image: String,
 }
 
-/// A picture on a display server: the crop window of a film.
+/// A picture on a display server, the crop window of a film.
 ///
 /// Dropping it ends its thread, even if packets are still to be sent.
 pub struct Display {
@@ -48,13 +48,12 @@ pub struct Display {
 }
 
 impl Display {
-    /// Begins to show the crop window `window` with some channels. Errors are reported by
-    /// [`Viewer::failure`].
+    /// Begins to show the crop window `window` with these channels. [`Viewer::failure`] reports errors.
     pub fn open(settings: &DisplaySettings, window: Window, channels: &[Channel]) -> Self {
         Self::with_room_for(MAX_WAITING, settings, window, channels)
     }
 
-    /// [`Self::open`] with at most `most_waiting` bytes of waiting packets.
+    /// Does [`Self::open`] with a queue of at most `most_waiting` bytes.
     pub(super) fn with_room_for(
         most_waiting: usize,
         settings: &DisplaySettings,
@@ -95,7 +94,7 @@ impl Display {
         update_image(&self.settings.image, &shown, &self.names(), values)
     }
 
-    /// Ends the display as too slow: it lacks the waiting packets, and up to `missed` tiles.
+    /// Ends the display because it is too slow. The waiting packets, and up to `missed` tiles, are not shown.
     fn give_up(&self, missed: usize) {
         let packets = self.queue.lock().left() + missed;
         self.fail(DisplayError::Slow { address: self.settings.address.clone(), packets });
@@ -107,7 +106,7 @@ impl Display {
 }
 
 impl TileSink for Display {
-    /// Shows a tile, now or, if too much waits to be sent, when the picture is [finished](Viewer::finish).
+    /// Shows a tile: now, or, if the queue is full, when the picture is [finished](Viewer::finish).
     fn put(&self, tile: &FinishedTile) {
         if !self.queue.lock().is_open() {
             return;
@@ -122,7 +121,7 @@ impl TileSink for Display {
         });
     }
 
-    /// Pixels shown stay until the tile is put again.
+    /// Does nothing. The pixels stay visible until the tile is stored again.
     fn revoke(&self, _: &Tile) {}
 }
 
@@ -131,8 +130,8 @@ impl Viewer for Display {
         self.queue.lock().take_failure().map(Into::into)
     }
 
-    /// Sends the tiles that found no room before, and waits until all packets are sent: at most 20 s, at most
-    /// 2 s without progress.
+    /// Sends the tiles that were not queued before, and waits until everything is sent, for at most 20 s, and
+    /// at most 2 s without progress.
     fn finish(&self, film: &Film) {
         let missed = std::mem::take(&mut self.queue.lock().missed);
         let mut watch = Watch::new();
@@ -160,7 +159,7 @@ impl Drop for Display {
     }
 }
 
-/// Watchdog of a display's progress.
+/// Watchdog of the progress of a display.
 struct Watch {
     begun: Instant,
     moved: Instant,
@@ -173,7 +172,7 @@ impl Watch {
         Self { begun: now, moved: now, sent: 0 }
     }
 
-    /// Waits until `is_ready` holds. Returns whether it does; false if the display takes too long.
+    /// Waits until `is_ready` is true. Returns false if the display takes too long.
     fn wait_until(&mut self, queue: &SharedQueue, is_ready: impl Fn(&PacketQueue) -> bool) -> bool {
         while !queue.wait_until(WRITE_WAIT, &is_ready) {
             let sent = queue.lock().sent;
@@ -235,7 +234,7 @@ fn send_all(stream: &mut TcpStream, queue: &SharedQueue) -> io::Result<()> {
     Ok(())
 }
 
-/// Returns whether a write that failed may be tried again.
+/// Returns whether a failed write can be tried again.
 fn is_passing(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted)
 }

@@ -13,7 +13,7 @@ use rustix::net::sockopt;
 use super::packet::create_image;
 use super::*;
 
-/// A film of `tiles` tiles of 64 x 64 in a column, cropped out of a larger picture.
+/// Film of `tiles` tiles of 64 x 64 pixels in a column, cropped from a larger picture.
 fn film(tiles: u32) -> (Film, Vec<Tile>) {
     let window = Window { x0: 3, x1: 67, y0: 5, y1: 5 + 64 * tiles };
     let mut film = Film::new(100, 100 + 64 * tiles, window, SumFormat::ONE).unwrap();
@@ -31,7 +31,7 @@ fn settings(listener: &TcpListener) -> DisplaySettings {
     DisplaySettings { address, image: "film".into() }
 }
 
-/// The packets of a connection until it ends.
+/// Packets that arrive on a connection until it ends.
 fn packets(mut stream: TcpStream) -> Vec<Vec<u8>> {
     let mut bytes = Vec::new();
     stream.read_to_end(&mut bytes).unwrap();
@@ -55,7 +55,7 @@ fn shown(display: &Display, film: &Film, tiles: &[Tile]) -> Duration {
 }
 
 #[test]
-fn every_tile_is_shown_though_few_have_room_to_wait() {
+fn every_tile_is_shown_although_few_fit_into_the_queue() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let settings = settings(&listener);
     let (film, tiles) = film(9);
@@ -79,7 +79,7 @@ fn every_tile_is_shown_though_few_have_room_to_wait() {
 }
 
 #[test]
-fn a_display_that_never_reads_holds_nothing_up_for_long() {
+fn a_display_that_never_reads_delays_a_render_only_briefly() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     sockopt::set_socket_recv_buffer_size(&listener, 4096).unwrap();
     let (film, tiles) = film(400);
@@ -93,7 +93,7 @@ fn a_display_that_never_reads_holds_nothing_up_for_long() {
 }
 
 #[test]
-fn a_display_that_goes_away_is_told_of_once() {
+fn a_display_that_disconnects_is_reported_once() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let settings = settings(&listener);
     let (film, tiles) = film(400);
@@ -109,7 +109,7 @@ fn a_display_that_goes_away_is_told_of_once() {
 }
 
 #[test]
-fn a_display_that_is_not_there_is_told_of_once() {
+fn a_display_that_cannot_be_reached_is_reported_once() {
     let settings = settings(&TcpListener::bind("127.0.0.1:0").unwrap());
     let (film, tiles) = film(1);
     let display = Display::open(&settings, film.window(), Layers::colour());

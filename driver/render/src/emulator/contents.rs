@@ -1,7 +1,7 @@
 //! Contents of the lines that a chip reads: the boxes, triangles and photons among which it searches.
 //!
-//! A chip tests all that is in a line, so that these counts are exact numbers of the steps of its units; the
-//! cost model ([`crate::cost_model`]) multiplies them by the operations of a step.
+//! A chip tests everything in a line, so that these counts are the exact numbers of its units' steps. The
+//! cost model ([`crate::cost_model`]) multiplies them by the operations per step.
 
 use std::ops::Range;
 
@@ -11,37 +11,37 @@ use photoncard_shared::layout::{BvhLeaf, PhotonLeaf, WideNode};
 use photoncard_shared::message::Fault;
 use serde::{Deserialize, Serialize};
 
-/// Counts of what was in the lines that a chip read for tiles.
+/// Counts of the contents of lines that a chip read for tiles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Contents {
-    /// Nodes of the bounding volume hierarchy.
+    /// Number of nodes of the bounding volume hierarchy.
     pub nodes: u64,
-    /// Boxes in these nodes.
+    /// Number of boxes in these nodes.
     pub boxes: u64,
-    /// Leaves of the hierarchy, without those that are read again for one triangle of a surface.
+    /// Number of leaves of the hierarchy, without those read again for one triangle of a surface.
     pub leaves: u64,
-    /// Vertices in these leaves.
+    /// Number of vertices in these leaves.
     pub vertices: u64,
-    /// Triangles in these leaves.
+    /// Number of triangles in these leaves.
     pub triangles: u64,
-    /// Records of materials.
+    /// Number of material records.
     pub materials: u64,
-    /// Records of lights: nodes of the light tree, emitters.
+    /// Number of light records: nodes of the light tree, and emitters.
     pub lights: u64,
-    /// Nodes of photon maps and above irradiance points.
+    /// Number of inner nodes of photon maps and above irradiance points.
     pub photon_nodes: u64,
-    /// Boxes in these nodes.
+    /// Number of boxes in these nodes.
     pub photon_boxes: u64,
-    /// Leaves of photons and irradiance points.
+    /// Number of leaves of photons and irradiance points.
     pub photon_leaves: u64,
-    /// Photons and irradiance points in these leaves.
+    /// Number of photons and irradiance points in these leaves.
     pub photons: u64,
-    /// Photons of Jensen's kd-tree, each a node.
+    /// Number of photons of Jensen's kd-tree. Each is a node.
     pub tree_photons: u64,
 }
 
 impl Contents {
-    /// Nothing was read.
+    /// Counts that are all zero.
     pub const ZERO: Self = Self {
         nodes: 0,
         boxes: 0,
@@ -73,7 +73,7 @@ impl Contents {
         self.tree_photons += other.tree_photons;
     }
 
-    /// Counts the contents of a line of which the bytes `used` are used.
+    /// Counts the contents of a line, of which the chip uses the bytes `used`.
     fn count(&mut self, structure: Structure, line: &[u8; LINE_BYTES], used: &Range<u32>) {
         match structure {
             Structure::Nodes => {
@@ -106,7 +106,7 @@ impl Contents {
     }
 }
 
-/// Memory that counts the contents of the lines that are read for tiles.
+/// Memory that counts the contents of the lines read for tiles.
 pub struct Inspected<M> {
     memory: M,
     stage: Stage,
@@ -114,7 +114,7 @@ pub struct Inspected<M> {
 }
 
 impl<M> Inspected<M> {
-    /// Counts the contents of the lines of `memory`.
+    /// Wraps `memory` and counts the contents of its lines.
     pub fn new(memory: M) -> Self {
         Self { memory, stage: Stage::Begin, contents: Contents::ZERO }
     }
@@ -124,12 +124,12 @@ impl<M> Inspected<M> {
         &self.contents
     }
 
-    /// The memory below.
+    /// The wrapped memory.
     pub fn below(&self) -> &M {
         &self.memory
     }
 
-    /// The memory below, mutable.
+    /// The wrapped memory, mutable.
     pub fn below_mut(&mut self) -> &mut M {
         &mut self.memory
     }

@@ -1,4 +1,4 @@
-//! Chips without cards and links: tiles rendered straight from a card image, for studies and for whole-frame
+//! Chips without cards and links: renders tiles straight from a card image, for studies and for whole-frame
 //! reordering.
 
 use photoncard_firmware::chip::{Chip, FinishedPixel, PixelView, Progress};
@@ -17,21 +17,21 @@ use rayon::prelude::*;
 
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 
-/// A rendered tile, with its work and memory traffic.
+/// A rendered tile, with the work and memory traffic of rendering it.
 pub struct RenderedTile {
-    /// Light of the pixels, row by row, in the image's radiance units: one sum per pixel, or with layers
-    /// [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
+    /// Sums of the light of the pixels, row by row, in the image's radiance units: one per pixel, or with
+    /// layers [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
     pub sums: Vec<ColourSum>,
-    /// The other channels of the pixels, row by row.
+    /// Albedo, normal and depth of the pixels, row by row.
     pub views: Vec<PixelView>,
-    /// Counts of the work.
+    /// Counters of the work.
     pub counters: Counters,
-    /// Memory traffic; zero for a memory that is not modelled.
+    /// Memory traffic; zero if the memory is not modelled.
     pub traffic: MemoryTraffic,
 }
 
 impl RenderedTile {
-    /// The tile of complete pixels, in any order.
+    /// Assembles a tile from complete pixels in any order.
     fn new(mut pixels: Vec<FinishedPixel>, frame: &FrameParameters, counters: Counters) -> Self {
         pixels.sort_by_key(|pixel| pixel.index);
         let mut sums = Vec::with_capacity(pixels.len() * sums_of_pixel(frame.layers) as usize);
@@ -40,7 +40,7 @@ impl RenderedTile {
         Self { sums, views, counters, traffic: MemoryTraffic::ZERO }
     }
 
-    /// Values of the pixels, row by row, in a format of the frame.
+    /// Values of the pixels, row by row. `format` is the format of the frame's sums.
     pub fn pixels(&self, format: SumFormat) -> impl Iterator<Item = FilmPixel> {
         let sums = self.sums.chunks(sums_of_pixel(format.layers) as usize);
         self.views.iter().zip(sums).map(move |(view, light)| format.values(&view.sums(light)))
@@ -50,10 +50,10 @@ impl RenderedTile {
 /// Error of [`render_tiles_apart`].
 #[derive(Debug, thiserror::Error)]
 pub enum TileError {
-    /// Error of a malformed image, or of a tile that is too large.
+    /// The image is malformed, or a tile is too large.
     #[error("{0}")]
     Fault(Fault),
-    /// The work was stopped.
+    /// The caller stopped the work.
     #[error("the render was stopped")]
     Stopped,
 }
@@ -64,16 +64,16 @@ impl From<Fault> for TileError {
     }
 }
 
-/// A new chip. It is built on the stack first: in a frame of its own, as the caller's may be of a thread with
-/// a small stack.
+/// Creates a chip. It is built on the stack first, in a stack frame of its own, because the caller's thread
+/// may have a small stack.
 #[inline(never)]
 pub fn new_chip<K: ChipKind>() -> Box<Chip<K>> {
     Box::new(Chip::new())
 }
 
-/// Renders tiles on chips of the kind `K`, one a thread of `pool`, whose stacks must hold a chip while it is
-/// built. Each tile has a new memory that `model` makes, so that it begins with empty caches. `is_stopped` is
-/// polled before each.
+/// Renders tiles on chips of kind `K`, one per thread of `pool`. The threads' stacks must have room for a
+/// chip while it is built. `model` creates a new memory for each tile, so that every tile begins with empty
+/// caches. `is_stopped` is polled before each tile.
 ///
 /// # Errors
 /// If the card image is malformed, or the work is stopped.
@@ -95,8 +95,8 @@ pub fn render_tiles_apart<'a, K: ChipKind, M: MeasuredMemory>(
     pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip::<K>, render_one).collect())
 }
 
-/// Renders a tile on a chip with a memory of its own. With an `outlet` the pixels' gathers are sent to it
-/// instead, and the caller evaluates them and adds them to the sums.
+/// Renders a tile on a chip with a memory of its own. With an `outlet`, the gathers of pixels are passed to
+/// it; the caller must then do them and add the results to the sums.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for the tile.
@@ -120,7 +120,7 @@ pub fn render_tile<K: ChipKind>(
 }
 
 /// Renders tiles on a chip, with as many in flight as the frame and the chip allow. `take` is called with
-/// each tile when it is done, in any order, without its traffic, and returns whether to go on.
+/// each finished tile, in any order and without its traffic, and returns whether to continue.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for a tile.

@@ -1,11 +1,11 @@
-//! DRAM of an emulated card, stored copy-on-write over the host's card image.
+//! DRAM of an emulated card, copy-on-write over the host's card image.
 //!
-//! A host and its emulated cards live in one process, and each card's DRAM holds the same image. A card may
-//! be given the image by reference before its first line, and checks it like a received one; or it receives
-//! the image line by line over its link. As long as the received lines equal the lines of the host's image at
-//! the same addresses, the card stores no copy and reads the host's; lines beyond the image are its own. At
-//! the first line of the image that differs it switches to lines of its own, so that a card always reads what
-//! was written.
+//! A host and its emulated cards are in one process, and the DRAM of each card contains the same image. A
+//! card can get the image by reference before its first line is written, and checks it like a received one;
+//! or it receives the image line by line over its link. As long as the received lines equal the lines of the
+//! host's image at the same addresses, the card stores no copy and reads the host's lines. Lines beyond the
+//! image are the card's own. At the first line of the image that differs, the card switches to lines of its
+//! own, so that it always reads what was written.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -17,38 +17,38 @@ use photoncard_shared::message::{Fault, FaultCode};
 
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 
-/// The host's card image; empty until [`Self::give`].
+/// The host's card image; empty before [`Self::give`].
 #[derive(Clone, Default)]
 pub struct SharedImage(Arc<OnceLock<Given>>);
 
-/// An image, and its checksum if that is computed already.
+/// An image, and its checksum if that is already known.
 struct Given {
     image: Arc<CardImage>,
     checksum: Option<u64>,
 }
 
 impl SharedImage {
-    /// Shares the image with the cards; later calls have no effect. Cards that hold it need not compute a
-    /// known checksum again.
+    /// Shares the image with the cards. Later calls have no effect. Cards that hold the image need not
+    /// compute a known checksum again.
     pub fn give(&self, image: Arc<CardImage>, checksum: Option<u64>) {
         // Cards that receive another image store it themselves.
         let _ = self.0.set(Given { image, checksum });
     }
 }
 
-/// DRAM that takes host memory only for written lines, and none for lines that the shared image holds.
+/// DRAM that takes host memory only for written lines, and none for lines that equal the shared image's.
 pub(super) struct EmulatedDram {
     lines: Stored,
     limit: u32,
     shared: SharedImage,
-    /// Image that a memory without written lines holds, once it is given.
+    /// Image that the memory contains if no line was written, once it is given.
     held: SharedImage,
 }
 
 /// Lines from the first to the last written one.
 enum Stored {
     Own(Vec<Line>),
-    /// The first lines of an image, and their number; and lines after the whole image.
+    /// The first `written` lines of an image, by reference, and lines after the whole image.
     Shared {
         image: Arc<CardImage>,
         written: usize,
@@ -61,12 +61,12 @@ impl EmulatedDram {
         Self { lines: Stored::Own(Vec::new()), limit: bytes / LINE_BYTES as u32, shared, held }
     }
 
-    /// The image of a memory that holds one, and without a line that was written.
+    /// Image that the memory contains by reference, if no line was written.
     fn held(&self) -> Option<&Given> {
         self.held.0.get().filter(|_| matches!(&self.lines, Stored::Own(own) if own.is_empty()))
     }
 
-    /// Stores the lines of an image that the memory holds, by reference.
+    /// Takes over the lines of an image that the memory contains by reference.
     #[cold]
     fn adopt(&mut self) {
         if let Some(Given { image, .. }) = self.held() {
@@ -87,7 +87,7 @@ impl EmulatedDram {
         }
     }
 
-    /// All lines, without those beyond a shared image.
+    /// All lines except those beyond a shared image.
     fn all(&self) -> &[Line] {
         if let Some(Given { image, .. }) = self.held() {
             return image.lines();
@@ -99,7 +99,7 @@ impl EmulatedDram {
     }
 
     /// Stores lines by reference if they equal the shared image's and follow the lines stored so far. Returns
-    /// whether they do.
+    /// whether it did so.
     fn share(&mut self, first: usize, lines: &[[u8; LINE_BYTES]]) -> bool {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty())
             && let Some(Given { image, .. }) = self.shared.0.get()
@@ -116,8 +116,8 @@ impl EmulatedDram {
         shares
     }
 
-    /// The card's own lines, and the index in them of the line `first`. In a shared image the card stores all
-    /// lines itself.
+    /// The card's own lines, and the index of line `first` in them. If `first` is in a shared image, all
+    /// lines are copied before.
     fn own_from(&mut self, first: usize) -> (&mut Vec<Line>, usize) {
         if let Stored::Shared { image, written, beyond } = &self.lines
             && first < image.lines().len()
@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn a_card_shares_what_is_the_same_and_holds_what_was_written() {
+    fn a_card_shares_equal_lines_and_reads_what_was_written() {
         let image = image();
         let bytes: Vec<[u8; LINE_BYTES]> = image.lines().iter().map(|line| line.0).collect();
         let shared = SharedImage::default();
@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_outside_are_refused() {
+    fn lines_outside_the_memory_are_refused() {
         let mut dram =
             EmulatedDram::new(2 * LINE_BYTES as u32, SharedImage::default(), SharedImage::default());
         assert_eq!(dram.write(LineAddress(1), &[[1; LINE_BYTES]; 2]), None);

@@ -1,4 +1,4 @@
-//! A measured memory of any kind behind a table of functions.
+//! A measured memory of any kind, called through a function table.
 
 use std::ops::Range;
 
@@ -9,10 +9,10 @@ use photoncard_shared::message::Fault;
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use super::trace::TraceFile;
 
-/// Memory that measures its traffic, of a kind that the chip does not know.
+/// Memory that measures its traffic, of a kind unknown to the chip.
 ///
-/// The chip is compiled for each kind of memory, and all that a measured memory does would be compiled into
-/// each of its reads: of the kinds that measure it is compiled for this one.
+/// The chip is compiled for each kind of memory, and the code of a measured memory would be inlined into each
+/// of its reads. This type is the only measured memory for which it is compiled.
 pub struct Measured<'a>(Box<dyn MeasuredCard + Send + 'a>);
 
 trait MeasuredCard: CardMemory + MeasuredMemory {}
@@ -20,7 +20,7 @@ trait MeasuredCard: CardMemory + MeasuredMemory {}
 impl<M: CardMemory + MeasuredMemory> MeasuredCard for M {}
 
 impl<'a> Measured<'a> {
-    /// The memory behind the table.
+    /// Wraps a memory.
     pub fn new(memory: impl CardMemory + MeasuredMemory + Send + 'a) -> Self {
         Self(Box::new(memory))
     }

@@ -1,4 +1,4 @@
-//! Model of a chip's memory: its caches, with counters of the traffic above and below them.
+//! Model of a chip's memory: its caches, and counters of the traffic above and below them.
 
 use std::fmt;
 use std::str::FromStr;
@@ -12,38 +12,38 @@ use photoncard_shared::address::{LINE_BYTES, Line, Structure};
 use super::contents::{Contents, Inspected};
 use super::trace::TraceFile;
 
-/// Caches between a chip and its DRAM: the argument of `--cache`.
+/// Caches between a chip and its DRAM, as in the argument of `--cache`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CacheSettings {
-    /// One cache for the photon map and one for the scene.
+    /// Separate caches for the photon map and for the scene.
     Split {
-        /// Cache of the photon map.
+        /// Cache for the photon map.
         photon: CacheSpec,
-        /// Cache of the scene.
+        /// Cache for the scene.
         scene: CacheSpec,
     },
-    /// One cache for both.
+    /// One cache for everything.
     Unified(CacheSpec),
 }
 
-/// Shape of a cache: `SIZE/LINE/WAYS` of `--cache`, and the index of sets.
+/// Shape of a cache: `SIZE/LINE/WAYS` of `--cache`, and the mapping to sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CacheSpec {
     /// Capacity, bytes.
     pub bytes: u32,
     /// Size of a cache line, bytes.
     pub line_bytes: u32,
-    /// Associativity: lines of a set.
+    /// Associativity: number of lines per set.
     pub ways: u32,
-    /// Function from a line's address to its set.
+    /// Mapping from a line's address to its set.
     pub index: SetIndex,
 }
 
 impl CacheSpec {
-    /// The dissertation's cache of the photon map: 128 KB in lines of 128 bytes (section 6.5); 4 ways are our
-    /// choice.
+    /// Photon cache of the dissertation: 128 KB with lines of 128 bytes (section 6.5). The 4 ways are this
+    /// project's choice.
     pub const PHOTON: Self = Self { bytes: 128 << 10, line_bytes: 128, ways: 4, index: SetIndex::Modulo };
-    /// The dissertation's cache of the ray caster: 75 KB (section 7.3.2), otherwise as [`Self::PHOTON`].
+    /// Ray caster cache of the dissertation: 75 KB (section 7.3.2), otherwise like [`Self::PHOTON`].
     pub const SCENE: Self = Self { bytes: 75 << 10, ..Self::PHOTON };
 
     fn shape(&self) -> Result<CacheShape, ShapeError> {
@@ -95,7 +95,7 @@ impl fmt::Display for CacheSettings {
 impl FromStr for CacheSettings {
     type Err = String;
 
-    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash`, whose parts are optional, or
+    /// Parses `photon=128K/128/4,scene=75K/128/4,index=hash`, in which each part is optional, or
     /// `unified=256K/128/8`.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut photon = None;
@@ -174,11 +174,12 @@ fn cache(text: &str) -> Result<CacheSpec, String> {
     }
 }
 
-/// A memory behind caches, with counters above and below them, and of what the chip's lines contain.
+/// A memory behind caches. Traffic is counted above and below them, and so are the contents of the lines that
+/// the chip reads.
 pub type ModelledMemory<M> = Inspected<Counted<LineCaches<Counted<M>, Vec<CacheEntry>, Vec<Line>>>>;
 
 impl CacheSettings {
-    /// A memory behind these caches.
+    /// Wraps a memory in these caches.
     pub fn over<M: MemoryPort>(&self, memory: M) -> ModelledMemory<M> {
         let dram = Counted::new(memory);
         Inspected::new(Counted::new(match self {
@@ -191,9 +192,9 @@ impl CacheSettings {
 /// Memory traffic of a chip, above and below its caches.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MemoryTraffic {
-    /// Reads by the chip, above the caches: records and their bytes.
+    /// Reads by the chip, above the caches. A read is a record.
     pub requested: Traffic,
-    /// Reads from DRAM, below the caches: lines of card memory.
+    /// Reads from DRAM, below the caches. A read is a line of card memory.
     pub fetched: Traffic,
     /// Contents of the lines that the chip read.
     pub contents: Contents,
@@ -211,17 +212,17 @@ impl MemoryTraffic {
         self.contents.add(&other.contents);
     }
 
-    /// Reads of the chosen structures for tiles: requested, and fetched from DRAM.
+    /// Reads of the chosen structures for tiles: those requested by the chip, and those fetched from DRAM.
     pub fn of(&self, chosen: impl Fn(Structure) -> bool) -> [Reads; 2] {
         [self.requested.of_tiles(&chosen), self.fetched.of_tiles(&chosen)]
     }
 
-    /// Bytes of the photon map from DRAM, for tiles.
+    /// Bytes of the photon map fetched from DRAM for tiles.
     pub fn photon_map_bytes(&self) -> u64 {
         self.fetched.of_tiles(Structure::is_photon_map).bytes
     }
 
-    /// Bytes of the scene from DRAM, for tiles.
+    /// Bytes of the scene fetched from DRAM for tiles.
     pub fn scene_bytes(&self) -> u64 {
         self.fetched.of_tiles(|structure| !structure.is_photon_map()).bytes
     }
@@ -229,10 +230,10 @@ impl MemoryTraffic {
 
 /// Memory that reports its traffic.
 pub trait MeasuredMemory: MemoryPort {
-    /// Traffic since the memory was made; zero for a memory that is not modelled.
+    /// Traffic since the memory was created; zero if the memory is not modelled.
     fn traffic(&self) -> MemoryTraffic;
 
-    /// Takes the unfinished trace of its reads, if there is one.
+    /// Takes the unfinished trace of the reads, if there is one.
     fn take_trace(&mut self) -> Option<TraceFile> {
         None
     }
@@ -283,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_cache_is_refused_with_what_is() {
+    fn invalid_caches_are_refused_with_the_valid_forms() {
         for (text, said) in [
             ("", "SIZE/LINE/WAYS"),
             ("photon", "SIZE/LINE/WAYS"),

@@ -1,4 +1,5 @@
-//! Emulated cards: the firmware on threads of this process, one chip per thread, each on a loopback link.
+//! Emulated cards: the firmware on threads of this process, one chip per thread, with a loopback link per
+//! chip.
 
 pub mod contents;
 pub mod direct;
@@ -40,11 +41,11 @@ use photoncard_picture::choice::choices;
 /// Kind of the chip on an emulated card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EmulatedKind {
-    /// A chip of the budget [`REFERENCE`](photoncard_firmware::kind::REFERENCE).
+    /// Chip with the budget [`REFERENCE`](photoncard_firmware::kind::REFERENCE).
     Reference,
-    /// A chip of the budget [`LARGE`](photoncard_firmware::kind::LARGE).
+    /// Chip with the budget [`LARGE`](photoncard_firmware::kind::LARGE).
     Large,
-    /// A chip of the budget [`MICRO`](photoncard_firmware::kind::MICRO).
+    /// Chip with the budget [`MICRO`](photoncard_firmware::kind::MICRO).
     Micro,
 }
 
@@ -55,7 +56,7 @@ choices!(EmulatedKind {
 });
 
 impl EmulatedKind {
-    /// On-chip memory of the firmware, its caches and stack included, bytes.
+    /// On-chip memory of the firmware, including caches and stack, bytes.
     pub fn sram_bytes(self) -> usize {
         match self {
             Self::Reference => sram_bytes::<Reference>(),
@@ -78,8 +79,8 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
-    /// Name of the kind of chip with this budget, which may be on a board: `reference`, `large`, `micro` or
-    /// `other`.
+    /// Name of the kind of chip with this budget: `reference`, `large`, `micro` or `other`. The chip may be
+    /// on a board.
     pub fn name_of(budget: &Budget) -> &'static str {
         match *budget {
             kind::REFERENCE => "reference",
@@ -98,7 +99,7 @@ impl EmulatedKind {
         }
     }
 
-    /// Caches of the budget's sizes, of four ways.
+    /// Caches with the budget's sizes and four ways.
     pub fn caches(self) -> CacheSettings {
         let budget = self.budget();
         CacheSettings::Split {
@@ -107,7 +108,7 @@ impl EmulatedKind {
         }
     }
 
-    /// On-chip memory of the buffers of tile and link, bytes.
+    /// On-chip memory of the buffers for tiles and link, bytes.
     pub fn buffer_bytes(self) -> usize {
         let budget = self.budget();
         self.sram_bytes() - cache_bytes(&budget) - budget.stack_bytes as usize
@@ -116,22 +117,22 @@ impl EmulatedKind {
 
 /// Capacity of a loopback link in each direction, bytes.
 const LINK_CAPACITY: usize = 64 << 10;
-/// Bytes of a card for which the host is woken: a third of the frames that may be in flight.
+/// Number of bytes from a card at which the host is woken: a third of the frames that may be in flight.
 const WOKEN_AT: usize = WINDOW * MAX_FRAME / 3;
-/// Stack of a chip's thread, bytes: the chip's buffers are built there before they move to the heap.
+/// Stack of a chip's thread, bytes. The chip's buffers are built there before they move to the heap.
 pub const THREAD_STACK: usize = 16 << 20;
 
 /// Model of an emulated card's memory.
 pub struct MemoryModel {
     /// Caches between chip and DRAM.
     pub caches: CacheSettings,
-    /// File that the chip's reads are written to, if any.
+    /// File to which the chip's reads are written, if any.
     pub trace: Option<TraceFile>,
 }
 
-/// Record of a modelled memory at the end of its card.
+/// Record of a modelled memory, made when its card ends.
 pub struct MemoryRecord {
-    /// Traffic of the card's whole life.
+    /// Traffic during the card's whole life.
     pub traffic: MemoryTraffic,
     /// Unfinished trace of the reads.
     pub trace: Option<TraceFile>,
@@ -143,13 +144,13 @@ pub struct EmulatedCard {
     port: Option<LoopbackPort>,
     trace_has_failed: Option<Arc<AtomicBool>>,
     tile_lines: TileLines,
-    /// Image that the memory holds, as long as nothing was loaded.
+    /// Image that the memory contains by reference as long as nothing was loaded.
     held: Option<SharedImage>,
 }
 
 impl EmulatedCard {
-    /// Starts a card. Without a model its memory has no caches and no counters. A card that is loaded with
-    /// the image in `shared` keeps no copy of it.
+    /// Starts a card. Without a model its memory has neither caches nor counters. A card that is loaded with
+    /// the image in `shared` stores no copy of it.
     ///
     /// # Errors
     /// If the card's thread cannot be started.
@@ -174,31 +175,31 @@ impl EmulatedCard {
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
     }
 
-    /// Takes the empty memory of a card to which nothing was loaded; `None` from the second call on, and of a
-    /// modelled memory. An image that is given to it is held by reference.
+    /// Takes the empty memory of a card into which nothing was loaded, so that an image can be given to it by
+    /// reference; `None` from the second call on, and for a modelled memory.
     pub fn take_empty_memory(&mut self) -> Option<SharedImage> {
         self.held.take()
     }
 
-    /// The host's end of the link.
+    /// Host's end of the link.
     ///
     /// # Panics
-    /// Never: the port is there until the card is dropped.
+    /// Never: the port exists until the card is dropped.
     pub fn port(&mut self) -> &mut LoopbackPort {
         self.port.as_mut().expect("the port lives as long as the card")
     }
 
-    /// Returns whether writing the trace has failed.
+    /// Returns whether writing the trace failed.
     pub fn trace_has_failed(&self) -> bool {
         self.trace_has_failed.as_ref().is_some_and(|failed| failed.load(Ordering::Relaxed))
     }
 
-    /// Lines from DRAM of the tiles that the card has rendered, if its memory is modelled.
+    /// Number of DRAM lines read for each tile that the card has rendered, if its memory is modelled.
     pub fn tile_lines(&self) -> &TileLines {
         &self.tile_lines
     }
 
-    /// Ends the card. Returns the record of its memory, if it is modelled.
+    /// Ends the card. Returns the record of its memory if that is modelled.
     ///
     /// # Panics
     /// If the chip panicked.
@@ -219,7 +220,7 @@ impl Drop for EmulatedCard {
     }
 }
 
-/// Serves an emulated card to a host elsewhere, until the port fails.
+/// Serves an emulated card to a host in another process, until the port fails.
 ///
 /// # Errors
 /// If the card's thread cannot be started.
@@ -258,7 +259,7 @@ fn run(
     }
 }
 
-/// Serves a card with some memory until the host drops its end of the link. Returns the result of `end` on
+/// Serves a card with a given memory until the host drops its end of the link. Returns the result of `end` on
 /// the memory.
 fn serve_on<M: CardMemory, R>(
     kind: EmulatedKind,

@@ -1,5 +1,5 @@
-//! Lines that a chip has read from its DRAM for each tile: a note beside the link, as cards and host are in
-//! one process.
+//! Number of lines that a chip read from its DRAM for each tile. It is passed beside the link, because card
+//! and host are in one process.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -12,7 +12,7 @@ use photoncard_shared::message::Fault;
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
 use super::trace::TraceFile;
 
-/// Lines from DRAM of the tiles that a card has rendered, by tile.
+/// Number of DRAM lines by tile, for the tiles that a card has rendered.
 #[derive(Clone, Debug, Default)]
 pub struct TileLines(Arc<Mutex<HashMap<u32, u64>>>);
 
@@ -21,18 +21,18 @@ impl TileLines {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).insert(tile, lines);
     }
 
-    /// Takes the lines of a tile that the card has rendered; `None` if its memory is not modelled. Of tiles
-    /// in flight together each has the lines since the end of the one before.
+    /// Takes the number of lines of a tile that the card has rendered; `None` if its memory is not modelled.
+    /// If several tiles are in flight, a tile counts the lines since the previous one ended.
     pub fn take(&self, tile: u32) -> Option<u64> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&tile)
     }
 }
 
-/// Memory that notes the lines of each tile when it ends.
+/// Memory that records the number of lines of each tile when the tile ends.
 pub(super) struct TileMeter<M> {
     memory: M,
     notes: TileLines,
-    /// Lines of all tiles so far.
+    /// Number of lines of all tiles so far.
     counted: u64,
 }
 

@@ -1,11 +1,12 @@
-//! Files of traces of a chip's memory: every read of its tiles, above the caches for a cache simulator, or
-//! below them for a DRAM simulator.
+//! Trace files of a chip's memory: every read for tiles, above the caches for a cache simulator, or below
+//! them for a DRAM simulator.
 //!
-//! Above the caches a trace has the classic input format of Dinero. Each line of text is one access: a label,
-//! a blank, a byte address in hexadecimal. Label 0 is a read of data; label 4 is Dinero's escape that flushes
-//! its caches, written at the beginning of every tile with address 0. Dinero ignores the rest of a line: a
-//! labelled trace has structure, stage and bytes of the read there. Below the caches, each line of text is a
-//! fetch of one line of card memory, in the format of Ramulator 2 or of `DRAMsim3`. See `docs/memory.md`.
+//! Above the caches, a trace has Dinero's classic input format. Each line of text is one access: a label, a
+//! blank, and a byte address in hexadecimal. Label 0 is a read of data. Label 4 is Dinero's escape that
+//! flushes its caches; it is written at the beginning of every tile with address 0. Dinero ignores the rest
+//! of a line, where a labelled trace has the structure, the stage and the bytes of the read. Below the
+//! caches, each line of text is a fetch of one line of card memory, in the format of Ramulator 2 or of
+//! `DRAMsim3`. See `docs/memory.md`.
 
 use std::fmt::Arguments;
 use std::io::{self, Write};
@@ -20,10 +21,10 @@ use photoncard_picture::choice::{Choice, choices};
 use photoncard_picture::output::{OutputError, PendingFile};
 use photoncard_shared::address::Structure;
 
-/// Size of a block of text that is compressed at once, bytes.
+/// Size of the blocks in which text is compressed, bytes.
 const BUFFER: usize = 64 << 10;
-/// Maximum length of a line: a label, 39 bits in hexadecimal, the names of a structure and of a stage, three
-/// digits of bytes, blanks and the line feed.
+/// Maximum length of a line of text, bytes: a label, 39 bits in hexadecimal, the names of a structure and of
+/// a stage, three digits of bytes, blanks and the line feed.
 const LONGEST_LINE: usize = 64;
 
 const READ: u8 = 0;
@@ -35,10 +36,10 @@ pub enum TraceFormat {
     /// Reads above the caches, for Dinero.
     #[default]
     Dinero,
-    /// Lines from DRAM, for Ramulator 2's load-store trace.
+    /// Lines fetched from DRAM, for Ramulator 2's load-store trace.
     Ramulator,
-    /// Lines from DRAM, for `DRAMsim3`: each a cycle after the one before, so that the DRAM is never without
-    /// work.
+    /// Lines fetched from DRAM, for `DRAMsim3`. Each is one cycle after the previous one, so that the DRAM
+    /// always has work.
     Dramsim3,
 }
 
@@ -49,13 +50,13 @@ choices!(TraceFormat {
 });
 
 impl TraceFormat {
-    /// True for traces of the DRAM, false for those of the chip's requests.
+    /// Returns true for traces of the DRAM, false for traces of the chip's requests.
     pub fn is_below_caches(self) -> bool {
         self != Self::Dinero
     }
 }
 
-/// File of a trace, and its form.
+/// Path and format of a trace.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TraceSettings {
     /// Path of the file.
@@ -66,21 +67,20 @@ pub struct TraceSettings {
     pub has_labels: bool,
 }
 
-/// Unfinished trace file, compressed by gzip. The file appears under its name only when the trace is
-/// finished.
+/// Unfinished trace file, compressed by gzip. It appears under its name only when the trace is finished.
 pub struct TraceFile {
     encoder: GzEncoder<PendingFile>,
     buffer: Vec<u8>,
     settings: TraceSettings,
     /// Number of fetches written.
     fetches: u64,
-    /// First failure, after which nothing is written.
+    /// First failure. Nothing is written after it.
     error: Option<io::Error>,
     has_failed: Arc<AtomicBool>,
 }
 
 impl TraceFile {
-    /// Creates a trace that will be stored at the path of `settings`.
+    /// Creates a trace that will be stored at the path in `settings`.
     ///
     /// # Errors
     /// As [`photoncard_picture::output::check_writable`].
@@ -95,7 +95,8 @@ impl TraceFile {
         })
     }
 
-    /// Flag that is set once the file cannot be written. The render may end then, as there will be no trace.
+    /// Flag that is set if the file cannot be written. The render can then end, because there will be no
+    /// trace.
     pub fn has_failed(&self) -> Arc<AtomicBool> {
         self.has_failed.clone()
     }
@@ -105,7 +106,6 @@ impl TraceFile {
         self.settings.format.is_below_caches()
     }
 
-    /// Adds a read of `bytes` bytes.
     pub(super) fn add_read(&mut self, address: u64, structure: Structure, stage: Stage, bytes: usize) {
         if self.is_below_caches() {
             self.add_fetch(address);
@@ -127,7 +127,7 @@ impl TraceFile {
         self.fetches += 1;
     }
 
-    /// Begins a tile: a cache simulator empties its caches.
+    /// Begins a tile. A cache simulator empties its caches there.
     pub(super) fn begin_tile(&mut self) {
         if !self.is_below_caches() {
             self.add(format_args!("{FLUSH} 0"));
@@ -155,7 +155,7 @@ impl TraceFile {
     /// Ends the trace and moves the file to its path.
     ///
     /// # Errors
-    /// If any part of it could not be written.
+    /// If any part of the trace could not be written.
     pub fn finish(mut self) -> Result<(), OutputError> {
         self.compress();
         let Self { encoder, settings: TraceSettings { path, .. }, error, .. } = self;
@@ -173,9 +173,9 @@ mod tests {
 
     use super::*;
 
-    /// Text is compressed when the next line might not fit into the buffer.
+    /// Text must be compressed when the next line might not fit into the buffer.
     #[test]
-    fn the_longest_line_fits_into_the_room_that_is_kept_for_it() {
+    fn the_longest_line_fits_into_the_reserved_room() {
         let longest = |names: Vec<&str>| names.into_iter().map(str::len).max().unwrap();
         let structure = longest(Structure::ALL.iter().map(|structure| structure.name()).collect());
         let stage = longest(Stage::ALL.iter().map(|stage| stage.name()).collect());

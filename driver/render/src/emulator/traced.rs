@@ -1,4 +1,4 @@
-//! Memory whose reads go into a trace.
+//! Memory whose reads are recorded in a trace.
 
 use std::ops::Range;
 
@@ -14,12 +14,12 @@ pub(super) struct Traced<M> {
     memory: M,
     trace: Option<TraceFile>,
     stage: Stage,
-    /// False before the first tile: earlier reads are not recorded.
+    /// False before the first tile. Earlier reads are not recorded.
     in_tiles: bool,
 }
 
 impl<M> Traced<M> {
-    /// Memory that records the reads of `memory` in `trace`.
+    /// Wraps `memory` and records its reads in `trace`.
     pub(super) fn new(memory: M, trace: Option<TraceFile>) -> Self {
         Self { memory, trace, stage: Stage::Begin, in_tiles: false }
     }
@@ -91,7 +91,7 @@ mod tests {
     use crate::emulator::trace::{TraceFormat, TraceSettings};
 
     #[test]
-    fn a_trace_has_a_flush_for_a_tile_and_lines_for_a_read_of_it() {
+    fn a_trace_has_a_flush_per_tile_and_the_lines_of_its_reads() {
         let folder = tempfile::tempdir().unwrap();
         use TraceFormat::{Dinero, Dramsim3, Ramulator};
         for (format, has_labels, used, expected) in [

@@ -1,8 +1,9 @@
-//! All gathers of a frame along one Hilbert curve: the bound that the orders of a chip are compared with.
+//! Does all gathers of a frame along one Hilbert curve. It is the bound with which the orders of a chip are
+//! compared.
 //!
-//! No chip can do it: the gathers of a frame are gigabytes. Emulated chips hand their gathers to the host,
-//! which sorts them and has them done when all rays are cast (Steinhurst, Coombe, Lastra 2005). Gathers of
-//! irradiance records, whose results are needed before the pixels, stay on the chips.
+//! No chip can do this, because the gathers of a frame take gigabytes. Emulated chips pass their gathers to
+//! the host, which sorts them, and does them when all rays are cast (Steinhurst, Coombe, Lastra 2005).
+//! Gathers of irradiance records, whose results are needed before those of pixels, stay on the chips.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -27,14 +28,13 @@ use super::direct::{RenderedTile, new_chip, render_tile};
 use super::measured::Measured;
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 
-/// Maximum number of gathers that are kept at once, 32 bytes each: 4.3 GB.
+/// Maximum number of gathers kept at once. With 32 bytes each they take 4.3 GB.
 const MAX_GATHERS: u64 = 1 << 27;
-/// Approximate number of gathers in the tiles of one round of casting, after which the host takes them over.
+/// Approximate number of gathers in one round of casting. The host takes them over after the round.
 const GATHERS_PER_CAST: u64 = 1 << 21;
-/// Number of gathers of one task.
 const GATHERS_PER_TASK: usize = 4096;
-/// Number of gathers of one task where memory is modelled: so many that the empty caches at its beginning
-/// hardly count.
+/// Number of gathers per task if memory is modelled. It is large, so that the empty caches at a task's
+/// beginning hardly matter.
 const GATHERS_PER_COUNTED_TASK: usize = 1 << 22;
 /// Minimum number of gathers between two reports of progress.
 const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
@@ -47,10 +47,10 @@ pub enum FrameError {
         "the frame may have {gathers} gathers, and at most {MAX_GATHERS} are kept at once, as memory allows"
     )]
     TooManyGathers {
-        /// Gathers that the frame may have: gather rays of all pixels and samples.
+        /// Number of gathers that the frame may have: gather rays of all pixels and samples.
         gathers: u64,
     },
-    /// Error of a malformed image.
+    /// The image is malformed.
     #[error("the card image is malformed: {0}")]
     Image(Fault),
     /// The threads cannot be started.
@@ -70,30 +70,30 @@ impl From<Fault> for FrameError {
 /// A gather that waits for its turn along the curve.
 #[derive(Clone, Copy)]
 struct Waiting {
-    /// Index of the sum that it adds to, in [`Frame::sums`].
+    /// Index in [`Frame::sums`] of the sum to which the result is added.
     sum: u32,
     request: GatherRequest,
 }
 
-/// State of a frame: the sums of its pixels, tile after tile, one per pixel or several with layers, and the
-/// gathers that are still to be added to them.
+/// State of a frame: the sums of its pixels, tile after tile (one per pixel, or several with layers), and the
+/// gathers whose results are not yet added.
 struct Frame {
     sums: Vec<ColourSum>,
-    /// The other channels of the pixels.
+    /// Albedo, normal and depth of the pixels.
     views: Vec<PixelView>,
     waiting: Vec<Waiting>,
     counters: Counters,
     traffic: MemoryTraffic,
 }
 
-/// A tile whose rays are cast, with the gathers that it leaves to the host.
+/// A tile whose rays are cast, and the gathers that it leaves to the host.
 struct CastTile {
     tile: RenderedTile,
-    /// Gathers, each with the index of its pixel in the tile.
+    /// Gathers with the indices of their pixels in the tile.
     waiting: Vec<(u32, GatherRequest)>,
 }
 
-/// Collector of a chip's gathers.
+/// Collector of the gathers of a chip.
 struct Outlet(Vec<(u32, GatherRequest)>);
 
 impl GatherOutlet for Outlet {
@@ -102,30 +102,30 @@ impl GatherOutlet for Outlet {
     }
 }
 
-/// A frame to render along the curve.
+/// A frame to be rendered along the curve.
 #[derive(Clone, Copy)]
 pub struct CurveJob<'a> {
     /// The card image.
     pub image: &'a CardImage,
     /// The frame's parameters.
     pub frame: &'a FrameParameters,
-    /// The tiles of the frame, in the order in which their rays are cast.
+    /// Tiles of the frame, in the order in which their rays are cast.
     pub tiles: &'a [Tile],
-    /// Number of emulated reference chips, a thread each.
+    /// Number of emulated reference chips, each on its own thread.
     pub chips: usize,
 }
 
 /// Work and memory traffic of a frame.
 pub struct CurveOutcome {
-    /// Counts of the work.
+    /// Counters of the work.
     pub counters: Counters,
-    /// Memory traffic, if the memory is modelled: caches are empty when a tile begins, and at every 2^22-th
+    /// Memory traffic, if the memory is modelled. Caches are empty when a tile begins, and at every 2^22-th
     /// gather.
     pub traffic: MemoryTraffic,
 }
 
-/// Renders tiles into sinks, all of them at the end. `progress(done, total)` is called with the work that is
-/// done, in tiles, and returns whether to go on. With `caches` the memory is modelled.
+/// Renders tiles and stores them in sinks, all of them at the end. `progress(done, total)` is called with the
+/// work done, in tiles, and returns whether to continue. With `caches` the memory is modelled.
 ///
 /// # Errors
 /// If the frame has too many gathers, the card image is malformed, the threads cannot be started, or
@@ -187,7 +187,7 @@ fn render_with<'a, M: MeasuredMemory>(
     Ok(CurveOutcome { counters: all.counters, traffic: all.traffic })
 }
 
-/// Number of gather rays per pixel; an estimate with the irradiance cache and with adaptive sampling.
+/// Number of gather rays per pixel. It is an estimate with the irradiance cache and with adaptive sampling.
 fn rays_of_pixel(frame: &FrameParameters) -> u64 {
     let samples = frame.samples as u64;
     match frame.irradiance_error {
@@ -218,8 +218,8 @@ impl Frame {
         Ok(all)
     }
 
-    /// Takes over the sums and gathers of tiles. Only the gathers of glossy lobes beside an irradiance cache,
-    /// and of several paths a sample, can exceed the room that is reserved.
+    /// Adds the sums and gathers of tiles. Only gathers of glossy lobes beside an irradiance cache, and of
+    /// several paths per sample, can exceed the reserved memory.
     fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), FrameError> {
         for CastTile { tile, waiting } in tiles {
             let gathers = (self.waiting.len() + waiting.len()) as u64;
@@ -259,7 +259,7 @@ fn cast_tiles<'a, M: MeasuredMemory>(
     tiles.par_iter().map_init(new_chip, cast_one).collect()
 }
 
-/// Puts the tiles into sinks.
+/// Stores the tiles in sinks.
 fn complete(job: CurveJob, all: &Frame, sinks: &[&dyn TileSink]) -> Result<(), FrameError> {
     let (scene, _) = job.image.view();
     let format = SumFormat::new(&scene.header, job.frame);
@@ -277,7 +277,7 @@ fn complete(job: CurveJob, all: &Frame, sinks: &[&dyn TileSink]) -> Result<(), F
 
 /// Results of some gathers.
 struct Gathered {
-    /// Light to be added, with the index of its sum.
+    /// Light to be added, with the indices of its sums.
     brought: Vec<(u32, Vec3)>,
     counters: Counters,
     traffic: MemoryTraffic,

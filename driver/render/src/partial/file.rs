@@ -1,5 +1,5 @@
-//! The file of a partial render, opened safely: links are not followed, pipes do not block, and no foreign
-//! file is written or removed.
+//! Opens the file of a partial render safely: links are not followed, pipes do not block, and no foreign file
+//! is written or removed.
 
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read};
@@ -9,9 +9,9 @@ use photoncard_picture::output::kind_of;
 
 use super::error::PartialError;
 
-/// Beginning of the first line in all versions; the version's number follows.
+/// Beginning of the first line in all versions. The version's number follows it.
 pub(super) const FAMILY: &str = "photoncard partial render ";
-/// Maximum length of the first line: a number of 10 digits and the line feed.
+/// Maximum length of the first line, bytes: a number of 10 digits and the line feed.
 const MAX_TITLE: u64 = FAMILY.len() as u64 + 11;
 /// Maximum number of attempts to open a file that other processes create or remove at the same time.
 const MAX_TRIES: usize = 16;
@@ -19,13 +19,13 @@ const MAX_TRIES: usize = 16;
 /// First line of a partial render.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Title {
-    /// The file ends within the line: it holds no tile.
+    /// The file ends within the line, so that it has no tiles.
     CutOff,
     /// Version of the format.
     Version(u32),
 }
 
-/// Reads the first line; `None` if the file is no partial render.
+/// Reads the first line; `None` if the file is not a partial render.
 pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>> {
     let mut line = Vec::new();
     reader.take(MAX_TITLE).read_until(b'\n', &mut line)?;
@@ -44,8 +44,8 @@ pub(super) fn read_title(reader: &mut impl BufRead) -> io::Result<Option<Title>>
     }))
 }
 
-/// Opens and locks the file. If it does not exist, it is created if `create` is true; otherwise the result is
-/// `None`.
+/// Opens and locks the file. A file that does not exist is created if `create` is true; otherwise the result
+/// is `None`.
 pub(super) fn open(path: &Path, create: bool) -> Result<Option<File>, PartialError> {
     let failed = |source| PartialError::File { path: path.to_owned(), source };
     for _ in 0..MAX_TRIES {
@@ -88,7 +88,7 @@ fn open_there(path: &Path) -> io::Result<File> {
     File::options().read(true).write(true).open(path)
 }
 
-/// Refuses anything but a regular file, and a file with several hard links, which may belong to somebody
+/// Refuses anything but a regular file, and a file with several hard links, because it may belong to somebody
 /// else.
 fn check_kind(path: &Path, found: &Metadata) -> Result<(), PartialError> {
     let linked = has_other_names(found).then_some("file with other hard links");
@@ -103,13 +103,14 @@ fn has_other_names(found: &Metadata) -> bool {
     std::os::unix::fs::MetadataExt::nlink(found) > 1
 }
 
-/// Not every system reports the number of links.
+/// Returns false, because not every system reports the number of links.
 #[cfg(not(unix))]
 fn has_other_names(_: &Metadata) -> bool {
     false
 }
 
-/// Checks that no other render has locked the file. A system without locks, or one that refuses them, passes.
+/// Checks that no other render has locked the file. The check passes on a system without locks, or that
+/// refuses them.
 pub(super) fn check_lock(path: &Path, locked: &Result<(), TryLockError>) -> Result<(), PartialError> {
     match locked {
         Err(TryLockError::WouldBlock) => Err(PartialError::Busy { path: path.to_owned() }),
@@ -117,7 +118,7 @@ pub(super) fn check_lock(path: &Path, locked: &Result<(), TryLockError>) -> Resu
     }
 }
 
-/// Removes the file, unless its path names another file by now.
+/// Removes the file, unless its path now names another file.
 pub(super) fn remove(file: &File, path: &Path) -> io::Result<()> {
     if !is_at(file, path)? {
         return Ok(());
@@ -140,7 +141,7 @@ pub(super) fn is_at(file: &File, path: &Path) -> io::Result<bool> {
     }
 }
 
-/// On other systems an open file keeps its name.
+/// Returns true, because an open file keeps its name on other systems.
 #[cfg(not(unix))]
 pub(super) fn is_at(_: &File, _: &Path) -> io::Result<bool> {
     Ok(true)

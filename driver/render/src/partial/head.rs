@@ -1,4 +1,4 @@
-//! Head of a partial render: title, settings and their checksum.
+//! Head of a partial render: title, settings, and their checksum.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
@@ -14,32 +14,30 @@ use super::records::has_record;
 /// Maximum size of the settings, bytes.
 const MAX_SETTINGS: u64 = 1 << 20;
 
-/// Head of a partial render.
 pub(super) struct Head {
-    /// Settings that identify the picture, by the names of options.
+    /// Settings that identify the picture, by option names.
     pub(super) settings: Map<String, Value>,
-    /// Size, bytes.
     pub(super) bytes: u64,
     /// CRC-32C of title and settings.
     pub(super) checksum: u32,
 }
 
-/// File of finished tiles, and whether a render continues from it.
+/// File of finished tiles, and whether a render resumes from it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PartialSettings {
     /// Path of the file.
     pub path: PathBuf,
-    /// True to take over its tiles; otherwise a file with tiles is an error.
+    /// True to take over the file's tiles; otherwise a file with tiles is an error.
     pub resume: bool,
 }
 
 impl PartialSettings {
-    /// Settings of the samples that a render goes on from, by the names of options; `None` if it is not to be
-    /// resumed, or there are none.
+    /// Reads the settings of the samples that a render resumes from, by option names; `None` if it does not
+    /// resume or there are no samples.
     ///
     /// # Errors
-    /// If the file is no partial render of this version, its settings are damaged, or it is in use by another
-    /// render or unreadable.
+    /// If the file is not a partial render of this version, its settings are damaged, or it is in use by
+    /// another render or unreadable.
     pub fn kept(&self) -> Result<Option<Map<String, Value>>, PartialError> {
         let Some(file) = self.resume.then(|| file::open(&self.path, false)).transpose()?.flatten() else {
             return Ok(None);
@@ -48,18 +46,18 @@ impl PartialSettings {
         Ok(read_head(&mut BufReader::new(&file), &self.path)?.map(|head| head.settings))
     }
 
-    /// Checks that the file may be written: it has no tiles, or the render goes on from them.
+    /// Checks that the file may be written: it has no tiles, or the render resumes from them.
     ///
     /// # Errors
-    /// [`PartialError::Unfinished`] if tiles would be lost; if the file is no partial render of this version,
-    /// its settings are damaged, or it is in use by another render or unreadable.
+    /// [`PartialError::Unfinished`] if tiles would be lost; or if the file is not a partial render of this
+    /// version, its settings are damaged, or it is in use by another render or unreadable.
     pub fn check_free(&self) -> Result<(), PartialError> {
         let file = file::open(&self.path, false)?;
         file.filter(|_| !self.resume).map_or(Ok(()), |file| check_empty(&file, &self.path))
     }
 }
 
-/// Reads the head; `None` if the file ends before it does.
+/// Reads the head; `None` if the file ends within it.
 pub(super) fn read_head(reader: &mut impl BufRead, path: &Path) -> Result<Option<Head>, PartialError> {
     let foreign = || PartialError::Foreign { path: path.to_owned() };
     match read_title(reader).map_err(failed(path))?.ok_or_else(foreign)? {
@@ -85,7 +83,7 @@ pub(super) fn read_head(reader: &mut impl BufRead, path: &Path) -> Result<Option
     Ok(Some(Head { settings, bytes: (bytes.len() + sum.len()) as u64, checksum }))
 }
 
-/// Bytes of a head, and the checksum of title and settings.
+/// Encodes a head. Returns it and the checksum of title and settings.
 pub(super) fn encode(settings: &Value) -> (Vec<u8>, u32) {
     let mut bytes = format!("{}{settings}\n", title()).into_bytes();
     let sum = checksum(&bytes);
@@ -96,7 +94,7 @@ pub(super) fn encode(settings: &Value) -> (Vec<u8>, u32) {
 /// Checks that a file has no tiles.
 ///
 /// # Errors
-/// If it has, is no partial render of this version, or its settings are damaged.
+/// If it has tiles, is not a partial render of this version, or its settings are damaged.
 pub(super) fn check_empty(mut file: &File, path: &Path) -> Result<(), PartialError> {
     file.rewind().map_err(failed(path))?;
     let mut reader = BufReader::new(file);
@@ -105,7 +103,7 @@ pub(super) fn check_empty(mut file: &File, path: &Path) -> Result<(), PartialErr
     if has_tiles { Err(PartialError::Unfinished { path: path.to_owned() }) } else { Ok(()) }
 }
 
-/// Error of a file that cannot be read.
+/// Creates the error of a file that cannot be read.
 fn failed(path: &Path) -> impl Fn(io::Error) -> PartialError {
     move |source| PartialError::File { path: path.to_owned(), source }
 }

@@ -1,8 +1,8 @@
-//! Records of finished tiles in a partial render: `magic number | x, y, width, height | first sample, samples
-//! | pixels | CRC-32C`.
+//! Records of finished tiles in a partial render:
+//! `magic number | x, y, width, height | first sample, samples | pixels | CRC-32C`.
 //!
-//! The checksum begins with that of the file's head: records of another picture, which a copy over this file
-//! that was interrupted leaves in it, are invalid.
+//! The checksum also covers the checksum of the file's head. Records of another picture, which remain if a
+//! copy over this file was interrupted, are therefore invalid.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek};
@@ -17,19 +17,21 @@ use photoncard_shared::message::{PixelSums, Tile};
 
 use super::samples::{KeptSamples, SampleRange};
 
-/// Magic number of a record. As in PNG, a transfer that alters line ends or eighth bits destroys it.
+/// Magic number of a record. As in PNG, a transfer that changes line ends or clears the eighth bit destroys
+/// it.
 pub(super) const MAGIC: [u8; 8] = *b"\x89TILE\r\n\x1a";
-/// Size of magic number, position and size of the tile, and range of samples, bytes.
+/// Size of a record before its pixels, bytes: magic number, position and size of the tile, and range of
+/// samples.
 pub(super) const HEAD_BYTES: usize = MAGIC.len() + 24;
 pub(super) const CHECKSUM_BYTES: usize = 4;
-/// Maximum number of pixels of a tile: the largest budget of a chip.
+/// Maximum number of pixels of a tile, over all kinds of chips.
 const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
-/// Limit of the bytes that a reader may spend on invalid tiles, in addition to the file's size: some hundred
-/// of the largest tiles. Without a limit, a hostile file would take hours.
+/// Maximum number of bytes that a reader may spend on invalid tiles, in addition to the file's size: some
+/// hundred of the largest tiles. Without a limit, a hostile file would take hours.
 const MAX_IN_VAIN: u64 = 32 << 20;
 
-/// Encodes the record of a finished tile, whose samples begin with `first_sample`, for a file whose head has
-/// the checksum `file`.
+/// Encodes the record of a finished tile. Its samples begin with number `first_sample`; `file` is the
+/// checksum of the file's head.
 pub(crate) fn record(finished: &FinishedTile, first_sample: u32, file: u32) -> Vec<u8> {
     let mut bytes = head(finished.tile(), first_sample, finished.format().samples);
     bytes.extend(finished.records());
@@ -37,7 +39,7 @@ pub(crate) fn record(finished: &FinishedTile, first_sample: u32, file: u32) -> V
     bytes
 }
 
-/// CRC-32C of the checksum of a file's head and the bytes of a record.
+/// CRC-32C of the checksum of a file's head followed by the bytes of a record.
 fn checksum(file: u32, record: &[u8]) -> [u8; CHECKSUM_BYTES] {
     let mut sum = Checksum::default();
     sum.update(&file.to_le_bytes());
@@ -45,7 +47,7 @@ fn checksum(file: u32, record: &[u8]) -> [u8; CHECKSUM_BYTES] {
     sum.value().to_le_bytes()
 }
 
-/// Encodes the head of a tile's record.
+/// Encodes the part of a tile's record before its pixels.
 fn head(tile: &Tile, first_sample: u32, samples: u32) -> Vec<u8> {
     let Tile { x, y, width, height, .. } = *tile;
     let mut bytes = MAGIC.to_vec();
@@ -53,13 +55,12 @@ fn head(tile: &Tile, first_sample: u32, samples: u32) -> Vec<u8> {
     bytes
 }
 
-/// Size of the record of a tile, bytes.
 pub(crate) fn record_bytes(tile: &Tile, format: &SumFormat) -> u64 {
     (HEAD_BYTES + CHECKSUM_BYTES) as u64 + tile.pixels() * format.record_bytes() as u64
 }
 
-/// Decodes the record of a tile with all samples of the format, from a file whose head has the checksum
-/// `file`; `None` unless it is that, sound and whole.
+/// Decodes the record of a tile with all samples of the format. `file` is the checksum of the file's head.
+/// `None` unless the record is complete, valid and of this tile.
 pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat, file: u32) -> Option<FinishedTile> {
     let (bytes, sum) = record.split_last_chunk::<CHECKSUM_BYTES>()?;
     let pixels = bytes.strip_prefix(&*head(tile, 0, format.samples))?;
@@ -67,9 +68,9 @@ pub(crate) fn decode(record: &[u8], tile: &Tile, format: SumFormat, file: u32) -
     is_sound.then(|| FinishedTile::new(*tile, pixels.to_vec(), format, Counters::ZERO)).flatten()
 }
 
-/// Reads all valid tiles from offset `start` on, behind a head of the checksum `file`. Returns the end of the
-/// last one. After invalid bytes the search continues at the next magic number. It stops when the invalid
-/// tiles exceed the file's size plus [`MAX_IN_VAIN`].
+/// Reads all valid tiles from offset `start` on. `file` is the checksum of the file's head. Returns the end
+/// of the last valid tile. After invalid bytes the search continues at the next magic number. It stops when
+/// the invalid tiles exceed the file's size plus [`MAX_IN_VAIN`].
 pub(super) fn read_tiles(
     reader: &mut BufReader<&File>,
     start: u64,
@@ -99,7 +100,7 @@ pub(super) fn read_tiles(
     Ok(sound)
 }
 
-/// Returns whether the file has a record from the reader's place on.
+/// Returns whether the file has a record after the reader's position.
 pub(super) fn has_record(reader: &mut impl BufRead) -> io::Result<bool> {
     Ok(skip_magic(reader)?.is_some())
 }
@@ -128,8 +129,8 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     }
 }
 
-/// Reads a tile after its magic number, at most `available` bytes. Returns their number; `None` if it is
-/// invalid.
+/// Reads a tile after its magic number, at most `available` bytes. Returns the number of bytes read; `None`
+/// if the tile is invalid.
 fn read_tile(
     reader: &mut impl Read,
     file: u32,
@@ -165,8 +166,8 @@ fn read_tile(
     Ok(Some(behind_magic))
 }
 
-/// Decodes position and size of a tile, and its range of samples; `None` unless the tile lies in the window
-/// and within a chip's budget, and the range is not empty.
+/// Decodes position and size of a tile, and its range of samples; `None` unless the tile is in the window and
+/// within a chip's budget, and the range is not empty.
 fn tile_at(bytes: &[u8], window: Window) -> Option<(Tile, SampleRange)> {
     let number = |index: usize| bytes.as_chunks().0.get(index).map(|bytes| u32::from_le_bytes(*bytes));
     let tile = Tile { id: 0, x: number(0)?, y: number(1)?, width: number(2)?, height: number(3)? };

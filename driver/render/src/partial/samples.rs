@@ -1,37 +1,38 @@
-//! Samples that a partial render has kept: a film for each range of them.
+//! Samples that a partial render has kept. Each range of samples has a film.
 
 use photoncard_picture::film::{Film, Window};
 use photoncard_picture::sums::SumFormat;
 
-/// Maximum number of ranges of a file: passes of one picture.
+/// Maximum number of ranges in a file. Each is a pass of the picture.
 const MAX_RANGES: usize = 16;
 
-/// Range of a pixel's samples.
+/// Range of sample numbers of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct SampleRange {
     pub(super) first: u32,
     pub(super) count: u32,
 }
 
-/// Films of ranges of samples, for a picture of more of them.
+/// Films of ranges of samples, for a picture that may have more samples.
 pub(super) struct KeptSamples<'a> {
     /// Empty film of the picture.
     empty: &'a Film,
     ranges: Vec<(SampleRange, Film)>,
-    /// Maximum number of samples, up to the last, that any record has.
+    /// End of the highest range of samples in any record.
     most: u32,
 }
 
-/// Samples of a picture, as far as they are kept.
+/// Kept samples of a picture, divided into complete ones and others.
 pub(super) struct Split {
-    /// The complete film of the first samples, if there are any but not all of the picture's.
+    /// Complete film of the first samples; `None` if there are none, or if all samples of the picture are
+    /// complete.
     pub(super) base: Option<Film>,
-    /// Film of the other samples; `None` if none of their tiles is kept.
+    /// Film of the remaining samples; `None` if none of their tiles is kept.
     pub(super) rest: Option<Film>,
 }
 
 impl<'a> KeptSamples<'a> {
-    /// No samples yet of the picture that `empty` is the film of.
+    /// Creates a collection without samples, for the picture of the film `empty`.
     pub(super) fn new(empty: &'a Film) -> Self {
         Self { empty, ranges: Vec::new(), most: 0 }
     }
@@ -44,8 +45,8 @@ impl<'a> KeptSamples<'a> {
         self.empty.window()
     }
 
-    /// Film of a range of samples; `None` if the picture does not have them, or there is no room for a film
-    /// of them.
+    /// Film of a range of samples; `None` if the picture does not have them, or there is no memory for
+    /// another film.
     pub(super) fn film_of(&mut self, samples: SampleRange) -> Option<&mut Film> {
         let end = samples.first.saturating_add(samples.count);
         self.most = self.most.max(end);
@@ -64,10 +65,11 @@ impl<'a> KeptSamples<'a> {
         self.ranges.get_mut(index).map(|(_, film)| film)
     }
 
-    /// The samples that the picture takes over.
+    /// Divides the samples that the picture takes over.
     ///
     /// # Errors
-    /// If there are samples of pictures of other numbers alone: the greatest of these numbers.
+    /// The greatest number of samples in the file, if all samples are of pictures with other numbers of
+    /// samples.
     pub(super) fn split(mut self) -> Result<Split, u32> {
         let samples = self.format().samples;
         let mut base: Option<Film> = None;

@@ -16,7 +16,7 @@ const TILES: u32 = 6;
 /// Size of a tile's record, bytes.
 const RECORD_BYTES: usize = HEAD_BYTES + 12 * PIXEL_BYTES + CHECKSUM_BYTES;
 
-/// A film of `samples` samples.
+/// Film with `samples` samples per pixel.
 fn film_of(samples: u32) -> Film {
     let format = SumFormat { samples, ..SumFormat::ONE };
     Film::new(4 * TILES, 3, Window::full(4 * TILES, 3), format).unwrap()
@@ -30,13 +30,13 @@ fn tile(id: u32) -> Tile {
     Tile { id, x: 4 * id, y: 0, width: 4, height: 3 }
 }
 
-/// A tile of black pixels.
+/// Tile of black pixels.
 fn blank(tile: &Tile) -> FinishedTile {
     let records = vec![0; PIXEL_BYTES * tile.pixels() as usize];
     FinishedTile::new(*tile, records, SumFormat::ONE, Counters::ZERO).unwrap()
 }
 
-/// Begins a render without samples of an earlier one.
+/// Begins a render and asserts that no samples of an earlier one are complete.
 fn begin_render(
     settings: &PartialSettings,
     identity: Value,
@@ -47,12 +47,11 @@ fn begin_render(
     Ok(partial)
 }
 
-/// Settings of a partial render in a folder.
 fn partial(folder: &tempfile::TempDir, resume: bool) -> PartialSettings {
     PartialSettings { path: folder.path().join("partial"), resume }
 }
 
-/// Writes a file of all tiles, and returns its bytes.
+/// Writes a file with all tiles. Returns its bytes.
 fn written(folder: &tempfile::TempDir) -> Vec<u8> {
     let mut film = film();
     for (number, (x, y)) in
@@ -67,7 +66,7 @@ fn written(folder: &tempfile::TempDir) -> Vec<u8> {
     fs::read(settings.path).unwrap()
 }
 
-/// Tiles that a resumed render takes over.
+/// Numbers of the tiles that a resumed render takes over.
 fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
     let settings = partial(folder, true);
     fs::write(&settings.path, bytes).unwrap();
@@ -86,7 +85,7 @@ fn taken_over(folder: &tempfile::TempDir, bytes: &[u8]) -> Vec<u32> {
 }
 
 #[test]
-fn damage_loses_the_tile_that_it_hits_alone() {
+fn damage_loses_only_the_tile_that_it_hits() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
     let start = bytes.len() - TILES as usize * RECORD_BYTES;
@@ -109,8 +108,8 @@ fn damage_loses_the_tile_that_it_hits_alone() {
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
 }
 
-/// Tiles of an outvoted card: they are not taken over until another card has rendered them, and then as that
-/// card has.
+/// Tiles of an outvoted card must not be taken over before another card has rendered them, and then with that
+/// card's pixels.
 #[test]
 fn revoked_tiles_are_struck_out_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,7 +139,7 @@ fn revoked_tiles_are_struck_out_and_replaced() {
 }
 
 #[test]
-fn a_file_of_revoked_tiles_holds_none() {
+fn a_file_with_only_revoked_tiles_holds_none() {
     let folder = tempfile::tempdir().unwrap();
     let render = begin_render(&partial(&folder, false), json!({}), &mut film()).unwrap();
     render.put(&blank(&tile(0)));
@@ -150,7 +149,7 @@ fn a_file_of_revoked_tiles_holds_none() {
 }
 
 #[test]
-fn the_later_record_of_a_tile_holds() {
+fn the_later_record_of_a_tile_is_used() {
     let folder = tempfile::tempdir().unwrap();
     let mut bytes = written(&folder);
     let mut film = film();
@@ -174,7 +173,7 @@ fn the_later_record_of_a_tile_holds() {
 }
 
 #[test]
-fn layers_are_kept() {
+fn layers_survive_a_partial_render() {
     let folder = tempfile::tempdir().unwrap();
     let settings = partial(&folder, true);
     let with_layers =
@@ -195,7 +194,7 @@ fn layers_are_kept() {
 }
 
 #[test]
-fn a_file_has_one_render() {
+fn a_partial_file_is_locked_by_one_render() {
     let folder = tempfile::tempdir().unwrap();
     let [mut one, mut two, mut three] = [film(), film(), film()];
     let begin = |resume, film: &mut Film| begin_render(&partial(&folder, resume), json!({}), film);
@@ -216,9 +215,9 @@ fn a_file_has_one_render() {
     begin(false, &mut three).unwrap();
 }
 
-/// A file of headers of the largest tile: each is read and summed in vain.
+/// Every tile of this file is the head of a largest tile, which is read and summed in vain.
 #[test]
-fn a_hostile_file_does_not_take_hours() {
+fn a_hostile_file_is_read_quickly() {
     let folder = tempfile::tempdir().unwrap();
     let mut bytes = written(&folder);
     let settings = partial(&folder, true);
@@ -236,7 +235,7 @@ fn a_hostile_file_does_not_take_hours() {
 }
 
 #[test]
-fn a_head_that_is_cut_off_holds_nothing() {
+fn a_truncated_head_holds_no_tiles() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
     let head = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(1).unwrap().0;
@@ -252,7 +251,7 @@ fn a_head_that_is_cut_off_holds_nothing() {
 }
 
 #[test]
-fn a_file_that_cannot_be_begun_is_not_left() {
+fn a_file_whose_head_cannot_be_written_is_removed() {
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;
     let mut film = film();
@@ -283,15 +282,15 @@ fn a_file_that_was_removed_is_not_at_its_path() {
 }
 
 #[test]
-fn locks_that_the_system_refuses_hinder_no_render() {
+fn a_render_works_where_the_system_refuses_locks() {
     let path = Path::new("partial");
     check_lock(path, &Err(TryLockError::Error(io::Error::other("no locks available")))).unwrap();
     assert!(check_lock(path, &Err(TryLockError::WouldBlock)).is_err());
 }
 
-/// A foreign file of the partial render's name is refused and unchanged.
+/// A foreign file with the partial render's name must be refused and left unchanged.
 #[test]
-fn a_foreign_file_is_refused_and_stays() {
+fn a_foreign_file_is_refused_and_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;
     let long = "photoncard partial render of a room\n".repeat(100_000);
@@ -333,7 +332,8 @@ fn a_foreign_file_is_refused_and_stays() {
     }
 }
 
-/// Without `resume` a file of tiles is neither written over nor removed, whoever wrote it and whenever.
+/// Without `resume`, a file with tiles must neither be overwritten nor removed, whoever wrote it and
+/// whenever.
 #[test]
 fn finished_tiles_are_not_lost_without_resume() {
     let folder = tempfile::tempdir().unwrap();
@@ -359,8 +359,7 @@ fn finished_tiles_are_not_lost_without_resume() {
     }
 }
 
-/// Records of another picture have checksums as well: a file that takes the place of one that is read is
-/// refused.
+/// Records of another picture have valid checksums too. A file that replaces one being read must be refused.
 #[test]
 fn a_file_that_changes_while_it_is_read_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -380,9 +379,9 @@ fn a_file_that_changes_while_it_is_read_is_refused() {
     }
 }
 
-/// A file of another picture that takes the place of one that is written gets no tile of this one.
+/// A file of another picture that replaces one being written must get no tiles of this picture.
 #[test]
-fn a_file_that_is_written_over_while_tiles_are_added_gets_no_more() {
+fn an_overwritten_file_gets_no_more_tiles() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
     let settings = partial(&folder, true);
@@ -397,10 +396,10 @@ fn a_file_that_is_written_over_while_tiles_are_added_gets_no_more() {
     }
 }
 
-/// A render takes settings that are not stated from the file: a damaged number in it gives a picture of two
+/// A render takes unstated settings from the file, so that a damaged number would give a picture with two
 /// settings.
 #[test]
-fn damaged_settings_are_refused_and_stay() {
+fn damaged_settings_are_refused_and_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let bytes = written(&folder);
     let (head, _) = encode(&json!({ "seed": 1 }));
@@ -419,7 +418,8 @@ fn damaged_settings_are_refused_and_stay() {
     }
 }
 
-/// A copy of another picture's file over this one that was interrupted: its settings, and then tiles of both.
+/// Copying another picture's file over this one was interrupted. The file then has the other settings, and
+/// tiles of both pictures.
 #[test]
 fn tiles_of_another_picture_are_not_taken_over() {
     let folder = tempfile::tempdir().unwrap();
@@ -438,7 +438,7 @@ fn tiles_of_another_picture_are_not_taken_over() {
 }
 
 #[test]
-fn another_version_is_told_and_stays() {
+fn another_version_is_reported_and_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;
     let old = b"photoncard partial render 1\n{}\nsomething";
@@ -451,10 +451,10 @@ fn another_version_is_told_and_stays() {
     assert_eq!(fs::read(&path).unwrap(), old);
 }
 
-/// Links lead to others' files, and a pipe would block: neither is opened.
+/// Links can lead to other people's files, and a pipe would block. Neither may be opened.
 #[cfg(unix)]
 #[test]
-fn what_is_no_file_of_its_own_is_refused_and_stays() {
+fn links_and_pipes_are_refused_and_unchanged() {
     use std::os::unix::fs::symlink;
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;

@@ -1,9 +1,10 @@
-//! Dealing of a picture to its parts: a fixed rule, by which renders agree without communication.
+//! Assignment of a picture's pixels to its parts, by a fixed rule, so that renders agree without
+//! communication.
 //!
-//! The window is divided into square patches, which are numbered along a Hilbert curve. Of each run of `N`
-//! patches along it every one of `N` parts has one, so that a part has patches all over the picture and costs
-//! about what the others do. Runs deal forth and back in turn, as the curve is regular: no part has the same
-//! places in a pattern of the picture.
+//! The window is divided into square patches, which are numbered along a Hilbert curve. Each run of `N`
+//! patches has one patch for each of `N` parts, so that a part has patches all over the picture and costs
+//! about as much as any other. Runs assign parts in ascending and descending order alternately: because the
+//! curve is regular, a part would otherwise have the same positions in a pattern of the picture.
 
 use std::fmt;
 use std::str::FromStr;
@@ -14,16 +15,16 @@ use photoncard_shared::message::Tile;
 
 /// Maximum number of parts of a picture.
 pub const MAX_PARTS: u32 = 1 << 16;
-/// Side of the patches of a picture with many for each part, pixels: the widest tile of a chip.
+/// Side of the patches if each part has many, pixels: the widest tile of a chip.
 const WIDEST_PATCH: u32 = 64;
-/// Side of patches that are not divided for more parts, pixels: that of the coarsest cells of irradiance
-/// records, which narrower ones would compute several times.
+/// Minimum side of patches, pixels: the side of the coarsest cells of irradiance records. Narrower patches
+/// would compute these records several times.
 const NARROWEST_PATCH: u32 = 16;
-/// Minimum number of patches of a part, as far as the picture is large enough: the more, the more alike parts
-/// cost.
+/// Minimum number of patches per part, if the picture is large enough. With more patches, the costs of parts
+/// are more equal.
 const PATCHES_OF_PART: u64 = 64;
 
-/// A part of a picture: the `number`-th of `count`, from 1 on.
+/// A part of a picture: number `number`, counted from 1, of `count` parts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Part {
     number: u32,
@@ -31,17 +32,17 @@ pub struct Part {
 }
 
 impl Part {
-    /// The `number`-th part of `count`; `None` unless `1 <= number <= count <=` [`MAX_PARTS`].
+    /// Part `number` of `count`; `None` unless `1 <= number <= count <=` [`MAX_PARTS`].
     pub fn new(number: u32, count: u32) -> Option<Self> {
         ((1..=MAX_PARTS).contains(&count) && (1..=count).contains(&number)).then_some(Self { number, count })
     }
 
-    /// All parts of a picture that is divided into `count`.
+    /// All parts of a picture with `count` parts.
     pub fn all(count: u32) -> impl Iterator<Item = Self> {
         (1..=count).map(move |number| Self { number, count })
     }
 
-    /// Number of the part, from 1 on.
+    /// Number of the part, counted from 1.
     pub fn number(self) -> u32 {
         self.number
     }
@@ -51,13 +52,13 @@ impl Part {
         self.count
     }
 
-    /// Patches of the part, along the curve. Those of all parts cover the window once.
+    /// Patches of the part, along the curve. The patches of all parts cover the window exactly once.
     pub fn patches(self, window: Window) -> Vec<Tile> {
         deal(window, self.count).filter(|(part, _)| *part == self).map(|(_, patch)| patch).collect()
     }
 
-    /// Tiles of the part, each of at most `side * side` pixels, numbered from 0. No tile reaches over
-    /// patches.
+    /// Tiles of the part, numbered from 0, each with at most `side * side` pixels. No tile extends over
+    /// several patches.
     pub fn tiles(self, window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
         let of_patch = |Tile { x, y, width, height, .. }: Tile| {
             tiles(Window { x0: x, x1: x + width, y0: y, y1: y + height }, side, order)
@@ -83,7 +84,7 @@ impl FromStr for Part {
     }
 }
 
-/// Patches of a window along the curve, each with its part of `count`.
+/// Patches of a window along the curve, with their parts out of `count`.
 pub(super) fn deal(window: Window, count: u32) -> impl Iterator<Item = (Part, Tile)> {
     let side = patch_side(window, count);
     let mut patches = tiles(window, side, GatherOrder::Tiled);
@@ -97,7 +98,7 @@ pub(super) fn deal(window: Window, count: u32) -> impl Iterator<Item = (Part, Ti
     (0..).zip(patches).map(move |(index, patch)| (part_of(index), patch))
 }
 
-/// Side of the patches of a window that is divided into `count` parts.
+/// Side of the patches of a window with `count` parts, pixels.
 fn patch_side(window: Window, count: u32) -> u32 {
     let patches =
         |side: u32| u64::from(window.width().div_ceil(side)) * u64::from(window.height().div_ceil(side));
@@ -108,7 +109,7 @@ fn patch_side(window: Window, count: u32) -> u32 {
     std::iter::successors(Some(WIDEST_PATCH), narrower).last().unwrap_or(WIDEST_PATCH)
 }
 
-/// Place of a point on the Hilbert curve through a quarter of the plane, whose sides are below 2^16.
+/// Index of a point on the Hilbert curve through a quarter of the plane. Its coordinates are below 2^16.
 fn hilbert([mut x, mut y]: [u32; 2]) -> u64 {
     let mut place = 0;
     for level in (0..16).rev() {
@@ -148,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn parts_cover_the_window_once_in_tiles_of_any_size() {
+    fn parts_cover_the_window_exactly_once_with_tiles_of_any_size() {
         for (window, count) in [
             (Window::full(1, 1), 3),
             (Window { x0: 3, x1: 203, y0: 40, y1: 99 }, 1),
@@ -177,7 +178,7 @@ mod tests {
         }
     }
 
-    /// A picture that costs much in a stripe, a quarter or a chequered half of it.
+    /// Costs are concentrated in a stripe, in a quarter, or in half of a checkerboard.
     #[test]
     fn parts_of_uneven_pictures_cost_alike() {
         let window = Window::full(1024, 1024);

@@ -8,21 +8,21 @@ use photoncard_picture::output::OutputError;
 
 use super::dealing::Part;
 
-/// Version of the format of a part's file, in its first line.
+/// Version of the format of a part's file. The first line states it.
 pub(super) const VERSION: u32 = 2;
 
 /// Error of a part that cannot be written, or of parts that cannot be merged.
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 #[non_exhaustive]
 pub enum PartError {
-    /// Error of a file that is no part.
+    /// The file is not a part.
     #[error("{} is no part of a picture", path.display())]
     #[diagnostic(help("merge files that `photoncard render --part K/N` has written"))]
     Foreign {
         /// Path of the file.
         path: PathBuf,
     },
-    /// Error of a part of another version of the format.
+    /// The part has another version of the format.
     #[error("{} is a part of version {found}, and this program merges version {VERSION}", path.display())]
     #[diagnostic(help("merge with the program that rendered it"))]
     Version {
@@ -31,7 +31,7 @@ pub enum PartError {
         /// Version of the file's format.
         found: u32,
     },
-    /// Error of a part whose bytes are not those that were written.
+    /// The bytes of the part are not those that were written.
     #[error("{} is damaged: {fault}", path.display())]
     #[diagnostic(help("copy it again, or render the part again"))]
     Damaged {
@@ -40,52 +40,52 @@ pub enum PartError {
         /// Description of the damage.
         fault: &'static str,
     },
-    /// Error of parts of different pictures.
+    /// The parts are of different pictures.
     #[error("parts differ in {}", differences.join("; "))]
     #[diagnostic(help("render all parts with equal settings"))]
     Differs {
         /// Descriptions of the settings that differ.
         differences: Vec<String>,
     },
-    /// Error of two files of a part that have other pixels.
+    /// Two files of the same part have different pixels.
     #[error("{} and {} are both part {part}, with other pixels: a machine or a card was wrong", first.display(), second.display())]
     #[diagnostic(help("render the part once more; --verify compares the tiles of two cards"))]
     Unequal {
-        /// Their part.
+        /// Part of both files.
         part: Part,
         /// Path of one file.
         first: PathBuf,
         /// Path of the other file.
         second: PathBuf,
     },
-    /// Error of a picture of which parts are missing.
+    /// Parts of the picture are missing.
     #[error("{} of {count} parts are missing: {}", missing.len(), named(missing))]
     #[diagnostic(help("render them, and merge all"))]
     Missing {
-        /// Number of the picture's parts.
+        /// Number of parts of the picture.
         count: u32,
         /// The missing parts.
         missing: Vec<Part>,
     },
-    /// Error of a picture that is not possible.
+    /// The picture is not possible.
     #[error(transparent)]
     Film(#[from] FilmError),
-    /// Error of reading a part.
+    /// A part cannot be read.
     #[error("cannot read {}", path.display())]
     #[diagnostic(help("check that the path names a file and that it may be read"))]
     Unreadable {
         /// Path of the file.
         path: PathBuf,
-        /// The operating system's error.
+        /// Error of the operating system.
         #[source]
         source: io::Error,
     },
-    /// Error of writing a part.
+    /// A part cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
 }
 
-/// The first of some parts, and the number of the others.
+/// Text that names the first of some parts, and states the number of the others.
 fn named(parts: &[Part]) -> String {
     const NAMED: usize = 8;
     let mut text = parts.iter().take(NAMED).map(Part::to_string).collect::<Vec<_>>().join(", ");

@@ -1,4 +1,4 @@
-//! The file of a part.
+//! Reads and writes the file of a part.
 
 use std::fs::File;
 use std::io::{self, BufReader, Read, Seek, Write};
@@ -14,10 +14,10 @@ use super::error::{PartError, VERSION};
 use super::head::{PartHead, PartPicture};
 use crate::partial::records::{decode, record, record_bytes};
 
-/// Kind of the file.
+/// Kind and version of the file.
 const KIND: Kind = Kind { name: "photoncard part", version: VERSION };
 
-/// Writes the part of the head from a film that has its pixels, whole or not at all.
+/// Writes the part stated in the head from a film that has its pixels, whole or not at all.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -33,22 +33,22 @@ pub fn write(path: &Path, head: &PartHead, film: &Film) -> Result<(), PartError>
     Ok(file.into_inner().map_err(|error| failed(error.into_error()))?.commit()?)
 }
 
-/// The file of a part, with its head.
+/// File of a part, with its head.
 pub(super) struct PartFile {
     pub(super) path: PathBuf,
     pub(super) head: PartHead,
     pub(super) picture: PartPicture,
     /// Checksum of the head.
     checksum: u32,
-    /// Bytes of the head, and of the file.
+    /// Size of the head and of the file, bytes.
     bytes: [u64; 2],
 }
 
 impl PartFile {
-    /// Reads the head of a part, and checks it.
+    /// Reads and checks the head of a part.
     ///
     /// # Errors
-    /// If the file is no part, of another version or unreadable, or its head is damaged.
+    /// If the file is not a part, of another version, or unreadable, or its head is damaged.
     pub(super) fn open(path: &Path) -> Result<Self, PartError> {
         let unreadable = |source| PartError::Unreadable { path: path.to_owned(), source };
         let damaged = |fault| PartError::Damaged { path: path.to_owned(), fault };
@@ -69,10 +69,10 @@ impl PartFile {
         Ok(Self { path: path.to_owned(), head, picture, checksum, bytes })
     }
 
-    /// Checks that the file is as long as the `patches` of the part.
+    /// Checks that the file has the length that the `patches` of the part take.
     ///
     /// # Errors
-    /// If it is not.
+    /// If it has not.
     pub(super) fn check_length(&self, patches: &[Tile]) -> Result<(), PartError> {
         let records: u64 = patches.iter().map(|patch| record_bytes(patch, &self.picture.format)).sum();
         let [head, whole] = self.bytes;
@@ -83,11 +83,11 @@ impl PartFile {
         Err(PartError::Damaged { path: self.path.clone(), fault })
     }
 
-    /// Reads the `patches` of the part. The head is read again before and after them: a file
-    /// that is written over meanwhile is another.
+    /// Reads the `patches` of the part. The head is read again before and after them, so that an overwritten
+    /// file is detected.
     ///
     /// # Errors
-    /// If the file is damaged, unreadable or no longer that of the head, and those of `put`.
+    /// If the file is damaged, unreadable, or has another head now; and the errors of `put`.
     pub(super) fn read(
         &self,
         patches: &[Tile],
@@ -109,7 +109,7 @@ impl PartFile {
         self.check_head(&mut reader)
     }
 
-    /// Checks that the file still begins with the head, and reads up to its end.
+    /// Checks that the file still begins with the head. Reads up to the head's end.
     fn check_head(&self, reader: &mut BufReader<File>) -> Result<(), PartError> {
         reader.rewind().map_err(|source| PartError::Unreadable { path: self.path.clone(), source })?;
         match KIND.read::<PartHead>(reader) {

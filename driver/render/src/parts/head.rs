@@ -1,4 +1,4 @@
-//! Head of a part's file: the part, and all that the picture is made of beside its pixels.
+//! Head of a part's file: the part, and everything about the picture except pixels.
 
 use photoncard_picture::film::{Film, FilmError, SumFormat, Window};
 use photoncard_picture::layer::Layers;
@@ -13,21 +13,21 @@ use super::dealing::Part;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartHead {
-    /// The part.
+    /// Part that the file contains.
     #[serde(serialize_with = "write_part", deserialize_with = "read_part")]
     pub part: Part,
-    /// Provenance of the picture: all that its pixels depend on, by the names of options.
+    /// Provenance of the picture: everything that its pixels depend on, by option names.
     pub settings: Map<String, Value>,
-    /// Layers of the picture, as in `--aov`.
+    /// Layers of the picture, in the form of the argument of `--aov`.
     pub layers: String,
-    /// Arguments of the command that has made the part.
+    /// Arguments of the command that made the part.
     pub command: Vec<String>,
-    /// Bits of the units of the sums of radiance and depth, single precision.
+    /// Units of the sums of radiance and depth, as bits of `f32`.
     pub units: [u32; 2],
 }
 
 impl PartHead {
-    /// Head of a part of the picture that `film` is a part of.
+    /// Creates the head of a part of the picture in `film`.
     pub fn new(
         part: Part,
         film: &Film,
@@ -40,7 +40,7 @@ impl PartHead {
         Self { part, settings, layers: layers.to_string(), command, units }
     }
 
-    /// Picture of the head; `None` if the settings do not state one.
+    /// Picture that the head describes; `None` if the settings do not state one.
     pub(super) fn picture(&self) -> Option<PartPicture> {
         let numbers = |name: &str| -> Option<Vec<u32>> {
             let numbers = self.settings.get(name)?.as_array()?.iter();
@@ -61,7 +61,7 @@ impl PartHead {
         is_possible.then_some(PartPicture { size: [width, height], window, format, layers })
     }
 
-    /// Descriptions of the settings that differ from another head of the picture, by name.
+    /// Descriptions of the settings in which two heads differ, by name.
     pub(super) fn differences(&self, other: &Self, [own, others]: [&str; 2]) -> Vec<String> {
         let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
         let names = self
@@ -85,7 +85,7 @@ impl PartHead {
     }
 }
 
-/// Picture that a part is of.
+/// Picture that a part belongs to.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct PartPicture {
     size: [u32; 2],
@@ -95,7 +95,7 @@ pub(super) struct PartPicture {
 }
 
 impl PartPicture {
-    /// Empty film of the picture.
+    /// Creates an empty film of the picture.
     ///
     /// # Errors
     /// If it does not fit in memory.

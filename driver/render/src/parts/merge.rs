@@ -1,4 +1,4 @@
-//! The merge of parts to the picture.
+//! Merges parts to the whole picture.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -20,13 +20,13 @@ pub struct Parts {
     patches: BTreeMap<Part, Vec<Tile>>,
 }
 
-/// Picture of all parts.
+/// Picture merged from all parts.
 pub struct Merged {
     /// Pixels of the picture.
     pub film: Film,
-    /// Layers of the picture, as in `--aov`.
+    /// Layers of the picture, in the form of the argument of `--aov`.
     pub layers: Layers,
-    /// Provenance of the picture: all that its pixels depend on.
+    /// Provenance of the picture: everything that its pixels depend on.
     pub provenance: Map<String, Value>,
 }
 
@@ -34,7 +34,7 @@ impl Parts {
     /// Reads the heads of parts, and checks that they are of one picture.
     ///
     /// # Errors
-    /// If a file is no part, is cut off or has a damaged head, or settings differ.
+    /// If a file is not a part, is truncated or has a damaged head, or settings differ.
     pub fn open(paths: &[PathBuf]) -> Result<Self, PartError> {
         let mut this = Self { files: Vec::new(), patches: BTreeMap::new() };
         for path in paths {
@@ -63,7 +63,7 @@ impl Parts {
         self.patches.get(&file.head.part).map_or(&[], |patches| patches)
     }
 
-    /// The parts that none of the files is.
+    /// Parts that none of the files contains.
     pub fn missing(&self) -> Vec<Part> {
         let found: BTreeSet<Part> = self.files.iter().map(|file| file.head.part).collect();
         self.patches.keys().filter(|part| !found.contains(part)).copied().collect()
@@ -74,18 +74,18 @@ impl Parts {
         self.files.first().map(|file| &file.head)
     }
 
-    /// Reads the pixels of all files.
+    /// Reads and checks the pixels of all files.
     ///
     /// # Errors
-    /// If one is damaged or unreadable.
+    /// If a file is damaged or unreadable.
     pub fn check_pixels(&self) -> Result<(), PartError> {
         self.files.iter().try_for_each(|file| file.read(self.patches_of(file), |_| Ok(())))
     }
 
-    /// Merges the parts. Several files of a part must have equal pixels.
+    /// Merges the parts. Several files of the same part must have equal pixels.
     ///
     /// # Errors
-    /// If parts are missing, one is damaged, two files of a part differ, or there is no memory for the
+    /// If parts are missing, a file is damaged, two files of a part differ, or there is no memory for the
     /// picture.
     pub fn merge(&self) -> Result<Merged, PartError> {
         let missing = self.missing();
@@ -119,7 +119,7 @@ fn take(file: &PartFile, patches: &[Tile], film: &mut Film) -> Result<(), PartEr
     file.read(patches, |patch| patch.sums().try_for_each(|((x, y), sums)| Ok(film.write(x, y, &sums)?)))
 }
 
-/// Checks that a part has the pixels of the film, which are from the file `first`.
+/// Checks that a part has the same pixels as the film, which were read from the file `first`.
 fn compare(file: &PartFile, patches: &[Tile], film: &Film, first: &Path) -> Result<(), PartError> {
     file.read(patches, |patch| {
         let is_equal = film.finished(patch.tile()).is_some_and(|own| own.records() == patch.records());

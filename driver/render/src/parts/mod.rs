@@ -1,7 +1,8 @@
-//! Parts of a picture, rendered anywhere, and their merge to the picture that one render gives, to the bit.
+//! Parts of a picture that can be rendered on different machines, and their merge. The merged picture equals,
+//! bit for bit, that of a single render.
 //!
-//! A part is a share of the picture's pixels, dealt by a fixed rule ([`Part`]). Its file has all that the
-//! picture's does, but for the other parts' pixels:
+//! A part is a set of the picture's pixels, assigned by a fixed rule ([`Part`]). Its file has everything that
+//! the picture's file has, except for the pixels of other parts:
 //!
 //! ```text
 //! photoncard part 1\n
@@ -10,8 +11,8 @@
 //! records of patches, as in a partial render
 //! ```
 //!
-//! Position and size of each record follow from the head, so that a file is exactly as long as its head says,
-//! and none is read that is not. Files of equal parts differ in the recorded command alone.
+//! Position and size of each record follow from the head. A file whose length differs from that stated by its
+//! head is refused. Files of the same part differ only in the recorded command.
 
 mod dealing;
 mod error;

@@ -11,10 +11,10 @@ use super::*;
 
 const WINDOW: Window = Window { x0: 5, x1: 75, y0: 2, y1: 40 };
 
-/// A change of a head.
+/// Function that changes a head.
 type Change = fn(&mut PartHead);
 
-/// A film of all pixels, each with other sums.
+/// Film with distinct sums in all pixels.
 fn film(seed: i64) -> Film {
     let mut film = Film::new(80, 50, WINDOW, SumFormat { samples: 4, ..SumFormat::ONE }).unwrap();
     for y in WINDOW.y0..WINDOW.y1 {
@@ -38,14 +38,14 @@ fn part(number: u32, count: u32) -> Part {
     Part::new(number, count).unwrap()
 }
 
-/// Writes a part of `film`, and returns its path.
+/// Writes a part of `film`. Returns the path.
 fn written(folder: &Path, name: &str, part: Part, film: &Film) -> PathBuf {
     let path = folder.join(name);
     write(&path, &head(part, 4), film).unwrap();
     path
 }
 
-/// The error of a merge.
+/// Error of a merge that must be refused.
 fn refused(paths: &[PathBuf]) -> PartError {
     match Parts::open(paths).and_then(|parts| parts.merge()) {
         Err(error) => error,
@@ -53,8 +53,7 @@ fn refused(paths: &[PathBuf]) -> PartError {
     }
 }
 
-/// A file of other settings that takes the place of one whose head was read: its pixels have checksums as
-/// well.
+/// A file with other settings replaces one whose head was read. Its pixels have valid checksums too.
 #[test]
 fn a_part_that_changes_after_its_head_was_read_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -110,7 +109,7 @@ fn missing_parts_are_named() {
 }
 
 #[test]
-fn parts_of_other_settings_are_refused_with_the_difference() {
+fn parts_with_other_settings_are_refused_with_the_difference() {
     let folder = tempfile::tempdir().unwrap();
     let first = written(folder.path(), "a", part(1, 2), &film(0));
     let second = folder.path().join("b");
@@ -172,7 +171,7 @@ fn a_damaged_part_is_refused_and_named() {
     assert!(matches!(refused(&[folder]), PartError::Unreadable { .. }));
 }
 
-/// Heads that a checksum does not protect from: those that somebody has written.
+/// Heads written by hand, with valid checksums.
 #[test]
 fn a_hostile_head_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! The file of a prepared scene.
+//! Reads and writes the file of a prepared scene.
 
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, ErrorKind, Read, Write};
@@ -16,13 +16,13 @@ use super::head::Head;
 use super::scene::PreparedScene;
 use crate::PROGRAM;
 
-/// Kind of the file.
+/// Kind and version of the file.
 pub(super) const KIND: Kind = Kind { name: "photoncard prepared scene", version: VERSION };
-/// Multiple of bytes at which the lines begin: a page of memory, and so a line.
+/// Alignment of the lines in the file, bytes: a page of memory, which is a multiple of a line.
 const PAGE: u64 = 4096;
-/// Maximum number of lines: no card has more than 4 GB of memory.
+/// Maximum number of lines, because no card has more than 4 GB of memory.
 const MAX_LINES: u32 = u32::MAX / LINE_BYTES as u32;
-/// Bytes that are read at once.
+/// Number of bytes that are read at once.
 const BUFFER: usize = 1 << 18;
 
 impl PreparedScene {
@@ -37,7 +37,7 @@ impl PreparedScene {
     /// Opens a prepared scene.
     ///
     /// # Errors
-    /// If the file is none, of another version of format or program, damaged or unreadable.
+    /// If the file is not a prepared scene, of another version of format or program, damaged, or unreadable.
     pub fn open(path: &Path) -> Result<Self, PreparedError> {
         open(path)
     }
@@ -98,7 +98,7 @@ fn open(path: &Path) -> Result<PreparedScene, PreparedError> {
     head.into_scene(image).map_err(damaged)
 }
 
-/// Empty list with room for `count` lines.
+/// Creates an empty list with room for `count` lines.
 fn empty(count: u32) -> Result<Vec<Line>, OutOfMemory> {
     let mut lines = Vec::new();
     let bytes = u64::from(count) * LINE_BYTES as u64;
@@ -106,8 +106,8 @@ fn empty(count: u32) -> Result<Vec<Line>, OutOfMemory> {
     Ok(lines)
 }
 
-/// Reads lines into memory, and returns their CRC-32C. It is that of the bytes that are used, whatever
-/// becomes of the file.
+/// Reads lines into memory. Returns the CRC-32C of the bytes in memory, which later changes of the file do
+/// not affect.
 fn read_lines(reader: &mut impl BufRead, count: u32, lines: &mut Vec<Line>) -> io::Result<u32> {
     let mut sum = Checksum::default();
     for _ in 0..count {

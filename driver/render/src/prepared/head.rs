@@ -1,4 +1,4 @@
-//! Head of a prepared scene's file: everything but the card image.
+//! Head of a prepared scene's file, which has everything but the card image.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,14 +22,14 @@ use crate::{Integrator, PROGRAM, PhotonMaps, RenderSettings};
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Head {
-    /// Name and version of the program that has traced the photons.
+    /// Name and version of the program that traced the photons.
     pub(super) program: String,
-    /// Number of the card image's lines.
+    /// Number of lines of the card image.
     pub(super) lines: u32,
     /// CRC-32C of the card image.
     pub(super) checksum: u32,
     cameras: Vec<StoredCamera>,
-    /// Place of the scene's origin in the coordinates of its file.
+    /// Position of the scene's origin in the coordinates of its file, metres.
     offset: [f64; 3],
     /// Checksums of the scene, with and without cameras.
     scene: [String; 2],
@@ -39,7 +39,7 @@ pub(super) struct Head {
     max_distance: f32,
     caustics: Option<CausticGather>,
     paths: u64,
-    /// Views of frames, by their numbers.
+    /// Views of frames, by frame number.
     frames: BTreeMap<u32, StoredView>,
     notes: Map<String, Value>,
 }
@@ -66,10 +66,10 @@ impl Head {
         }
     }
 
-    /// The prepared scene of an image.
+    /// Combines the head with an image to the prepared scene.
     ///
     /// # Errors
-    /// If there is no such camera or distance, or the photons are for one camera.
+    /// If a camera or a distance is not possible, or the photons are for one camera.
     pub(super) fn into_scene(self, image: CardImage) -> Result<PreparedScene, &'static str> {
         let Self {
             cameras, offset, photons, integrator, max_distance, caustics, paths, frames, notes, ..
@@ -112,7 +112,7 @@ fn checksum(lines: &[Line]) -> u32 {
     sum.value()
 }
 
-/// View of a frame in a file.
+/// View of a frame, as stored in a file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StoredView {
@@ -132,7 +132,7 @@ impl StoredView {
     }
 }
 
-/// Camera in a file: numbers that parse back exactly.
+/// Camera, as stored in a file. Its numbers are read back exactly.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StoredCamera {

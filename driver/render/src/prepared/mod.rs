@@ -1,5 +1,5 @@
-//! Prepared scenes: files with all that pictures of a scene need, so that no render of it reads a glTF file,
-//! runs a pilot or traces photons.
+//! Prepared scenes: files with everything that pictures of a scene need. Renders of a prepared scene need not
+//! read a glTF file, run a pilot or trace photons.
 //!
 //! ```text
 //! photoncard prepared scene 3\n
@@ -9,7 +9,7 @@
 //! lines of the card image, whose CRC-32C is in the JSON
 //! ```
 //!
-//! The lines are read into memory, and checked there: what becomes of the file later has no effect.
+//! The lines are read into memory and checked there, so that later changes of the file have no effect.
 
 mod error;
 mod file;

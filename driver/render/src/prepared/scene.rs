@@ -1,4 +1,4 @@
-//! A scene with all that its pictures need.
+//! A scene with everything that its pictures need.
 
 use std::collections::BTreeMap;
 
@@ -15,30 +15,30 @@ use crate::renderer::{Chosen, Kept, Renderer, Source};
 use crate::times::Times;
 use crate::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
 
-/// A scene with its photon map, as a card image, and the settings that it depends on.
+/// A scene with its photon map, as a card image, and the settings that the image depends on.
 pub struct PreparedScene {
-    /// The cameras of the scene, and what is known of the rest.
+    /// Cameras of the scene, and known properties of the rest.
     pub(super) scene: FixedScene<'static>,
     pub(super) photons: PhotonMaps,
     pub(super) integrator: Integrator,
     pub(super) kept: Kept,
-    /// Views of frames, by their numbers.
+    /// Views of frames, by frame number.
     pub(super) frames: BTreeMap<u32, View>,
     pub(super) notes: Map<String, Value>,
 }
 
-/// Cameras of a frame, and the checksum of the scene with them.
+/// Cameras of a frame, and the checksum of the scene with these cameras.
 pub(super) struct View {
     pub(super) cameras: Vec<Camera>,
     pub(super) checksum: String,
 }
 
 impl PreparedScene {
-    /// Prepares a scene: packs it, has photons and integrator chosen, and traces photons. The image must fit
-    /// cards with `budgets`. `notes` are the caller's, such as names of the inputs.
+    /// Prepares a scene: packs it, lets `choose` determine photons and integrator, and traces photons. The
+    /// image must fit cards with `budgets`. `notes` are the caller's, such as names of inputs.
     ///
     /// # Errors
-    /// As of [`Renderer::render_chosen`].
+    /// As [`Renderer::render_chosen`].
     pub fn new(
         scene: &FixedScene,
         settings: &RenderSettings,
@@ -67,7 +67,7 @@ impl PreparedScene {
         Ok(Self { scene, photons, integrator, kept, frames: BTreeMap::new(), notes })
     }
 
-    /// Adds a frame, which is seen by the cameras of `scene`. Returns false, and adds none, if more than its
+    /// Adds a frame with the cameras of `scene`. Returns false, and adds no frame, if anything but the
     /// cameras differs from the prepared scene.
     pub fn add_frame(&mut self, number: u32, scene: &FixedScene) -> bool {
         let is_same = scene.checksum_without_cameras() == self.scene.checksum_without_cameras();
@@ -78,12 +78,12 @@ impl PreparedScene {
         is_same
     }
 
-    /// Numbers of the frames, increasing; none if the scene was prepared as it stands.
+    /// Frame numbers in increasing order; none if the scene was prepared without frames.
     pub fn frames(&self) -> impl Iterator<Item = u32> {
         self.frames.keys().copied()
     }
 
-    /// Cameras of a frame, as [`Self::scene`]; `None` without such a frame.
+    /// Cameras of a frame, like [`Self::scene`]; `None` if there is no such frame.
     pub fn frame(&self, number: u32) -> Option<FixedScene<'static>> {
         let View { cameras, checksum } = self.frames.get(&number)?;
         let checksums = [checksum, self.scene.checksum_without_cameras()].map(str::to_owned);
@@ -91,12 +91,12 @@ impl PreparedScene {
         Some(FixedScene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
     }
 
-    /// Cameras of the scene, without anything else of it.
+    /// Cameras of the scene, without its other contents.
     pub fn scene(&self) -> &FixedScene<'static> {
         &self.scene
     }
 
-    /// Notes of the caller that prepared the scene.
+    /// Notes that the caller of [`Self::new`] passed.
     pub fn notes(&self) -> &Map<String, Value> {
         &self.notes
     }
@@ -106,15 +106,15 @@ impl PreparedScene {
         self.kept.prepared.image.bytes()
     }
 
-    /// Settings with the photons and the integrator that the scene was prepared for.
+    /// Replaces photons and integrator in settings by those that the scene was prepared for.
     #[must_use]
     pub fn settings(&self, settings: RenderSettings) -> RenderSettings {
         let (photons, integrator) = (self.photons.clone(), self.integrator.clone());
         RenderSettings { photons, integrator, ..settings }
     }
 
-    /// Renderer that has the card image: it renders [`Self::scene`] and [`Self::frame`] with
-    /// [`Renderer::render_fixed`] by [`Self::settings`].
+    /// Creates a renderer that has the card image. [`Renderer::render_fixed`] renders [`Self::scene`] and
+    /// [`Self::frame`] with it, with settings from [`Self::settings`].
     pub fn renderer(&self) -> Renderer {
         Renderer::with_image(self.kept.clone())
     }
@@ -133,7 +133,7 @@ fn check_cameras(photons_for: PhotonsFor) -> Result<(), RenderError> {
     }
 }
 
-/// Returns whether a camera is one: finite, and with an opening.
+/// Returns whether a camera is valid: finite, with a positive field of view.
 pub(super) fn is_camera(camera: &Camera) -> bool {
     let Camera { name: _, origin, right, up, forward, vertical_fov, aspect } = camera;
     let is_length = |length: f32| length.is_normal() && length > 0.0;

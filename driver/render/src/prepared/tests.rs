@@ -27,7 +27,7 @@ fn settings() -> RenderSettings {
     })
 }
 
-/// Prepares the scene of all tests, and returns the path of its file.
+/// Prepares the scene of all tests. Returns the path of its file.
 fn prepared(folder: &Path) -> PathBuf {
     let RenderSettings { photons, integrator, .. } = settings();
     let choose = |_: &PackedScene| Ok((photons.clone(), integrator.clone()));
@@ -45,7 +45,7 @@ fn sums(film: &Film) -> Vec<photoncard_picture::film::PixelSums> {
 }
 
 #[test]
-fn pictures_of_a_prepared_scene_are_those_of_the_scene() {
+fn a_prepared_scene_gives_the_same_pictures_as_its_scene() {
     let folder = tempfile::tempdir().unwrap();
     let prepared = PreparedScene::open(&prepared(folder.path())).unwrap();
     assert_eq!(prepared.notes().get("name"), Some(&json!("cornell")));
@@ -65,10 +65,10 @@ fn pictures_of_a_prepared_scene_are_those_of_the_scene() {
     }
 }
 
-/// The file of an open scene is written over in place, cut off and removed: pictures are those of the scene
-/// that was opened.
+/// The file of an open scene is overwritten in place, truncated and removed. Pictures must be those of the
+/// scene that was opened.
 #[test]
-fn a_file_that_changes_later_changes_no_picture() {
+fn later_changes_of_the_file_change_no_picture() {
     let folder = tempfile::tempdir().unwrap();
     let path = prepared(folder.path());
     let bytes = fs::read(&path).unwrap();
@@ -85,9 +85,9 @@ fn a_file_that_changes_later_changes_no_picture() {
     }
 }
 
-/// Frames are seen by cameras of their own. What is not of the prepared scene is no frame of it.
+/// Frames have their own cameras. A scene with other contents than the prepared one must be refused.
 #[test]
-fn frames_of_a_prepared_scene_are_those_of_the_scene() {
+fn a_prepared_scene_gives_the_same_frames_as_its_scene() {
     let folder = tempfile::tempdir().unwrap();
     let path = prepared(folder.path());
     let mut of_rest = PreparedScene::open(&path).unwrap();
@@ -111,7 +111,7 @@ fn frames_of_a_prepared_scene_are_those_of_the_scene() {
 }
 
 #[test]
-fn a_prepared_scene_is_the_same_file_again() {
+fn preparing_a_scene_twice_gives_equal_files() {
     let folders = [(); 2].map(|()| tempfile::tempdir().unwrap());
     let [first, second] = folders.each_ref().map(|folder| fs::read(prepared(folder.path())).unwrap());
     assert!(first == second);
@@ -144,7 +144,7 @@ fn a_damaged_prepared_scene_is_refused_and_named() {
     assert!(matches!(PreparedScene::open(folder.path()), Err(PreparedError::Unreadable { .. })));
 }
 
-/// Files with sound checksums that no preparation has written.
+/// Files with valid checksums that no preparation has written.
 #[test]
 fn a_hostile_prepared_scene_is_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Settings that depend on the scene, from the variances of pilot renders.
+//! Chooses settings that depend on the scene, from the variances of pilot renders.
 
 use std::ops::RangeInclusive;
 
@@ -12,35 +12,35 @@ use super::level::{Level, Quality};
 use super::pilot::{SHADOW_RAYS as PILOT_SHADOW_RAYS, Variances, measure};
 use crate::{Integrator, Observer, RenderError, RenderSettings};
 
-/// Settings that suit a scene.
+/// Settings chosen for a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
-    /// Number of samples of a pixel.
+    /// Number of samples per pixel.
     pub samples: u32,
     /// Number of photons in the map.
     pub photons: usize,
-    /// Guiding of the photons: never [`PhotonsFor::Auto`].
+    /// Cameras for which photons are traced; never [`PhotonsFor::Auto`].
     pub photons_for: PhotonsFor,
     /// Number of gather rays of a pixel, and of an irradiance record.
     pub gather_rays: u32,
     /// Number of shadow rays per sample.
     pub shadow_rays: u32,
-    /// If irradiance is interpolated: false where hardly any could be.
+    /// True if irradiance is interpolated; false if hardly any could be.
     pub interpolates: bool,
-    /// Maximum error of interpolated irradiance; infinite where the quality's own is small enough.
+    /// Maximum error of interpolated irradiance; infinite if the quality's own error bound is small enough.
     pub max_irradiance_error: f32,
-    /// Model's adaptive threshold per unit of sample cost, W^(1/2)/(sr^(1/2) m).
+    /// Adaptive threshold of the cost model for a sample of unit cost, W^(1/2)/(sr^(1/2) m).
     pub unit_threshold: f64,
-    /// Adaptive threshold that gives the pilot's pixels 1.1 paths per sample, W^(1/2)/(sr^(1/2) m); `None`
-    /// where these paths lower the variance of direct light by less than half.
+    /// Adaptive threshold that gives the pilot's pixels 1.1 paths per sample, W^(1/2)/(sr^(1/2) m); `None` if
+    /// these paths do not at least halve the variance of direct light.
     pub spent_threshold: Option<f64>,
-    /// Numbers that the scene would take beyond the bounds of the quality.
+    /// Numbers that the scene would need beyond the limits of the quality.
     pub beyond: Beyond,
-    /// Noise of the pilot, from which the settings follow.
+    /// Measured noise of the pilot, from which the settings follow.
     pub measured: Measured,
 }
 
-/// Numbers that a scene would take, where they exceed the bounds of a quality.
+/// Numbers that a scene would need, if they exceed the limits of a quality.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Beyond {
     /// Number of photons in the map.
@@ -49,25 +49,25 @@ pub struct Beyond {
     pub gather_rays: Option<u32>,
 }
 
-/// Settings that a fit leaves as they are, because they are stated.
+/// Settings that the user stated. A fit does not change them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stated {
-    /// Number of samples.
+    /// True if the number of samples is stated.
     pub samples: bool,
-    /// Number of photons.
+    /// True if the number of photons is stated.
     pub photons: bool,
-    /// Number of gather rays.
+    /// True if the number of gather rays is stated.
     pub gather_rays: bool,
-    /// Number of shadow rays.
+    /// True if the number of shadow rays is stated.
     pub shadow_rays: bool,
-    /// The irradiance cache, or its error.
+    /// True if the irradiance cache or its error bound is stated.
     pub cache: bool,
-    /// Adaptive sampling, or its threshold.
+    /// True if adaptive sampling or its threshold is stated.
     pub adaptive: bool,
 }
 
 impl Stated {
-    /// All settings that a fit would choose.
+    /// All settings that a fit would choose are stated.
     pub const ALL: Self = Self {
         samples: true,
         photons: true,
@@ -77,8 +77,8 @@ impl Stated {
         adaptive: true,
     };
 
-    /// Returns whether there is a setting that only a pilot can choose. Adaptive sampling alone is none: it
-    /// is off then.
+    /// Returns whether any setting is left to a pilot. Adaptive sampling does not count: it is off without a
+    /// pilot.
     pub fn needs_fit(self) -> bool {
         Self { adaptive: true, ..self } != Self::ALL
     }
@@ -87,24 +87,25 @@ impl Stated {
 /// Relative standard deviations of samples in a pilot render, and their costs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
-    /// By the place of a sample in its pixel.
+    /// Deviation caused by the position of a sample in its pixel.
     pub place: f64,
-    /// By one shadow ray.
+    /// Deviation caused by one shadow ray.
     pub shadow_ray: f64,
-    /// By one gather ray.
+    /// Deviation caused by one gather ray.
     pub gather_ray: f64,
-    /// Error of 4x4 pixels by a map of a million photons.
+    /// Error of 4x4 pixels caused by a map of a million photons.
     pub million_photons: f64,
-    /// Squared error of a map for the camera over that of one for any camera; `None` where the camera uses
-    /// most photons anyway, or the photons are stated to be for either.
+    /// Ratio of the squared errors of a map for the camera and of one for any camera; `None` if the camera
+    /// uses most photons anyway, or the user stated for which cameras photons are.
     pub photons_for_camera: Option<f64>,
-    /// Number of gather rays that a pixel costs for each one of its own, by irradiance records and samples
-    /// without.
+    /// Number of gather rays that a pixel costs per gather ray setting, including rays of irradiance records
+    /// and of samples without interpolation.
     pub gather_rays_per_ray: f64,
 }
 
 impl Measured {
-    /// Deviation of a sample by its place and some shadow rays, over that by the pilot's; 1 without noise.
+    /// Ratio of a sample's deviations with `shadow_rays` shadow rays and with the pilot's number, considering
+    /// its position and these rays; 1 without noise.
     fn deviation_by(&self, shadow_rays: u32) -> f64 {
         let of_rays = |rays: u32| if rays == 0 { 0.0 } else { self.shadow_ray.powi(2) / f64::from(rays) };
         let variance = |rays: u32| self.place.powi(2) + of_rays(rays);
@@ -113,44 +114,46 @@ impl Measured {
     }
 }
 
-/// Maximum squared error of a map for the camera, over that of one for any camera, for which photons are for
-/// the camera: the ratio of two pilots is uncertain by a third.
+/// Maximum ratio of squared errors at which photons are traced for the camera. It is well below 1, because
+/// the ratio of two pilots is uncertain by a third.
 const MAX_RATIO_FOR_CAMERA: f64 = 0.6;
-/// Share of samples with a Lambertian part below which nothing is interpolated.
+/// Fraction of samples with a Lambertian part below which nothing is interpolated.
 const FEW_LAMBERTIAN: f64 = 0.05;
-/// Number of shadow rays of a sample.
+/// Range of the number of shadow rays per sample.
 const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
-/// CPU time of a shadow ray over that of a sample without its rays to lights, as measured in rooms and halls.
+/// CPU time of a shadow ray relative to a sample without its rays to lights, as measured in rooms and halls.
 const COST_OF_SHADOW_RAY: f64 = 0.4;
-/// CPU time of a gather ray with its gather, likewise.
+/// CPU time of a gather ray with its gather, relative to the same.
 const COST_OF_GATHER_RAY: f64 = 1.2;
-/// CPU time of tracing and storing a photon, likewise.
+/// CPU time of tracing and storing a photon, relative to the same.
 const COST_OF_PHOTON: f64 = 2.5;
-/// Bounds of the threshold of adaptive sampling, over that of the model.
+/// Minimum and maximum of the threshold of adaptive sampling, relative to that of the cost model.
 const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 8.0];
-/// Minimum number of gather rays that a pixel is taken to cost for each one of its own: the surveyed tiles
-/// may miss what gathers.
+/// Minimum of [`Variances::gather_rays_per_ray`], because the surveyed tiles may miss samples that gather.
 const MIN_GATHER_RAYS_PER_RAY: f64 = 1.0 / 64.0;
-/// Weight of the variance of gather rays where several records are interpolated.
+/// Weight of the variance of gather rays if several records are interpolated.
 const WEIGHT_OF_RECORDS: f64 = 0.5;
-/// Weight of the squared error of the map in 4x4 pixels: it is no noise of a pixel, but a blotch.
+/// Weight of the map's squared error in 4x4 pixels. It is above 1, because the error is not noise of single
+/// pixels but a blotch.
 const WEIGHT_OF_MAP: f64 = 6.0;
-/// Error of 4x4 pixels by the photon map, as a share of the noise that a picture is rendered to. That of
+/// Allowed error of 4x4 pixels by the photon map, relative to the aimed noise of the picture. The error of
 /// single pixels is up to twice as large.
 const SHARE_OF_MAP: f64 = 0.25;
-/// Error of interpolated irradiance by the rays of its records, likewise.
+/// Allowed error of interpolated irradiance by the rays of its records, relative to the aimed noise of the
+/// picture.
 const SHARE_OF_RECORDS: f64 = 0.5;
-/// Allowed error of interpolated irradiance over the noise that a picture is rendered to: the picture then
-/// errs by about half of the noise where small objects are seen with few pixels.
+/// Error bound of interpolated irradiance relative to the aimed noise of the picture. The error is then about
+/// half of the noise where small objects cover few pixels.
 const IRRADIANCE_ERROR_OF_NOISE: f64 = 2.5;
-/// Maximum numbers of photons, and of rays of a record, for the noise that a picture is rendered to.
+/// Maximum number of photons for an aimed noise. [`MAX_RAYS_OF_RECORD`] is the maximum number of rays of a
+/// record.
 const MAX_PHOTONS: usize = 8_000_000;
 const MAX_RAYS_OF_RECORD: u32 = 8_000;
 
 impl Fit {
-    /// Settings for a picture that gets samples until their noise is `noise`, relative to the mean pixel:
-    /// with more photons, and more rays of irradiance records, where the errors that no number of samples
-    /// lowers would exceed their share of it.
+    /// Adjusts the settings for a picture that gets samples until its noise, relative to the mean pixel, is
+    /// `noise`. Photons and rays of irradiance records are increased if errors that samples do not reduce
+    /// would otherwise exceed their share of the noise.
     pub fn for_noise(self, noise: f64) -> Self {
         let Measured { gather_ray, million_photons, .. } = self.measured;
         let photons = 1e6 * (million_photons / (SHARE_OF_MAP * noise)).powi(2);
@@ -171,8 +174,8 @@ impl Fit {
         }
     }
 
-    /// Changes settings to these, but for the stated ones. Samples of a stated number share the shadow rays
-    /// of a pixel, and without a cache its gather rays.
+    /// Applies the fit to settings, except for stated ones. If the number of samples is stated, samples share
+    /// the shadow rays of a pixel and, without a cache, its gather rays.
     pub fn apply(&self, settings: &mut RenderSettings, stated: Stated) {
         let RenderSettings { photons, integrator, .. } = settings;
         if !stated.samples {
@@ -203,9 +206,9 @@ impl Fit {
     }
 
     /// Threshold of adaptive sampling: [`Self::spent_threshold`] for the picture's shadow rays, within
-    /// [`FACTORS_OF_THRESHOLD`] of that by which each pixel has the number of samples that it is worth, `n =
-    /// w s sqrt(1 / c)` with `s` its deviation relative to the root of its radiance; `None` where all samples
-    /// are probes, or noise is even.
+    /// [`FACTORS_OF_THRESHOLD`] of the cost model's threshold. The model gives each pixel
+    /// `n = w s sqrt(1 / c)` samples, where `s` is its deviation relative to the square root of its radiance.
+    /// `None` if all samples are probes, or noise is uniform.
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
@@ -219,9 +222,9 @@ impl Fit {
 }
 
 impl Quality {
-    /// Settings of this quality that suit a scene, by pilot renders with view, filter and sampling of
-    /// `settings`; `None` where no setting depends on the scene. Seed, cards, threads and crop window have no
-    /// effect.
+    /// Chooses settings of this quality for a scene by pilot renders with the view, filter and sampling in
+    /// `settings`; `None` if no setting of the quality depends on the scene. Seed, cards, threads and crop
+    /// window have no effect.
     ///
     /// # Errors
     /// As [`render`](crate::render).
@@ -242,19 +245,18 @@ impl Quality {
     }
 }
 
-/// A picture, as far as a fit depends on it.
+/// Properties of a picture that a fit depends on.
 struct Pictured {
-    /// Number of pixels.
     pixels: f64,
-    /// If the irradiance cache may be used.
+    /// True if the irradiance cache may be used.
     is_cached: bool,
 }
 
 impl Level {
-    /// Settings for the variances of a scene in a picture: those with the least sum of time and variance.
+    /// Chooses the settings with the least sum of time and variance for the variances of a scene.
     ///
-    /// With `n` of something, samples or rays or photons, a pixel takes the time `c n` and has the variance
-    /// `v / n`. The sum of `c n + w^2 v / n` is the least for `n = w sqrt(v / c)`, `w` the worth of accuracy.
+    /// With `n` samples, rays or photons, a pixel takes the time `c n` and has the variance `v / n`. The sum
+    /// `c n + w^2 v / n` is least for `n = w sqrt(v / c)`, where `w` is the worth of accuracy.
     fn fit(&self, variances: &Variances, of: &Pictured) -> Fit {
         let Variances {
             place,
@@ -305,7 +307,7 @@ impl Level {
     }
 }
 
-/// The least multiple of `step` that is not below a number, within bounds; the maximum for no number.
+/// Smallest multiple of `step` that is at least `number`, within bounds; the maximum for NaN.
 fn within(number: f64, bounds: &RangeInclusive<u32>, step: u32) -> u32 {
     if number.is_nan() {
         return *bounds.end();
@@ -314,12 +316,12 @@ fn within(number: f64, bounds: &RangeInclusive<u32>, step: u32) -> u32 {
     steps.saturating_mul(step).clamp(*bounds.start(), *bounds.end())
 }
 
-/// A positive number rounded to two digits.
+/// Rounds a positive number to two digits.
 fn two_digits(number: f64) -> f32 {
     format!("{number:.1e}").parse().unwrap_or(f32::NAN)
 }
 
-/// A number of photons within bounds, rounded up to two digits; the maximum for none that is finite.
+/// Number of photons within bounds, rounded up to two digits; the maximum if `number` is not finite.
 fn rounded(number: f64, bounds: &RangeInclusive<usize>) -> usize {
     let finite = if number.is_finite() { number } else { *bounds.end() as f64 };
     let bounded = finite.clamp(*bounds.start() as f64, *bounds.end() as f64) as usize;
@@ -350,7 +352,7 @@ mod tests {
         Quality::Good.level().unwrap().fit(variances, &PICTURED)
     }
 
-    /// Time and weighted variance of a pixel.
+    /// Time plus weighted variance of a pixel.
     fn loss(variances: &Variances, [samples, shadow_rays, gather_rays, photons]: [f64; 4]) -> f64 {
         let Variances { place, shadow_ray, gather_ray, photon, gather_rays_per_ray, .. } = variances;
         let rays = samples * shadow_rays;
@@ -366,7 +368,7 @@ mod tests {
     }
 
     #[test]
-    fn other_settings_cost_more_than_they_are_worth() {
+    fn fitted_settings_minimise_time_plus_weighted_variance() {
         let fit = good(&VARIANCES);
         let chosen = [fit.samples, fit.shadow_rays, fit.gather_rays, fit.photons as u32].map(f64::from);
         assert_eq!(chosen, [24.0, 6.0, 200.0, 280_000.0]);
@@ -401,7 +403,7 @@ mod tests {
     }
 
     #[test]
-    fn photons_are_for_the_camera_where_that_gains_and_are_then_fewer() {
+    fn fewer_photons_are_traced_for_the_camera_where_that_gains() {
         let by = |ratio: f64| {
             let maps = ForCamera { photon: 0.25 * VARIANCES.photon, ratio };
             good(&Variances { for_camera: Some(maps), ..VARIANCES })
@@ -421,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_beyond_the_bounds_are_those_that_the_scene_would_take() {
+    fn numbers_beyond_the_limits_are_reported() {
         let beyond = |photon, gather_ray| good(&Variances { photon, gather_ray, ..VARIANCES }).beyond;
         assert_eq!(beyond(VARIANCES.photon, VARIANCES.gather_ray), Beyond::default());
         let Beyond { photons, gather_rays } = beyond(100.0 * VARIANCES.photon, 100.0 * VARIANCES.gather_ray);
@@ -430,7 +432,7 @@ mod tests {
         assert_eq!(most, Beyond { photons: Some(MAX_PHOTONS), gather_rays: Some(MAX_RAYS_OF_RECORD) });
     }
 
-    /// Rays of records are shared by the pixels around them.
+    /// Without records, pixels do not share rays, so that equal costs allow more rays.
     #[test]
     fn pixels_without_records_take_more_rays_for_equal_costs() {
         let level = Quality::Good.level().unwrap();
@@ -440,7 +442,7 @@ mod tests {
     }
 
     #[test]
-    fn little_noise_takes_the_photons_and_rays_of_records_that_keep_their_errors_below_it() {
+    fn a_low_noise_aim_raises_photons_and_record_rays_to_keep_their_errors_below_it() {
         let fit = good(&VARIANCES);
         assert_eq!(Fit { max_irradiance_error: f32::INFINITY, ..fit.for_noise(1.0) }, fit);
         for noise in [0.02, 0.01, 0.005] {
@@ -464,7 +466,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fit_changes_what_is_not_stated() {
+    fn a_fit_changes_only_settings_that_are_not_stated() {
         let fit = Fit { interpolates: false, ..good(&VARIANCES) };
         let initial = Quality::Good.settings();
         let applied = |stated| initial.clone().with(|settings| fit.apply(settings, stated));
@@ -480,7 +482,7 @@ mod tests {
     }
 
     #[test]
-    fn the_threshold_spends_what_the_pilot_measured_near_that_of_the_model() {
+    fn the_adaptive_threshold_stays_near_that_of_the_model() {
         let fit = good(&VARIANCES);
         let threshold = |spent, samples| {
             let integrator = Integrator { samples, shadow_rays: 4, ..Quality::Good.settings().integrator };
@@ -496,7 +498,7 @@ mod tests {
     }
 
     #[test]
-    fn a_shadow_ray_alone_has_twice_the_deviation_of_four() {
+    fn one_shadow_ray_has_twice_the_deviation_of_four() {
         let Measured { place, .. } = good(&VARIANCES).measured;
         let by_rays = Measured { place: 0.0, ..good(&VARIANCES).measured };
         assert!(
@@ -523,7 +525,7 @@ mod tests {
     }
 
     #[test]
-    fn a_better_quality_never_takes_fewer_of_anything() {
+    fn a_better_quality_never_lowers_a_number() {
         let fits = [Quality::Draft, Quality::Good, Quality::Final]
             .map(|quality| quality.level().unwrap().fit(&VARIANCES, &PICTURED));
         for [worse, better] in [[fits[0], fits[1]], [fits[1], fits[2]]] {

@@ -1,4 +1,4 @@
-//! Settings of kept samples, for a render that adds to them.
+//! Takes over settings of kept samples, for a render that adds to them.
 
 use photoncard_map::photon_map::PhotonsFor;
 use photoncard_picture::choice::Choice;
@@ -8,9 +8,10 @@ use super::Stated;
 use crate::{NamedSettings, RenderSettings};
 
 impl Stated {
-    /// Takes over into `settings` what a quality may have chosen for kept samples of a picture, by the names
-    /// of options, and their planned number, but for what is stated. A value that is no such setting is left
-    /// out: a render compares all settings with those of the samples.
+    /// Copies into `settings` the values that a quality may have chosen for the kept samples of a picture,
+    /// and their planned number, except for stated settings. `kept` has them by option names. A value that is
+    /// not a valid setting is ignored, because a render compares all settings with those of the samples
+    /// anyway.
     pub fn take_over(self, settings: &mut RenderSettings, kept: &NamedSettings) {
         let number = |name: &str| kept.get(name).and_then(Value::as_u64);
         let rays = |name: &str| number(name).and_then(|rays| u32::try_from(rays).ok());
@@ -62,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_stated_becomes_that_of_the_kept_samples() {
+    fn unstated_settings_become_those_of_the_kept_samples() {
         let earlier = RenderSettings::default().with(|s| {
             s.photons.count = 3000;
             s.integrator.samples = 3;
@@ -96,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn values_that_are_no_settings_are_left_out() {
+    fn invalid_values_are_ignored() {
         for value in [json!(-1), json!("many"), json!(1e9), json!([1]), json!(u64::from(u32::MAX) + 1)] {
             let names = ["gather-rays", "shadow-rays", "planned-spp", "ic-error"];
             let kept = names.map(|name| (name.to_owned(), value.clone())).into_iter().collect();

@@ -1,4 +1,4 @@
-//! Qualities: worth of accuracy, bounds, and settings for a scene that is not known.
+//! Qualities: worth of accuracy, limits, and settings for an unknown scene.
 
 use std::ops::RangeInclusive;
 
@@ -6,17 +6,17 @@ use photoncard_picture::choice::choices;
 
 use crate::{Filter, Integrator, PhotonMaps, Picture, RenderSettings};
 
-/// Quality of a picture, by which settings that are not stated are chosen.
+/// Quality of a picture. It determines the settings that the user does not state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Quality {
-    /// A look at the scene.
+    /// Quality for a quick look at the scene.
     Draft,
-    /// A picture to show.
+    /// Quality for a picture to show.
     #[default]
     Good,
-    /// A picture to keep.
+    /// Quality for a picture to keep.
     Final,
-    /// The dissertation's nominal values (Table 7.1): those of studies.
+    /// Nominal values of the dissertation (Table 7.1), which studies use.
     Paper,
 }
 
@@ -27,29 +27,30 @@ choices!(Quality {
     Paper = "paper": "The dissertation's nominal values, for studies: one sample a pixel, a hundred gather rays, no cache",
 });
 
-/// Photons that a gather searches for: fewer blur less, and 24 leave the noise of gather rays as it is.
+/// Number of photons that a gather searches for. Fewer photons blur less, and with 24 the noise of gather
+/// rays still dominates.
 const NEIGHBORS: u32 = 24;
 
-/// Values of a quality whose settings depend on the scene: the worth of accuracy, and bounds of what is
-/// chosen by it.
+/// Parameters of a quality whose settings depend on the scene: the worth of accuracy, and limits of the
+/// settings chosen by it.
 pub(super) struct Level {
     /// Worth of accuracy, `w` in [`Self::fit`]: a relative variance of 1 in a pixel is worth the time of
     /// `w^2` samples.
     pub(super) worth: f64,
-    /// Number of samples of a pixel.
+    /// Range of the number of samples per pixel.
     pub(super) samples: RangeInclusive<u32>,
-    /// Number of gather rays of a pixel, and of an irradiance record.
+    /// Range of the number of gather rays of a pixel, and of an irradiance record.
     pub(super) gather_rays: RangeInclusive<u32>,
-    /// Number of photons in the map.
+    /// Range of the number of photons in the map.
     pub(super) photons: RangeInclusive<usize>,
-    /// Number of photons of the caustic map.
+    /// Number of photons in the caustic map.
     caustic_photons: usize,
-    /// Relative error of interpolated irradiance.
+    /// Error bound of interpolated irradiance.
     irradiance_error: f32,
 }
 
 impl Quality {
-    /// Values of this quality; `None` where no setting depends on the scene.
+    /// Parameters of this quality; `None` if none of its settings depends on the scene.
     pub(super) fn level(self) -> Option<Level> {
         Some(match self {
             Self::Draft => Level {
@@ -80,8 +81,8 @@ impl Quality {
         })
     }
 
-    /// Settings of this quality for a scene that is not known: the fewest samples, and middle numbers of rays
-    /// and photons, where [`Self::fit`] chooses.
+    /// Settings of this quality for an unknown scene. Where [`Self::fit`] would choose, it has the fewest
+    /// samples, and medium numbers of rays and photons.
     pub fn settings(self) -> RenderSettings {
         let Some(level) = self.level() else { return RenderSettings::default() };
         RenderSettings {

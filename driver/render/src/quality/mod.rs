@@ -1,7 +1,7 @@
-//! Qualities of a picture: settings for what it is needed for.
+//! Qualities of a picture: settings for its purpose.
 //!
-//! Settings that depend on the scene are found by a pilot render ([`Quality::fit`]): few pixels, from photon
-//! maps of few photons.
+//! Settings that depend on the scene are found by a pilot render ([`Quality::fit`]) of few pixels, with
+//! photon maps of few photons.
 
 mod fit;
 mod kept;

@@ -1,21 +1,23 @@
-//! Number of paths that adaptive sampling would take, from the deviations of a pilot's pixels.
+//! Predicts the number of paths that adaptive sampling would take, from the deviations of a pilot's pixels.
 
 use photoncard_shared::message::MAX_PATHS;
 
-/// Mean number of paths of a later sample beyond one that adaptive sampling takes. Time times variance is
-/// about the least in rooms, halls and single objects: with two to three times as many it is 1.2 times as
-/// great in halls and Cornell boxes, and a fifth smaller where few pixels have nearly all noise.
+/// Mean number of additional paths per later sample that adaptive sampling is tuned to. It about minimises
+/// time times variance in rooms, halls and single objects. With two to three times as many, this product is
+/// 1.2 times as large in halls and Cornell boxes, and a fifth smaller in pictures where few pixels have
+/// nearly all noise.
 const EXTRA_PATHS: f64 = 0.1;
-/// Minimum gain by these paths, [`Deviations::gain`], for which adaptive sampling is on. Deviations by two
-/// samples make even noise seem uneven, with a gain of 1.3 to 1.5. It is 1.5 to 2.2 in Cornell boxes and
-/// halls, where time times variance hardly changes, and 2.2 to 4 in scenes where it falls to a half or less.
+/// Minimum gain, [`Deviations::gain`], at which adaptive sampling is on. Deviations estimated from two
+/// samples make even uniform noise seem uneven, with a gain of 1.3 to 1.5. The gain is 1.5 to 2.2 in Cornell
+/// boxes and halls, where time times variance hardly changes, and 2.2 to 4 in scenes where it falls to a half
+/// or less.
 const MIN_GAIN: f64 = 2.0;
-/// Thresholds among which one is chosen.
+/// Minimum and maximum of the thresholds that are tried.
 const THRESHOLDS: [f64; 2] = [1e-9, 1e9];
-/// Halvings of the interval of the threshold's logarithm.
+/// Number of bisections of the logarithm of the threshold.
 const STEPS: u32 = 60;
 
-/// Deviations of a sample of some pixels: their standard deviations over the roots of their radiances,
+/// Deviations of the samples of some pixels: standard deviation divided by the square root of the radiance,
 /// W^(1/2)/(sr^(1/2) m).
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Deviations(Vec<f64>);
@@ -25,8 +27,8 @@ impl Deviations {
     #[cfg(test)]
     pub(super) const NONE: Self = Self(Vec::new());
 
-    /// Deviations of pixels, by the light of several samples of each that probes would see, and the mean
-    /// radiance of the pixel.
+    /// Computes the deviations of pixels. Each has the light of `N` samples, as probes would see it, and its
+    /// mean radiance.
     pub(super) fn new<const N: usize>(pixels: impl IntoIterator<Item = ([f64; N], f64)>) -> Self {
         let of_pixel = |(light, radiance): ([f64; N], f64)| {
             let mean = light.iter().sum::<f64>() / N as f64;
@@ -37,14 +39,14 @@ impl Deviations {
         Self(pixels.into_iter().map(of_pixel).collect())
     }
 
-    /// Mean number of paths of a later sample beyond one.
+    /// Mean number of additional paths per later sample at a threshold.
     fn extra_paths(&self, threshold: f64) -> f64 {
         let extra = |deviation: &f64| paths(*deviation, threshold) - 1.0;
         self.0.iter().map(extra).sum::<f64>() / self.0.len().max(1) as f64
     }
 
-    /// Variance of all pixels with one path a sample, over that with the paths by a threshold; 1 without
-    /// variance.
+    /// Ratio of the variances of all pixels with one path per sample and with the paths at a threshold; 1
+    /// without variance.
     fn gain(&self, threshold: f64) -> f64 {
         let by_one: f64 = self.0.iter().map(|deviation| deviation.powi(2)).sum();
         let by_paths: f64 =
@@ -53,14 +55,14 @@ impl Deviations {
         if gain.is_finite() { gain } else { 1.0 }
     }
 
-    /// Threshold by which later samples have [`EXTRA_PATHS`] beyond one; `None` where they gain less than
+    /// Threshold at which later samples have [`EXTRA_PATHS`] additional paths; `None` if the gain is below
     /// [`MIN_GAIN`].
     pub(super) fn worthy_threshold(&self) -> Option<f64> {
         let threshold = self.threshold();
         (self.gain(threshold) >= MIN_GAIN).then_some(threshold)
     }
 
-    /// Threshold by which later samples have [`EXTRA_PATHS`] beyond one, or the nearest of [`THRESHOLDS`].
+    /// Threshold at which later samples have [`EXTRA_PATHS`] additional paths, limited to [`THRESHOLDS`].
     fn threshold(&self) -> f64 {
         let [mut low, mut high] = THRESHOLDS;
         for _ in 0..STEPS {
@@ -75,7 +77,7 @@ impl Deviations {
     }
 }
 
-/// Number of paths of a later sample of a pixel.
+/// Number of paths per later sample of a pixel.
 fn paths(deviation: f64, threshold: f64) -> f64 {
     (deviation / threshold).round().clamp(1.0, MAX_PATHS.into())
 }
@@ -93,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_threshold_spends_the_paths_that_are_worth_it() {
+    fn the_threshold_gives_the_intended_number_of_paths() {
         // Ten of the 1,000 pixels have eleven paths, the others one.
         let threshold = spots().threshold();
         assert!((spots().0[0] / threshold - 11.5).abs() < 0.01, "{threshold}");
@@ -105,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn deviations_by_two_samples_of_even_noise_are_no_gain() {
+    fn uniform_noise_measured_by_two_samples_gives_no_gain() {
         let light = |sample: u32| f64::from(hash(sample)) / f64::from(u32::MAX);
         let noisy = Deviations::new((0..1000).map(|pixel| ([light(2 * pixel), light(2 * pixel + 1)], 0.5)));
         let gain = noisy.gain(noisy.threshold());
@@ -114,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn even_noise_has_one_path_a_sample() {
+    fn uniform_noise_has_one_path_per_sample() {
         let even = Deviations::new([([1.0, 3.0], 2.0); 10]);
         // Deviation 1: with more than one path every pixel has two.
         assert!((even.threshold() - 2.0 / 3.0).abs() < 1e-6);

@@ -17,46 +17,47 @@ use crate::emulator::THREAD_STACK;
 use crate::emulator::direct::{RenderedTile, render_tiles_apart};
 use crate::{Observer, Phase, RenderError, RenderSettings, Sampling};
 
-/// Tiles in a grid of cells, for the noise: each at a place in its cell by a hash.
+/// Grid of tiles in which noise is measured. Each tile has a hashed position in its cell.
 const SPREAD: Grid = Grid { cells: 8, side: 4 };
-/// Tiles in which irradiance records are placed: large, as tiles compute records at their borders of their
-/// own.
+/// Grid of tiles in which irradiance records are placed. The tiles are large, because tiles do not share the
+/// records at their borders.
 const SURVEYED: Grid = Grid { cells: 4, side: 32 };
-/// Maximum share of the photons that are where the picture uses any for which maps for the camera are
-/// measured: in rooms, halls and Cornell boxes, where guiding gains nothing, it is greater.
+/// Photon maps guided towards the camera are measured only if the picture can use less than this fraction of
+/// the photons of an unguided map. In rooms, halls and Cornell boxes, where guiding gains nothing, the
+/// fraction is greater.
 const MAX_USED_SHARE: f64 = 0.3;
-/// Photons of the smaller map; the larger one has four times as many.
+/// Number of photons of the smaller map. The larger map has four times as many.
 const FEW_PHOTONS: usize = 16_384;
 const MORE: usize = 4;
-/// Seeds of a pair of renders, and of the photons: of none of the picture's random numbers, so that pictures
-/// of all seeds have equal settings.
+/// Seeds of a pair of renders and of their photons. They differ from the picture's seed, so that the settings
+/// do not depend on that.
 const SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
 const PHOTON_SEED: u32 = 0x5eed_0003;
-/// Minimum side of the picture, pixels: tiles of smaller ones would overlap.
+/// Minimum side of the picture, pixels. In a smaller picture tiles would overlap.
 const MIN_SIDE: u32 = SPREAD.cells * SPREAD.side;
-/// Numbers of rays that are compared.
+/// Numbers of shadow rays that are compared.
 pub(super) const SHADOW_RAYS: [u32; 2] = [1, 4];
 const GATHER_RAYS: [u32; 2] = [8, 32];
 
-/// Variances and errors that the settings follow from, relative to the radiance of the pixels.
+/// Variances and errors from which the settings follow, relative to the radiance of the pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Variances {
-    /// Variance of a sample by its place: by edges and textures in a pixel. A lower bound: strata make that
-    /// of several rays less than `v / n`.
+    /// Variance of a sample caused by its position, at edges and textures in a pixel. It is a lower bound,
+    /// because strata make the variance by several rays less than `v / n`.
     pub(super) place: f64,
-    /// Variance of a sample by one shadow ray.
+    /// Variance of a sample caused by one shadow ray.
     pub(super) shadow_ray: f64,
-    /// Variance of a sample by one gather ray.
+    /// Variance of a sample caused by one gather ray.
     pub(super) gather_ray: f64,
-    /// Mean squared error that a map of one photon would make in the light of 4x4 pixels, by the law `1 / N`.
+    /// Mean squared error in the light of 4x4 pixels, extrapolated to a map of one photon by the law `1 / N`.
     pub(super) photon: f64,
-    /// Maps for the camera; `None` where the camera uses most photons anyway, or photons are stated to be for
-    /// either.
+    /// Errors of maps for the camera; `None` if the camera uses most photons anyway, or the user stated for
+    /// which cameras photons are.
     pub(super) for_camera: Option<ForCamera>,
-    /// Share of the samples that see a surface with a Lambertian part.
+    /// Fraction of the samples that see a surface with a Lambertian part.
     pub(super) lambertian: f64,
-    /// Number of gather rays that a pixel costs for each one of its own: those of irradiance records, and of
-    /// samples between which nothing is interpolated.
+    /// Number of gather rays that a pixel costs per gather ray setting: rays of irradiance records, and of
+    /// samples without interpolation.
     pub(super) gather_rays_per_ray: f64,
     /// Radiance of the median pixel, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
@@ -70,14 +71,15 @@ pub(super) struct Variances {
 pub(super) struct ForCamera {
     /// [`Variances::photon`] of a map for the camera.
     pub(super) photon: f64,
-    /// Squared error of a map for the camera over that of one of as many photons for any camera, blur
-    /// included: where few photons are used, two maps for any camera are blurred alike, and differ by less
-    /// than they err.
+    /// Ratio of the squared errors, including blur, of a map for the camera and of a map of as many photons
+    /// for any camera. If few photons are used, two maps for any camera are blurred alike, and their
+    /// difference is less than their error.
     pub(super) ratio: f64,
 }
 
 impl ForCamera {
-    /// Errors by maps of fewer and more photons for the camera, and the map of more photons for any camera.
+    /// Computes the errors from maps with fewer and with more photons for the camera, and the map with more
+    /// photons for any camera.
     fn new(best: &[Pixels; 2], [few, more]: [Pixels; 2], of_scene: &Pixels) -> Self {
         let photon = of_photon(best, [&few, &more]);
         let own = photon / (MORE * FEW_PHOTONS) as f64;
@@ -89,7 +91,7 @@ impl ForCamera {
 /// Renders the pilots of a picture.
 ///
 /// # Errors
-/// If photons cannot be traced, the settings have no possible camera, or the observer stops the render.
+/// If photons cannot be traced, the settings have no valid camera, or the observer stops the render.
 pub(super) fn measure(
     scene: &Scene,
     packed: &PackedScene,
@@ -154,16 +156,16 @@ pub(super) fn measure(
     })
 }
 
-/// Variance of a sample by one ray, from a pair of renders by fewer `rays` and the best pair. The variance by
-/// `n` rays is `a + v / n`, with `a` that of the places of the samples and of other rays: two numbers of rays
-/// give `v`.
+/// Variance of a sample caused by one ray, from a pair of renders with fewer `rays` and the best pair. The
+/// variance with `n` rays is `a + v / n`, where `a` is caused by positions of samples and other rays; two
+/// numbers of rays determine `v`.
 fn of_ray(rays: [u32; 2], noisy: &[Pixels; 2], best: &[Pixels; 2]) -> f64 {
     let [more, less] = of_pairs([noisy, best]);
     ((more - less) / (1.0 / f64::from(rays[0]) - 1.0 / f64::from(rays[1]))).max(0.0)
 }
 
-/// Variances of a sample in pairs of renders, where all see a surface, relative to the radiance in the last
-/// pair.
+/// Variances of a sample in pairs of renders, over pixels that see a surface in all of them, relative to the
+/// radiance in the last pair.
 fn of_pairs<const N: usize>(pairs: [&[Pixels; 2]; N]) -> [f64; N] {
     let seen: Vec<usize> = pixels_with_surfaces(&pairs).collect();
     let radiances = |pixels: &Pixels| seen.iter().map(|&pixel| pixels.radiance(pixel)).collect::<Vec<_>>();
@@ -173,7 +175,7 @@ fn of_pairs<const N: usize>(pairs: [&[Pixels; 2]; N]) -> [f64; N] {
     pairs.map(|[first, second]| 0.5 * levels.mean_square(first, second))
 }
 
-/// Pixels that see a surface in all renders.
+/// Indices of the pixels that see a surface in all renders.
 fn pixels_with_surfaces(pairs: &[&[Pixels; 2]]) -> impl Iterator<Item = usize> {
     let pixels = pairs.first().map_or(0, |[first, _]| first.direct.len());
     (0..pixels).filter(move |&pixel| pairs.iter().copied().flatten().all(|pixels| pixels.is_seen[pixel]))
@@ -195,13 +197,13 @@ fn deviations(pair: &[Pixels; 2]) -> Deviations {
     }))
 }
 
-/// Mean squared error of tiles by a map of one photon, from the difference of two maps of fewer and more
-/// photons whose errors are independent.
+/// Mean squared error of tiles, extrapolated to a map of one photon, from the difference of two maps with
+/// fewer and more photons whose errors are independent.
 fn of_photon(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     difference(best, maps) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
 }
 
-/// Mean squared difference of tiles by two maps.
+/// Mean squared difference of tiles between two maps.
 fn difference(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     // All tiles are of equal size.
     let pixels_of_tile = (best[0].direct.len() / SPREAD.number()).max(1);
@@ -221,15 +223,15 @@ fn difference(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
     levels.mean_square(first, second)
 }
 
-/// Photon map of a pilot, with the scene, and the threads of its chips.
+/// Photon map of a pilot with its scene, and the threads of its chips.
 struct Pilot<'a> {
     scene: &'a Scene,
     mapped: MappedImage,
     pool: &'a ThreadPool,
     observer: &'a dyn Observer,
-    /// If the picture has a caustic map, which takes that light from gather rays.
+    /// True if the picture has a caustic map, which replaces the caustics of gather rays.
     has_caustics: bool,
-    /// Share of the photons that are where the picture uses any; `None` where nothing follows from it.
+    /// Fraction of the photons that the picture can use; `None` if it is not needed.
     used_share: Option<f64>,
 }
 
@@ -256,7 +258,7 @@ impl<'a> Pilot<'a> {
         Ok(Self { scene, mapped, pool, observer, has_caustics, used_share })
     }
 
-    /// Number of gather rays of tiles with the irradiance cache, for each ray of a pixel.
+    /// Number of gather rays of tiles with the irradiance cache, per gather ray setting of a pixel.
     fn gather_rays_per_ray(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<f64, RenderError> {
         let mut frame = self.frame(settings)?;
         (frame.samples, frame.planned_samples, frame.shadow_rays, frame.gather_rays, frame.seed) =
@@ -267,7 +269,7 @@ impl<'a> Pilot<'a> {
         Ok(rays as f64 / pixels.max(1) as f64)
     }
 
-    /// Renders one sample of each pixel of the tiles, without the irradiance cache.
+    /// Renders one sample of each pixel in the tiles, without the irradiance cache.
     fn render_pixels(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<Pixels, RenderError> {
         let mut frame = self.frame(settings)?;
         (frame.samples, frame.planned_samples, frame.irradiance_error, frame.layers) = (1, 1, None, true);
@@ -290,13 +292,13 @@ impl<'a> Pilot<'a> {
     }
 }
 
-/// Light of the pixels of a pilot render, means over the channels, W/(sr m^2).
+/// Light of the pixels of a pilot render, averaged over channels, W/(sr m^2).
 struct Pixels {
     direct: Vec<f64>,
     indirect: Vec<f64>,
-    /// If the sample gathers: it sees a surface that reflects more than mirror images.
+    /// True for pixels whose sample gathers, because it sees a surface with more than mirror reflection.
     is_seen: Vec<bool>,
-    /// Share of the samples that see a surface with a Lambertian part.
+    /// Fraction of the samples that see a surface with a Lambertian part.
     lambertian: f64,
 }
 
@@ -318,7 +320,7 @@ impl Pixels {
     }
 }
 
-/// Settings of a picture of equal aspect whose sides are at least [`MIN_SIDE`].
+/// Settings of a picture with the same aspect ratio and sides of at least [`MIN_SIDE`] pixels.
 fn enlarged(settings: &RenderSettings) -> RenderSettings {
     let [width, height] = [settings.picture.width, settings.picture.height];
     let factor = MIN_SIDE.div_ceil(width.min(height).max(1));
@@ -328,22 +330,22 @@ fn enlarged(settings: &RenderSettings) -> RenderSettings {
     })
 }
 
-/// A grid of cells over a picture, with a tile in each.
+/// A grid of cells over a picture, with one tile in each cell.
 struct Grid {
-    /// Rows and columns.
+    /// Number of rows and of columns.
     cells: u32,
     /// Side of a tile, pixels.
     side: u32,
 }
 
 impl Grid {
-    /// Number of tiles.
+    /// Number of tiles in the grid.
     const fn number(&self) -> usize {
         (self.cells * self.cells) as usize
     }
 
-    /// Tiles of equal size in a window, each at a place in its cell by a hash; fewer, or of the window's
-    /// size, if that is small.
+    /// Tiles of equal size in a window, each at a hashed position in its cell. In a small window there are
+    /// fewer tiles, or one of the window's size.
     fn tiles(&self, window: Window) -> Vec<Tile> {
         let side = self.side;
         let [width, height] = [window.width(), window.height()];

@@ -1,9 +1,9 @@
-//! Relative mean squares of differences between renders, of most pixels.
+//! Relative mean squared differences between renders, over most pixels.
 
-/// Share of the greatest squares that is left out: a few bright pixels would outweigh all others.
+/// Fraction of the greatest squares that is omitted, because a few bright pixels would outweigh all others.
 const LEFT_OUT: f64 = 0.02;
-/// Levels that differences are relative to: each pixel's radiance, or the median of the lit ones where it is
-/// darker, as noise in the dark is seen less.
+/// Levels to which differences are relative: the radiance of each pixel, or the median of the lit pixels if
+/// that is greater, because noise in the dark is less visible.
 pub(super) struct Levels {
     levels: Vec<f64>,
     median: f64,
@@ -19,7 +19,7 @@ impl Levels {
         Self { levels: radiances.into_iter().map(|radiance| radiance.max(median)).collect(), median }
     }
 
-    /// Median of the lit pixels; 1 for a black picture.
+    /// Median radiance of the lit pixels; 1 for a black picture.
     pub(super) fn median(&self) -> f64 {
         self.median
     }
@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn a_few_bright_pixels_do_not_count() {
+    fn the_brightest_pixels_are_omitted() {
         let levels = Levels::new([1.0; 100]);
         let mut noisy = [1.1; 100];
         noisy[7] = 1e6;

@@ -1,4 +1,4 @@
-//! Test of a chip's arithmetic: its results are compared, bit for bit, with the host's.
+//! Test of a chip's arithmetic. Its results are compared, bit for bit, with the host's.
 
 use std::f32::consts::PI;
 
@@ -11,12 +11,12 @@ use photoncard_shared::message::{CASES_PER_COMMAND, RESULTS};
 use super::bench::Bench;
 use crate::greeting::GreetingError;
 
-/// Test of a chip's arithmetic.
+/// Result of the test of a chip's arithmetic.
 #[derive(Clone, Debug)]
 pub struct ArithmeticTest {
     /// Number of operand triples.
     pub cases: usize,
-    /// Number of compared results.
+    /// Number of results that were compared.
     pub results: usize,
     /// Expressions with wrong results.
     pub wrong: Vec<WrongResults>,
@@ -25,11 +25,11 @@ pub struct ArithmeticTest {
 /// Wrong results of an expression.
 #[derive(Clone, Copy, Debug)]
 pub struct WrongResults {
-    /// The expression, of the operands `a`, `b` and `c`.
+    /// Expression in the operands `a`, `b` and `c`.
     pub expression: &'static str,
     /// Number of wrong results.
     pub count: usize,
-    /// The first of them.
+    /// The first wrong result.
     pub first: WrongResult,
 }
 
@@ -45,7 +45,7 @@ pub struct WrongResult {
 }
 
 impl WrongResult {
-    /// Likely cause of the difference, if it is one of those that compilers and processors have.
+    /// Likely cause of the difference, if it is typical of compilers or processors.
     pub fn cause(&self) -> Option<&'static str> {
         let [a, b, c] = self.operands;
         let [expected, found] = [self.expected, self.found].map(f32::from_bits);
@@ -63,7 +63,7 @@ impl WrongResult {
     }
 }
 
-/// Runs the test.
+/// Runs the test of a chip's arithmetic.
 pub(super) fn test<P: Port>(bench: &mut Bench<P>) -> Result<ArithmeticTest, GreetingError> {
     let cases = cases();
     let mut wrong: [Option<WrongResults>; RESULTS] = [None; RESULTS];
@@ -103,11 +103,11 @@ fn operand_bytes(operands: &[f32; 3]) -> [u8; 12] {
     bytes
 }
 
-/// Number of cases of random operands.
+/// Number of cases with random operands.
 const RANDOM_CASES: u32 = 240;
 
-/// Operands of the test: those that tell a fused multiply-add, flushed denormal numbers and another rounding,
-/// and random ones.
+/// Operands of the test: some that reveal fused multiply-adds, flushed denormal numbers or another rounding
+/// mode, and random ones.
 fn cases() -> Vec<[f32; 3]> {
     let ulp = f32::EPSILON;
     let denormal = f32::MIN_POSITIVE / 2.0;

@@ -1,4 +1,4 @@
-//! A card under test, its link and its clock.
+//! A card under test, with its link and its clock.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ use crate::exchange::exchange;
 use crate::greeting::GreetingError;
 use crate::{CardError, Observer};
 
-/// Card under test.
+/// A card under test.
 pub(super) struct Bench<'a, P> {
     pub(super) session: Session,
     port: &'a mut P,
@@ -20,7 +20,7 @@ pub(super) struct Bench<'a, P> {
 }
 
 impl<'a, P: Port> Bench<'a, P> {
-    /// A card that has said hello in `session`.
+    /// Bench of a card that answered the greeting in `session`.
     pub(super) fn new(session: Session, port: &'a mut P, start: Instant, observer: &'a dyn Observer) -> Self {
         let resets = session.link_bytes().resets;
         Self { session, port, start, resets, observer }
@@ -30,7 +30,7 @@ impl<'a, P: Port> Bench<'a, P> {
         self.start.elapsed()
     }
 
-    /// Waits for the next result.
+    /// Waits for the next event of the session.
     pub(super) fn next_event(&mut self) -> Result<Event, GreetingError> {
         loop {
             if let Some(event) = self.session.next_event() {

@@ -1,4 +1,4 @@
-//! Test of card memory: patterns, their times and their wrong words.
+//! Test of card memory: its patterns with their times and wrong words.
 
 use std::time::Duration;
 
@@ -11,20 +11,20 @@ use super::bench::Bench;
 use crate::Phase;
 use crate::greeting::GreetingError;
 
-/// Test of a memory by one pattern.
+/// Result of the test of a memory with one pattern.
 #[derive(Clone, Copy, Debug)]
 pub struct PatternTest {
     /// The pattern.
     pub pattern: MemoryPattern,
-    /// Time of writing it over the memory, as the host measures it.
+    /// Time to write the pattern over the whole memory, measured by the host.
     pub write: Duration,
-    /// Time of reading it back.
+    /// Time to read the pattern back, measured by the host.
     pub check: Duration,
-    /// Words that hold another value.
+    /// Words whose value differs from the written one.
     pub wrong: WrongWords,
 }
 
-/// Runs the test. Returns the lines of the memory, and its patterns.
+/// Runs the test of card memory. Returns the number of lines of the memory, and the results of its patterns.
 pub(super) fn test<P: Port>(bench: &mut Bench<P>) -> Result<(u32, Vec<PatternTest>), GreetingError> {
     let mut patterns = Vec::new();
     bench.session.test_memory(bench.now());
@@ -48,7 +48,7 @@ pub(super) fn test<P: Port>(bench: &mut Bench<P>) -> Result<(u32, Vec<PatternTes
     }
 }
 
-/// Bytes that were written or read, and those of the whole test.
+/// Number of bytes written or read so far, and in the whole test.
 fn bytes(progress: &MemoryTest) -> (u64, u64) {
     let MemoryTest { lines, pattern, written, checked, .. } = *progress;
     let [lines, written, checked] = [lines, written, checked].map(u64::from);

@@ -1,4 +1,4 @@
-//! Self-test of a card, for the bring-up of a board: its arithmetic, and its memory.
+//! Self-test of a card's arithmetic and memory, for the bring-up of a board.
 
 mod arithmetic;
 mod bench;
@@ -16,21 +16,21 @@ pub use self::memory::PatternTest;
 use super::greeting::{GreetingError, greet_port, open};
 use super::{CardAddress, Observer, RenderError};
 
-/// Outcome of a card's self-test.
+/// Result of a card's self-test.
 #[derive(Clone, Debug)]
 pub struct SelfTest {
     /// Capacities and limits of the chip.
     pub budget: Budget,
-    /// Arithmetic of the chip, compared with the host's.
+    /// Result of the arithmetic test.
     pub arithmetic: ArithmeticTest,
-    /// Lines of card memory, all of which were tested.
+    /// Number of lines of card memory. All were tested.
     pub lines: u32,
-    /// Patterns of card memory, in the order of the test.
+    /// Results of the memory test by pattern, in the order of the test.
     pub patterns: Vec<PatternTest>,
 }
 
 impl SelfTest {
-    /// Bytes of card memory.
+    /// Size of card memory, bytes.
     pub fn memory_bytes(&self) -> u64 {
         u64::from(self.lines) * LINE_BYTES as u64
     }
@@ -40,8 +40,7 @@ impl SelfTest {
         self.memory_bytes() < u64::from(self.budget.dram_bytes)
     }
 
-    /// Returns whether all results are equal, all words right, and the memory is as large as the budget
-    /// states.
+    /// Returns whether all results and all words are right, and the memory is as large as the budget states.
     pub fn is_passed(&self) -> bool {
         self.arithmetic.wrong.is_empty()
             && self.patterns.iter().all(|pattern| pattern.wrong.count == 0)
@@ -49,8 +48,8 @@ impl SelfTest {
     }
 }
 
-/// Tests the first card at an address. The card forgets its scene. The observer receives the bytes of memory
-/// that were written or read.
+/// Tests the first card at an address. The card forgets its scene. The observer is notified of the number of
+/// memory bytes written or read.
 ///
 /// # Errors
 /// If the card cannot be started or reached, its reply is invalid, it is reset, or the observer stops the
@@ -59,10 +58,10 @@ pub fn card_self_test(address: &CardAddress, observer: &dyn Observer) -> Result<
     self_test_on(&mut open(address)?, &address.name_of(0), observer)
 }
 
-/// Tests the card at the other end of a port, like [`card_self_test`]; `card` is its name in errors.
+/// Tests the card at the other end of a port, like [`card_self_test`]. `card` is its name in errors.
 ///
 /// # Errors
-/// As of [`card_self_test`].
+/// As [`card_self_test`].
 pub fn self_test_on(
     port: &mut impl Port,
     card: &str,

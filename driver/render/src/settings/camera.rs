@@ -1,4 +1,4 @@
-//! Camera of the picture: the scene's, as far as the settings do not place, turn or zoom it.
+//! Camera of the picture: the scene's camera, unless the settings move, turn or zoom it.
 
 use glam::{DVec3, Vec3};
 use photoncard_scene::error::SceneError;
@@ -11,11 +11,11 @@ use crate::error::RenderError;
 const VERTICAL: f64 = 1e-6;
 
 impl RenderSettings {
-    /// Camera of the picture. Each of [`Picture::camera_at`], [`Picture::look_at`] and [`Picture::fov`]
-    /// replaces what the scene's camera states, and leaves the rest as it is.
+    /// Determines the camera of the picture. [`Picture::camera_at`], [`Picture::look_at`] and
+    /// [`Picture::fov`] each replace a property of the scene's camera; its other properties stay.
     ///
     /// # Errors
-    /// If the scene has no camera of the name, or the values are not those of a camera.
+    /// If the scene has no camera with this name, or the values are not valid for a camera.
     pub fn camera(&self, scene: &Scene) -> Result<Camera, RenderError> {
         let Picture { camera, camera_at, look_at, fov, .. } = &self.picture;
         // Of an orthographic camera that is placed and turned anew nothing is left.
@@ -41,8 +41,9 @@ impl RenderSettings {
     }
 }
 
-/// Right, up and forward of a camera whose up is in the plane of its direction and +y. Along +y and -y, where
-/// there is no such plane, right is +x, as of a camera that is tilted from -z, glTF's own direction.
+/// Right, up and forward vectors of a camera whose up vector is in the plane of its direction and +y. For
+/// directions +y and -y, where there is no such plane, right is +x, as if the camera were tilted from glTF's
+/// default direction -z.
 fn upright(forward: DVec3) -> [DVec3; 3] {
     let right = forward.cross(DVec3::Y);
     let right = if right.length() < VERTICAL { DVec3::X } else { right.normalize() };
@@ -50,7 +51,7 @@ fn upright(forward: DVec3) -> [DVec3; 3] {
     [forward.cross(up), up, forward]
 }
 
-/// Field of view in radians.
+/// Converts a field of view from degrees to radians.
 fn field_of_view(degrees: f32) -> Result<f32, RenderError> {
     let radians = degrees.to_radians();
     let half = libm::tanf(0.5 * radians);
@@ -65,7 +66,7 @@ fn field_of_view(degrees: f32) -> Result<f32, RenderError> {
     })
 }
 
-/// Place in the scene of coordinates in its file.
+/// Converts coordinates of the scene's file to a position in the scene.
 fn placed(option: &'static str, place: [f64; 3], scene: &Scene) -> Result<Vec3, RenderError> {
     let place = DVec3::from_array(place);
     let placed = scene.in_scene(place);
@@ -112,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_given_is_the_scenes() {
+    fn unstated_properties_are_those_of_the_scenes_camera() {
         let own = scene().cameras.remove(0);
         assert_eq!(camera(|_| ()).unwrap(), own);
         let moved = camera(|picture| picture.camera_at = Some([4.0, 5.0, 6.0])).unwrap();
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn straight_up_and_down_the_right_is_that_of_a_camera_tilted_from_minus_z() {
+    fn a_vertical_view_has_the_right_vector_of_a_camera_tilted_from_minus_z() {
         for (y, top) in [(-1.0, Vec3::NEG_Z), (1.0, Vec3::Z)] {
             for (x, z) in [(0.0, 0.0), (1e-8, -1e-8)] {
                 let view = |picture: &mut Picture| {
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_view_is_refused_with_its_option() {
+    fn invalid_views_are_refused_with_their_option() {
         let refused = |option: &str, change: &dyn Fn(&mut Picture)| match camera(change) {
             Err(RenderError::Setting { option: found, .. }) => assert_eq!(found, option),
             other => panic!("{other:?}"),

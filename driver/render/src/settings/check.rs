@@ -1,4 +1,4 @@
-//! The settings against each other, and against what a card can hold.
+//! Checks settings against each other, and against the capacities of cards.
 
 use photoncard_firmware::card::MAX_PICTURE_SIDE;
 use photoncard_picture::choice::Choice;
@@ -10,14 +10,15 @@ use crate::address::{CardAddress, check_chips, first_remote, is_one_emulated_chi
 use crate::emulator::EmulatedKind;
 use crate::error::RenderError;
 
-/// Photons that a gather of caustics looks for at the least.
+/// Minimum number of photons that a gather in the caustic map searches for.
 const MIN_CAUSTIC_NEIGHBORS: u32 = 8;
 
 /// Maximum number of photons.
 const MAX_PHOTONS: usize = 1 << 27;
 
 impl RenderSettings {
-    /// Checks what needs no card to be known: each setting alone, and against the others.
+    /// Checks everything that does not depend on a card: each setting by itself, and combinations of
+    /// settings.
     ///
     /// # Errors
     /// The first setting that is not possible on any card.
@@ -45,10 +46,10 @@ impl RenderSettings {
         budgets.iter().try_for_each(|budget| self.check_budget(budget))
     }
 
-    /// Checks the settings against what a card can hold.
+    /// Checks the settings against the budget of a card.
     ///
     /// # Errors
-    /// The first setting that is not possible on the card.
+    /// The first setting that is not possible on this card.
     pub fn check_budget(&self, budget: &Budget) -> Result<(), RenderError> {
         on_card("--neighbors", self.photons.neighbors, 2, budget.neighbors)?;
         if self.photons.caustic_photons != Some(0) {
@@ -69,7 +70,7 @@ impl RenderSettings {
         self.check_tile_with_layers(budget)
     }
 
-    /// Checks that the error of interpolated irradiance is one, if any is interpolated.
+    /// Checks that the error bound of interpolated irradiance is valid, if there is one.
     fn check_irradiance_error(&self) -> Result<(), RenderError> {
         match self.integrator.irradiance_error {
             Some(error) if !(MIN_IRRADIANCE_ERROR..=1.0).contains(&error) => Err(RenderError::Setting {
@@ -82,7 +83,7 @@ impl RenderSettings {
         }
     }
 
-    /// Checks that the greatest distance of a gather is one, if it is given.
+    /// Checks that the maximum distance of a gather is valid, if it is stated.
     fn check_max_distance(&self) -> Result<(), RenderError> {
         match self.photons.max_distance {
             Some(distance) if !(distance.is_finite() && distance > 0.0) => Err(RenderError::Setting {
@@ -95,7 +96,7 @@ impl RenderSettings {
         }
     }
 
-    /// Checks that the threshold of adaptive sampling is one, if there is any.
+    /// Checks that the threshold of adaptive sampling is valid, if there is one.
     fn check_adaptive_threshold(&self) -> Result<(), RenderError> {
         match self.integrator.adaptive_threshold {
             Some(threshold) if !(threshold.is_finite() && threshold > 0.0) => Err(RenderError::Setting {
@@ -108,7 +109,7 @@ impl RenderSettings {
         }
     }
 
-    /// Checks that a chip has room for a tile with layers, if the picture has layers of chips.
+    /// Checks that a chip has room for a tile with layers, if the picture has layers that chips render.
     fn check_tile_with_layers(&self, budget: &Budget) -> Result<(), RenderError> {
         let most = budget.pixels_of_tile(self.picture.layers.are_of_chip()).isqrt();
         let side = self.schedule.tile.unwrap_or(1);
@@ -132,10 +133,10 @@ impl RenderSettings {
         })
     }
 
-    /// Checks that the reads of the cards can be traced, if they are to be.
+    /// Checks that the reads of the cards can be traced, if a trace is requested.
     ///
     /// # Errors
-    /// If there is no one order of them.
+    /// If the reads have no unique order.
     fn check_trace(&self) -> Result<(), RenderError> {
         let Some(trace) = &self.cards.trace else { return Ok(()) };
         let refuse = |reason: &str, remedy: &str| {
@@ -170,7 +171,7 @@ impl RenderSettings {
         Ok(())
     }
 
-    /// Checks that the memory of every card can be modelled, if it is to be.
+    /// Checks that the memory of every card can be modelled, if a model is requested.
     ///
     /// # Errors
     /// If a card is not emulated in this process.
@@ -186,10 +187,11 @@ impl RenderSettings {
         }
     }
 
-    /// Checks that there are tiles to go on with: an order of the whole frame completes all tiles at once.
+    /// Checks that a render can be resumed, if requested. An order of the whole frame completes all tiles at
+    /// the end, so that there are none to resume from.
     ///
     /// # Errors
-    /// If the render is to be resumed in such an order.
+    /// If a render in such an order is to be resumed.
     fn check_resume(&self) -> Result<(), RenderError> {
         let resumes = self.outputs.partial.as_ref().is_some_and(|partial| partial.resume);
         if !(resumes && self.schedule.order.is_of_whole_frame()) {
@@ -204,7 +206,7 @@ impl RenderSettings {
     }
 }
 
-/// Checks that a value lies in a range that is the same for every card.
+/// Checks that a value is in a range that all cards share.
 fn within(option: &'static str, value: u64, least: u64, most: u64) -> Result<(), RenderError> {
     if (least..=most).contains(&value) {
         return Ok(());
@@ -215,7 +217,7 @@ fn within(option: &'static str, value: u64, least: u64, most: u64) -> Result<(),
     Err(RenderError::Setting { option, value: value.to_string(), reason, remedy })
 }
 
-/// Checks that a value lies in the range of a card.
+/// Checks that a value is in the range of one card.
 fn on_card(option: &'static str, value: u32, least: u32, most: u32) -> Result<(), RenderError> {
     if (least..=most).contains(&value) {
         return Ok(());
@@ -255,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn a_card_without_room_for_any_value_is_to_be_another() {
+    fn another_card_is_suggested_where_no_value_fits() {
         let settings = RenderSettings::default();
         settings.check_budget(&REFERENCE).unwrap();
         for (option, budget) in [
@@ -282,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_used_needs_no_room() {
+    fn unused_techniques_need_no_capacity() {
         let few = Budget { neighbors: 7, gather_queue: 0, ..REFERENCE };
         let settings = RenderSettings {
             photons: PhotonMaps { neighbors: 7, ..PhotonMaps::default() },

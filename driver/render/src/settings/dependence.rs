@@ -1,7 +1,7 @@
-//! Settings by the names of their options, in lists: those that pixels depend on, those that only the work
-//! depends on, and those of the cards.
+//! Lists of settings by option names: those that pixels depend on, those that only the work depends on, and
+//! those of the cards.
 //!
-//! The lists destructure the groups field by field, so that a new field cannot be forgotten.
+//! The lists destructure the groups field by field, so that no new field can be forgotten.
 
 use photoncard_picture::choice::Choice;
 use photoncard_scene::{FixedScene, Scene};
@@ -11,11 +11,11 @@ use serde_json::{Map, Value, json};
 use super::RenderSettings;
 use super::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
 
-/// Values by the names of their options.
+/// Values by option names.
 pub type NamedSettings = Map<String, Value>;
 
 impl RenderSettings {
-    /// All settings that pixels depend on.
+    /// Settings that pixels depend on.
     pub fn of_pixels(&self) -> NamedSettings {
         let Self { picture, photons, integrator, schedule, cards, outputs } = self;
         let Schedule {
@@ -83,8 +83,8 @@ impl RenderSettings {
         settings
     }
 
-    /// Every setting that a chip's work and memory traffic depend on besides the kind of chip and its caches,
-    /// and no pixel; for a picture of its own.
+    /// Settings that a chip's work and memory traffic depend on, but no pixel, without the kind of chip and
+    /// its caches. They describe a picture that is not part of a series.
     pub fn of_work(&self) -> NamedSettings {
         let Self { picture: _, photons, integrator: _, schedule, cards: _, outputs: _ } = self;
         let PhotonMaps {
@@ -108,7 +108,7 @@ impl RenderSettings {
         ])
     }
 
-    /// Settings of cards, of their links and of the model of their memory. No pixel depends on them.
+    /// Settings of cards, their links, and the model of their memory. No pixel depends on them.
     pub fn of_cards(&self) -> NamedSettings {
         let CardSet { addresses, faults, verify, caches: _, trace: _ } = &self.cards;
         let addresses: Vec<_> = addresses.iter().map(ToString::to_string).collect();
@@ -125,12 +125,12 @@ impl RenderSettings {
         self.identity_of(&scene.into())
     }
 
-    /// [`Self::identity`] for a scene that stays as it is.
+    /// Does [`Self::identity`] for a scene that does not change between pictures.
     pub fn identity_of(&self, scene: &FixedScene) -> NamedSettings {
         self.resolved_if(scene.is_specular()).identity_with(scene.checksum())
     }
 
-    /// [`Self::identity`] of settings that are [`Self::resolved`], and of a scene of this checksum.
+    /// Does [`Self::identity`] for [resolved](Self::resolved) settings and a scene with this checksum.
     pub fn identity_with(&self, checksum: &str) -> NamedSettings {
         let mut identity = self.of_pixels();
         identity.extend(named([

@@ -1,5 +1,5 @@
-//! The groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated
-//! reference chip.
+//! Groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated reference
+//! chip.
 
 use photoncard_cards::link::LineFaults;
 use photoncard_cards::scheduler::GatherOrder;
@@ -17,7 +17,7 @@ use crate::emulator::trace::TraceSettings;
 use crate::partial::PartialSettings;
 use crate::parts::Part;
 
-/// The picture and the camera that sees it.
+/// Picture, and the camera that sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Width, pixels.
@@ -26,23 +26,24 @@ pub struct Picture {
     pub height: u32,
     /// Window to render; `None` for the whole picture.
     pub crop: Option<Window>,
-    /// Name of the camera; `None` for the first.
+    /// Name of the camera; `None` for the scene's first.
     pub camera: Option<String>,
-    /// Place of the camera in the coordinates of the scene's file, metres; `None` for its own.
+    /// Position of the camera in the coordinates of the scene's file, metres; `None` for the camera's own.
     pub camera_at: Option<[f64; 3]>,
-    /// Place in the middle of the picture, likewise, with +y upwards; `None` for the camera's own direction.
+    /// Position that appears in the middle of the picture, in the coordinates of the scene's file, metres,
+    /// with +y upwards; `None` for the camera's own direction.
     pub look_at: Option<[f64; 3]>,
     /// Vertical field of view, degrees; `None` for the camera's own.
     pub fov: Option<f32>,
-    /// Layers of the picture besides radiance.
+    /// Layers of the picture in addition to radiance.
     pub layers: Layers,
     /// Pixel filter.
     pub filter: Filter,
 }
 
 impl Picture {
-    /// Returns whether place and direction of the camera are stated, so that nothing of the file's view is
-    /// left.
+    /// Returns whether both position and direction of the camera are stated, so that the file's view has no
+    /// influence.
     pub fn states_view(&self) -> bool {
         self.camera_at.is_some() && self.look_at.is_some()
     }
@@ -70,7 +71,7 @@ impl Default for Picture {
 pub struct PhotonMaps {
     /// Number of photons in the map.
     pub count: usize,
-    /// Guiding of the photons, by the scene or by the picture's camera.
+    /// Cameras for which photons are traced: any, or the picture's.
     pub photons_for: PhotonsFor,
     /// Layout of the photon map in card memory; no pixel depends on it.
     pub layout: PhotonLayout,
@@ -82,9 +83,9 @@ pub struct PhotonMaps {
     /// [`DEFAULT_CAUSTIC_PHOTONS`](super::DEFAULT_CAUSTIC_PHOTONS) if the scene has a specular surface, and
     /// no map otherwise.
     pub caustic_photons: Option<usize>,
-    /// Number of photons that a gather of caustics searches for.
+    /// Number of photons that a gather in the caustic map searches for.
     pub caustic_neighbors: u32,
-    /// Estimate of the radiance at the ends of gather rays.
+    /// Source of the reflected radiance at the ends of gather rays.
     pub radiance: Radiance,
 }
 
@@ -103,7 +104,7 @@ impl Default for PhotonMaps {
     }
 }
 
-/// Estimation of light by rays.
+/// Parameters of light estimation by rays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Integrator {
@@ -111,25 +112,26 @@ pub struct Integrator {
     pub seed: u32,
     /// Number of samples per pixel.
     pub samples: u32,
-    /// Number of samples per pixel among which the irradiance cache divides the gather rays of a pixel;
-    /// `None` for `samples`. It is equal in all passes of a picture.
+    /// Planned number of samples per pixel, among which the irradiance cache divides the gather rays of a
+    /// pixel; `None` for `samples`. It is equal in all passes of a picture.
     pub planned_samples: Option<u32>,
-    /// Number of final gather rays per sample; with an irradiance cache per record, and per pixel of other
-    /// samples.
+    /// Number of final gather rays per sample. With an irradiance cache: per record, and per pixel for
+    /// samples without interpolation.
     pub gather_rays: u32,
     /// Number of shadow rays per sample.
     pub shadow_rays: u32,
-    /// Sampling density of the directions of gather rays.
+    /// Importance sampling of final gather rays.
     pub sampling: Sampling,
-    /// Maximum relative error of interpolated irradiance; `None` to interpolate none.
+    /// Error bound of interpolated irradiance, relative; `None` to interpolate none.
     pub irradiance_error: Option<f32>,
-    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m): samples of a pixel whose first ones deviate by
-    /// more, over the root of their mean, are means of several paths. `None` for one path a sample.
+    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m); `None` for one path per sample. Later samples of
+    /// a pixel are means of several paths if the standard deviation of its first samples, divided by the
+    /// square root of their mean, exceeds it.
     pub adaptive_threshold: Option<f32>,
 }
 
 impl Integrator {
-    /// Number of samples per pixel that rays are divided among.
+    /// Number of samples per pixel among which rays are divided.
     pub fn planned(&self) -> u32 {
         self.planned_samples.unwrap_or(self.samples)
     }
@@ -153,7 +155,7 @@ impl Default for Integrator {
 /// Order of the work. No pixel depends on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
-    /// Side of a tile, pixels; `None` for one that suits cards and picture
+    /// Side of a tile, pixels; `None` to choose it by cards and picture
     /// ([`tile_side`](super::RenderSettings::tile_side)).
     pub tile: Option<u32>,
     /// Order of the photon gathers.
@@ -163,16 +165,16 @@ pub struct Schedule {
     /// Maximum number of gathers that wait on a chip, for orders with a queue; `None` for the chip's
     /// capacity.
     pub queue: Option<u32>,
-    /// Maximum number of tiles in flight on a chip; `None` for the chip's own.
+    /// Maximum number of tiles in flight on a chip; `None` for the chip's capacity.
     pub in_flight: Option<u32>,
-    /// Pixel near which tiles are rendered first; `None` to spread them over the picture. With modelled
-    /// memory it has no effect.
+    /// Pixel near which tiles are rendered first; `None` to spread tiles over the picture. It has no effect
+    /// with modelled memory.
     pub focus: Option<[u32; 2]>,
-    /// Part of the picture to render; `None` for all of it.
+    /// Part of the picture to render; `None` for the whole picture.
     pub part: Option<Part>,
-    /// `true` for one of several pictures whose samples are added
-    /// ([`Renderer::refine`](crate::Renderer::refine)): cards keep irradiance records between them, each in
-    /// its memory beyond the image. Not with `verify`, which compares the work of cards.
+    /// True if the picture is one of several whose samples are added
+    /// ([`Renderer::refine`](crate::Renderer::refine)). Cards then keep irradiance records between pictures,
+    /// in their memory beyond the image. It has no effect with `verify`, which compares the work of cards.
     pub keep_records: bool,
 }
 
@@ -191,24 +193,24 @@ impl Default for Schedule {
     }
 }
 
-/// Cards that render, with tests and models of them. No pixel depends on them.
+/// Cards that render, and tests and models of them. No pixel depends on these settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CardSet {
     /// Addresses of the cards.
     pub addresses: Vec<CardAddress>,
-    /// Injected faults of the links to the cards; `None` for no faults.
+    /// Faults injected into the links to the cards; `None` for no faults.
     pub faults: Option<LineFaults>,
-    /// Share of the tiles that two cards render for comparison; `None` for no tile.
+    /// Fraction of the tiles that two cards render for comparison; `None` for no tiles.
     pub verify: Option<f64>,
-    /// Caches of the memory model; `None` to model none, which costs nothing.
+    /// Caches of the memory model; `None` for no model, which has no cost.
     pub caches: Option<CacheSettings>,
-    /// Trace of every read of the chip. It takes a single chip; without `caches` the default caches are
+    /// Trace of every read of the chip. It requires a single chip. Without `caches` the default caches are
     /// modelled.
     pub trace: Option<TraceSettings>,
 }
 
 impl CardSet {
-    /// Number of cards, one chip each.
+    /// Number of cards. Each has one chip.
     pub fn count(&self) -> usize {
         self.addresses.iter().map(|address| address.emulated_chips().max(1)).sum()
     }
@@ -222,7 +224,7 @@ impl CardSet {
         each_card.enumerate().map(|(index, address)| address.name_of(index)).collect()
     }
 
-    /// Caches of the kind of the first emulated card.
+    /// Caches of the first emulated card's kind.
     pub fn own_caches(&self) -> CacheSettings {
         let kind = self.addresses.iter().find_map(|address| match address {
             CardAddress::Emulated { kind, .. } => Some(*kind),
@@ -247,9 +249,9 @@ impl Default for CardSet {
 /// Destinations of finished tiles besides the film. No pixel depends on them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TileOutputs {
-    /// File in which finished tiles are kept until the picture is written; `None` to keep none. Not possible
-    /// with the order [`Hilbert`](GatherOrder::Hilbert), whose tiles are finished at the end together.
+    /// File in which finished tiles are kept until the picture is written; `None` to keep none. It is not
+    /// possible with the order [`Hilbert`](GatherOrder::Hilbert), which finishes all tiles at the end.
     pub partial: Option<PartialSettings>,
-    /// Viewer that shows tiles as they are finished; `None` to show none.
+    /// Viewer that shows tiles as soon as they are finished; `None` for no viewer.
     pub display: Option<DisplaySettings>,
 }

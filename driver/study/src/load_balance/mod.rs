@@ -1,9 +1,9 @@
-//! Load balance of many chips: a simulation of the scheduler over the costs of a picture's tiles.
+//! Load balance of many chips: simulates the scheduler with the costs of a picture's tiles.
 //!
-//! Tiles are dealt by [`Scheduler`] itself, under the policy of [`photoncard_cards::session`]: one queue;
-//! when the host turns to a card, it sends as many tiles as the card has free credits; a chip renders its
-//! tiles in the order of arrival; a tile frees its credit when its result is at the host. A chip is done with
-//! a tile once it has rendered it: the time to send the result is the link's.
+//! The real [`Scheduler`] assigns tiles, with the policy of [`photoncard_cards::session`]: there is one
+//! queue. When the host turns to a card, it sends as many tiles as the card has free credits. A chip renders
+//! its tiles in the order of arrival. A tile frees its credit when its result arrives at the host. A chip is
+//! done with a tile when it has rendered it; the time to send the result belongs to the link.
 //!
 //! Times are whole nanoseconds, and simultaneous events happen in the order of the chips, so that a
 //! simulation gives the same result on every machine.
@@ -22,12 +22,12 @@ use photoncard_cards::scheduler::Scheduler;
 use photoncard_picture::sink::FinishedTile;
 use photoncard_picture::sums::SumFormat;
 
-/// Model of the chips' links, all served by one host, one message at a time.
+/// Model of the chips' links. One host serves all of them, one message at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkModel {
-    /// Time that the host takes for one tile command, seconds.
+    /// Time that the host takes for a tile command, seconds.
     pub command_seconds: f64,
-    /// Time that the host takes for one tile's result, pixels and final message, seconds.
+    /// Time that the host takes for the result of a tile (pixels and final message), seconds.
     pub result_seconds: f64,
     /// Latency of any message, seconds.
     pub latency_seconds: f64,
@@ -38,8 +38,8 @@ pub struct LinkModel {
 pub struct Setup {
     /// Number of chips.
     pub chips: usize,
-    /// Maximum of unanswered tile commands per chip;
-    /// [`Budget::tiles`](photoncard_shared::budget::Budget::tiles).
+    /// Maximum number of unanswered tile commands per chip
+    /// ([`Budget::tiles`](photoncard_shared::budget::Budget::tiles)).
     pub credits: usize,
     /// Model of the links.
     pub link: LinkModel,
@@ -48,76 +48,76 @@ pub struct Setup {
 /// Error of [`simulate`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum LoadBalanceError {
-    /// Error of an empty picture.
+    /// The picture has no tiles.
     #[error("there are no tiles to deal; give the cost of one at least")]
     NoTiles,
-    /// Error of a machine without chips or credits.
+    /// The machine has no chips or no credits.
     #[error("{chips} chips of {credits} credits render nothing; give one of each at least")]
     NoChips {
         /// Number of chips.
         chips: usize,
-        /// Maximum of unanswered tile commands per chip.
+        /// Maximum number of unanswered tile commands per chip.
         credits: usize,
     },
-    /// Error of a time that is negative, above [`MAX_SECONDS`] or NaN.
+    /// A time is negative, above [`MAX_SECONDS`] or NaN.
     #[error("{0} is no time; give seconds from 0 to {MAX_SECONDS}")]
     Time(f64),
 }
 
-/// Maximum time of a tile or of a message, seconds: sums of nanoseconds stay exact.
+/// Maximum time of a tile or a message, seconds. With it, sums of nanoseconds stay exact.
 pub const MAX_SECONDS: f64 = 1e9;
 
-/// Result of a simulation. Times are seconds since the host began to deal.
+/// Result of a simulation. Times are seconds since the host began to assign tiles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Balance {
-    /// Time at which the host has the last result, seconds.
+    /// Time when the host has the last result, seconds.
     pub makespan_seconds: f64,
-    /// Time of all tiles on one chip, without links, seconds.
+    /// Time to render all tiles on one chip, without links, seconds.
     pub work_seconds: f64,
-    /// Time at which each chip is done with its last tile, seconds; 0 for a chip without tiles.
+    /// Time when each chip is done with its last tile, seconds; 0 for a chip without tiles.
     pub chip_seconds: Vec<f64>,
     /// Time that the host spent on messages, seconds.
     pub host_seconds: f64,
-    /// Maximum number of tiles dealt and unanswered at one time, over all chips.
+    /// Maximum number of tiles that were assigned and unanswered at the same time, over all chips.
     pub most_in_flight: usize,
     /// Index of the chip that rendered each tile, in the picture's order.
     pub chip_of_tile: Vec<usize>,
 }
 
 impl Balance {
-    /// Speed-up over one chip without links, `work / makespan`.
+    /// Speed-up over one chip without links: `work / makespan`.
     pub fn speedup(&self) -> f64 {
         if self.makespan_seconds > 0.0 { self.work_seconds / self.makespan_seconds } else { 1.0 }
     }
 
-    /// Parallel efficiency, `speedup / chips`: share of the chips' time until the makespan that they spend on
-    /// rendering.
+    /// Parallel efficiency, `speedup / chips`: fraction of the chips' time until the makespan that they spend
+    /// on rendering.
     pub fn efficiency(&self) -> f64 {
         self.speedup() / self.chip_seconds.len() as f64
     }
 
-    /// Idle share, `1 - efficiency`: chips wait for tiles, or for the last chip.
+    /// Idle fraction, `1 - efficiency`: chips wait for tiles, or for the last chip.
     pub fn idle_share(&self) -> f64 {
         1.0 - self.efficiency()
     }
 
-    /// Time at which the slowest chip is done, seconds.
+    /// Time when the slowest chip is done, seconds.
     pub fn slowest_chip_seconds(&self) -> f64 {
         self.chip_seconds.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Mean over the chips of the time at which they are done, seconds.
+    /// Mean over the chips of the time when they are done, seconds.
     pub fn mean_chip_seconds(&self) -> f64 {
         self.chip_seconds.iter().sum::<f64>() / self.chip_seconds.len() as f64
     }
 }
 
-/// Simulates the dealing of a picture's tiles to chips.
+/// Simulates the assignment of a picture's tiles to chips.
 ///
 /// `costs` are the seconds that a chip takes for each tile, in the picture's order.
 ///
 /// # Errors
-/// If there are no tiles, no chips or no credits, or a time is negative, above [`MAX_SECONDS`] or no number.
+/// If there are no tiles, no chips or no credits, or a time is negative, above [`MAX_SECONDS`] or NaN.
 pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balance, LoadBalanceError> {
     let &Setup { chips, credits, link } = setup;
     if costs.is_empty() {
@@ -147,13 +147,13 @@ pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balanc
 
 #[derive(Clone, Copy, Default)]
 struct Chip {
-    /// Tiles dealt and unanswered.
+    /// Number of tiles that are assigned and unanswered.
     tiles: usize,
-    /// Time at which the chip is done with its tiles.
+    /// Time when the chip is done with its tiles.
     done: u128,
 }
 
-/// State of the simulation; times are nanoseconds.
+/// State of the simulation. Times are in nanoseconds.
 struct Simulation {
     scheduler: Scheduler,
     credits: usize,
@@ -163,9 +163,9 @@ struct Simulation {
     costs: Vec<u128>,
     chips: Vec<Chip>,
     chip_of_tile: Vec<usize>,
-    /// Queue of results in transit: time of arrival at the host, chip and tile.
+    /// Queue of results in transit. Each has the time of arrival at the host, the chip and the tile.
     results: BinaryHeap<Reverse<(u128, usize, u32)>>,
-    /// Time until which the host has worked or waited.
+    /// Time up to which the host has worked or waited.
     now: u128,
     /// Time that the host has spent on messages.
     busy: u128,
@@ -188,8 +188,8 @@ impl Simulation {
         }
     }
 
-    /// Handles the arrival of a result. The scheduler's clock matters only for lost or late cards, of which
-    /// there are none here.
+    /// Handles the arrival of a result. The scheduler's clock, which only matters for lost or late cards, is
+    /// not used.
     fn receive(&mut self, chip: usize, id: u32) {
         let finished =
             FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);

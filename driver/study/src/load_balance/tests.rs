@@ -26,7 +26,7 @@ fn longest(costs: &[f64]) -> f64 {
     costs.iter().copied().fold(0.0, f64::max)
 }
 
-/// The minimum makespan over all assignments of tiles to chips.
+/// Minimum makespan over all assignments of tiles to chips.
 fn best_makespan(costs: &[f64], chips: usize) -> f64 {
     let ways = chips.pow(costs.len() as u32);
     let makespan = |mut way: usize| {
@@ -68,7 +68,7 @@ fn a_second_credit_hides_the_latency_of_the_link() {
     assert!(four.idle_share() <= two.idle_share() + ROUNDING);
 }
 
-/// Of eight tiles for two cards one waits behind the long one, however many credits a card has.
+/// With eight tiles for two cards, one tile waits behind the long one, however many credits a card has.
 #[test]
 fn few_tiles_wait_behind_a_long_one() {
     let mut costs = [1.0; 8];
@@ -77,7 +77,7 @@ fn few_tiles_wait_behind_a_long_one() {
     assert_eq!([makespan(1), makespan(4), makespan(8)], [10.0, 11.0, 11.0]);
 }
 
-/// Chips with credits for four tiles are hardly more idle than those that are dealt one at a time.
+/// Chips with credits for four tiles are hardly more idle than chips that get one tile at a time.
 #[test]
 fn credits_leave_many_chips_busy() {
     let costs: Vec<f64> = (0..1024).map(|tile| 1.0 + f64::from(hash(tile) % 100) / 50.0).collect();
@@ -97,7 +97,7 @@ fn a_busy_host_bounds_the_speed_of_many_chips() {
 }
 
 #[test]
-fn the_longest_first_keeps_the_end_short() {
+fn longest_first_order_shortens_the_end() {
     let mut costs = [1.0; 9];
     costs[8] = 3.0;
     let makespan = |order| balance(&costs, order, 3, 1, NO_LINK).makespan_seconds;
@@ -115,7 +115,7 @@ fn equal_tiles_on_a_divisor_of_chips_leave_none_idle() {
 }
 
 #[test]
-fn what_cannot_be_simulated_is_refused() {
+fn impossible_simulations_are_refused() {
     let simulate = |costs: &[f64], chips, credits, link| {
         simulate(costs, TileOrder::Picture, &Setup { chips, credits, link })
     };
@@ -144,9 +144,9 @@ proptest! {
         prop_assert_eq!(one.speedup(), 1.0);
     }
 
-    /// No schedule beats the longest tile, nor an even share of the work.
+    /// No schedule is faster than the longest tile, nor than an even share of the work.
     #[test]
-    fn no_dealing_beats_the_work(
+    fn no_schedule_is_faster_than_the_work_allows(
         costs in costs(), order in orders(), chips in 1..40_usize, credits in 1..8_usize, latency in 0.0..0.5_f64,
     ) {
         let link = LinkModel { command_seconds: 0.001, result_seconds: 0.002, latency_seconds: latency };
@@ -158,9 +158,9 @@ proptest! {
         prop_assert!(dealt.most_in_flight <= (chips * credits).min(costs.len()));
     }
 
-    /// Graham 1966: no chip idles while a tile waits, so the last tile starts before an even share of the
-    /// rest is done. This requires free links and one credit: a tile that waits on a chip is not available to
-    /// others.
+    /// Graham 1966: no chip is idle while a tile waits, so that the last tile starts before an even share of
+    /// the remaining work is done. This requires links without cost and one credit, because a tile that waits
+    /// on a chip is not available to others.
     #[test]
     fn one_credit_without_links_keeps_grahams_bound(
         costs in costs(), order in orders(), chips in 1..40_usize,
@@ -173,7 +173,7 @@ proptest! {
 
     /// Graham 1969: descending cost takes at most `4/3 - 1/(3 chips)` of the optimal time.
     #[test]
-    fn the_longest_first_is_within_a_third_of_the_best(
+    fn longest_first_order_is_within_a_third_of_the_optimum(
         costs in proptest::collection::vec((0..1000_u32).prop_map(|cost| cost as f64 / 1000.0), 1..8),
         chips in 1..4_usize,
     ) {
@@ -183,7 +183,7 @@ proptest! {
     }
 
     #[test]
-    fn every_tile_is_rendered_once_and_the_same_way_each_time(
+    fn every_tile_is_rendered_once_and_simulations_are_reproducible(
         costs in costs(), order in orders(), chips in 1..40_usize, credits in 1..8_usize, latency in 0.0..0.5_f64,
     ) {
         let link = LinkModel { command_seconds: 0.001, result_seconds: 0.002, latency_seconds: latency };

@@ -1,39 +1,40 @@
-//! Key figures of studies, for documents and programs: one CSV file, a line a figure.
+//! Key figures of studies, for documents and programs: a CSV file with one line per figure.
 
 use super::table::{Cell, Column, Table};
 
-/// File of the key figures of a run.
+/// Name of the file with the key figures of a run.
 pub const FIGURES: &str = "figures.csv";
 
-/// Key figure of a study.
+/// A key figure of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Figure {
-    /// Name of the quantity, unique with [`Self::scene`]; words with hyphens, levels with dots.
+    /// Name of the quantity, with hyphens between words and dots between levels. It is unique together with
+    /// [`Self::scene`].
     pub name: String,
-    /// Scene; empty if the figure is of none.
+    /// Name of the scene; empty if the figure belongs to no scene.
     pub scene: String,
-    /// Number or text.
+    /// Value of the figure: a number or a text.
     pub value: Cell,
     /// Unit of the number; empty if it has none.
     pub unit: &'static str,
-    /// Ends of its 95 % confidence interval.
+    /// Ends of the 95 % confidence interval.
     pub interval: Option<[f64; 2]>,
 }
 
 impl Figure {
-    /// A figure without an interval.
+    /// Creates a figure without an interval.
     pub fn new(name: impl Into<String>, scene: &str, value: impl Into<Cell>, unit: &'static str) -> Self {
         Self { name: name.into(), scene: scene.to_owned(), value: value.into(), unit, interval: None }
     }
 
-    /// The figure with the ends of its confidence interval.
+    /// Adds the ends of the confidence interval to the figure.
     #[must_use]
     pub fn within(self, lower: f64, upper: f64) -> Self {
         Self { interval: Some([lower, upper]), ..self }
     }
 }
 
-/// The figures as CSV.
+/// Encodes the figures as CSV.
 pub(crate) fn figures_csv(figures: &[Figure]) -> String {
     let heads = ["name", "scene", "value", "unit", "lower", "upper"];
     let mut table = Table::new("", heads.map(|head| Column::new(head, "")).into());
@@ -54,8 +55,8 @@ pub(crate) fn figures_csv(figures: &[Figure]) -> String {
     table.to_csv()
 }
 
-/// A name as a part of a figure's: lower case, with a hyphen for each run of other characters than letters,
-/// digits and dots.
+/// Converts a name to a part of a figure's name: lower case, with a hyphen for each run of characters other
+/// than letters, digits and dots.
 pub(crate) fn slug(name: &str) -> String {
     let is_kept = |c: char| c.is_ascii_alphanumeric() || c == '.';
     let words = name.split(|c: char| !is_kept(c)).filter(|word| !word.is_empty());

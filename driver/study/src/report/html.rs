@@ -1,4 +1,4 @@
-//! Reports as HTML: one page with the results and the provenance that reproduces them.
+//! Reports as HTML: one page with the results, and the provenance by which they can be reproduced.
 
 use std::fmt::Write;
 
@@ -22,14 +22,14 @@ pub struct Report {
     pub sections: Vec<Section>,
     /// Provenance of the numbers.
     pub provenance: Provenance,
-    /// Key figures, which are on no page.
+    /// Key figures. They are not on the page.
     pub figures: Vec<Figure>,
 }
 
 /// A part of a report under one heading.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Section {
-    /// The heading.
+    /// Text of the heading.
     pub heading: String,
     /// Blocks in reading order.
     pub blocks: Vec<Block>,
@@ -40,23 +40,23 @@ pub struct Section {
 pub enum Block {
     /// Plain text.
     Paragraph(String),
-    /// A link to a page in this folder or one below.
+    /// A link to a page in this folder or a folder below.
     Link {
         /// Text of the link.
         text: String,
         /// Path of the linked page, relative to this one.
         target: String,
     },
-    /// A table, which is also the file `<name>.csv` beside the page.
+    /// A table. It is also stored in the file `<name>.csv` beside the page.
     Table {
-        /// The file's name without its extension.
+        /// Name of the file without its extension.
         name: String,
         /// The table.
         table: Table,
     },
-    /// A plot, which is also the file `<name>.svg` beside the page.
+    /// A plot. It is also stored in the file `<name>.svg` beside the page.
     Plot {
-        /// The file's name without its extension.
+        /// Name of the file without its extension.
         name: String,
         /// The plot.
         plot: Plot,
@@ -66,21 +66,21 @@ pub enum Block {
 /// Provenance of a report's numbers: program, date, machine, command line and settings.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
-    /// The program and its version.
+    /// Name and version of the program.
     pub version: String,
     /// Date of the study, `YYYY-MM-DD`.
     pub date: String,
-    /// The processor and the operating system.
+    /// Processor and operating system.
     pub host: String,
     /// Command line of the study.
     pub command_line: String,
-    /// Every setting and its value.
+    /// Names and values of all settings.
     pub settings: Vec<(String, String)>,
 }
 
 impl Report {
-    /// The report with a banner, and with titles of plots that say that they are of a trial: their files
-    /// stand alone too.
+    /// Adds a banner to the report. Titles of plots then say that they are of a trial, because the plots'
+    /// files can be used separately.
     #[must_use]
     pub fn marked(mut self, banner: String) -> Self {
         self.banner = Some(banner);
@@ -92,8 +92,8 @@ impl Report {
         self
     }
 
-    /// The report as one self-contained HTML page, with links to the tables and plots beside it. The page is
-    /// also well-formed XML.
+    /// Encodes the report as a self-contained HTML page with links to the tables and plots beside it. The
+    /// page is also well-formed XML.
     pub fn to_html(&self) -> String {
         let title = escape(&self.title);
         let mut html = format!(
@@ -120,7 +120,7 @@ impl Report {
 }
 
 impl Block {
-    /// Name and content of the block's file beside the page, if it has one.
+    /// Name and content of the block's file beside the page; `None` if it has no file.
     pub(super) fn file(&self) -> Option<(String, String)> {
         match self {
             Self::Paragraph(_) | Self::Link { .. } => None,
@@ -186,12 +186,12 @@ fn link(name: &str, extension: &str) -> String {
     format!("<a href=\"{file}\" download=\"{file}\">{file}</a>")
 }
 
-/// A plot that shrinks with the page, but not below the size at which its text can be read.
+/// HTML of a plot that shrinks with the page, but not below the size at which its text is legible.
 fn sized(plot: &Plot) -> String {
     format!("<div style=\"--panels: {}\">\n{}</div>\n", plot.panels.len().max(1), plot.to_svg())
 }
 
-/// Content in a box of its own, which scrolls where the content is wider than the page.
+/// HTML of a box that scrolls if its content is wider than the page.
 fn scrolling(class: &str, label: &str, content: &str) -> String {
     format!(
         "<div class=\"scroll {class}\" role=\"region\" aria-label=\"{}\" tabindex=\"0\">\n{content}</div>\n",

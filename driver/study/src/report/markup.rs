@@ -1,7 +1,7 @@
-//! Escapes of text in HTML and SVG.
+//! Escapes text in HTML and SVG.
 
-/// `text` as content or as an attribute's value in double quotes. Characters that XML cannot hold become
-/// U+FFFD.
+/// Escapes `text` as content, or as the value of an attribute in double quotes. Characters that XML does not
+/// allow become U+FFFD.
 pub(super) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -19,10 +19,10 @@ pub(super) fn escape(text: &str) -> String {
     escaped
 }
 
-/// A strict reader of the markup that reports write, which panics on malformed documents.
+/// A strict reader of the markup in reports. It panics on malformed documents.
 #[cfg(test)]
 pub(super) mod reader {
-    /// A start or empty tag, and the text up to the next tag.
+    /// A start tag or empty tag, and the text up to the next tag.
     #[derive(Debug)]
     pub(crate) struct Element {
         pub(crate) tag: String,
@@ -40,10 +40,10 @@ pub(super) mod reader {
         }
     }
 
-    /// The elements of a document in their order.
+    /// Elements of a document, in order.
     ///
     /// # Panics
-    /// If it is not well-formed.
+    /// If the document is not well-formed.
     pub(crate) fn elements(document: &str) -> Vec<Element> {
         let (mut elements, mut open): (Vec<Element>, Vec<String>) = (Vec::new(), Vec::new());
         let mut rest = document.trim().strip_prefix("<!DOCTYPE html>").unwrap_or(document.trim()).trim();
@@ -106,7 +106,7 @@ pub(super) mod reader {
     }
 
     #[test]
-    fn malformed_markup_is_found() {
+    fn malformed_markup_is_detected() {
         for malformed in
             ["<a>", "<a><b></a></b>", "<a b=c/>", "<a>&x</a>", "<a/><b/>", "<a b=\"1\" b=\"2\"/>"]
         {

@@ -1,6 +1,6 @@
-//! Reports of studies: tables, plots and one page that holds them all.
+//! Reports of studies: tables, plots, and a page with all of them.
 //!
-//! [`write()`] puts a [`Report`] into a folder: `index.html`, which is self-contained, every table as CSV and
+//! [`write()`] stores a [`Report`] in a folder: the self-contained page `index.html`, every table as CSV, and
 //! every plot as SVG.
 
 mod figure;
@@ -26,7 +26,7 @@ pub use self::plot::{Panel, Plot, Point, Series, XAxis, XScale, YAxis, YScale};
 pub use self::table::{Cell, Column, Table};
 use photoncard_picture::output::{self, OutputError};
 
-/// The page's file name.
+/// File name of the page.
 const PAGE: &str = "index.html";
 
 /// Error of [`write()`].
@@ -39,23 +39,23 @@ pub enum ReportError {
          no dot"
     )]
     BadName {
-        /// The name.
+        /// Name of the table or plot.
         name: String,
     },
-    /// Two tables or two plots have one name, letter case aside.
+    /// Two tables or two plots have names that are equal or differ only in case.
     #[error(
         "two files of the report would be named {file}, in some case; give each table and each plot its own name"
     )]
     SameName {
-        /// The file's name.
+        /// Name of the file.
         file: String,
     },
-    /// The folder cannot be made.
+    /// The folder cannot be created.
     #[error("cannot create the folder {}; check the permissions of the folder that it is to be in", folder.display())]
     Folder {
-        /// The folder.
+        /// Path of the folder.
         folder: PathBuf,
-        /// The operating system's error.
+        /// Error of the operating system.
         #[source]
         source: io::Error,
     },
@@ -64,13 +64,13 @@ pub enum ReportError {
     Output(#[from] OutputError),
 }
 
-/// Writes `report` into `folder`, which is made if it is missing: each table as `<name>.csv`, each plot as
-/// `<name>.svg`, and `index.html` last. Files of those names are replaced, each atomically; others are left
-/// alone.
+/// Writes `report` into `folder`, which is created if it is missing: each table as `<name>.csv`, each plot as
+/// `<name>.svg`, and finally `index.html`. Existing files with these names are replaced, each atomically;
+/// other files are left unchanged.
 ///
 /// # Errors
-/// If a name is not of letters, digits, `-` and `.`, or two files would have one name (names that differ in
-/// case alone included), before anything is written; if the folder or a file cannot be written.
+/// If a name has other characters than letters, digits, `-` and `.`, or two files would have names that are
+/// equal or differ only in case; nothing is written then. If the folder or a file cannot be written.
 pub fn write(folder: &Path, report: &Report) -> Result<(), ReportError> {
     let blocks = || report.sections.iter().flat_map(|section| &section.blocks);
     for block in blocks() {
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_holds_the_page_and_what_it_links_to() {
+    fn a_report_folder_holds_the_page_and_the_files_that_it_links() {
         let folder = tempfile::tempdir().unwrap();
         let folder = folder.path().join("new/report");
         for _ in 0..2 {

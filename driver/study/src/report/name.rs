@@ -1,7 +1,7 @@
-//! Names of files that the caller chooses.
+//! Checks names of files that the caller chooses.
 
-/// Maximum length of a name, bytes: with an extension and a hash it stays within the 255 bytes of common file
-/// systems.
+/// Maximum length of a name, bytes. With an extension and a hash it stays within the 255 bytes that common
+/// file systems allow.
 const LONGEST: usize = 100;
 
 /// Returns whether `name` is a valid file name on every system: 1 to 100 letters, digits, `-` and `.`, not

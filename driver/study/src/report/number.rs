@@ -3,8 +3,8 @@
 /// Superscript digits.
 const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
-/// `value` with at most `digits` significant digits, thousands separators and a true minus sign. Values that
-/// would need many zeros are written with a power of ten.
+/// Formats `value` with at most `digits` significant digits, thousands separators and a true minus sign.
+/// Values that would need many zeros are written with a power of ten.
 pub fn human(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "n/a".to_owned();
@@ -23,12 +23,12 @@ pub fn human(value: f64, digits: usize) -> String {
     grouped(trim_zeros(&format!("{rounded:.decimals$}")))
 }
 
-/// `value` with `decimals` decimals, thousands separators and a true minus sign.
+/// Formats `value` with `decimals` decimals, thousands separators and a true minus sign.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     grouped(&format!("{value:.decimals$}"))
 }
 
-/// A decimal number in plain digits, given thousands separators and a true minus sign.
+/// Adds thousands separators and a true minus sign to a decimal number in plain digits.
 pub(super) fn grouped(decimal: &str) -> String {
     let (sign, digits) = match decimal.strip_prefix('-') {
         // A zero has no sign once it is rounded.
@@ -47,7 +47,7 @@ pub(super) fn grouped(decimal: &str) -> String {
     text
 }
 
-/// `base` with `exponent` in superscript digits.
+/// Formats `base` with `exponent` in superscript digits.
 pub(super) fn power(base: u32, exponent: i32) -> String {
     let mut text = base.to_string();
     if exponent < 0 {
@@ -58,7 +58,7 @@ pub(super) fn power(base: u32, exponent: i32) -> String {
     text
 }
 
-/// The shortest decimal number that reads back as `value`, without needless zeros.
+/// Shortest decimal number that reads back as `value`, without superfluous zeros.
 pub(super) fn full(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-5..1e16).contains(&value.abs());
     if plain { format!("{value}") } else { format!("{value:e}") }
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn people_read_four_digits() {
+    fn numbers_for_people_are_rounded_to_four_digits() {
         let cases = [
             (0.0, "0"),
             (-0.0, "0"),
@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn programs_read_every_digit() {
+    fn numbers_for_programs_have_full_precision() {
         for value in [0.1, 1.0 / 3.0, 1e300, -2.5e-300, 123_456_789.125, f64::MAX, f64::INFINITY] {
             assert_eq!(full(value).parse::<f64>().unwrap(), value);
         }

@@ -1,7 +1,7 @@
 //! Plots of lines and markers, drawn as stand-alone SVG.
 //!
-//! A plot has one or several panels side by side over one legend. It is drawn without a font at hand: the
-//! room for text is sized for the widest common fonts.
+//! A plot has one or several panels side by side above one legend. No font is available while it is drawn:
+//! the space for text is sized for the widest common fonts.
 
 mod axis;
 mod content;
@@ -26,11 +26,12 @@ use super::markup::escape;
 /// Space around the drawing and between its parts, in pixels.
 const MARGIN: f64 = 14.0;
 const TITLE_GAP: f64 = 6.0;
-/// Widths of the plotting area of a single panel, and of one of several, in pixels.
+/// Width of the plotting area of a single panel, in pixels.
 const LONE_WIDTH: f64 = 560.0;
 const PANEL_WIDTH: f64 = 390.0;
 
-/// A figure: panels side by side that share a legend. Series of one name have one style in all panels.
+/// A figure: panels side by side that share a legend. Series with the same name have the same style in all
+/// panels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plot {
     /// Title of the figure.
@@ -39,12 +40,12 @@ pub struct Plot {
     pub caption: String,
     /// Panels from left to right.
     pub panels: Vec<Panel>,
-    /// True if panels of equal vertical scale share one vertical range.
+    /// True if panels with the same vertical scale share one vertical range.
     pub shares_y_range: bool,
 }
 
 impl Plot {
-    /// The plot as a stand-alone SVG document, which can also stand inside HTML.
+    /// Encodes the plot as a stand-alone SVG document, which can also be embedded in HTML.
     pub fn to_svg(&self) -> String {
         let names = self.series_names();
         let (drawings, left_out) = self.drawings(&names);
@@ -76,7 +77,7 @@ impl Plot {
         self.document(width, top + MARGIN, &body)
     }
 
-    /// The panels, laid out, and the points that are left out of them.
+    /// Lays out the panels. Also returns the points that cannot be drawn.
     fn drawings<'a>(&'a self, names: &[&'a str]) -> (Vec<Drawing<'a>>, Vec<LeftOut<'a>>) {
         let area = if self.panels.len() == 1 { LONE_WIDTH } else { PANEL_WIDTH };
         let (mut all_data, mut all_left_out) = (Vec::new(), Vec::new());
@@ -103,7 +104,7 @@ impl Plot {
         (drawings, all_left_out)
     }
 
-    /// The names of all series, each once.
+    /// Names of all series, each once.
     fn series_names(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for series in self.panels.iter().flat_map(|panel| &panel.series) {
@@ -126,7 +127,7 @@ impl Plot {
         )
     }
 
-    /// Description of the plot for readers who cannot see it: SVG's `desc`.
+    /// Description of the plot for readers who cannot see it, for SVG's `desc`.
     fn description(&self) -> String {
         let mut parts = Vec::new();
         if !self.caption.is_empty() {
@@ -150,7 +151,7 @@ impl Plot {
     }
 }
 
-/// Notes that report missing points with their reasons.
+/// Notes that report missing points and the reasons.
 fn notes(left_out: &[LeftOut]) -> Vec<String> {
     let mut notes = Vec::new();
     for (reason, why) in [

@@ -5,12 +5,12 @@ use std::fmt::Write;
 use super::markup::escape;
 use super::number;
 
-/// Significant digits of a measured value, and of its half-width, in HTML.
+/// Number of significant digits of a measured value and of its half-width in HTML.
 const DIGITS: usize = 4;
 const HALF_WIDTH_DIGITS: usize = 2;
 /// Maximum number of characters of a text that stays on one line in HTML.
 const MAX_NAME: usize = 40;
-/// Class of numbers in HTML.
+/// HTML class of cells with numbers.
 const NUMBER: &str = "number";
 
 /// A titled table with one unit per column.
@@ -21,7 +21,7 @@ pub struct Table {
     rows: Vec<Vec<Cell>>,
 }
 
-/// The head of a column.
+/// Head of a column.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Column {
     /// Name of the quantity.
@@ -30,10 +30,10 @@ pub struct Column {
     pub unit: String,
 }
 
-/// One entry of a table.
+/// A cell of a table.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cell {
-    /// No value.
+    /// Cell without a value.
     Empty,
     /// Text.
     Text(String),
@@ -41,9 +41,9 @@ pub enum Cell {
     Integer(i128),
     /// A measured value, shown with four significant digits.
     Real {
-        /// The value in the column's unit.
+        /// Value in the column's unit.
         value: f64,
-        /// Half the width of its confidence interval, in the column's unit.
+        /// Half-width of the confidence interval, in the column's unit.
         half_width: Option<f64>,
     },
 }
@@ -56,7 +56,7 @@ impl Column {
 }
 
 impl Cell {
-    /// A measured value and half the width of its confidence interval, both in the column's unit.
+    /// Cell with a measured value and the half-width of its confidence interval, both in the column's unit.
     pub fn interval(value: f64, half_width: f64) -> Self {
         Self::Real { value, half_width: Some(half_width) }
     }
@@ -72,7 +72,7 @@ impl Cell {
         matches!(self, Self::Text(_))
     }
 
-    /// Class of the entry in HTML: numbers and names stay on one line.
+    /// HTML class of the cell. Numbers and names stay on one line.
     fn class(&self) -> &'static str {
         match self {
             Self::Text(text) if text.chars().count() > MAX_NAME => "text",
@@ -81,7 +81,7 @@ impl Cell {
         }
     }
 
-    /// Text of the entry in CSV, before quoting: numbers in full precision.
+    /// Text of the cell in CSV, before quoting. Numbers are in full precision.
     pub fn csv(&self) -> String {
         match self {
             Self::Empty => String::new(),
@@ -142,15 +142,15 @@ impl<T: Into<Cell>> From<Option<T>> for Cell {
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub fn new(title: impl Into<String>, columns: Vec<Column>) -> Self {
         Self { title: title.into(), columns, rows: Vec::new() }
     }
 
-    /// Adds a row below the others.
+    /// Adds a row at the end.
     ///
     /// # Panics
-    /// If the row does not have one cell for every column.
+    /// If the row does not have one cell per column.
     pub fn push(&mut self, row: Vec<Cell>) {
         assert_eq!(row.len(), self.columns.len(), "a row of the table '{}'", self.title);
         self.rows.push(row);
@@ -161,17 +161,17 @@ impl Table {
         &self.title
     }
 
-    /// The columns' heads, from left to right.
+    /// Heads of the columns, from left to right.
     pub fn columns(&self) -> &[Column] {
         &self.columns
     }
 
-    /// The rows, from top to bottom; each has as many cells as there are columns.
+    /// Rows, from top to bottom. Each has as many cells as there are columns.
     pub fn rows(&self) -> &[Vec<Cell>] {
         &self.rows
     }
 
-    /// The table as CSV (RFC 4180), with a header `name (unit)` and numbers in full precision.
+    /// Encodes the table as CSV (RFC 4180), with a header `name (unit)` and numbers in full precision.
     ///
     /// A column with half-widths is followed by a column of the half-widths. Values that are not finite are
     /// written `NaN`, `inf` and `-inf`.
@@ -200,8 +200,8 @@ impl Table {
         csv
     }
 
-    /// The table as an HTML element `table`, without its title: integers whole, other numbers with four
-    /// significant digits.
+    /// Encodes the table as an HTML element `table`, without its title. Integers are written in full, other
+    /// numbers with four significant digits.
     pub fn to_html(&self) -> String {
         let mut html = "<table>\n<thead><tr>".to_owned();
         for (index, column) in self.columns.iter().enumerate() {
@@ -252,7 +252,7 @@ mod tests {
     use super::super::markup::reader;
     use super::*;
 
-    /// A reader of CSV as RFC 4180 defines it.
+    /// Parses CSV as defined by RFC 4180.
     fn parse(csv: &str) -> Vec<Vec<String>> {
         let (mut records, mut record, mut field) = (Vec::new(), Vec::new(), String::new());
         let mut characters = csv.chars().peekable();
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn csv_reads_back_what_was_written() {
+    fn csv_is_read_back_unchanged() {
         let records = parse(&nasty().to_csv());
         assert_eq!(records[0], ["name, \"quoted\"", "traffic (GB/s)", "traffic half-width (GB/s)", "n"]);
         assert_eq!(records[1][0], "a\r\nb \"c\", <d> & 'e'");
@@ -302,14 +302,14 @@ mod tests {
     }
 
     #[test]
-    fn a_single_empty_cell_is_still_a_record() {
+    fn a_row_with_one_empty_cell_is_a_csv_record() {
         let mut table = Table::new("", vec![Column::new("only", "")]);
         table.push(vec![Cell::Empty]);
         assert_eq!(parse(&table.to_csv()), [["only"], [""]]);
     }
 
     #[test]
-    fn html_shows_rounded_numbers_with_units_and_escapes_words() {
+    fn html_has_rounded_numbers_with_units_and_escaped_text() {
         let html = nasty().to_html();
         let elements = reader::elements(&html);
         let cells: Vec<_> = elements.iter().filter(|element| element.tag == "td").collect();

@@ -1,5 +1,5 @@
-//! Tables of counted arithmetic: operations of each unit for a ray and for a gather, beside Table 7.1's
-//! constants.
+//! Tables of counted arithmetic: operations of each unit per ray and per gather, compared with the constants
+//! of Table 7.1.
 
 use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::arithmetic::{Arithmetic, ChipPart, Operations, Unit, Work};
@@ -28,8 +28,8 @@ pub(super) struct CountedFrame<'a> {
     pub(super) arithmetic: &'a Arithmetic,
 }
 
-/// Operations of each unit for one piece of work of each frame: a ray in the ray caster, a gather in the
-/// gather unit, a gather ray in the controller.
+/// Table of the operations of each unit per piece of work: per ray in the ray caster, per gather in the
+/// gather unit, per gather ray in the controller.
 pub(super) fn operations(frames: &[CountedFrame]) -> Table {
     let heads = [
         ("frame", ""),
@@ -73,7 +73,7 @@ fn row(frame: &str, piece: &str, unit: &str, operations: &Operations) -> Vec<Cel
     names.into_iter().chain(numbers.map(Cell::from)).collect()
 }
 
-/// FLOPs of a ray, of a gather and of a frame by Table 7.1's constants and counted.
+/// Table of the FLOPs per ray, per gather and per frame, by Table 7.1's constants and as counted.
 pub(super) fn comparison(frames: &[CountedFrame]) -> Table {
     let heads = [
         ("frame", ""),

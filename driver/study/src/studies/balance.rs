@@ -1,19 +1,19 @@
-//! Load balance of a measured frame: simulated dealing of its tiles to chips.
+//! Load balance of a measured frame, by simulating the assignment of its tiles to chips.
 
 use super::super::load_balance::{Balance, LinkModel, Setup, TileOrder, simulate};
 use super::super::report::{Panel, Point, XScale, YScale};
 use super::present::{panel, series};
 
-/// A way to deal tiles: its name, the order of the tiles, and the credits of a chip.
+/// A policy of assigning tiles: its name, the order of the tiles, and the credits of a chip.
 pub(super) type Dealing = (&'static str, TileOrder, usize);
 
-/// Dealings that differ in the credits of a chip, tiles in the picture's order.
+/// Policies that differ in the credits of a chip. Tiles are in the picture's order.
 pub(super) const CREDITS: [Dealing; 3] = [
     ("1 credit", TileOrder::Picture, 1),
     ("2 credits", TileOrder::Picture, 2),
     ("4 credits", TileOrder::Picture, 4),
 ];
-/// Dealings that differ in the order of the tiles, one credit per chip.
+/// Policies that differ in the order of the tiles. A chip has one credit.
 pub(super) const ORDERS: [Dealing; 3] = [
     ("picture's order", TileOrder::Picture, 1),
     ("random order", TileOrder::Random(1), 1),
@@ -25,13 +25,13 @@ pub(super) fn chip_counts(most: usize) -> Vec<usize> {
     std::iter::successors(Some(1), |chips| Some(2 * chips)).take_while(|&chips| chips <= most).collect()
 }
 
-/// Simulates the dealing of tiles that take `seconds` each, with links that take no time. `None` if there are
-/// no tiles.
+/// Simulates the assignment of tiles that take `seconds` each, with links that take no time; `None` if there
+/// are no tiles.
 pub(super) fn deal(seconds: &[f64], chips: usize, (_, order, credits): Dealing) -> Option<Balance> {
     simulate(seconds, order, &Setup { chips, credits, link: LinkModel::default() }).ok()
 }
 
-/// A panel over the number of chips, with a line for each dealing.
+/// Panel over the number of chips, with one line per policy.
 pub(super) fn curves(
     title: &str,
     seconds: &[f64],

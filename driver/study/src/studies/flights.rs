@@ -1,4 +1,4 @@
-//! Tiles in flight: bytes of whole frames whose gathers wait across tiles.
+//! Tiles in flight: traffic of whole frames whose gathers wait across tiles.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::{LARGE, REFERENCE};
@@ -19,22 +19,22 @@ use super::scenes::SCENES;
 pub(super) struct Setup {
     chip: EmulatedKind,
     in_flight: u32,
-    /// Bytes of the cache of the scene.
+    /// Size of the scene cache, bytes.
     scene_cache: u32,
 }
 
-/// The reference chip, whose queue is drained at the end of a tile.
+/// The reference chip, whose queue is drained at the end of each tile.
 const ON_REFERENCE: Setup =
     Setup { chip: EmulatedKind::Reference, in_flight: 1, scene_cache: REFERENCE.scene_cache_bytes };
-/// The large chip with as many tiles in flight as it has room for.
+/// The large chip with the maximum number of tiles in flight.
 pub(super) const LARGE_IN_FLIGHT: Setup =
     Setup { chip: EmulatedKind::Large, in_flight: LARGE.in_flight, scene_cache: LARGE.scene_cache_bytes };
-/// The large chip with one tile after another.
+/// The large chip with one tile in flight.
 const ON_LARGE: Setup = Setup { in_flight: 1, ..LARGE_IN_FLIGHT };
 const SETUPS: [Setup; 3] = [ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT];
 
 impl Setup {
-    /// The whole frame on one chip.
+    /// Point that renders the whole frame on one chip.
     pub(super) fn point(self, scale: &Scale, scene: &str, settings: RenderSettings) -> Point {
         let settings = settings.with(|s| s.schedule.in_flight = Some(self.in_flight));
         let scene_cache = CacheSpec { bytes: self.scene_cache, ..CacheSpec::SCENE };

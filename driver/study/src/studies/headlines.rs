@@ -1,4 +1,4 @@
-//! Headline figures over the nominal range of photons: naive, exact reordering, and all techniques.
+//! Headline figures over the nominal range of photons: naive order, exact reordering, and all techniques.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_map::photon_map::PhotonLayout;
@@ -15,10 +15,10 @@ use super::scenes::{ATRIUM, CORNELL};
 /// A simple and a large scene: file and name in the report.
 const SCENES: [(&str, &str); 2] = [(CORNELL, "Cornell box"), (ATRIUM, "atrium")];
 
-/// Bytes of a gather in the dissertation's naive order.
+/// Bytes per gather in the dissertation's naive order.
 const PUBLISHED_GATHER_BYTES: f64 = 14_000.0;
 
-/// A render of a scene by a number of photons.
+/// A line: its name, and its point for a scene and a number of photons.
 type Line = (&'static str, fn(&Scale, &str, usize) -> Point);
 
 const NAIVE: Line = ("naive", |scale, scene, photons| {
@@ -42,12 +42,13 @@ const LINES: [Line; 4] = [
     }),
 ];
 
-/// Photons of the map: in the dissertation's range of 0.5 to 6 million at the nominal scale.
+/// Numbers of photons in the map. At the nominal scale they are in the dissertation's range of 0.5 to 6
+/// million.
 fn photons(scale: &Scale) -> Vec<usize> {
     scale.pick(&[1, 4, 12], &[1, 4]).iter().map(|times| times * scale.photons).collect()
 }
 
-/// A line's point at a number of photons, with what names it.
+/// A line's point at a number of photons, with its names.
 struct Headline {
     scene: &'static str,
     scene_name: &'static str,
@@ -75,13 +76,13 @@ impl Headline {
         results.traffic(&self.point(scale)).dram_bytes()
     }
 
-    /// Bytes of the photon map of a gather.
+    /// Bytes of the photon map fetched per gather.
     fn gather_bytes(&self, scale: &Scale, results: &Results) -> f64 {
         let measured = results.traffic(&self.point(scale));
         measured.photon_map_bytes().value / measured.gathers().value
     }
 
-    /// Ratio of the naive bytes to this line's, by as many photons.
+    /// Ratio of the bytes of the naive order to this line's, with the same number of photons.
     fn factor(&self, scale: &Scale, results: &Results) -> Ratio {
         let naive = Self { line: NAIVE, ..*self };
         if self.line.0 == NAIVE.0 {

@@ -1,4 +1,5 @@
-//! Study of interactive frames: what each part of the system takes while the camera, and while lights move.
+//! Study of interactive frames: time and bytes that each part of the system needs while the camera or lights
+//! move.
 
 use photoncard_render::RenderSettings;
 use photoncard_render::cost_model::{Cost, Distribution, Machine, Prediction, Symbols};
@@ -17,30 +18,30 @@ use super::scenes::SCENES;
 use super::times;
 use super::workload::{self, of_frame};
 
-/// Frames a second that the study asks for.
+/// Frame rate that the study aims at, frames per second.
 const RATE: f64 = 30.0;
 /// Maximum number of chips in the plots.
 const MAX_CHIPS: usize = 64;
 /// Numbers of chips in the table of uploads.
 const CHIPS: [u64; 3] = [3, 16, 64];
-/// Photons of each frame, over those of the scale.
+/// Numbers of photons of the frames, as multiples of the scale's.
 const PHOTONS: [usize; 3] = [1, 4, 12];
-/// Shares of photons that are traced anew.
+/// Fractions of the photons that are traced anew.
 const SHARES: [f64; 4] = [0.001, 0.01, 0.1, 1.0];
-/// Share of the tiles that is measured for a chip's time.
+/// Fraction of the tiles that is measured for a chip's time.
 const SAMPLE: SampleRate = match SampleRate::new(1, 16) {
     Some(sample) => sample,
     None => SampleRate::ALL,
 };
-/// Minimum number of these tiles.
+/// Minimum number of tiles that are measured for a chip's time.
 const MIN_TILES: usize = 4;
 
-/// A frame of one scene and number of photons: its scale and its names.
+/// A frame with one scene and one number of photons: its scale and its names.
 struct Frame {
     scale: Scale,
     file: &'static str,
     scene: &'static str,
-    /// True for the number of photons with which changes are measured.
+    /// True for the number of photons at which changes are measured.
     is_first: bool,
 }
 
@@ -74,7 +75,7 @@ impl Frame {
         format!("{}, {} million photons", self.scene, say(self.scale.photons as f64 / 1e6))
     }
 
-    /// Changes that are measured.
+    /// Changes that are measured for the frame.
     fn changes(&self) -> Vec<Change> {
         if !self.is_first {
             return Vec::new();
@@ -96,13 +97,13 @@ pub(super) fn host_frames(scale: &Scale, bench: &mut HostBench) -> Result<Vec<Ho
     Frame::all(scale).iter().map(measure).collect()
 }
 
-/// Demand of a frame on chips and link.
+/// Time and chips that a frame needs.
 struct Demand {
-    /// Seconds of one chip, with reads that take their time.
+    /// Time of one chip for the frame, with read latency, seconds.
     chip_seconds: f64,
-    /// Chips for [`RATE`] by bandwidth and counted arithmetic.
+    /// Number of chips needed for [`RATE`], by bandwidth and counted arithmetic.
     chips: u64,
-    /// Seconds of reading the pixels back.
+    /// Time to read the pixels back, seconds.
     back: f64,
 }
 
@@ -122,7 +123,7 @@ impl Demand {
     }
 }
 
-/// Seconds of an upload of `bytes` to all chips.
+/// Time of an upload of `bytes` bytes to all chips, seconds.
 fn upload(way: Distribution, bytes: u64, chips: u64, machine: &Machine) -> f64 {
     way.seconds(bytes as f64, chips, &Symbols::NOMINAL, machine)
 }
@@ -216,7 +217,8 @@ fn host_work(measured: &[(&Frame, &HostFrame)]) -> Table {
     table
 }
 
-/// Threads of this host for [`RATE`] frames a second, if its work is spread over them without loss.
+/// Number of threads of this host needed for [`RATE`] frames per second, if its work is distributed over them
+/// without loss.
 fn threads_needed(host: &HostFrame) -> u64 {
     (RATE * host.threads as f64 * host.seconds()).ceil() as u64
 }
@@ -291,14 +293,15 @@ fn changed_lines(measured: &[(&Frame, &HostFrame)]) -> Vec<Block> {
     ]
 }
 
-/// Share of the photons whose lines all chips receive in a frame, if as large a share of the map's lines
-/// changes.
+/// Fraction of the photons whose lines all chips can receive within a frame, if an equal fraction of the
+/// map's lines changes.
 fn fitting_share(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
     let bytes = way.bytes_within(1.0 / RATE, chips, &Symbols::NOMINAL, machine);
     (bytes / host.map.bytes.max(1) as f64).min(1.0)
 }
 
-/// Maximum measured share of the photons whose changed lines all chips receive in a frame; 0 if none fits.
+/// Maximum measured fraction of the photons whose changed lines all chips can receive within a frame; 0 if
+/// none fits.
 fn fitting_measured(way: Distribution, host: &HostFrame, chips: u64, machine: &Machine) -> f64 {
     let fits = |bytes| upload(way, bytes, chips, machine) <= 1.0 / RATE;
     let shares = host.changes.iter().filter_map(|changed| match changed.change {

@@ -1,4 +1,5 @@
-//! Study of Table 7.1: chips that a frame rate takes, by the table's symbols and by measured counts.
+//! Study of Table 7.1: number of chips that a frame rate needs, by the table's symbols and by measured
+//! counts.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_map::photon_map::PhotonMapSize;
@@ -26,25 +27,24 @@ struct Frame {
     workload: Workload,
     /// Cost by Table 7.1's constants.
     cost: Cost,
-    /// Counted arithmetic, and the cost by it; `None` for a frame of the table's own counts.
+    /// Counted arithmetic, and the cost that follows from it; `None` for a frame with the table's own counts.
     counted: Option<(Arithmetic, Cost)>,
-    /// Errors of the counts; zeros for a frame of the table's own counts, or all of whose tiles were
-    /// rendered.
+    /// Errors of the counts. They are zero for a frame with the table's own counts, and for a frame whose
+    /// tiles were all rendered.
     errors: Errors,
-    /// The photon map.
     map: PhotonMapSize,
-    /// The machine that renders it.
+    /// Machine that renders the frame.
     machine: Machine,
 }
 
-/// Half the widths of confidence intervals.
+/// Half-widths of confidence intervals.
 #[derive(Clone, Copy, Default)]
 struct Errors {
     rays: f64,
     gathers: f64,
-    /// Bytes from DRAM.
+    /// Half-width of the scene's bytes from DRAM.
     scene: f64,
-    /// Bytes from DRAM.
+    /// Half-width of the photon map's bytes from DRAM.
     photon_map: f64,
 }
 
@@ -65,7 +65,8 @@ impl Frame {
         Prediction::new(&self.workload, &self.cost, &self.machine)
     }
 
-    /// Prediction by counted arithmetic, or by the constants of the table's own frames.
+    /// Prediction by counted arithmetic. Frames of Table 7.1 have no counts; they are predicted by the
+    /// table's constants.
     fn prediction(&self) -> Prediction {
         let cost = self.counted.as_ref().map_or(&self.cost, |(_, cost)| cost);
         Prediction::new(&self.workload, cost, &self.machine)
@@ -81,12 +82,13 @@ fn naive(scale: &Scale, scene: &'static str) -> Point {
     scale.traffic(scene, scale.settings(GatherOrder::Naive))
 }
 
-/// All techniques on, in the largest tiles; every tile is rendered.
+/// Point with all techniques and the largest tiles. Every tile is rendered.
 fn all_on(scale: &Scale, scene: &'static str) -> Point {
     scale.whole(scene, scale.all_on())
 }
 
-/// All techniques on, in tiles of 16x16 pixels, which are dealt to chips; every tile is rendered.
+/// Point with all techniques and tiles of 16x16 pixels, which can be assigned to chips. Every tile is
+/// rendered.
 fn dealt(scale: &Scale, scene: &'static str) -> Point {
     scale.whole(scene, scale.all_on_in_small_tiles())
 }
@@ -97,12 +99,12 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
     SCENES.iter().flat_map(of_scene).collect()
 }
 
-/// Table 7.1's symbols with the scale's numbers of tiles, rays, neighbours and photons.
+/// Symbols of Table 7.1 with the scale's numbers of tiles, rays, neighbours and photons.
 pub(super) fn symbols(scale: &Scale) -> Symbols {
     workload::symbols(&scale.settings(GatherOrder::Sort))
 }
 
-/// Frames of the table's own counts.
+/// Frames with the table's own counts.
 fn table_frames(machine: Machine) -> [Frame; 2] {
     let nominal = Symbols::NOMINAL;
     let (naive_workload, all_workload) = (Workload::naive(&nominal), Workload::nominal(&nominal));
@@ -129,7 +131,7 @@ fn table_frames(machine: Machine) -> [Frame; 2] {
     ]
 }
 
-/// Frames of measured counts, after the table's own if the scale is the table's.
+/// Frames with measured counts. The table's own frames precede them if the scale is the table's.
 fn frames(scale: &Scale, results: &Results) -> Vec<Frame> {
     let mut frames = Vec::new();
     if scale.is_nominal() {
@@ -204,7 +206,8 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     Report { figures, ..page("Table 7.1: chips for a frame rate", introduction, sections) }
 }
 
-/// Chips for 30 frames/s of the frames with measured counts: naive and all techniques of each scene.
+/// Key figures: number of chips needed for 30 frames/s by the frames with measured counts, naive and with all
+/// techniques, for each scene.
 fn figures(frames: &[Frame]) -> Vec<Figure> {
     let kinds = SCENES.iter().flat_map(|(scene, _)| ["naive", "all-techniques"].map(|kind| (*scene, kind)));
     let measured = frames.iter().filter(|frame| frame.counted.is_some());
@@ -273,7 +276,7 @@ fn workloads(frames: &[Frame]) -> Table {
     table
 }
 
-/// A count with its error, in units of `unit`.
+/// Cell with a count and its error, both divided by `unit`.
 fn within(value: f64, error: f64, unit: f64) -> Cell {
     if error > 0.0 { Cell::interval(value / unit, error / unit) } else { (value / unit).into() }
 }

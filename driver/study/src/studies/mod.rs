@@ -1,4 +1,4 @@
-//! The studies: each a list of points, and a report on their outcomes.
+//! The studies. Each is a list of points, and a report on their outcomes.
 
 mod arithmetic;
 mod balance;
@@ -31,15 +31,16 @@ use photoncard_picture::choice::choices;
 pub enum Study {
     /// Memory traffic by order, cache and layout.
     Reordering,
-    /// Memory traffic over the exponent of a glossy floor: figure 6.17 of the dissertation.
+    /// Memory traffic over the exponent of a glossy floor (figure 6.17 of the dissertation).
     Figure617,
-    /// The cost model of table 7.1, with nominal and measured counts.
+    /// Cost model of Table 7.1, with nominal and measured counts.
     Table71,
     /// Each technique alone and all together, at equal numbers of rays and at equal quality.
     Techniques,
-    /// Memory traffic over photons, tile sides and queue sizes; time over chips.
+    /// Memory traffic over the number of photons, the side of tiles and the size of the queue; time over the
+    /// number of chips.
     Scaling,
-    /// Parts of a frame while camera and lights move.
+    /// Parts of a frame while the camera and lights move.
     Interactive,
 }
 
@@ -53,7 +54,7 @@ choices!(Study {
 });
 
 impl Study {
-    /// The points that the study measures.
+    /// Points that the study measures.
     pub fn points(self, scale: &Scale) -> Vec<Point> {
         match self {
             Self::Reordering => reordering::points(scale),
@@ -76,7 +77,7 @@ impl Study {
         }
     }
 
-    /// The report on the results, without provenance. It has published figures only beside those of a
+    /// Creates the report on the results, without provenance. It includes published figures only at a
     /// [nominal](Scale::is_nominal) scale.
     ///
     /// # Panics
@@ -113,7 +114,7 @@ mod tests {
     use super::super::quality::{Quality, TileError};
     use super::*;
 
-    /// Host's work, made up.
+    /// Host's work with made-up numbers.
     fn host_frame() -> HostFrame {
         let change = |change| Changed { change, bytes: 6_000_000, of: 8_000_000 };
         HostFrame {
@@ -132,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn interactive_frames_take_the_threads_and_links_of_their_measurements() {
+    fn interactive_frames_report_the_threads_and_links_of_their_measurements() {
         let page = page(Study::Interactive, &Scale::FULL);
         // 30 frames of a second each on two threads.
         assert!(page.contains(">60<"), "threads");
@@ -141,7 +142,7 @@ mod tests {
         );
     }
 
-    /// Page of a study on made-up outcomes.
+    /// Page of a study with made-up outcomes.
     fn page(study: Study, scale: &Scale) -> String {
         let counters =
             Counters { gathers: 10, gather_rays: 20, eye_rays: 1, photons_found: 500, ..Counters::ZERO };
@@ -162,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn published_figures_are_beside_those_of_the_nominal_frame_alone() {
+    fn published_figures_appear_only_at_the_nominal_scale() {
         let larger = Scale { side: 1024, ..Scale::FULL };
         for (study, words) in [
             (Study::Reordering, "Published figures are of frames"),

@@ -1,5 +1,5 @@
-//! Times of a frame on a chip that casts rays while its queue drains, beside those of the chip as it is
-//! built.
+//! Compares the times of a frame on a chip that casts rays while its queue is drained with those of the chip
+//! as it is built.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;
@@ -15,22 +15,22 @@ use super::present::{columns, panel, plot, series, table, text};
 use super::scenes::CORNELL;
 use super::times::{TimedFrame, table_shares};
 
-/// Policies of the tables: how the queue is drained, and how the arithmetic is shared.
+/// Policies in the tables: how the queue is drained, and how arithmetic is shared.
 const POLICIES: [&str; 3] =
     ["alternate, as built", "overlapped, units by their work", "overlapped, units by Table 7.1"];
 
-/// An order and a layout of the photon map.
+/// A line of the tables: order of the gathers, and layout of the photon map.
 type Line = (GatherOrder, PhotonLayout);
 
 /// The line whose queue is varied.
 const SORT_LINES: Line = (GatherOrder::Sort, PhotonLayout::Lines);
 
-/// Sizes of the queue whose halves are measured as well.
+/// Sizes of the queue whose halves are measured too.
 fn queues(scale: &Scale) -> Vec<u32> {
     scale.pick(&[512, 1024, 2048, 4096, 8192, 16_384], &[2048, 8192])
 }
 
-/// Point of a line with as many places in the queue; `None` for the chip's.
+/// Point of a line with a queue of `queue` entries; `None` for the chip's own size.
 fn point(scale: &Scale, (order, layout): Line, queue: Option<u32>) -> Point {
     let settings = scale.settings(order).with(|s| {
         s.photons.layout = layout;
@@ -39,13 +39,14 @@ fn point(scale: &Scale, (order, layout): Line, queue: Option<u32>) -> Point {
     scale.traffic(CORNELL, settings)
 }
 
-/// Point whose queue is one half of as many places, if the order has a queue.
+/// Point of a line with a queue of `queue / 2` entries. An order without a queue gets the chip's own size.
 fn half(scale: &Scale, line: Line, queue: Option<u32>) -> Point {
     let half = queue.unwrap_or(REFERENCE.gather_queue) / 2;
     point(scale, line, line.0.has_queue().then_some(half))
 }
 
-/// Points of frames on one half of the queue, and of frames by the size of the queue.
+/// Points of `lines` with half the chip's own queue, and of [`SORT_LINES`] with each size of [`queues`] and
+/// half of it.
 pub(super) fn points(scale: &Scale, lines: &[Line]) -> Vec<Point> {
     let halves = lines.iter().map(|&line| half(scale, line, None));
     let by_queue = queues(scale)

@@ -7,42 +7,42 @@ use super::super::report::{
 };
 use super::super::sample::Estimate;
 
-/// Bytes of a gigabyte.
+/// Number of bytes of a gigabyte.
 pub(super) const GIGA: f64 = 1e9;
 
-/// A number in a sentence: three significant digits.
+/// Formats a number in a sentence with three significant digits.
 pub(super) fn say(value: f64) -> String {
     human(value, 3)
 }
 
-/// A scene's name in figures: its file's without the extension.
+/// Name of a scene in key figures: its file name without the extension.
 pub(super) fn key(scene: &str) -> &str {
     scene.split('.').next().unwrap_or_default()
 }
 
-/// A count or an amount with its confidence interval, in units of `unit`.
+/// Cell with an estimate and its confidence interval, both divided by `unit`.
 pub(super) fn cell(estimate: Estimate, unit: f64) -> Cell {
     let estimate = estimate.scaled(1.0 / unit);
     Cell::interval(estimate.value, estimate.half_width)
 }
 
-/// A number of bytes with its confidence interval, in gigabytes.
+/// Cell with a number of bytes and its confidence interval, in gigabytes.
 pub(super) fn gigabytes(estimate: Estimate) -> Cell {
     cell(estimate, GIGA)
 }
 
-/// A point of a plot: bytes with their confidence interval, in gigabytes.
+/// Point of a plot at `x`: a number of bytes with its confidence interval, in gigabytes.
 pub(super) fn gigabyte_point(x: f64, estimate: Estimate) -> Point {
     let estimate = estimate.scaled(1.0 / GIGA);
     Point::with_half_width(x, estimate.value, estimate.half_width)
 }
 
-/// Columns of these names and units.
+/// Columns with these names and units.
 pub(super) fn columns(heads: &[(&str, &str)]) -> Vec<Column> {
     heads.iter().map(|&(name, unit)| Column::new(name, unit)).collect()
 }
 
-/// A report whose banner and provenance are still to be added.
+/// Report without a banner and without provenance.
 pub(super) fn page(title: &str, introduction: Vec<String>, sections: Vec<Section>) -> Report {
     Report {
         title: title.to_owned(),
@@ -54,28 +54,26 @@ pub(super) fn page(title: &str, introduction: Vec<String>, sections: Vec<Section
     }
 }
 
-/// A section.
 pub(super) fn section(heading: &str, blocks: Vec<Block>) -> Section {
     Section { heading: heading.to_owned(), blocks }
 }
 
-/// A paragraph.
 pub(super) fn text(text: impl Into<String>) -> Block {
     Block::Paragraph(text.into())
 }
 
-/// A table in the file of that name.
+/// Block with a table that is stored in a file with this name.
 pub(super) fn table(name: &str, table: Table) -> Block {
     Block::Table { name: name.to_owned(), table }
 }
 
-/// A plot in the file of that name.
+/// Block with a plot that is stored in a file with this name.
 pub(super) fn plot(name: &str, title: &str, caption: &str, panels: Vec<Panel>) -> Block {
     let plot = Plot { title: title.to_owned(), caption: caption.to_owned(), panels, shares_y_range: true };
     Block::Plot { name: name.to_owned(), plot }
 }
 
-/// A pair of axes with its series; an axis is its label, unit and scale.
+/// A pair of axes with its series. Each axis is given by label, unit and scale.
 pub(super) fn panel(
     title: &str,
     (x_label, x_unit, x_scale): (&str, &str, XScale),
@@ -90,12 +88,11 @@ pub(super) fn panel(
     }
 }
 
-/// A named line.
 pub(super) fn series(name: impl Into<String>, points: Vec<Point>) -> Series {
     Series { name: name.into(), points }
 }
 
-/// The paragraph on counting that every report has in its introduction.
+/// Paragraph that explains counting, for the introduction of every report.
 pub(super) fn how_it_counts() -> String {
     "Raw bytes are what the chip asks of the photon map; bytes from DRAM are the lines that miss the cache, times a line's \
      bytes. Sampled tiles are rendered on an emulated chip whose caches are empty when a tile begins; each stands for \

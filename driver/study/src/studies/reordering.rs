@@ -1,4 +1,4 @@
-//! Memory traffic of the photon map by order, cache and layout.
+//! Study of the photon map's memory traffic by order, cache and layout.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::memory::SetIndex;
@@ -20,7 +20,7 @@ use super::present::{
 use super::scenes::CORNELL;
 use super::times::{self, TimedFrame};
 
-/// Orders of the gathers that a chip can keep.
+/// Orders of gathers that a chip supports.
 const ORDERS: [GatherOrder; 5] = [
     GatherOrder::Naive,
     GatherOrder::Tiled,
@@ -29,13 +29,14 @@ const ORDERS: [GatherOrder; 5] = [
     GatherOrder::Sort,
 ];
 const LAYOUTS: [PhotonLayout; 2] = [PhotonLayout::Jensen, PhotonLayout::Lines];
-/// Sides of tiles, pixels: the dissertation's, and what the reference chip has room for.
+/// Sides of tiles, pixels: the dissertation's, a larger one, and the largest for which the reference chip has
+/// room.
 const TILES: [u32; 3] = [16, 32, WIDEST_TILE];
-/// Published bytes of a frame (Graphics Interface 2005): raw in the naive order, from DRAM in the practical
-/// orders, and from DRAM along a Hilbert curve.
+/// Published bytes per frame (Graphics Interface 2005): requested in the naive order, fetched from DRAM in
+/// the practical orders, and fetched from DRAM along a Hilbert curve.
 const PUBLISHED: [f64; 3] = [196e9, 24e9, 15e6];
 
-/// Orders that a chip can keep, with both layouts.
+/// Orders that a chip supports, each with both layouts.
 fn lines() -> Vec<(GatherOrder, PhotonLayout)> {
     LAYOUTS.into_iter().flat_map(|layout| ORDERS.map(|order| (order, layout))).collect()
 }
@@ -44,7 +45,7 @@ fn sizes(scale: &Scale) -> Vec<u32> {
     scale.pick(&[32, 64, 128, 256, 512], &[32, 128, 512])
 }
 
-/// Photon caches of 1, 4 and 32 ways, the last also with hashed sets, by name.
+/// Photon caches with 1, 4 and 32 ways, and with 32 ways and hashed sets, with their names.
 fn associativities() -> [(String, CacheSettings); 4] {
     let of = |ways, index| behind(CacheSpec { ways, index, ..CacheSpec::PHOTON });
     [
@@ -68,7 +69,7 @@ fn point(scale: &Scale, order: GatherOrder, layout: PhotonLayout, caches: CacheS
     scale.traffic_behind(CORNELL, settings, caches)
 }
 
-/// A point of sorted gathers in tiles of `tile` x `tile` pixels.
+/// Point with sorted gathers in tiles of `tile` x `tile` pixels.
 fn sorted(scale: &Scale, layout: PhotonLayout, tile: u32) -> Point {
     let settings = scale.settings(GatherOrder::Sort).with(|s| {
         s.photons.layout = layout;
@@ -125,7 +126,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     page("Reordering photon gathers", introduction, sections)
 }
 
-/// A table with a row for every order and layout behind the nominal caches.
+/// Table with a row for every order and layout, behind the nominal caches.
 fn by_order<'a>(
     title: &str,
     heads: &[(&str, &str)],
@@ -155,7 +156,7 @@ fn orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -
     })
 }
 
-/// A table of sorted gathers by the side of a tile: each tile reads about the whole map once.
+/// Table of sorted gathers by the side of a tile. Each tile reads about the whole map once.
 fn by_tile<'a>(
     scale: &Scale,
     results: &Results,
@@ -236,7 +237,7 @@ fn plot_of_orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measur
     )
 }
 
-/// Paragraph on the share of the rays that end in a gather.
+/// Paragraph on the fraction of the rays that end in a gather.
 fn share_of_gathers<'a>(
     scale: &Scale,
     nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement,
@@ -301,7 +302,7 @@ fn published<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> 
     table
 }
 
-/// A table with a row for each order and a column for each cache.
+/// Table with a row for each order and a column for each cache.
 fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, CacheSettings)]) -> Table {
     let mut heads = vec![Column::new("order", "")];
     heads.extend(caches.iter().map(|(name, _)| Column::new(name.as_str(), "GB")));
@@ -317,7 +318,7 @@ fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, C
     table
 }
 
-/// A line for each order over caches at their positions `x`.
+/// Series for each order over caches at positions `x`.
 fn lines_by_caches(scale: &Scale, results: &Results, caches: &[(f64, CacheSettings)]) -> Vec<Series> {
     let line = |order: GatherOrder| {
         let points = caches.iter().map(|&(x, caches)| {

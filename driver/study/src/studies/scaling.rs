@@ -1,5 +1,5 @@
-//! Traffic over the number of photons, the side of tiles, the size of the queue and the number of tiles in
-//! flight; time over the number of chips.
+//! Study of traffic as a function of the number of photons, the side of tiles, the size of the queue and the
+//! number of tiles in flight; and of time as a function of the number of chips.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;
@@ -21,7 +21,7 @@ use super::present::{
 use super::scenes::CORNELL;
 use super::workload::tile_seconds;
 
-/// A line of a plot: its name, and settings of which a sweep varies one.
+/// A line of a plot: its name, and its settings, one of which a sweep varies.
 type Line = (&'static str, fn(&Scale) -> RenderSettings);
 
 const NAIVE: Line = ("naive", |scale| scale.settings(GatherOrder::Naive));
@@ -32,7 +32,7 @@ const SORT_LINES: Line = ("sort, lines", |scale| {
 });
 const ALL_ON: Line = ("all techniques", Scale::all_on);
 
-/// A setting that is varied, and the lines that are measured over its values.
+/// A setting that is varied, and the lines measured over its values.
 struct Sweep {
     /// Name of the sweep's files, without extension.
     name: &'static str,
@@ -75,7 +75,7 @@ const SWEEPS: [Sweep; 3] = [
     },
 ];
 
-/// `least` times the powers of two, up to `most`.
+/// Products of `least` and powers of two, up to `most`.
 fn powers(least: u32, most: u32) -> Vec<u32> {
     std::iter::successors(Some(least), |value| value.checked_mul(2))
         .take_while(|&value| value <= most)

@@ -1,6 +1,6 @@
 //! Scenes of the studies.
 
-/// A simple, a glossy and a large scene: file and name in the reports.
+/// File and name in reports of a simple, a glossy and a large scene.
 pub(super) const SCENES: [(&str, &str); 3] =
     [(CORNELL, "Cornell box"), (GLOSSY, "glossy Cornell box"), (ATRIUM, "atrium")];
 pub(super) const CORNELL: &str = "cornell.gltf";

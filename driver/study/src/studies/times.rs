@@ -1,4 +1,4 @@
-//! Time of one chip for a frame, with reads that take their time.
+//! Time of one chip for a frame, with read latency.
 
 use photoncard_render::cost_model::arithmetic::ChipPart;
 use photoncard_render::cost_model::timing::{FrameLoad, FrameTimes, Load, Policy, Shares, TimedChip};
@@ -18,16 +18,15 @@ const FEWER_TASKS: [u32; 2] = [1, 16];
 pub(super) struct TimedFrame {
     load: FrameLoad,
     machine: Machine,
-    /// Gathers that a drain begins with, in the mean: of the drains that were counted, or as many as the chip
-    /// has places for, if the order has no queue of its own. Gathers of such an order wait for the gather
-    /// unit as well, and are done in the order of arrival.
+    /// Mean number of gathers at the beginning of a drain. It is the counted number or, if the order has no
+    /// queue, the number of places that the chip has. Gathers of such an order also wait for the gather unit,
+    /// and are done in the order of arrival.
     drained: u64,
     has_queue: bool,
 }
 
 impl TimedFrame {
-    /// Rays with their reads of the scene, and gathers with their reads of the photon map, of a point's
-    /// frame.
+    /// Rays and their reads of the scene, and gathers and their reads of the photon map, in a point's frame.
     pub(super) fn new(point: &Point, measured: &Measurement, machine: &Machine) -> Self {
         let arithmetic = arithmetic::of_frame(measured, &workload::symbols(&point.settings));
         let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
@@ -58,7 +57,7 @@ impl TimedFrame {
         Self { load, machine: *machine, drained, has_queue }
     }
 
-    /// Times of the chip as it is built: nothing is cast while the queue drains.
+    /// Times of the chip as it is built, which casts no rays while the queue is drained.
     pub(super) fn as_built(&self) -> FrameTimes {
         self.alternating(self.machine.tasks)
     }
@@ -67,8 +66,8 @@ impl TimedFrame {
         self.times(tasks, self.drained, Policy::Alternate)
     }
 
-    /// Times of a chip with units of their own, and a queue in two halves. The frame must be measured with a
-    /// queue of one half, if its order has one.
+    /// Times of a chip with separate arithmetic per unit, and a queue in two halves. If the order has a
+    /// queue, the frame must be measured with a queue of the size of one half.
     pub(super) fn overlapped(&self, shares: Shares) -> FrameTimes {
         let queue = if self.has_queue { 2 * self.drained } else { self.drained };
         self.times(self.machine.tasks, queue, Policy::Overlapped(shares))
@@ -90,7 +89,7 @@ impl TimedFrame {
     }
 }
 
-/// Rays of all kinds.
+/// Number of rays of all kinds.
 fn rays(counters: &Counters) -> u64 {
     let Counters { eye_rays, shadow_rays, gather_rays, survey_rays, specular_rays, .. } = *counters;
     eye_rays + shadow_rays + gather_rays + survey_rays + specular_rays
@@ -101,17 +100,18 @@ pub(super) fn table_shares() -> Shares {
     Shares::of(&Cost::new(&Workload::nominal(&Symbols::NOMINAL), &Symbols::NOMINAL))
 }
 
-/// Seconds of one chip for a frame, as it is built.
+/// Time of one chip, as it is built, for a frame, seconds.
 pub(super) fn frame_seconds(point: &Point, measured: &Measurement, machine: &Machine) -> f64 {
     TimedFrame::new(point, measured, machine).as_built().seconds
 }
 
-/// Numbers of tasks in flight of the table, the machine's own last.
+/// Numbers of tasks in flight in the table. The last is the machine's own.
 fn tasks(machine: &Machine) -> Vec<u32> {
     FEWER_TASKS.into_iter().filter(|&fewer| fewer < machine.tasks).chain([machine.tasks]).collect()
 }
 
-/// Columns of [`cells`]: parts at the machine's tasks in flight, then the frame by tasks, then its bound.
+/// Columns of [`cells`]: parts of the time with the machine's tasks in flight, the whole frame by number of
+/// tasks, and the bound of the frame.
 pub(super) fn heads(machine: &Machine) -> Vec<(String, &'static str)> {
     let parts = ["rays", "gathers"].map(|part| format!("{part}, {} in flight", machine.tasks));
     let frames = tasks(machine).into_iter().map(|tasks| format!("frame, {tasks} in flight"));
@@ -119,7 +119,7 @@ pub(super) fn heads(machine: &Machine) -> Vec<(String, &'static str)> {
     names.map(|name| (name, "ms")).collect()
 }
 
-/// Description of what the times assume.
+/// Text that states what the times assume.
 pub(super) fn assumptions(machine: &Machine) -> String {
     format!(
         "Milliseconds of one chip of {machine}, whose reads from DRAM take {} ns. A ray or a gather reads one line at a time, computes on \
@@ -130,7 +130,7 @@ pub(super) fn assumptions(machine: &Machine) -> String {
     )
 }
 
-/// Times of a frame, milliseconds.
+/// Cells with the times of a frame, milliseconds.
 pub(super) fn cells(frame: &TimedFrame) -> Vec<Cell> {
     let as_built = frame.as_built();
     let parts = [as_built.seconds - as_built.draining, as_built.draining];

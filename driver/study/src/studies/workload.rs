@@ -1,4 +1,4 @@
-//! Measured counts as workloads of the cost model.
+//! Converts measured counts to workloads of the cost model.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_render::RenderSettings;
@@ -9,15 +9,15 @@ use super::super::measure::{Measurement, TileMeasurement};
 
 type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;
 
-/// Workload of one frame, estimated from its sample of tiles. Bytes on the host's link are the table's: they
-/// do not depend on the scene.
+/// Workload of one frame, estimated from its sample of tiles. Bytes on the host's link are the table's,
+/// because they do not depend on the scene.
 pub(super) fn of_frame(measured: &Measurement, pixels: f64, symbols: &Symbols) -> Workload {
     let total = |count: Count| measured.total(count).value;
     // Tiles of the table's size, so that tile rates of frames in tiles of any size can be compared.
     of(&total, pixels / symbols.tile_pixels, pixels, symbols)
 }
 
-/// Table 7.1's symbols with the numbers of tiles, rays, neighbours and photons of a render.
+/// Symbols of Table 7.1 with the numbers of tiles, rays, neighbours and photons of a render.
 pub(super) fn symbols(settings: &RenderSettings) -> Symbols {
     let RenderSettings { photons, integrator, .. } = settings;
     let window = settings.window();
@@ -31,12 +31,11 @@ pub(super) fn symbols(settings: &RenderSettings) -> Symbols {
     }
 }
 
-/// [`symbols`] of a measured frame: `N_PM` is the number of photons in its map.
+/// Symbols as in [`symbols`], where `N_PM` is the number of photons in the measured frame's map.
 pub(super) fn symbols_of(settings: &RenderSettings, measured: &Measurement) -> Symbols {
     Symbols { photons: measured.map.photons as f64, ..symbols(settings) }
 }
 
-/// Workload of one tile.
 fn of_tile(tile: &TileMeasurement, symbols: &Symbols) -> Workload {
     of(&|count: Count| count(tile), 1.0, symbols.tile_pixels, symbols)
 }
@@ -69,7 +68,7 @@ pub(super) fn cost(workload: &Workload, symbols: &Symbols, order: GatherOrder) -
     if order == GatherOrder::Naive { Cost::naive(workload, symbols) } else { Cost::new(workload, symbols) }
 }
 
-/// Seconds that a chip takes for each tile: `max(bytes from DRAM / bandwidth, counted FLOPs / FLOPS)`.
+/// Time that a chip takes for each tile, seconds: `max(bytes from DRAM / bandwidth, counted FLOPs / FLOPS)`.
 pub(super) fn tile_seconds(measured: &Measurement, symbols: &Symbols, machine: &Machine) -> Vec<f64> {
     let seconds = |tile: &TileMeasurement| {
         let work = Work::new(&tile.counters, &tile.contents, symbols.gather_rays);

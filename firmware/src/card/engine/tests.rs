@@ -1,4 +1,4 @@
-//! Replies that are full on purpose: a fault, never pixels or checksums that are lost.
+//! Replies that were filled on purpose: the engine reports a fault and loses neither pixels nor checksums.
 
 use std::boxed::Box;
 use std::vec;
@@ -10,7 +10,7 @@ use super::*;
 use crate::kind::Micro;
 use crate::memory::Lines;
 
-/// Engine of a card whose reply has no room.
+/// Engine whose reply buffer is full.
 fn full() -> Box<Engine<Micro>> {
     let mut engine = Box::new(Engine::new());
     engine.data.resize(DATA_BYTES, 0).unwrap();

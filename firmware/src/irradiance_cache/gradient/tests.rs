@@ -1,4 +1,4 @@
-//! Gradients compared with differences of irradiance.
+//! Compares gradients with differences of irradiance.
 
 use glam::Vec3;
 
@@ -12,14 +12,14 @@ fn white(position: Vec3, normal: Vec3) -> Surface {
     Surface::white(position, normal, magnitude(&[position]))
 }
 
-/// Hit of a ray from `origin` on a ceiling at height 1: distance, and a radiance that grows along x.
+/// Hit on a ceiling at height 1 of a ray from `origin`: its distance, and a radiance that grows along x.
 fn ceiling(origin: Vec3, direction: Vec3) -> (f32, f32) {
     let distance = (1.0 - origin.y) / max(direction.y, 1e-3);
     let x = (origin + direction * distance).x;
     (distance, 1.0 + 1.0 / (1.0 + libm::expf(-2.0 * x)))
 }
 
-/// Irradiance over pi of the ceiling, with gradients, from `rays` rays.
+/// Irradiance over pi from the ceiling, with gradients, gathered by `rays` rays.
 fn gathered(position: Vec3, normal: Vec3, rays: u32) -> Irradiance {
     let pattern = Pattern::new(1, 2, 3, 0, Dimension::Irradiance);
     let point = GatherPoint::record(white(position, normal), pattern, rays);
@@ -49,7 +49,7 @@ fn gathered(position: Vec3, normal: Vec3, rays: u32) -> Irradiance {
 }
 
 #[test]
-fn distances_survive_their_code() {
+fn distances_survive_encoding() {
     for ratio in [0.01, 0.5, 0.99, 1.0, 1.5, 100.0] {
         assert!((decode(encode(ratio)) / ratio - 1.0).abs() < 0.04, "{ratio}");
     }
@@ -72,7 +72,7 @@ fn even_light_has_no_translational_gradient() {
 }
 
 #[test]
-fn a_record_tells_the_irradiance_around_it() {
+fn a_record_extrapolates_the_irradiance_around_it() {
     let normal = Vec3::new(0.1, 1.0, -0.2).normalize();
     let origin = Vec3::new(0.2, 0.0, 0.1);
     let here = gathered(origin, normal, 10_000);
@@ -102,7 +102,7 @@ fn the_error_of_a_record_grows_with_distance_and_turn_and_is_infinite_off_its_pl
 }
 
 #[test]
-fn a_record_in_a_gap_says_nothing_of_the_light_beyond_it() {
+fn a_record_in_a_gap_is_not_valid_beyond_it() {
     let in_gap = Record { distance: 0.015, ..Record::new(&white(Vec3::ZERO, Vec3::Y), 1.0) };
     assert!(in_gap.error(1.0, 0.04, Vec3::Y * 0.01, Vec3::Y).is_infinite());
     assert!(in_gap.error(1.0, 0.04, Vec3::X * 0.1, Vec3::Y).is_finite());

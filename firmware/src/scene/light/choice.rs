@@ -1,4 +1,4 @@
-//! Discrete choices, several in a row, by one random number: each choice rescales what is left of it.
+//! Several discrete choices in a row from one random number. Each choice rescales the number for the next.
 
 use photoncard_shared::message::Fault;
 
@@ -7,21 +7,21 @@ use crate::vector::{max, min};
 
 /// A random number in [0, 1) for several choices in a row.
 ///
-/// A choice of probability p leaves -log2(p) bits fewer. Random bits from `dither` replace them, so that
-/// choices within a small share have full resolution.
+/// A choice of probability p leaves the number with -log2(p) bits fewer. Random bits from `dither` replace
+/// them, so that choices within a small share have full resolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fraction {
     value: f32,
     dither: u32,
 }
 
-/// Resolution of the initial number: 2^-24.
+/// Resolution of a random number before the first choice: 2^-24.
 const STEP: f32 = 1.0 / 16_777_216.0;
-/// Greatest value of a fraction.
+/// Maximum value of a fraction.
 const BELOW_ONE: f32 = 1.0 - STEP;
 
 impl Fraction {
-    /// A fraction with value `value` in [0, 1) and 32 random bits.
+    /// Creates a fraction from a value in [0, 1) and 32 random bits.
     #[inline(always)]
     pub fn new(value: f32, dither: u32) -> Self {
         Self { value, dither }
@@ -33,7 +33,7 @@ impl Fraction {
         self.value
     }
 
-    /// Rescales the share `lower..lower + width`, which contains the value, to [0, 1).
+    /// Rescales the interval `lower..lower + width`, which contains the value, to [0, 1).
     #[inline(always)]
     #[must_use]
     pub fn within(self, lower: f32, width: f32) -> Self {
@@ -50,11 +50,11 @@ pub(super) struct Chosen {
     pub(super) rest: Fraction,
 }
 
-/// Denominator of the thresholds, 2^32.
+/// Denominator of the thresholds: 2^32.
 const ALL: f32 = 4_294_967_296.0;
 
-/// Chooses one of `count` by their cumulative distribution; `threshold` returns its value at an index, in
-/// units of 2^-32.
+/// Chooses one of `count` items by a cumulative distribution function. `threshold` returns the function's
+/// value at an index, in units of 2^-32.
 pub(super) fn choose(
     fraction: Fraction,
     count: u32,
@@ -76,7 +76,7 @@ pub(super) fn choose(
     Ok(Chosen { index: low, probability: width, rest })
 }
 
-/// Probability of `index` in [`choose`].
+/// Probability with which [`choose`] chooses item `index`.
 pub(super) fn probability(
     index: u32,
     mut threshold: impl FnMut(u32) -> Result<u32, Fault>,
@@ -84,7 +84,7 @@ pub(super) fn probability(
     share(index, &mut threshold).map(|(_, width)| width)
 }
 
-/// Lower end of a share, in units of 2^-32, and its width, 0 to 1.
+/// Lower end, in units of 2^-32, and width, 0 to 1, of the interval of item `index`.
 fn share(index: u32, threshold: &mut impl FnMut(u32) -> Result<u32, Fault>) -> Result<(u32, f32), Fault> {
     let lower = match index.checked_sub(1) {
         Some(before) => threshold(before)?,
@@ -100,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_left_of_a_number_is_as_fine_as_it_was() {
+    fn the_remainder_of_a_fraction_keeps_its_resolution() {
         // A share of ten steps of the initial number: the rescaled fraction takes more than ten values,
         // uniformly.
         let (lower, width) = (0.5, 10.0 * STEP);
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn thresholds_choose_each_by_its_share() {
+    fn thresholds_choose_each_item_by_its_share() {
         let thresholds = [1 << 30, (1 << 30) + 4, 3 << 30, u32::MAX];
         let threshold = |index: u32| Ok(thresholds[index as usize]);
         for (value, expected) in [(0.0, 0), (0.2, 0), (0.3, 2), (0.74, 2), (0.76, 3), (BELOW_ONE, 3)] {

@@ -1,4 +1,5 @@
-//! Sampling of emitters: triangles, uniformly by area, points and spots. The light tree selects the emitter.
+//! Sampling of emitters: triangles uniformly by area, and point and spot lights. The light tree selects the
+//! emitter.
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
@@ -20,17 +21,17 @@ const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
 /// A point on an emissive triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EmitterPoint {
-    /// The point, metres.
+    /// Position, metres.
     pub position: Vec3,
     /// Unit normal of the front.
     pub normal: Vec3,
-    /// Radiance leaving the point, W/(sr m^2).
+    /// Radiance that leaves the point, W/(sr m^2).
     pub emission: Vec3,
-    /// The greatest coordinate of the triangle, metres.
+    /// Maximum magnitude of the triangle's coordinates, metres.
     pub magnitude: f32,
 }
 
-/// Emitter `index`.
+/// Reads emitter `index`.
 ///
 /// # Errors
 /// If there is none.
@@ -40,11 +41,11 @@ pub fn read_emitter(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
     Ok(Emitter::read(bytes))
 }
 
-/// Maps a point of the unit square to an emissive triangle, uniformly by area and continuously; `None` if the
+/// Maps a point of the unit square to an emissive triangle, continuously and uniformly by area; `None` if the
 /// emitter is not a triangle.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn emitter_point(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -70,7 +71,8 @@ pub fn emitter_point(
     }))
 }
 
-/// Emitted radiance at barycentric `weights` of a triangle with an emissive texture or cut-outs, W/(sr m^2).
+/// Emitted radiance of a triangle with an emissive texture or cut-outs at the point with barycentric
+/// `weights`, W/(sr m^2).
 fn emission_at(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -92,11 +94,11 @@ fn emission_at(
     Ok(emission * Vec3::new(red, green, blue))
 }
 
-/// Probability density, 1/sr, of a light sample in a direction that meets an emissive triangle at `distance`,
-/// metres, and at `cosine` to its normal.
+/// Probability density, 1/sr, of a light sample in a direction that hits an emissive triangle. `distance`,
+/// metres, is that of the hit, `cosine` that of the angle to the triangle's normal.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn emitter_density(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -111,8 +113,8 @@ pub fn emitter_density(
     Ok(probability * (distance * distance / (cosine * area(vertices))))
 }
 
-/// Samples an emitter by the fractions `across` and `down`. `share` is the probability of choosing the
-/// emitters at all.
+/// Samples an emitter by the fractions `across` and `down`. `share` is the probability of choosing emitters
+/// at all.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -143,14 +145,15 @@ pub(super) fn sample(
     }
 }
 
-/// Angular attenuation of a spot at a cosine to its axis, 0 to 1 (`KHR_lights_punctual`).
+/// Angular attenuation of a spot light, 0 to 1, at a cosine to its axis (`KHR_lights_punctual`).
 #[inline(always)]
 pub fn falloff(cosine: f32, scale: f32, offset: f32) -> f32 {
     let linear = min(max(cosine * scale + offset, 0.0), 1.0);
     linear * linear
 }
 
-/// Light sample from a point of a triangle that was chosen with `density`, 1/m^2; `None` from its dark side.
+/// Light sample from a point of a triangle that was chosen with the density `density`, 1/m^2; `None` if the
+/// receiver is on its dark side.
 fn from_area(
     receiver: &Receiver,
     target: &EmitterPoint,
@@ -177,7 +180,7 @@ fn from_area(
     })
 }
 
-/// Light sample from a point light with an intensity, W/sr, that depends on the direction towards it.
+/// Light sample from a point light. `intensity` is a function of the direction towards the light, W/sr.
 fn from_point(
     receiver: &Receiver,
     position: Vec3,

@@ -1,7 +1,7 @@
-//! The environment: light from infinitely far, an equirectangular map. Directions are sampled by a grid of
-//! cells of equal angles: row, then column, in proportion to the light through the cell, then uniformly in
-//! solid angle within it. Cells whose light comes through small parts of them, such as a sun, are divided
-//! into parts of equal solid angle, which are chosen likewise.
+//! Environment light: infinitely distant light, given by an equirectangular map. Directions are sampled from
+//! a grid of cells of equal angles: first the row, then the column, in proportion to the light through the
+//! cell, then uniformly in solid angle within the cell. A cell whose light comes from a small part of it,
+//! such as the sun, is subdivided into parts of equal solid angle, which are chosen in the same way.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -15,16 +15,16 @@ use crate::memory::MemoryPort;
 use crate::scene::{SceneImage, read_texture, sample_texture};
 use crate::vector::{max, min};
 
-/// Coordinates of a direction on the map, from the left and from the top, 0 to 1. The centre is -z, the top
-/// +y.
+/// Coordinates of a direction on the map, from the left and from the top, 0 to 1. The map's centre is -z, its
+/// top +y.
 pub fn environment_coordinates(direction: Vec3) -> [f32; 2] {
     let Vec3 { x, y, z } = direction;
     let across = libm::atan2f(x, -z) * (0.5 * FRAC_1_PI) + 0.5;
     [across, libm::atan2f(libm::sqrtf(x * x + z * z), y) * FRAC_1_PI]
 }
 
-/// Unit vector at horizontal coordinate `across` of the map, 0 to 1 from the left, and `cosine` of the angle
-/// to +y.
+/// Unit vector at the horizontal coordinate `across` of the map, 0 to 1 from the left, and at the cosine
+/// `cosine` of the angle to +y.
 pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
     let angle = 2.0 * PI * (across - 0.5);
     let sine = libm::sqrtf(max(1.0 - cosine * cosine, 0.0));
@@ -32,10 +32,10 @@ pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
     Vec3::new(sine * x, cosine, -sine * z)
 }
 
-/// Radiance from a direction, W/(sr m^2); zero without an environment.
+/// Radiance of the environment from a direction, W/(sr m^2); zero without an environment.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn environment_radiance(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -50,7 +50,7 @@ pub fn environment_radiance(
 /// Probability density of a light sample in a direction of the environment, 1/sr.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn environment_density(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -107,7 +107,7 @@ fn cell_at(coordinate: f32, cells: u32) -> u32 {
     ((coordinate * cells as f32) as u32).min(cells - 1)
 }
 
-/// The grid of cells.
+/// The grid of cells, with the positions of its thresholds.
 struct Cells {
     columns: u32,
     rows: u32,
@@ -119,26 +119,27 @@ impl Cells {
         Self { columns, rows }
     }
 
-    /// Index of the first threshold of a row's cells.
+    /// Index of the first threshold of the cells in a row.
     fn first_of_row(&self, row: u32) -> u32 {
         self.rows.wrapping_add(row.wrapping_mul(self.columns))
     }
 
-    /// Cosine of the angle to +y at the fraction `share` of a row's solid angle, from its upper border.
+    /// Cosine of the angle to +y below which the fraction `share` of a row's solid angle lies, counted from
+    /// the row's upper border.
     fn cosine(&self, row: u32, share: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
         min(max(upper + (lower - upper) * share, -1.0), 1.0)
     }
 
-    /// Share of a row's solid angle above a direction of this cosine: the inverse of [`Self::cosine`].
+    /// Fraction of a row's solid angle above the direction with this cosine: the inverse of [`Self::cosine`].
     fn share(&self, row: u32, cosine: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
         (upper - cosine) / (upper - lower)
     }
 
-    /// Density of a direction in a cell that is chosen with `probability`, 1/sr.
+    /// Density, 1/sr, of a direction in a cell that is chosen with the probability `probability`.
     fn density(&self, share: f32, row: u32, probability: f32) -> f32 {
         // cos(upper border) - cos(lower border), as a product: no cancellation.
         let half = 0.5 * PI / self.rows as f32;
@@ -148,16 +149,16 @@ impl Cells {
     }
 }
 
-/// Parts of a divided cell: rows and columns, as many of both, of equal solid angle.
+/// Parts of a subdivided cell. There are as many rows as columns, and all parts have equal solid angle.
 struct Parts {
-    /// Index of the first threshold: those of the rows, then those of the parts of each row.
+    /// Index of the first threshold: the thresholds of the rows, then of the parts in each row.
     first: u32,
     side: u32,
 }
 
 impl Parts {
-    /// Parts of a cell, if it is divided. The numbers of all divided cells, increasing, follow the thresholds
-    /// of all cells, after their number and the number of rows of each.
+    /// Reads the parts of a cell; `None` if it is not subdivided. After the thresholds of all cells come the
+    /// number of subdivided cells, the number of rows of each, and the cells' numbers in increasing order.
     fn of(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -186,12 +187,13 @@ impl Parts {
         Ok(None)
     }
 
-    /// Index of the first threshold of a row's parts.
+    /// Index of the first threshold of the parts in a row.
     fn first_of_row(&self, row: u32) -> u32 {
         self.first.wrapping_add(self.side.wrapping_mul(row.wrapping_add(1)))
     }
 
-    /// Place in the cell, of its rows and columns, 0 to 1, and its density over that of an even choice.
+    /// Samples a position in the cell: its coordinates along rows and columns, 0 to 1, and its density
+    /// relative to a uniform choice.
     fn sample(
         &self,
         scene: &SceneImage,
@@ -207,7 +209,7 @@ impl Parts {
         Ok((place, row.probability * column.probability * (side * side)))
     }
 
-    /// Density of [`Self::sample`] at a place in the cell.
+    /// Density of [`Self::sample`] at a position in the cell, relative to a uniform choice.
     fn density(
         &self,
         scene: &SceneImage,
@@ -246,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn the_middle_is_ahead_the_right_is_x_and_the_top_is_up() {
+    fn the_map_has_minus_z_in_its_centre_x_on_the_right_and_y_at_the_top() {
         let near = |direction: Vec3, expected: [f32; 2]| {
             let found = environment_coordinates(direction);
             assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{direction}: {found:?}");

@@ -1,13 +1,13 @@
-//! Light sampling for shadow rays: choice of a light, point on it, probability density.
+//! Light sampling for shadow rays: choice of a light and of a point on it, with the probability density.
 //!
-//! Emissive triangles, points and spots are leaves of the light tree (module `tree`). Distant lights and the
-//! environment have no distance and are chosen beside it; the image header has the probabilities of the
-//! three. One point of the unit square makes all choices: each uses a part of a coordinate and rescales the
-//! rest ([`Fraction`]). Neighbouring points therefore fall on neighbouring points of one light, and a
-//! stratified pattern stratifies the lights.
+//! Emissive triangles, point lights and spot lights are leaves of the light tree (module `tree`). Distant
+//! lights and the environment have no distance and are chosen beside it; the image header contains the
+//! probabilities of the three. One point of the unit square makes all choices: each choice uses a part of a
+//! coordinate and rescales the remainder ([`Fraction`]). Neighbouring points therefore map to neighbouring
+//! points of one light, and a stratified pattern stratifies the lights.
 //!
-//! Sampling and density are computed by equal operations: the weights of a shadow ray and of a gather ray
-//! that meets the light differ only by the rounding of the gather ray's hit.
+//! Sampling and density use equal operations. The weights of a shadow ray and of a gather ray that hits the
+//! light therefore differ only by the rounding of the gather ray's hit.
 
 mod choice;
 mod distant;
@@ -31,10 +31,10 @@ use super::SceneImage;
 use crate::memory::MemoryPort;
 
 /// Samples a light for the receiver of `choices` by a point `(u, v)` of the unit square and 32 random bits;
-/// `None` for a sample without light.
+/// `None` if the sample has no light.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn sample_light(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

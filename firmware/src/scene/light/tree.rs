@@ -1,14 +1,14 @@
-//! The light tree: selection of the emitter of a shadow ray (Conty Estevez, Kulla 2018, *Importance sampling
-//! of many lights with adaptive tree splitting*; the bounds are those of Pharr, Jakob, Humphreys 2023,
-//! *Physically Based Rendering*, section 12.6.3).
+//! Light tree: selection of the emitter of a shadow ray (Conty Estevez, Kulla 2018, *Importance sampling of
+//! many lights with adaptive tree splitting*; bounds as in Pharr, Jakob, Humphreys 2023, *Physically Based
+//! Rendering*, section 12.6.3).
 //!
-//! At each node one of up to four children is chosen by an estimate of its light: power, times cosines at
-//! receiver and emitter, over the squared distance to the centre of the child's bounding sphere, which is at
-//! least the squared radius. Each cosine is a weighted mean of that at the centre and the greatest one that
-//! the sphere and the cone of normals allow. The greatest alone, as in the papers, is that of a few points of
-//! a large lamp or of a sky, and draws rays from emitters that are worth more. A fraction [`EVEN`] of the
-//! choices is uniform, so that emitters with a low estimate are not starved; a child whose greatest cosine is
-//! negative cannot light the receiver and is excluded.
+//! At each node one of up to four children is chosen by an estimate of its light: power times the cosines at
+//! receiver and emitter, divided by the squared distance to the centre of the child's bounding sphere, which
+//! is at least the squared radius. Each cosine is a weighted mean of the cosine at the centre and the
+//! greatest cosine that the sphere and the cone of normals allow. The papers use the greatest cosine only;
+//! for a large lamp or a sky it is attained at few points, and would draw rays from emitters that contribute
+//! more. A fraction [`EVEN`] of the choices is uniform, so that emitters with a low estimate are still
+//! sampled. A child whose greatest cosine is negative cannot light the receiver and is excluded.
 
 use glam::Vec3;
 use photoncard_shared::address::LINE_BYTES;
@@ -28,16 +28,16 @@ const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
 const TRAIL_BITS: usize = 2;
 const _: () = assert!(1 << TRAIL_BITS == LIGHT_CHILDREN && TRAIL_BITS * LIGHT_TREE_LEVELS <= 32);
 
-/// Fraction of the choices at a node that is uniform.
+/// Fraction of the choices at a node that are uniform.
 const EVEN: f32 = 1.0 / 64.0;
-/// Weight of the greatest cosine in that of an emitter, whose light comes from all of it: least noise in the
-/// atrium and the room.
+/// Weight of the greatest cosine in the mean cosine of an emitter, whose light comes from all of its surface.
+/// This value gives the least noise in the atrium and the room.
 const EMITTER_BOUND: f32 = 1.0 / 8.0;
-/// Weight of the greatest cosine in that of a node, whose nearest emitters may be anywhere in it: least noise
-/// of 10,000 emitters.
+/// Weight of the greatest cosine in the mean cosine of a node, whose nearest emitters can be anywhere in it.
+/// This value gives the least noise with 10,000 emitters.
 const NODE_BOUND: f32 = 1.0 / 2.0;
-/// Upper bound of a cosine below which a child is excluded: below 0 by more than the rounding error of cones'
-/// axes.
+/// Upper bound of a cosine below which a child is excluded. It is below 0 by more than the rounding error of
+/// cone axes.
 const BELOW_HORIZON: f32 = -1e-3;
 
 /// Result of [`select_emitter`].
@@ -47,14 +47,14 @@ pub struct Selection {
     pub emitter: u32,
     /// Probability of the choice.
     pub probability: f32,
-    /// Fraction rescaled after the choice, for the point on the emitter.
+    /// Fraction rescaled after the choice, to choose the point on the emitter.
     pub rest: Fraction,
 }
 
 /// Selects an emitter for a receiver; `None` if none can light it.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn select_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -78,10 +78,10 @@ pub fn select_emitter(
     Err(Fault { code: FaultCode::Depth, detail: node })
 }
 
-/// Probability of `emitter` in [`select_emitter`]; 0 if it cannot light the receiver.
+/// Probability with which [`select_emitter`] selects `emitter`; 0 if the emitter cannot light the receiver.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn selection_probability(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -118,26 +118,27 @@ fn read_node(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Re
     Ok(core::array::from_fn(|child| line.child(child)))
 }
 
-/// Number of no node: a tree has fewer.
+/// Node number that no tree contains.
 const NO_NODE: u32 = u32::MAX;
-/// Number of nodes whose choices are kept.
+/// Number of nodes whose choices are cached.
 const KEPT_CHOICES: usize = 4;
 
-/// A receiver, with its choices at the nodes that were read last: of the shadow rays of a point most pass the
-/// same few nodes.
+/// A receiver, with cached choices at the nodes read last. Most shadow rays of a point pass the same few
+/// nodes.
 pub struct LightChoices {
     pub(super) receiver: Receiver,
-    /// Nodes, each at its number modulo their count, and the choices there.
+    /// Cached choices with the numbers of their nodes. The position is the node's number modulo the array's
+    /// length.
     kept: [(u32, Choice); KEPT_CHOICES],
 }
 
 impl LightChoices {
-    /// A receiver without choices.
+    /// Creates a receiver without cached choices.
     pub fn new(receiver: Receiver) -> Self {
         Self { receiver, kept: [(NO_NODE, Choice::NONE); KEPT_CHOICES] }
     }
 
-    /// The choice at a node, which is read if its choice is not kept.
+    /// Choice at a node. The node is read if its choice is not cached.
     fn at(&mut self, scene: &SceneImage, memory: &mut impl MemoryPort, node: u32) -> Result<&Choice, Fault> {
         let [first, second, third, fourth] = &mut self.kept;
         let kept = match node as usize % KEPT_CHOICES {
@@ -153,13 +154,13 @@ impl LightChoices {
     }
 }
 
-/// Children of a node that may light a receiver, with their probabilities.
+/// Children of a node that can light a receiver, with their probabilities.
 #[derive(Clone, Copy)]
 struct Choice {
     options: [Option<Weighted>; LIGHT_CHILDREN],
 }
 
-/// A child with the probability of its choice.
+/// A child and the probability of its choice.
 #[derive(Clone, Copy)]
 struct Weighted {
     link: LightLink,
@@ -200,7 +201,7 @@ impl Choice {
         self.options.get(index).copied().flatten()
     }
 
-    /// The chosen child, and the lower end of its share; `None` without children.
+    /// Chosen child and lower end of its interval; `None` if there are no children.
     fn choose(&self, fraction: Fraction) -> Option<(Weighted, f32)> {
         let mut chosen = None;
         let mut lower = 0.0;
@@ -215,7 +216,7 @@ impl Choice {
     }
 }
 
-/// Estimate of a child's light at a receiver.
+/// Estimate of the light of a child at a receiver.
 #[derive(Clone, Copy)]
 struct Estimate {
     /// Power times the cosines at receiver and emitter.
@@ -225,7 +226,7 @@ struct Estimate {
 }
 
 impl Estimate {
-    /// The estimate; `None` for a child that cannot light the receiver.
+    /// Estimates the light of a child; `None` if it cannot light the receiver.
     fn new(child: &LightChild, receiver: &Receiver) -> Option<Self> {
         let way = Vec3::from_array(child.centre) - receiver.position;
         let towards = unit(way);
@@ -262,12 +263,13 @@ impl Estimate {
     }
 }
 
-/// Mean of the cosine at a child's centre and the greatest one, which has the weight `bound`.
+/// Weighted mean of the cosine at a child's centre and the greatest cosine. The latter has the weight
+/// `bound`.
 fn mean_cosine(centre: f32, greatest: f32, bound: f32) -> f32 {
     (1.0 - bound) * max(centre, 0.0) + bound * max(greatest, 0.0)
 }
 
-/// An angle, 0 to pi.
+/// An angle from 0 to pi, given by its cosine and sine.
 #[derive(Clone, Copy)]
 struct Angle {
     cosine: f32,
@@ -281,7 +283,7 @@ impl Angle {
         Self { cosine, sine: libm::sqrtf(max(1.0 - cosine * cosine, 0.0)) }
     }
 
-    /// Angle up to pi / 2.
+    /// Angle of at most pi / 2 with this squared sine.
     fn of_sine_squared(squared: f32) -> Self {
         Self { cosine: libm::sqrtf(max(1.0 - squared, 0.0)), sine: libm::sqrtf(squared) }
     }
@@ -327,7 +329,7 @@ mod tests {
     const FLOOR: Receiver = Receiver { position: Vec3::ZERO, normal: Vec3::Y, origin: Vec3::ZERO };
 
     #[test]
-    fn what_cannot_light_a_place_is_left_out_and_nothing_else() {
+    fn only_emitters_that_cannot_light_the_receiver_are_excluded() {
         let may_light = |child: LightChild| Estimate::new(&child, &FLOOR).is_some();
         let down = Vec3::NEG_Y;
         assert!(may_light(child(2.0 * Vec3::Y, 0.1, down, 1.0)));
@@ -341,7 +343,7 @@ mod tests {
     }
 
     #[test]
-    fn probabilities_sum_to_one_and_numbers_find_them() {
+    fn selection_probabilities_sum_to_one_and_match_the_selections() {
         let up =
             |share: f32, x: f32| LightChild { share, ..child(Vec3::new(x, 1.0, 0.0), 0.1, Vec3::NEG_Y, 0.9) };
         let children = [Some(up(0.25, 0.0)), None, Some(up(0.5, 40.0)), Some(up(1e-20, 3.0))];

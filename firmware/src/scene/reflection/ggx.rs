@@ -1,16 +1,16 @@
-//! Microfacet lobe of glTF's metallic-roughness model (glTF 2.0, appendix B.3, but for the masking):
-//! `f = D V F`, isotropic, single scattering.
+//! Microfacet lobe of glTF's metallic-roughness model, `f = D V F`: isotropic, single scattering. It follows
+//! glTF 2.0, appendix B.3, except for the masking.
 //!
-//! With `n` the normal, `o` and `i` the directions, `h` their half vector and `a = roughness^2`:
+//! `n` is the normal, `o` and `i` are the directions, `h` is their half vector, and `a = roughness^2`:
 //!
 //! - `D = a^2 / (pi ((n.h)^2 (a^2 - 1) + 1)^2)` (Walter et al. 2007; Trowbridge, Reitz 1975);
 //! - `V = 1 / (2 (n.i) L(n.o) + 2 (n.o) L(n.i))`, `L(c) = sqrt(a^2 + (1 - a^2) c^2)`: height-correlated Smith
 //!   masking (Heitz 2014);
 //! - `F = F0 + (F90 - F0) (1 - h.o)^5` (Schlick 1994).
 //!
-//! A mixture of metal and dielectric of one roughness is one lobe, as `F` is linear in `F0` and `F90`.
-//! Directions are sampled by visible normals (Heitz 2018), as spherical caps (Dupuy, Benyoub 2023), of
-//! density `p = D / (2 (n.o + L(n.o)))`: `f cos / p` is at most `F`.
+//! A mixture of metal and dielectric with one roughness is one lobe, because `F` is linear in `F0` and `F90`.
+//! Directions are sampled by visible normals (Heitz 2018) with spherical caps (Dupuy, Benyoub 2023). Their
+//! density is `p = D / (2 (n.o + L(n.o)))`, so that `f cos / p` is at most `F`.
 
 use core::f32::consts::PI;
 
@@ -19,59 +19,59 @@ use glam::Vec3;
 use super::ggx_albedo::albedo_shares;
 use crate::vector::{about, max, max_component, min, mirror, unit};
 
-/// Minimum of `a`: a lobe of 0.06 degrees, in which `f32` resolves the half vector.
+/// Minimum of `a`. Its lobe has a width of 0.06 degrees, in which `f32` still resolves the half vector.
 pub(super) const MIN_ALPHA: f32 = 1e-3;
 
-/// Minimum `a` of [`GgxLobe::gathers_caustics`]: half of the light within 3.4 degrees.
+/// Minimum of `a` for [`GgxLobe::gathers_caustics`]. At this value half of the light is within 3.4 degrees.
 const MIN_CAUSTIC_ALPHA: f32 = 0.03;
 
-/// Minimum of the albedo over which energy is compensated.
+/// Minimum albedo that energy compensation divides by.
 const MIN_ALBEDO: f32 = 0.1;
 
-/// A lobe seen from one direction.
+/// A lobe, seen from one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GgxLobe {
-    /// `F0`, the reflectance at normal incidence.
+    /// `F0`: the reflectance at normal incidence.
     f0: Vec3,
-    /// `F90`, the reflectance at grazing incidence.
+    /// `F90`: the reflectance at grazing incidence.
     f90: Vec3,
-    /// `a`.
+    /// `a = roughness^2`.
     alpha: f32,
     /// Albedo, 0 to 1, for the outgoing direction.
     pub(super) albedo: Vec3,
     /// Coefficients of `F0` and `F90` in the albedo.
     shares: [f32; 2],
-    /// Estimate of the light that the lobe reflects at the end of a ray.
+    /// Method that estimates the light reflected by the lobe at the end of a ray.
     pub(super) estimate: Estimate,
 }
 
-/// The estimate of the light that a lobe reflects at the end of a ray.
+/// Method that estimates the light reflected by a lobe at the end of a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub(super) enum Estimate {
-    /// Photons are gathered for it.
+    /// Photons are gathered for the lobe.
     Photons,
-    /// A ray follows it, and photons of lights without extent are stored and gathered for it.
+    /// A ray follows the lobe. Photons of lights without an area are stored and gathered for it.
     Ray,
-    /// As [`Self::Ray`], but photons are stored for the Lambertian part beside it.
+    /// As [`Self::Ray`], but photons are stored for the Lambertian part beside the lobe.
     RayBesideBase,
-    /// A ray alone: the lobe is that of a layer beyond the base, and photons are stored for the base.
+    /// A ray follows the lobe. It is the lobe of a layer above the base, and photons are stored for the base.
     RayAlone,
 }
 
-/// The normal and the two directions of `f`, reduced to what the lobe depends on.
+/// Normal and directions, reduced to the quantities that the lobe depends on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Geometry {
     pub(super) incident: f32,
     pub(super) outgoing: f32,
     /// `1 - (n.h)^2`.
     sine_squared: f32,
-    /// `h.o`.
+    /// Cosine `h.o`.
     along: f32,
 }
 
 impl Geometry {
-    /// Of unit vectors, the directions on the normal's side.
+    /// Geometry of unit vectors. Both directions are on the normal's side.
     #[inline(always)]
     pub(super) fn new(normal: Vec3, outgoing: Vec3, incident: Vec3) -> Self {
         let half = unit(outgoing + incident);
@@ -86,7 +86,7 @@ impl Geometry {
 }
 
 impl GgxLobe {
-    /// The lobe of a roughness, 0 to 1, seen at a cosine to the normal.
+    /// Creates the lobe of a roughness, 0 to 1, seen at a cosine to the normal.
     pub(super) fn new(f0: Vec3, f90: Vec3, roughness: f32, cosine: f32) -> Self {
         let shares = albedo_shares(roughness, cosine);
         let [of_f0, of_f90] = shares;
@@ -101,13 +101,13 @@ impl GgxLobe {
         }
     }
 
-    /// The lobe as that of a layer beyond the base, which rays follow.
+    /// Marks the lobe as that of a layer above the base, which rays follow.
     pub(super) fn as_layer(self) -> Self {
         Self { estimate: Estimate::RayAlone, ..self }
     }
 
-    /// The lobe with the light that its microsurface reflects several times: `f (1 + F0 (1 - E) / E)`, `E`
-    /// the albedo of a lobe with `F = 1` (Turquin 2019, *Practical multiple scattering compensation for
+    /// Adds the light scattered several times between microfacets: `f (1 + F0 (1 - E) / E)`, where `E` is the
+    /// albedo of a lobe with `F = 1` (Turquin 2019, *Practical multiple scattering compensation for
     /// microfacet models*).
     pub(super) fn compensated(self) -> Self {
         let [of_f0, of_f90] = self.shares;
@@ -115,56 +115,57 @@ impl GgxLobe {
         self.dimmed(Vec3::ONE + self.f0 * ((1.0 - of_white) / of_white))
     }
 
-    /// The greatest channel of the albedo that the lobe would have with another reflectance, 0 to 1.
+    /// Maximum channel of the albedo that the lobe would have with the reflectances `f0` and `f90`, 0 to 1.
     pub(super) fn albedo_of(&self, f0: Vec3, f90: f32) -> f32 {
         let [of_f0, of_f90] = self.shares;
         min(max_component(f0) * of_f0 + f90 * of_f90, 1.0)
     }
 
-    /// `f` times a colour.
+    /// Multiplies `f` by a colour.
     #[inline(always)]
     pub(super) fn dimmed(self, colour: Vec3) -> Self {
         Self { f0: self.f0 * colour, f90: self.f90 * colour, albedo: self.albedo * colour, ..self }
     }
 
-    /// `true` for a lobe that photons of lights without extent resolve, in the caustic map: it is wider than
-    /// the code of their directions, and than a disc of photons is seen from the things that reflect them.
+    /// Returns true if photons of lights without an area, in the caustic map, resolve the lobe. It must be
+    /// wider than the resolution of photon directions, and wider than a photon's disc appears from the
+    /// objects that reflect it.
     pub(super) fn gathers_caustics(&self) -> bool {
         self.alpha >= MIN_CAUSTIC_ALPHA && self.estimate != Estimate::RayAlone
     }
 
-    /// `a`.
+    /// `a = roughness^2`.
     #[inline(always)]
     pub(super) fn alpha(&self) -> f32 {
         self.alpha
     }
 
-    /// `sqrt(a)`.
+    /// Roughness, `sqrt(a)`.
     pub(super) fn roughness(&self) -> f32 {
         libm::sqrtf(self.alpha)
     }
 
-    /// `f`, 1/sr.
+    /// BRDF `f`, 1/sr.
     #[inline(always)]
     pub(super) fn evaluate(&self, geometry: &Geometry) -> Vec3 {
         self.fresnel(geometry) * (distribution(self.alpha, geometry) * visibility(self.alpha, geometry))
     }
 
-    /// `p`, 1/sr.
+    /// Sampling density `p`, 1/sr.
     #[inline(always)]
     pub(super) fn density(&self, geometry: &Geometry) -> f32 {
         let Geometry { outgoing, .. } = *geometry;
         distribution(self.alpha, geometry) / (2.0 * (outgoing + length(self.alpha, outgoing)))
     }
 
-    /// `f cos / p = F G2 / G1`, without unit, of a direction above the surface.
+    /// Sampling weight `f cos / p = F G2 / G1`, dimensionless, of a direction above the surface.
     pub(super) fn weight(&self, geometry: &Geometry) -> Vec3 {
         let Geometry { incident, outgoing, .. } = *geometry;
         let visible = 2.0 * (outgoing + length(self.alpha, outgoing)) * visibility(self.alpha, geometry);
         self.fresnel(geometry) * (visible * incident)
     }
 
-    /// `f / p` over the albedo, without unit.
+    /// Ratio `f / p` divided by the albedo, dimensionless.
     #[inline(always)]
     pub(super) fn gain(&self, geometry: &Geometry) -> f32 {
         let Geometry { outgoing, .. } = *geometry;
@@ -173,8 +174,9 @@ impl GgxLobe {
         max_component(self.fresnel(geometry)) * visible / albedo
     }
 
-    /// The colour of [`Kernel`](super::ggx_kernel::Kernel)s: the albedo over that of a lobe with `F = 1`. The
-    /// mean of `F` over all directions, so that the reflection of even light is exact.
+    /// Colour by which a [`Kernel`](super::ggx_kernel::Kernel) is multiplied: the lobe's albedo divided by
+    /// that of a lobe with `F = 1`. It is the mean of `F` over all directions, so that the reflection of
+    /// uniform light is exact.
     pub(super) fn colour(&self) -> Vec3 {
         let [of_f0, of_f90] = self.shares;
         self.albedo * (1.0 / max(of_f0 + of_f90, f32::MIN_POSITIVE))
@@ -187,20 +189,20 @@ impl GgxLobe {
         self.f0 + (self.f90 - self.f0) * (squared * squared * rest)
     }
 
-    /// A direction of density `p` at a point of the unit square; it may lie below the surface.
+    /// Samples a direction with density `p` by a point of the unit square. It can lie below the surface.
     #[inline(always)]
     pub(super) fn direction(&self, normal: Vec3, outgoing: Vec3, point: [f32; 2]) -> Vec3 {
         mirror(outgoing, visible_normal(normal, outgoing, self.alpha, point))
     }
 
-    /// `true` if `F0` or `F90` is above 0 in some channel.
+    /// Returns true if `F0` or `F90` is above 0 in some channel.
     #[inline(always)]
     pub(super) fn reflects(&self) -> bool {
         max_component(self.f0) > 0.0 || max_component(self.f90) > 0.0
     }
 }
 
-/// A microfacet's normal, by the density of visible normals, at a point of the unit square.
+/// Samples the normal of a microfacet, with the density of visible normals, by a point of the unit square.
 #[inline(always)]
 fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) -> Vec3 {
     let height = normal.dot(outgoing);
@@ -215,18 +217,18 @@ fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) ->
     unit((cap - normal * cap_height) * alpha + normal * max(cap_height, 0.0))
 }
 
-/// The normal of a visible microfacet of a roughness, at a point of the unit square.
+/// Samples the normal of a visible microfacet of a roughness by a point of the unit square.
 pub(super) fn microfacet(normal: Vec3, outgoing: Vec3, roughness: f32, point: [f32; 2]) -> Vec3 {
     visible_normal(normal, outgoing, max(roughness * roughness, MIN_ALPHA), point)
 }
 
-/// Smith's masking `G1` at a cosine to the normal, 0 to 1.
+/// Smith masking `G1` at a cosine to the normal, 0 to 1.
 pub(super) fn masking(roughness: f32, cosine: f32) -> f32 {
     let (alpha, cosine) = (max(roughness * roughness, MIN_ALPHA), max(cosine, 0.0));
     2.0 * cosine / max(cosine + length(alpha, cosine), f32::MIN_POSITIVE)
 }
 
-/// `D`, 1/sr.
+/// Normal distribution `D`, 1/sr.
 #[inline(always)]
 pub(super) fn distribution(alpha: f32, geometry: &Geometry) -> f32 {
     let squared = alpha * alpha;
@@ -235,10 +237,10 @@ pub(super) fn distribution(alpha: f32, geometry: &Geometry) -> f32 {
     squared / (PI * denominator * denominator)
 }
 
-/// Minimum of the denominator of `V`: `D V` stays finite.
+/// Minimum of the denominator of `V`, so that `D V` stays finite.
 const MIN_VISIBILITY_SUM: f32 = 1e-12;
 
-/// `V`.
+/// Visibility `V`.
 #[inline(always)]
 pub(super) fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
     let Geometry { incident, outgoing, .. } = *geometry;
@@ -246,7 +248,7 @@ pub(super) fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
     0.5 / max(sum, MIN_VISIBILITY_SUM)
 }
 
-/// `L`.
+/// Length `L`.
 #[inline(always)]
 fn length(alpha: f32, cosine: f32) -> f32 {
     let squared = alpha * alpha;
@@ -257,7 +259,7 @@ fn length(alpha: f32, cosine: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// A unit vector at a cosine to the y axis.
+    /// Unit vector at a cosine to the y axis and an azimuth.
     fn at(cosine: f32, azimuth: f32) -> Vec3 {
         let sine = (1.0 - cosine * cosine).sqrt();
         Vec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin())
@@ -267,7 +269,7 @@ mod tests {
         GgxLobe::new(Vec3::splat(f0), Vec3::splat(f90), roughness, cosine)
     }
 
-    /// The mean of `f cos / p` over sampled directions.
+    /// Mean of `f cos / p` over sampled directions.
     fn mean_weight(lobe: &GgxLobe, outgoing: Vec3, side: u32) -> f32 {
         let mut sum = 0.0_f64;
         for index in 0..side * side {
@@ -282,8 +284,8 @@ mod tests {
         (sum / f64::from(side * side)) as f32
     }
 
-    /// Integrals of `f cos` by quadrature over half vectors: roughness, cosine, a metal of F0 = 0.8, a
-    /// dielectric of 0.04.
+    /// Integrals of `f cos`, by quadrature over half vectors. Columns: roughness, cosine, integral for a
+    /// metal of F0 = 0.8, integral for a dielectric of F0 = 0.04.
     const ALBEDOS: [(f32, f32, f32, f32); 20] = [
         (0.1, 0.15, 0.8854, 0.4608),
         (0.1, 0.4, 0.8152, 0.1147),
@@ -343,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn light_goes_both_ways_alike() {
+    fn the_ggx_lobe_is_reciprocal() {
         for roughness in [0.1, 0.4, 0.9] {
             for (a, b) in [(0.2, 0.9), (0.5, 0.6), (0.95, 0.1)] {
                 for turn in [0.0, 1.0, 3.0] {
@@ -356,8 +358,8 @@ mod tests {
         }
     }
 
-    /// Pearson's test of sampled directions in 8 x 16 bins of cosine and azimuth against the integral of the
-    /// density.
+    /// Pearson's chi-squared test of sampled directions against the integral of the density, in 8 x 16 bins
+    /// of cosine and azimuth.
     #[test]
     fn directions_are_distributed_as_the_density_says() {
         const ROWS: usize = 8;

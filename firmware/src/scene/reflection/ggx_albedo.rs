@@ -1,19 +1,20 @@
-//! Directional albedo of the GGX lobe, `E = F0 A + F90 B`, with `A` and `B` in tables of (roughness, cosine).
+//! Directional albedo of the GGX lobe, `E = F0 A + F90 B`. `A` and `B` are in tables over roughness and
+//! cosine.
 //!
-//! `A` and `B` are the integrals of `f cos` of a lobe with `F = 1 - s` and `F = s`, `s = (1 - cos)^5`
-//! Schlick's share, by the quasi-Monte Carlo method with 2^17 directions of visible normals. Between the
-//! entries they are interpolated: to 0.004 for cosines above 0.2, to 0.02 below.
+//! They are the integrals of `f cos` for a lobe with `F = 1 - s` and with `F = s`, where `s = (1 - cos)^5` is
+//! Schlick's factor, computed by quasi-Monte Carlo with 2^17 directions from visible normals. Interpolation
+//! between the entries is accurate to 0.004 for cosines above 0.2, to 0.02 below.
 
-/// Entries along each axis: roughness 0 to 1, square root of the cosine 0 to 1.
+/// Number of entries on each axis: roughness 0 to 1, and square root of the cosine 0 to 1.
 pub(super) const SIDE: usize = 16;
 
-/// `[A, B]` at a roughness and a cosine between normal and outgoing direction, both 0 to 1.
+/// Coefficients `[A, B]` for a roughness and the cosine between normal and outgoing direction, both 0 to 1.
 #[inline(never)]
 pub(super) fn albedo_shares(roughness: f32, cosine: f32) -> [f32; 2] {
     [&F0_SHARES, &F90_SHARES].map(|table| interpolated(table, roughness, cosine))
 }
 
-/// Value of a table of (roughness, square root of the cosine), in steps of 1/255.
+/// Interpolates a table over roughness and square root of the cosine, whose entries are in steps of 1/255.
 #[inline(always)]
 pub(super) fn interpolated(table: &[[u8; SIDE]; SIDE], roughness: f32, cosine: f32) -> f32 {
     let (row, down) = cell(roughness);
@@ -25,7 +26,8 @@ pub(super) fn interpolated(table: &[[u8; SIDE]; SIDE], roughness: f32, cosine: f
     (between(row) * (1.0 - down) + between(row + 1) * down) * (1.0 / 255.0)
 }
 
-/// Index of the entry before a coordinate, and the rest, 0 to 1. NaN counts as 0.
+/// Index of the table entry before a coordinate, and the fraction of the step to the next, 0 to 1. NaN counts
+/// as 0.
 #[inline(always)]
 fn cell(coordinate: f32) -> (usize, f32) {
     let scaled = if coordinate > 0.0 { coordinate } else { 0.0 } * (SIDE - 1) as f32;
@@ -34,7 +36,7 @@ fn cell(coordinate: f32) -> (usize, f32) {
     (index, if rest < 1.0 { rest } else { 1.0 })
 }
 
-/// `A`, in steps of 1/255.
+/// Table of `A`, in steps of 1/255.
 const F0_SHARES: [[u8; SIDE]; SIDE] = [
     [0, 6, 22, 47, 79, 113, 148, 180, 207, 228, 242, 250, 253, 255, 255, 255],
     [22, 16, 25, 49, 79, 114, 149, 180, 207, 228, 241, 250, 253, 255, 255, 255],
@@ -54,7 +56,7 @@ const F0_SHARES: [[u8; SIDE]; SIDE] = [
     [243, 237, 226, 213, 199, 184, 170, 156, 143, 131, 120, 110, 101, 93, 85, 78],
 ];
 
-/// `B`, in steps of 1/255.
+/// Table of `B`, in steps of 1/255.
 const F90_SHARES: [[u8; SIDE]; SIDE] = [
     [255, 249, 233, 208, 176, 142, 107, 75, 48, 27, 13, 5, 2, 0, 0, 0],
     [231, 211, 221, 205, 175, 141, 106, 75, 48, 27, 14, 5, 2, 0, 0, 0],

@@ -1,4 +1,4 @@
-//! GGX lobe of a waiting gather, as a factor of photons' power.
+//! GGX lobe of a waiting gather, as a factor of photon power.
 
 use core::f32::consts::PI;
 
@@ -7,8 +7,8 @@ use glam::Vec3;
 use super::ggx::{Geometry, MIN_ALPHA, distribution, visibility};
 use crate::vector::max;
 
-/// A lobe with `F = 1` seen from one direction, as a factor of photons' power: `D V` over its bound
-/// `1 / (2 pi a^3 n.o)`, so that sums of factors stay within those of powers.
+/// Factor of photon power for a lobe with `F = 1`, seen from one direction: `D V` divided by its bound
+/// `1 / (2 pi a^3 n.o)`, so that sums of factors are bounded by sums of powers.
 #[derive(Clone, Copy, Debug)]
 pub struct Kernel {
     normal: Vec3,
@@ -20,7 +20,7 @@ pub struct Kernel {
 const MIN_KERNEL_COSINE: f32 = 0.02;
 
 impl Kernel {
-    /// Of unit vectors.
+    /// Kernel of unit vectors.
     pub(super) fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
         Self { normal, outgoing, alpha: max(roughness * roughness, MIN_ALPHA) }
     }
@@ -30,12 +30,12 @@ impl Kernel {
         max(self.normal.dot(self.outgoing), MIN_KERNEL_COSINE)
     }
 
-    /// The bound of `D V`, 1/sr.
+    /// Upper bound of `D V`, 1/sr.
     pub(super) fn bound(&self) -> f32 {
         1.0 / (2.0 * PI * self.alpha * self.alpha * self.alpha * self.cosine())
     }
 
-    /// `D V` over the bound, 0 to 1, for a unit vector to the light; 0 below the surface.
+    /// `D V` divided by the bound, 0 to 1, for a unit vector to the light; 0 below the surface.
     #[inline(always)]
     pub(super) fn factor(&self, incident: Vec3) -> f32 {
         let mut geometry = Geometry::new(self.normal, self.outgoing, incident);
@@ -54,7 +54,7 @@ mod tests {
     use super::super::ggx::GgxLobe;
     use super::*;
 
-    /// A unit vector at a cosine to the y axis.
+    /// Unit vector at a cosine to the y axis and an azimuth.
     fn at(cosine: f32, azimuth: f32) -> Vec3 {
         let sine = (1.0 - cosine * cosine).sqrt();
         Vec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin())

@@ -1,11 +1,11 @@
-//! Surfaces of several layers: coat, sheen, base, and the reflection of the other side that diffuse or rough
-//! transmission shows.
+//! Surfaces of several layers: coat, sheen, base, and the reflection of the other side, which diffuse or
+//! rough transmission shows.
 //!
-//! A path takes one layer at random, in proportion to its share of the light, and the reflection of that
-//! layer over the probability: the samples of a pixel cover all of them. So a surface has one lobe whatever
-//! its layers, in registers and in the record of a waiting gather. Light that reaches a layer is dimmed by
-//! the directional albedo of those above it. Coat, sheen and transmission are followed by rays, and photons
-//! light the base alone.
+//! A path takes one layer at random, in proportion to its share of the light; the reflection of that layer is
+//! divided by the probability. The samples of a pixel cover all layers. A surface therefore has one lobe
+//! whatever its layers, in registers and in the record of a waiting gather. Light that reaches a layer is
+//! attenuated by the directional albedo of the layers above it. Rays follow coat, sheen and transmission;
+//! photons light only the base.
 
 use glam::Vec3;
 use photoncard_shared::layout::{COMPENSATED, Layers, Material, NARROW_LOBE, Reflectance, THIN_WALLED};
@@ -19,10 +19,10 @@ use super::sheen::SheenLobe;
 use crate::scene::specular::{Bounds, Glass, Specular};
 use crate::vector::{max, max_component};
 
-/// Minimum probability of a layer that reflects light: it bounds the weight of a sample.
+/// Minimum probability of a layer that reflects light. It bounds the weight of a sample.
 const MIN_PROBABILITY: f32 = 1.0 / 8.0;
 
-/// F0 of a coat: of the index of refraction 1.5.
+/// F0 of a coat, whose index of refraction is 1.5.
 const COAT_F0: f32 = 0.04;
 
 /// Factors of [`Layers`] at a point, from textures.
@@ -53,7 +53,7 @@ impl LayerTexel {
     };
 }
 
-/// A layer, with what is left of its light.
+/// A layer, with the fraction of light that reaches it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::scene) enum Layer {
     Base,
@@ -63,20 +63,20 @@ pub(in crate::scene) enum Layer {
     Behind,
 }
 
-/// The layer that a path takes.
+/// The layer that a path has chosen.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Taken {
     pub(in crate::scene) layer: Layer,
-    /// Its scattering over `probability`.
+    /// Scattering of the layer, divided by `probability`.
     pub(in crate::scene) scattering: Scattering,
-    /// Shading normal.
+    /// Shading normal of the layer.
     pub(in crate::scene) normal: Vec3,
     pub(in crate::scene) probability: f32,
-    /// Probability of all layers of this side.
+    /// Probability that a layer of this side is chosen.
     pub(in crate::scene) of_front: f32,
 }
 
-/// All layers at a point.
+/// All layers of a material at a point.
 struct Stack {
     base: Scattering,
     behind: Reflection,
@@ -84,9 +84,9 @@ struct Stack {
     coat: Scattering,
 }
 
-/// Takes a layer of a material at a point. `coat_normal` is the coat's shading normal. Of `random`, numbers
-/// in [0, 1), 0 chooses the layer, 1 and 2 the microfacet of rough glass. The first layer of the lowest
-/// number is the base.
+/// Chooses a layer of a material at a point. `coat_normal` is the coat's shading normal. `random` returns
+/// numbers in [0, 1): number 0 chooses the layer, 1 and 2 choose the microfacet of rough glass. The lowest
+/// value of number 0 selects the base.
 #[inline(never)]
 pub(in crate::scene) fn take(
     (material, layers): (&Material, &Layers),
@@ -159,7 +159,7 @@ impl Stack {
     }
 }
 
-/// The material with the textures of its reflectance and transmission applied.
+/// Applies the textures of reflectance and transmission to a material.
 fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material {
     let mut material = *material;
     match &mut material.reflectance {
@@ -178,8 +178,8 @@ fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material 
     material
 }
 
-/// The coat's lobe, or mirror at roughness 0, seen at a cosine, and its `F(n.o)`, by which glTF dims all
-/// below it.
+/// Lobe of the coat, or its mirror at roughness 0, seen at a cosine; and `F(n.o)`, by which glTF attenuates
+/// everything below the coat.
 fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
     let factor = layers.coat * texel.coat;
     if factor <= 0.0 {
@@ -208,14 +208,14 @@ fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
     }
 }
 
-/// The base's reflection, without its narrow lobe: photons light it.
+/// Reflection of the base without its narrow lobe, which photons light.
 pub(super) fn lit_by_photons(material: &Material, texel: &Texel, view: &View) -> Reflection {
     let none = LayerTexel::WHITE;
     let (base, _) = base(material, (&Layers::NONE, &none), texel, view, &|_| 0.0);
     base.reflection.without_narrow_lobe()
 }
 
-/// The base, and the reflection of the other side that it shows.
+/// Scattering of the base, and the reflection of the other side that it shows.
 fn base(
     material: &Material,
     layers: (&Layers, &LayerTexel),
@@ -247,9 +247,9 @@ fn base(
     (base, Reflection::lambertian(white.reflection.diffuse * colour * share))
 }
 
-/// Rough glass. A thin wall shows the reflection of its other side, by the lobe of the microfacets. The
-/// surface of a volume is a perfectly specular one at a microfacet of visible normals (Walter et al. 2007),
-/// but for the reflection outside, which is a lobe.
+/// Scattering of rough glass. A thin wall shows the reflection of its other side through the lobe of its
+/// microfacets. The surface of a volume is perfectly specular at a microfacet sampled by visible normals
+/// (Walter et al. 2007), except for the reflection outside, which is a lobe.
 fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2]) -> (Scattering, Reflection) {
     let View { outgoing, normals, is_front } = *view;
     let [normal, geometric_normal] = normals;
@@ -301,13 +301,13 @@ fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2])
     (Scattering { reflection, specular, absorption }, Reflection::BLACK)
 }
 
-/// The greatest albedo of all ways on from a point.
+/// Maximum albedo over all continuations of a path at a point.
 fn albedo(Scattering { reflection, specular, .. }: &Scattering) -> f32 {
     let Reflection { diffuse, lobe } = reflection;
     [*diffuse, lobe.albedo(), specular.reflected, specular.transmitted].into_iter().map(max_component).sum()
 }
 
-/// Scattering times a colour.
+/// Multiplies scattering by a colour.
 fn dimmed(scattering: Scattering, colour: Vec3) -> Scattering {
     let Scattering { reflection, specular, .. } = scattering;
     let specular = Specular {

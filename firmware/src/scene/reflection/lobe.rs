@@ -1,5 +1,5 @@
-//! The models of a lobe. A model is a file beside this one, and a case here, in [`super::Reflector`] and in
-//! [`super::PartialReflection`].
+//! Models of a lobe. Each model is a file in this directory and a case of the enum [`Lobe`], of
+//! [`super::Reflector`] and of [`super::PartialReflection`].
 
 use glam::Vec3;
 
@@ -7,14 +7,14 @@ use super::ggx::GgxLobe;
 use super::phong::PhongLobe;
 use super::sheen::SheenLobe;
 
-/// A lobe.
+/// A lobe of one of the models.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Lobe {
-    /// The dissertation's, and that of `extras.photoncard.phong`.
+    /// Phong lobe of the dissertation and of `extras.photoncard.phong`.
     Phong(PhongLobe),
-    /// glTF's metallic-roughness model.
+    /// GGX lobe of glTF's metallic-roughness model.
     Ggx(GgxLobe),
-    /// `KHR_materials_sheen`. Rays follow it always.
+    /// Sheen lobe of `KHR_materials_sheen`. Rays always follow it.
     Sheen(SheenLobe),
 }
 
@@ -22,7 +22,7 @@ impl Lobe {
     /// A lobe that reflects nothing.
     pub(super) const BLACK: Self = Self::Phong(PhongLobe::BLACK);
 
-    /// `true` if some light is reflected.
+    /// Returns true if the lobe reflects any light.
     #[inline(always)]
     pub(super) fn reflects(&self) -> bool {
         match self {
@@ -32,7 +32,7 @@ impl Lobe {
         }
     }
 
-    /// The albedo: of a Phong lobe at normal incidence, of a GGX lobe seen from its direction.
+    /// Albedo: of a Phong lobe at normal incidence, of other lobes for their outgoing direction.
     #[inline(always)]
     pub(super) fn albedo(&self) -> Vec3 {
         match self {
@@ -42,7 +42,7 @@ impl Lobe {
         }
     }
 
-    /// `f` times a colour.
+    /// Multiplies `f` by a colour.
     #[inline(always)]
     pub(super) fn dimmed(self, colour: Vec3) -> Self {
         match self {

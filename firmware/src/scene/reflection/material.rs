@@ -1,5 +1,5 @@
-//! Materials as reflections: the factors of a record times those of textures and corners, seen from one
-//! direction.
+//! Converts materials to reflections seen from one direction. The factors of the material's record are
+//! multiplied by those of textures and vertices.
 
 use glam::Vec3;
 use photoncard_shared::layout::{COMPENSATED, Material, NARROW_LOBE, Reflectance};
@@ -10,7 +10,7 @@ use super::metallic_roughness::MetallicRoughness;
 use crate::scene::shading_normal::bent;
 use crate::scene::specular::{Bounds, Glass, Specular};
 
-/// Factors of the material's values at a point, from textures and vertex colours.
+/// Factors of a material at a point, from textures and vertex colours.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Texel {
     /// Factor of the base colour or the diffuse albedo.
@@ -28,14 +28,14 @@ impl Texel {
 pub(in crate::scene) struct View {
     /// Unit direction to the viewer.
     pub(in crate::scene) outgoing: Vec3,
-    /// Shading normal and geometric normal, unit vectors on the viewer's side.
+    /// Unit shading normal and unit geometric normal, on the viewer's side.
     pub(in crate::scene) normals: [Vec3; 2],
     pub(in crate::scene) is_front: bool,
 }
 
 impl View {
-    /// Cosine of the view to the normal by which a lobe or a mirror reflects: to the shading normal,
-    /// [`bent`].
+    /// Cosine between the view and the normal by which a lobe or a mirror reflects, the [`bent`] shading
+    /// normal.
     #[inline(always)]
     pub(super) fn glossy_cosine(&self) -> f32 {
         let [normal, geometric_normal] = self.normals;
@@ -54,17 +54,17 @@ pub(in crate::scene) struct Scattering {
 }
 
 impl Scattering {
-    /// No scattering.
+    /// Absence of scattering.
     pub(super) const BLACK: Self =
         Self { reflection: Reflection::BLACK, specular: Specular::NONE, absorption: Vec3::ZERO };
 
-    /// A lobe alone.
+    /// Scattering that consists of a lobe only.
     pub(super) fn of_lobe(lobe: Lobe) -> Self {
         Self { reflection: Reflection { diffuse: Vec3::ZERO, lobe }, ..Self::BLACK }
     }
 }
 
-/// The scattering of a material at a point, without [layers](super::layered).
+/// Scattering of a material at a point, without [layers](super::layered).
 #[inline(always)]
 pub(in crate::scene) fn scattering(material: &Material, texel: &Texel, view: &View) -> Scattering {
     let View { outgoing, normals, is_front } = *view;

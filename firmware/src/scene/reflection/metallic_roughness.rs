@@ -1,12 +1,12 @@
 //! glTF's metallic-roughness model (glTF 2.0, appendix B): a GGX lobe over a Lambertian base.
 //!
-//! - The lobe is [`GgxLobe`]: `F0` is the dielectric's with the share `1 - metallic`, the base colour with
-//!   the share `metallic`; `F90` is the factor of `KHR_materials_specular` with the share `1 - metallic`, 1
-//!   with the share `metallic`.
-//! - The Lambertian albedo is `base (1 - metallic) (1 - max(F, E))`: `F` the mean of the dielectric's
-//!   `F(h.o)` over even light, by which appendix B weights the base, and `E` the greatest channel of the
-//!   lobe's albedo towards `o`, greater at grazing views.
-//! - Of roughness 0 the coat is perfectly specular, with Schlick's reflectance at the angle.
+//! - The lobe is a [`GgxLobe`]. `F0` mixes the dielectric's, with the weight `1 - metallic`, and the base
+//!   colour, with the weight `metallic`. `F90` mixes the factor of `KHR_materials_specular` and 1 with the
+//!   same weights.
+//! - The Lambertian albedo is `base (1 - metallic) (1 - max(F, E))`. `F` is the mean over uniform light of
+//!   the dielectric's `F(h.o)`, by which appendix B weights the base. `E` is the maximum channel of the
+//!   lobe's albedo towards `o`, which exceeds `F` at grazing views.
+//! - At roughness 0 the lobe is perfectly specular, with Schlick's reflectance.
 
 use glam::Vec3;
 
@@ -16,7 +16,7 @@ use super::lobe::Lobe;
 use crate::scene::specular::Specular;
 use crate::vector::{max, max_component, min};
 
-/// A metallic-roughness surface at one point, textures applied.
+/// A metallic-roughness surface at a point, with textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MetallicRoughness {
     pub(super) base: Vec3,
@@ -26,14 +26,14 @@ pub(super) struct MetallicRoughness {
     pub(super) grazing: f32,
     pub(super) metallic: f32,
     pub(super) roughness: f32,
-    /// The material's [`NARROW_LOBE`](photoncard_shared::layout::NARROW_LOBE).
+    /// True if the material has [`NARROW_LOBE`](photoncard_shared::layout::NARROW_LOBE).
     pub(super) has_narrow_lobe: bool,
-    /// The material's [`COMPENSATED`](photoncard_shared::layout::COMPENSATED).
+    /// True if the material has [`COMPENSATED`](photoncard_shared::layout::COMPENSATED).
     pub(super) is_compensated: bool,
 }
 
 impl MetallicRoughness {
-    /// The reflection without its perfectly specular part, seen at a cosine to the normal.
+    /// Reflection without its perfectly specular part, seen at a cosine to the normal.
     pub(super) fn reflection(&self, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
         let lobe = self.lobe(f0, f90, cosine);
@@ -42,7 +42,7 @@ impl MetallicRoughness {
         Reflection { diffuse, lobe: Lobe::Ggx(lobe) }
     }
 
-    /// A share of the lobe, beside a Lambertian part of another albedo.
+    /// The lobe times `share`, beside a Lambertian part with the albedo `diffuse`.
     pub(super) fn lobe_beside(&self, diffuse: Vec3, share: f32, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
         let lobe = self.lobe(f0 * share, f90 * share, cosine);
@@ -57,7 +57,7 @@ impl MetallicRoughness {
         if self.is_compensated { lobe.compensated() } else { lobe }
     }
 
-    /// The Lambertian and the perfectly specular part at roughness 0, seen at a cosine to the normal.
+    /// Lambertian and perfectly specular part at roughness 0, seen at a cosine to the normal.
     pub(super) fn smooth(&self, cosine: f32) -> (Reflection, Specular) {
         let rest = 1.0 - cosine;
         let squared = rest * rest;
@@ -69,29 +69,29 @@ impl MetallicRoughness {
         (Reflection::lambertian(diffuse), Specular::mirror(towards(f0, f90, share)))
     }
 
-    /// The dielectric's `F(h.o)` at a cosine between normal and `o`, the mean over the directions of even
-    /// light: its base is dimmed by `1 - F` (glTF 2.0, appendix B.2.4), and by the lobe's albedo where that
-    /// is more.
+    /// Mean of the dielectric's `F(h.o)` over the directions of uniform light, for the cosine between normal
+    /// and `o`. The base is multiplied by `1 - F` (glTF 2.0, appendix B.2.4), or by 1 minus the lobe's albedo
+    /// where that albedo is greater.
     fn mean_fresnel(&self, cosine: f32) -> f32 {
         let f0 = max_component(self.dielectric);
         f0 + (self.grazing - f0) * mean_schlick(cosine)
     }
 
-    /// F0 and F90 of metal and dielectric by their shares.
+    /// F0 and F90 of the mixture of metal and dielectric.
     fn mixed(&self) -> [Vec3; 2] {
         let mix = |dielectric: Vec3, metal: Vec3| towards(dielectric, metal, self.metallic);
         [mix(self.dielectric, self.base), mix(Vec3::splat(self.grazing), Vec3::ONE)]
     }
 }
 
-/// Mean of `(1 - h.o)^5` over directions `i` of even light, `h` the half vector of `i` and `o`, at the cosine
-/// of `o`: a fit to 0.0001.
+/// Mean of `(1 - h.o)^5` over the directions `i` of uniform light, where `h` is the half vector of `i` and
+/// `o`, for the cosine of `o`. It is a fit with an error of 0.0001.
 fn mean_schlick(cosine: f32) -> f32 {
     let rest = 1.0 - min(max(cosine, 0.0), 1.0);
     rest * (0.0045 + rest * (rest * 0.0257 - 0.0021))
 }
 
-/// Linear interpolation, `from` at a share of 0.
+/// Linear interpolation from `from`, at share 0, to `to`.
 fn towards(from: Vec3, to: Vec3, share: f32) -> Vec3 {
     from * (1.0 - share) + to * share
 }
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn no_more_light_leaves_than_arrives() {
+    fn reflected_light_does_not_exceed_incident_light() {
         for surface in each() {
             for cosine in [0.0, 0.1, 0.5, 1.0] {
                 let Reflection { diffuse, lobe } = surface.reflection(cosine);

@@ -1,15 +1,15 @@
-//! Reflection, without perfectly specular parts ([`super::Specular`]): one room for values, densities,
-//! samples, and the records of gathers.
+//! Reflection without perfectly specular parts ([`super::Specular`]): values, densities, samples, and the
+//! records of gathers.
 //!
-//! | question | face |
+//! | question | answered by |
 //! |---|---|
 //! | which parts there are | [`Reflection`] |
 //! | `f`, albedos, sampled directions and their densities, seen from one direction | [`Reflector`] |
 //! | materials that photons are stored on | [`keeps_photons`] |
 //! | the record of a waiting gather, and its sums over photons | [`PartialReflection`] |
 //!
-//! A reflection is a Lambertian part and one lobe. Callers name neither the lobe's model nor its parameters:
-//! a model is a file here, as `phong` and `ggx` are, and a case in `lobe`, [`Reflector`] and
+//! A reflection is a Lambertian part and one lobe. Callers need to know neither the lobe's model nor its
+//! parameters. A model is a file here, such as `phong` and `ggx`, and a case in `lobe`, [`Reflector`] and
 //! [`PartialReflection`].
 
 mod ggx;
@@ -40,7 +40,7 @@ use ggx::Estimate;
 use lobe::Lobe;
 use phong::PhongLobe;
 
-/// The parameters of a reflection function `f`: a Lambertian part and a lobe.
+/// Parameters of a reflection function `f`: a Lambertian part and a lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflection {
     /// Lambertian albedo, 0 to 1.
@@ -52,38 +52,39 @@ impl Reflection {
     /// No reflection.
     pub const BLACK: Self = Self::lambertian(Vec3::ZERO);
 
-    /// A Lambertian reflection of an albedo, 0 to 1.
+    /// Lambertian reflection with this albedo, 0 to 1.
     pub const fn lambertian(albedo: Vec3) -> Self {
         Self { diffuse: albedo, lobe: Lobe::BLACK }
     }
 
-    /// A Lambertian reflection with one Phong lobe: `f = diffuse / pi + specular (n + 2) / (2 pi) max(0, cos
-    /// alpha)^n`, alpha measured from the mirror direction, `n` the exponent.
+    /// Lambertian reflection with a Phong lobe:
+    /// `f = diffuse / pi + specular (n + 2) / (2 pi) max(0, cos alpha)^n`, where alpha is measured from the
+    /// mirror direction and `n` is the exponent.
     pub const fn phong(diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
         Self { diffuse, lobe: Lobe::Phong(PhongLobe { albedo: specular, exponent }) }
     }
 
-    /// `true` if `f = 0` everywhere.
+    /// Returns true if `f = 0` everywhere.
     #[inline(always)]
     pub fn is_black(&self) -> bool {
         !self.has_lambertian() && self.is_lambertian()
     }
 
-    /// `true` with a Lambertian part, whose light is the irradiance alone.
+    /// Returns true if there is a Lambertian part, whose reflected light follows from the irradiance.
     #[inline(always)]
     pub fn has_lambertian(&self) -> bool {
         max_component(self.diffuse) > 0.0
     }
 
-    /// `true` without a lobe.
+    /// Returns true if there is no lobe.
     #[inline(always)]
     pub fn is_lambertian(&self) -> bool {
         !self.lobe.reflects()
     }
 
-    /// `true` with a lobe that photons cannot resolve: an estimate by the k nearest would be a few of them,
-    /// or none. Such a lobe is followed by a ray, as perfectly specular surfaces are, but where the eye sees
-    /// it.
+    /// Returns true if there is a lobe that photons cannot resolve, because only a few of the k nearest, or
+    /// none, would be in it. A ray follows such a lobe, as it follows perfectly specular surfaces, except
+    /// where the eye sees the lobe.
     #[inline(always)]
     pub fn has_narrow_lobe(&self) -> bool {
         match &self.lobe {
@@ -93,7 +94,7 @@ impl Reflection {
         }
     }
 
-    /// The share of a GGX lobe in the albedo, 0 without one.
+    /// Fraction of the albedo that a GGX lobe has; 0 without one.
     #[inline(always)]
     pub(super) fn glossy_share(&self) -> f32 {
         match &self.lobe {
@@ -105,15 +106,15 @@ impl Reflection {
         }
     }
 
-    /// The reflection that photons estimate: without a narrow lobe.
+    /// Removes a narrow lobe; photons estimate what remains.
     #[inline(always)]
     #[must_use]
     pub fn without_narrow_lobe(self) -> Self {
         if self.has_narrow_lobe() { Self::lambertian(self.diffuse) } else { self }
     }
 
-    /// `true` with a narrow lobe that the caustic map lights, with photons of lights without extent: a gather
-    /// ray of the lobe rarely meets their highlights.
+    /// Returns true if there is a narrow lobe that the caustic map lights with photons of lights without an
+    /// area. A gather ray of the lobe would rarely hit their highlights.
     #[inline(always)]
     pub fn gathers_caustics(&self) -> bool {
         match &self.lobe {
@@ -122,14 +123,15 @@ impl Reflection {
         }
     }
 
-    /// `true` with a narrow lobe for which photons of lights without extent are stored in the caustic map.
+    /// Returns true if there is a narrow lobe for which the caustic map stores photons of lights without an
+    /// area.
     #[inline(always)]
     pub fn keeps_caustics(&self) -> bool {
         self.gathers_caustics()
             && !matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.estimate == Estimate::RayBesideBase)
     }
 
-    /// The narrow lobe alone, as a part beside the Lambertian one, for which photons are stored.
+    /// Only the narrow lobe, marked as a part beside the Lambertian one, for which photons are stored.
     #[must_use]
     pub(in crate::scene) fn narrow_lobe_beside_base(self) -> Self {
         let mut part = self.narrow_lobe();
@@ -141,20 +143,20 @@ impl Reflection {
         part
     }
 
-    /// The narrow lobe alone; black without one.
+    /// Only the narrow lobe; black if there is none.
     #[must_use]
     pub fn narrow_lobe(self) -> Self {
         if self.has_narrow_lobe() { self.without_lambertian() } else { Self::BLACK }
     }
 
-    /// The lobe alone.
+    /// Only the lobe.
     #[inline(always)]
     #[must_use]
     pub fn without_lambertian(self) -> Self {
         Self { diffuse: Vec3::ZERO, ..self }
     }
 
-    /// `f` times a throughput.
+    /// Multiplies `f` by a throughput.
     #[inline(always)]
     #[must_use]
     pub fn dimmed(mut self, throughput: Vec3) -> Self {

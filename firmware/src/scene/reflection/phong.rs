@@ -2,9 +2,9 @@
 //! physically based rendering*): `f = ks (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha measured from the
 //! mirror direction. Its directions are sampled with the density `p = (n + 1) / (2 pi) max(0, cos alpha)^n`.
 //!
-//! `1 / (2 pi)` is a quotient in [`PhongLobe::evaluate`] and [`PhongLobe::density`], a product in
-//! [`PhongLobe::sampled_value`], [`PhongLobe::sampled_density`] and [`PhongLobe::factor`]: the two may differ
-//! by one unit in the last place, and pictures depend on either.
+//! [`PhongLobe::evaluate`] and [`PhongLobe::density`] divide by `2 pi`. [`PhongLobe::sampled_value`],
+//! [`PhongLobe::sampled_density`] and [`PhongLobe::factor`] multiply by the reciprocal. The results can
+//! differ by one unit in the last place, and pictures depend on it.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -12,12 +12,11 @@ use glam::Vec3;
 
 use crate::vector::{about, max, max_component};
 
-/// A lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PhongLobe {
-    /// `ks`, 0 to 1: the albedo at normal incidence.
+    /// Albedo `ks` at normal incidence, 0 to 1.
     pub(super) albedo: Vec3,
-    /// `n`, 0 to [`MAX_PHONG_EXPONENT`](photoncard_shared::layout::MAX_PHONG_EXPONENT).
+    /// Exponent `n`, 0 to [`MAX_PHONG_EXPONENT`](photoncard_shared::layout::MAX_PHONG_EXPONENT).
     pub(super) exponent: f32,
 }
 
@@ -25,7 +24,7 @@ impl PhongLobe {
     /// A lobe that reflects nothing.
     pub(super) const BLACK: Self = Self { albedo: Vec3::ZERO, exponent: 0.0 };
 
-    /// `ks > 0` in some channel.
+    /// Returns true if `ks > 0` in some channel.
     #[inline(always)]
     pub(super) fn reflects(&self) -> bool {
         max_component(self.albedo) > 0.0
@@ -37,44 +36,44 @@ impl PhongLobe {
         power(mirror.dot(direction), self.exponent)
     }
 
-    /// `f`, 1/sr, for a [`Self::power`].
+    /// BRDF `f`, 1/sr, for a value of [`Self::power`].
     #[inline(always)]
     pub(super) fn evaluate(&self, power: f32) -> Vec3 {
         self.albedo * ((self.exponent + 2.0) / (2.0 * PI) * power)
     }
 
-    /// `p`, 1/sr, for a [`Self::power`].
+    /// Sampling density `p`, 1/sr, for a value of [`Self::power`].
     #[inline(always)]
     pub(super) fn density(&self, power: f32) -> f32 {
         (self.exponent + 1.0) / (2.0 * PI) * power
     }
 
-    /// `f`, 1/sr, of a sampled direction.
+    /// BRDF `f`, 1/sr, of a sampled direction.
     #[inline(always)]
     pub(super) fn sampled_value(&self, power: f32) -> Vec3 {
         self.albedo * (Self::factor(self.exponent) * power)
     }
 
-    /// `p`, 1/sr, of a sampled direction.
+    /// Sampling density `p`, 1/sr, of a sampled direction.
     #[inline(always)]
     pub(super) fn sampled_density(&self, power: f32) -> f32 {
         (self.exponent + 1.0) * 0.5 * FRAC_1_PI * power
     }
 
-    /// `(n + 2) / (2 pi)`, 1/sr.
+    /// Normalisation factor `(n + 2) / (2 pi)`, 1/sr.
     #[inline(always)]
     pub(super) fn factor(exponent: f32) -> f32 {
         (exponent + 2.0) * 0.5 * FRAC_1_PI
     }
 
-    /// `f / (ks p)`, without unit.
+    /// Ratio `f / (ks p)`, dimensionless.
     #[inline(always)]
     pub(super) fn gain(&self) -> f32 {
         (self.exponent + 2.0) / (self.exponent + 1.0)
     }
 
-    /// A direction of density `p` about the mirror direction: the inverse of the cumulative distribution, at
-    /// a point of the unit square.
+    /// Samples a direction with density `p` about the mirror direction, by inversion of the cumulative
+    /// distribution function at a point of the unit square.
     #[inline(always)]
     pub(super) fn direction(&self, mirror: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let cosine = libm::powf(1.0 - v, 1.0 / (self.exponent + 1.0));
@@ -83,7 +82,7 @@ impl PhongLobe {
     }
 }
 
-/// `max(0, cosine)^exponent`; 0 at and below the lobe's horizon for every exponent, 0 among them.
+/// `max(0, cosine)^exponent`. It is 0 at and below the lobe's horizon for every exponent, including 0.
 #[inline(always)]
 pub(super) fn power(cosine: f32, exponent: f32) -> f32 {
     if cosine > 0.0 { libm::powf(cosine, exponent) } else { 0.0 }

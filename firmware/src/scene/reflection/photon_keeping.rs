@@ -1,4 +1,4 @@
-//! Materials that photons are stored on.
+//! Decides on which materials photons are stored.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Material, NO_TEXTURE};
@@ -10,11 +10,11 @@ use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
 use crate::scene::texture::{channel_ranges, read_texture};
 
-/// `true` for a material on whose surfaces photons are stored: at some texel its base reflects without a
-/// narrow lobe.
+/// Returns true if photons are stored on surfaces of a material: its base has, at some texel, a reflection
+/// besides a narrow lobe.
 ///
 /// # Errors
-/// If the image is not sound.
+/// If the image is invalid.
 pub fn keeps_photons(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -30,9 +30,9 @@ pub fn keeps_photons(
     Ok(metallic.into_iter().any(|metallic| keeps(material, metallic)))
 }
 
-/// `true` if photons are stored at a texel of a metalness, white besides: its reflection without a narrow
-/// lobe is not black. The light comes along the normal, where smooth coats reflect the least and leave the
-/// most. Of a range of metalness, one end keeps photons if any value does.
+/// Returns true if photons are stored at a white texel of this metalness, because its reflection without a
+/// narrow lobe is not black. Light is assumed along the normal, where smooth coats reflect least. If any
+/// value in a range of metalness keeps photons, one of the range's ends does.
 fn keeps(material: &Material, metallic: f32) -> bool {
     let texel = Texel { metallic, ..Texel::WHITE };
     let view = View { outgoing: Vec3::Y, normals: [Vec3::Y; 2], is_front: true };
@@ -53,7 +53,7 @@ mod tests {
         [1, 3, 9, 27].map(|place| SHARES[index / place % 3])
     }
 
-    /// All kinds of materials with shares of 0, 1/2 and 1.
+    /// Materials of all kinds with factors of 0, 1/2 and 1.
     fn materials() -> impl Iterator<Item = Material> {
         let reflectances = |[a, b, c, d]: [f32; 4]| {
             let [first, second] = [[a; 3], [b; 3]];
@@ -87,7 +87,7 @@ mod tests {
         })
     }
 
-    /// Texels of every colour and roughness and of one metalness, and the sides that they are seen from.
+    /// Texels of every colour and roughness with one metalness, and views of both sides.
     fn sights(metallic: f32) -> Vec<(Texel, View)> {
         let mut sights = Vec::new();
         for index in 0..81 {

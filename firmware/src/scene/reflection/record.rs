@@ -1,4 +1,4 @@
-//! The reflection in the record of a waiting gather, and its sums over photons.
+//! Reflection in the record of a waiting gather, and its sums over photons.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
@@ -11,12 +11,12 @@ use super::phong::{self, PhongLobe};
 use crate::fixed_point::ColourSum;
 use crate::vector::{from_upper_half, max, mirror, unit, upper_half};
 
-/// A reflection function, evaluated but for what depends on a photon: 13 bytes, the dissertation's `S_B`
-/// (section 7.4).
+/// A reflection function, evaluated as far as it does not depend on a photon: 13 bytes, the dissertation's
+/// `S_B` (section 7.4).
 ///
-/// Stage one, [`Self::encode`], is done once a query: albedos, weight, units and the lobe's factor become two
-/// colours. Stage two is done once a photon: [`Self::lobe_factor`]. Colours are rounded to a shared exponent,
-/// in every order alike.
+/// Stage one, [`Self::encode`], is done once per query: albedos, weight, units and the lobe's factor become
+/// two colours. Stage two, [`Self::lobe_factor`], is done once per photon. Colours are rounded to a shared
+/// exponent, in the same way for every order of gathers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PartialReflection {
     diffuse: Rgbe,
@@ -28,8 +28,8 @@ pub struct PartialReflection {
 const _: () = assert!(size_of::<PartialReflection>() == 13);
 
 impl PartialReflection {
-    /// The record of a reflector's `f` towards its outgoing direction, times `weight`. Random bits in
-    /// `dither` make the rounding unbiased.
+    /// Encodes a reflector's `f` towards its outgoing direction, times `weight`. Random bits in `dither` make
+    /// the rounding unbiased.
     // One copy for final gathers and caustics: code is memory on a chip.
     #[inline(never)]
     pub fn encode(reflector: &Reflector, weight: Vec3, dither: u32) -> Self {
@@ -53,7 +53,7 @@ impl PartialReflection {
         }
     }
 
-    /// The record of a reflection that does not wait, and its lobe: of GGX, with directions as they are.
+    /// Encodes a reflection that does not wait. Also returns its lobe; a GGX lobe has unrounded directions.
     pub fn encode_present(reflector: &Reflector, weight: Vec3, dither: u32) -> (Self, DecodedLobe) {
         let record = Self::encode(reflector, weight, dither);
         let Lobe::Ggx(lobe) = &reflector.reflection.lobe else { return (record, record.decode_lobe()) };
@@ -63,40 +63,40 @@ impl PartialReflection {
         (Self { lobe, ..record }, DecodedLobe::Ggx(kernel))
     }
 
-    /// The record for photons of another surface normal, of this code.
+    /// Replaces the code of the surface normal by that of other photons.
     #[must_use]
     pub fn among(self, normal: u8) -> Self {
         Self { normal, ..self }
     }
 
-    /// The record of a white diffuser of factor 1, which reflects the irradiance itself. `normal` is its
-    /// surface normal's code.
+    /// Encodes a white diffuser with factor 1, whose result is the irradiance. `normal` is the code of its
+    /// surface normal.
     pub fn diffuser(normal: u8) -> Self {
         // 1 is a power of two: nothing is rounded.
         let diffuse = Rgbe::encode([1.0; 3], 0);
         Self { diffuse, lobe: Rgbe::default(), shape: Shape([0; 4]), normal }
     }
 
-    /// `true` without a lobe: irradiance is enough, whatever the photons' directions.
+    /// Returns true if there is no lobe, so that irradiance suffices, whatever the directions of photons.
     #[inline(always)]
     pub fn is_lambertian(&self) -> bool {
         self.lobe == Rgbe::default()
     }
 
-    /// `true` if the lobe, where there is one, is a microfacet model's.
+    /// Returns true if the lobe, if any, is of a microfacet model.
     #[inline(always)]
     pub fn is_of_microfacets(&self) -> bool {
         let Shape([_, _, third, _]) = self.shape;
         third & GGX != 0
     }
 
-    /// The Lambertian part's factor of the photons' power.
+    /// Factor of photon power in the Lambertian part.
     #[inline(always)]
     pub fn lambertian(&self) -> Vec3 {
         self.diffuse.decode().into()
     }
 
-    /// Decodes the lobe, once for all photons of a gather.
+    /// Decodes the lobe. This is done once for all photons of a gather.
     #[inline(always)]
     pub fn decode_lobe(&self) -> DecodedLobe {
         if self.is_lambertian() {
@@ -105,7 +105,8 @@ impl PartialReflection {
         self.shape.decode()
     }
 
-    /// The factor of a photon's power in the lobe's sum, for the code of the direction that it came from.
+    /// Factor of a photon's power in the lobe's sum. `direction` is the code of the direction from which the
+    /// photon came.
     #[inline(always)]
     pub fn lobe_factor(lobe: &DecodedLobe, direction: [u8; 2]) -> Vec3 {
         let incident = unit(decode_direction(direction).into());
@@ -115,8 +116,7 @@ impl PartialReflection {
         })
     }
 
-    /// The reflected power of photons, in the units of `weight`, from the sum of their powers and the lobe's
-    /// sum.
+    /// Reflected power of photons, in the units of `weight`, from the sum of their powers and the lobe's sum.
     #[inline(always)]
     pub fn reflected(&self, power: &ColourSum, lobe: &ColourSum) -> Vec3 {
         self.lambertian() * power.value() + Vec3::from_array(self.lobe.decode()) * lobe.value()
@@ -129,32 +129,31 @@ impl PartialReflection {
     }
 }
 
-/// The lobe of a [`PartialReflection`], decoded.
+/// Decoded lobe of a [`PartialReflection`].
 #[derive(Clone, Copy, Debug)]
 pub enum DecodedLobe {
-    /// A Phong lobe: its unit mirror direction, zero without a lobe, and its exponent.
+    /// A Phong lobe, or no lobe.
     Phong {
-        /// The mirror direction.
+        /// Unit mirror direction; zero without a lobe.
         mirror: Vec3,
-        /// The exponent.
+        /// Exponent of the lobe.
         exponent: f32,
     },
     /// A GGX lobe.
     Ggx(Kernel),
 }
 
-/// The parameters of a lobe but its colour, of a model that the first bit of the third byte tells.
+/// Parameters of a lobe except its colour. The first bit of the third byte selects the model.
 ///
-/// - Phong, bit 0: two bytes of the mirror direction, a bfloat16 of the exponent, which is not negative.
+/// - Phong, bit 0: two bytes of the mirror direction, and a bfloat16 of the exponent, which is not negative.
 /// - GGX, bit 1: 12 bits of the outgoing direction, 12 of the normal, 7 of the roughness. Narrow lobes are
-///   not gathered ([`super::Reflection::has_narrow_lobe`]): a lobe here is ten times as wide as the steps of
-///   the directions.
+///   not gathered ([`super::Reflection::has_narrow_lobe`]), so that a lobe here is ten times as wide as the
+///   steps of the directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Shape([u8; 4]);
 
-/// The bit of a GGX lobe in the third byte.
+/// Bit in the third byte that marks a GGX lobe.
 const GGX: u8 = 0x80;
-/// Steps of the roughness.
 const ROUGHNESS_STEPS: f32 = 127.0;
 
 impl Shape {
@@ -200,16 +199,16 @@ impl Shape {
     }
 }
 
-/// Steps of a direction's coordinate in its own byte, and in six bits.
+/// Number of steps of a direction's coordinate, in a byte and in six bits.
 const STEPS: [u32; 2] = [254, 62];
 
-/// A coordinate of a direction's code in six bits.
+/// Rounds a direction's coordinate from a byte to six bits.
 fn coarse(byte: u8) -> u8 {
     let [fine, coarse] = STEPS;
     ((u32::from(byte).min(fine) * coarse + fine / 2) / fine) as u8
 }
 
-/// The coordinate in a byte of one in six bits.
+/// Extends a direction's coordinate from six bits to a byte.
 fn fine(bits: u8) -> u8 {
     let [fine, coarse] = STEPS;
     ((u32::from(bits).min(coarse) * fine + coarse / 2) / coarse) as u8

@@ -1,9 +1,9 @@
 //! A reflection seen from one direction: its values, densities and samples.
 //!
-//! A sample's point of the unit square becomes a direction by a map that keeps neighbours together, so that a
-//! stratified pattern stays stratified on the hemisphere. The Lambertian part and the lobe share the samples
-//! by their albedos, and the density of the mixture weights either's (the balance heuristic: Veach, Guibas
-//! 1995), which bounds the weight by the sum of the albedos: no fireflies.
+//! A sample's point of the unit square is mapped to a direction such that neighbours stay neighbours; a
+//! stratified pattern is therefore stratified on the hemisphere too. The Lambertian part and the lobe share
+//! the samples in proportion to their albedos, and the density of the mixture weights each sample (balance
+//! heuristic: Veach, Guibas 1995). This bounds the weight by the sum of the albedos and avoids fireflies.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -16,12 +16,12 @@ use super::phong::PhongLobe;
 use super::sheen::SheenLobe;
 use crate::vector::{from_frame, max, max_component, mirror};
 
-/// A direction that is reflected to, and its weight.
+/// A sampled direction of reflection, and its weight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReflectedDirection {
     /// Unit vector away from the surface.
     pub direction: Vec3,
-    /// `f cos(theta) / p`, without unit: the factor of what arrived.
+    /// Factor `f cos(theta) / p`, dimensionless, of the light that arrived.
     pub weight: Vec3,
 }
 
@@ -30,14 +30,14 @@ pub struct ReflectedDirection {
 pub struct Reflector {
     /// Unit shading normal on the side of `outgoing`.
     pub normal: Vec3,
-    /// Unit vector to where the light is reflected to: the eye's side of a path.
+    /// Unit vector towards which light is reflected, on the eye's side of a path.
     pub outgoing: Vec3,
-    /// The reflection.
+    /// Reflection at the point.
     pub reflection: Reflection,
 }
 
 impl Reflector {
-    /// `f`, 1/sr, for light from a unit vector on the normal's side.
+    /// BRDF `f`, 1/sr, for light from a unit vector on the normal's side.
     #[inline(always)]
     pub fn evaluate(&self, incident: Vec3) -> Vec3 {
         if self.reflection.is_lambertian() {
@@ -51,46 +51,46 @@ impl Reflector {
             }
     }
 
-    /// The Lambertian part of `f`, 1/sr.
+    /// Lambertian part of `f`, 1/sr.
     #[inline(always)]
     pub fn lambertian(&self) -> Vec3 {
         self.reflection.diffuse * FRAC_1_PI
     }
 
-    /// The Lambertian albedo, 0 to 1: the radiance reflected of an irradiance over pi.
+    /// Lambertian albedo, 0 to 1. Multiplied by irradiance over pi, it gives the reflected radiance.
     #[inline(always)]
     pub fn lambertian_albedo(&self) -> Vec3 {
         self.reflection.diffuse
     }
 
-    /// The albedo, 0 to 1.
+    /// Albedo of Lambertian part and lobe together, 0 to 1.
     #[inline(always)]
     pub fn albedo(&self) -> Vec3 {
         self.reflection.diffuse + self.reflection.lobe.albedo()
     }
 
-    /// The greatest channels of the Lambertian albedo and of the lobe's.
+    /// Maximum channel of the Lambertian albedo, and of the lobe's albedo.
     #[inline(always)]
     pub fn albedos(&self) -> [f32; 2] {
         [max_component(self.reflection.diffuse), max_component(self.reflection.lobe.albedo())]
     }
 
-    /// The Lambertian part's share of [`Self::albedos`], 1 without a lobe.
+    /// Fraction of the sum of [`Self::albedos`] that the Lambertian part has; 1 without a lobe.
     #[inline(always)]
     pub fn diffuse_share(&self) -> f32 {
         let [diffuse, lobe] = self.albedos();
         if lobe <= 0.0 { 1.0 } else { diffuse / (diffuse + lobe) }
     }
 
-    /// The lobe's share of [`Self::albedos`], 0 without a lobe.
+    /// Fraction of the sum of [`Self::albedos`] that the lobe has; 0 without a lobe.
     #[inline(always)]
     pub fn lobe_share(&self) -> f32 {
         let [diffuse, lobe] = self.albedos();
         if lobe > 0.0 { lobe / (diffuse + lobe) } else { 0.0 }
     }
 
-    /// The lobe's sharpness: the exponent `n` of the lobe `cos^n alpha` that is as wide; `1 / (2 a^2)` of a
-    /// GGX lobe (Walter et al. 2007).
+    /// Sharpness of the lobe: the exponent `n` of a lobe `cos^n alpha` with the same width. It is
+    /// `1 / (2 a^2)` for a GGX lobe (Walter et al. 2007).
     #[inline(always)]
     pub fn lobe_sharpness(&self) -> f32 {
         match &self.reflection.lobe {
@@ -100,7 +100,7 @@ impl Reflector {
         }
     }
 
-    /// The direction of the lobe's own sampling at a point of the unit square.
+    /// Samples a direction of the lobe by a point of the unit square.
     #[inline(always)]
     pub fn sample_lobe(&self, point: [f32; 2]) -> Vec3 {
         match &self.reflection.lobe {
@@ -110,8 +110,8 @@ impl Reflector {
         }
     }
 
-    /// The lobe's `f cos(theta) / p`, without unit, at a direction of [`Self::sample_lobe`]; zero below the
-    /// surface.
+    /// Weight `f cos(theta) / p` of the lobe, dimensionless, for a direction from [`Self::sample_lobe`]; zero
+    /// below the surface.
     pub fn lobe_weight(&self, direction: Vec3) -> Vec3 {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.albedo * (lobe.gain() * max(self.normal.dot(direction), 0.0)),
@@ -123,8 +123,8 @@ impl Reflector {
         }
     }
 
-    /// The lobe's `f / p` over its albedo, without unit, at a direction of [`Self::sample_lobe`] above the
-    /// surface.
+    /// Ratio `f / p` of the lobe divided by its albedo, dimensionless, for a direction from
+    /// [`Self::sample_lobe`] above the surface.
     #[inline(always)]
     pub fn lobe_gain(&self, direction: Vec3) -> f32 {
         match &self.reflection.lobe {
@@ -134,7 +134,7 @@ impl Reflector {
         }
     }
 
-    /// The probability density of [`Self::sample_lobe`], 1/sr; 0 without a lobe.
+    /// Probability density of [`Self::sample_lobe`], 1/sr; 0 without a lobe.
     #[inline(always)]
     pub fn lobe_density(&self, direction: Vec3) -> f32 {
         match &self.reflection.lobe {
@@ -144,7 +144,8 @@ impl Reflector {
         }
     }
 
-    /// `f` and [`Self::lobe_density`], both 1/sr, of a sampled direction: cheaper together.
+    /// BRDF `f` and [`Self::lobe_density`], both 1/sr, of a sampled direction. Computing both at once is
+    /// cheaper.
     #[inline(always)]
     pub fn sampled(&self, direction: Vec3) -> (Vec3, f32) {
         match &self.reflection.lobe {
@@ -160,7 +161,7 @@ impl Reflector {
         }
     }
 
-    /// The direction at a point of the unit square; `None` below the surface, where the weight is zero.
+    /// Samples a direction by a point of the unit square; `None` below the surface, where the weight is zero.
     pub fn sample(&self, [u, v]: [f32; 2]) -> Option<ReflectedDirection> {
         let Self { normal, reflection, .. } = *self;
         let diffuse_share = self.diffuse_share();
@@ -205,8 +206,8 @@ impl Reflector {
     }
 }
 
-/// A direction of density `cos(theta) / pi`: the square on the disc (Shirley, Chiu 1997), the disc lifted to
-/// the hemisphere.
+/// Samples a direction with density `cos(theta) / pi`: the square is mapped to the disc (Shirley, Chiu 1997),
+/// and the disc is projected up to the hemisphere.
 #[inline(always)]
 fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     let [a, b] = [2.0 * u - 1.0, 2.0 * v - 1.0];

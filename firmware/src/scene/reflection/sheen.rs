@@ -1,12 +1,12 @@
-//! Lobe of fibres (`KHR_materials_sheen`): `f = colour D G / (4 (n.i) (n.o))` (Estevez, Kulla 2017,
+//! Sheen lobe of fabrics (`KHR_materials_sheen`): `f = colour D G / (4 (n.i) (n.o))` (Estevez, Kulla 2017,
 //! *Production friendly microfacet sheen BRDF*), with `a = roughness^2`:
 //!
 //! - `D = (2 + 1/a) sin^(1/a)(n, h) / (2 pi)`;
-//! - `G = 1 / (1 + l(n.o) + l(n.i))`, `l` the fit of that paper.
+//! - `G = 1 / (1 + l(n.o) + l(n.i))`, where `l` is that paper's fit.
 //!
-//! Directions are sampled evenly over the hemisphere: the lobe is wide, and strongest at grazing angles. `E`,
-//! the directional albedo of a white lobe, is in a table. A roughness below 0.25 counts as 0.25: `E` would
-//! exceed 1 at grazing angles.
+//! Directions are sampled uniformly over the hemisphere, because the lobe is wide, and strongest at grazing
+//! angles. `E`, the directional albedo of a white lobe, is in a table. A roughness below 0.25 is replaced by
+//! 0.25, because `E` would exceed 1 at grazing angles.
 
 use core::f32::consts::PI;
 
@@ -15,29 +15,29 @@ use glam::Vec3;
 use super::ggx_albedo::{SIDE, interpolated};
 use crate::vector::{about, max, max_component, unit};
 
-/// Minimum roughness: a narrower lobe would reflect more light at grazing angles than arrives.
+/// Minimum roughness. A smaller roughness would reflect more light than arrives at grazing angles.
 const MIN_ROUGHNESS: f32 = 0.25;
-/// Density of the directions, 1/sr.
+/// Density of sampled directions, 1/sr.
 const DENSITY: f32 = 0.5 / PI;
 
-/// A lobe seen from one direction.
+/// A sheen lobe, seen from one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SheenLobe {
     colour: Vec3,
     alpha: f32,
-    /// `E` at the outgoing direction.
+    /// Albedo `E` of a white lobe for the outgoing direction.
     of_white: f32,
 }
 
 impl SheenLobe {
-    /// The lobe of a roughness, 0 to 1, seen at a cosine to the normal.
+    /// Creates the lobe of a roughness, 0 to 1, seen at a cosine to the normal.
     pub(super) fn new(colour: Vec3, roughness: f32, cosine: f32) -> Self {
         let roughness = max(roughness, MIN_ROUGHNESS);
         let of_white = interpolated(&ALBEDOS, roughness, cosine);
         Self { colour, alpha: roughness * roughness, of_white }
     }
 
-    /// `true` if some light is reflected.
+    /// Returns true if the lobe reflects any light.
     pub(super) fn reflects(&self) -> bool {
         max_component(self.colour) > 0.0
     }
@@ -47,12 +47,12 @@ impl SheenLobe {
         self.colour * self.of_white
     }
 
-    /// `f` times a colour.
+    /// Multiplies `f` by a colour.
     pub(super) fn dimmed(self, colour: Vec3) -> Self {
         Self { colour: self.colour * colour, ..self }
     }
 
-    /// `f`, 1/sr.
+    /// BRDF `f`, 1/sr.
     #[inline(never)]
     pub(super) fn evaluate(&self, normal: Vec3, outgoing: Vec3, incident: Vec3) -> Vec3 {
         let [o, i] = [outgoing, incident].map(|direction| normal.dot(direction));
@@ -72,28 +72,28 @@ impl SheenLobe {
         DENSITY
     }
 
-    /// `f / p` over the albedo, without unit.
+    /// Ratio `f / p` divided by the albedo, dimensionless.
     pub(super) fn gain(&self, normal: Vec3, outgoing: Vec3, incident: Vec3) -> f32 {
         let white = Self { colour: Vec3::ONE, ..*self };
         let albedo = max(self.of_white, f32::MIN_POSITIVE);
         white.evaluate(normal, outgoing, incident).x / (DENSITY * albedo)
     }
 
-    /// A direction above the surface at a point of the unit square.
+    /// Samples a direction above the surface by a point of the unit square.
     pub(super) fn direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let sine = libm::sqrtf(max(1.0 - v * v, 0.0));
         about(normal, 2.0 * PI * u, sine, v)
     }
 }
 
-/// `l` at a cosine.
+/// Shadowing fit `l` at a cosine.
 fn shadowing(cosine: f32, alpha: f32) -> f32 {
     let fit = |cosine| logarithm(cosine, alpha);
     libm::expf(if cosine < 0.5 { fit(cosine) } else { 2.0 * fit(0.5) - fit(1.0 - cosine) })
 }
 
-/// The logarithm of `l` below a cosine of 0.5: `a / (1 + b x^c) + d x + e`, its coefficients between those of
-/// `alpha` 0 and 1.
+/// Logarithm of `l` below a cosine of 0.5: `a / (1 + b x^c) + d x + e`. Its coefficients are interpolated
+/// between those for `alpha` 0 and 1.
 fn logarithm(x: f32, alpha: f32) -> f32 {
     const ROUGH: [f32; 5] = [21.5473, 3.829_87, 0.198_23, -1.977_6, -4.320_54];
     const SMOOTH: [f32; 5] = [25.3245, 3.324_35, 0.168_01, -1.273_93, -4.859_67];
@@ -105,8 +105,8 @@ fn logarithm(x: f32, alpha: f32) -> f32 {
     at(0) / (1.0 + at(1) * libm::powf(max(x, 0.0), at(2))) + at(3) * x + at(4)
 }
 
-/// `E`, in steps of 1/255, by the midpoint rule over 512^2 directions: rows of the roughness 0 to 1, columns
-/// of the square root of the cosine.
+/// Table of `E`, in steps of 1/255, by the midpoint rule over 512^2 directions. Rows are roughness 0 to 1,
+/// columns the square root of the cosine 0 to 1.
 const ALBEDOS: [[u8; SIDE]; SIDE] = [
     [255, 255, 255, 255, 76, 12, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0],
     [255, 255, 255, 255, 180, 81, 29, 8, 2, 0, 0, 0, 0, 0, 0, 0],
@@ -156,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn light_may_go_either_way() {
+    fn the_sheen_lobe_is_reciprocal() {
         let lobe = SheenLobe::new(Vec3::ONE, 0.4, 0.5);
         let [a, b] = [Vec3::new(0.6, 0.8, 0.0), Vec3::new(0.1, 0.3, 0.9).normalize()];
         let [there, back] = [lobe.evaluate(Vec3::Y, a, b), lobe.evaluate(Vec3::Y, b, a)];

@@ -1,5 +1,4 @@
-//! Properties that every lobe has: samples follow the density, weights are `f cos / p`, light may go either
-//! way.
+//! Properties of every lobe: samples follow the density, weights are `f cos / p`, and the lobe is reciprocal.
 
 use core::f32::consts::TAU;
 use std::{vec, vec::Vec};
@@ -27,7 +26,7 @@ fn ggx(roughness: f32, cosine: f32) -> Lobe {
     Lobe::Ggx(GgxLobe::new(Vec3::new(1.0, 0.5, 0.0), Vec3::ONE, roughness, cosine))
 }
 
-/// Lobes of every model, seen from above and at a grazing angle.
+/// Lobes of every model, seen at a high angle and at grazing angles.
 fn reflectors() -> Vec<Reflector> {
     [0.95, 0.5, 0.15]
         .into_iter()
@@ -45,7 +44,8 @@ const ROWS: usize = 12;
 const COLUMNS: usize = 24;
 const CELLS: usize = ROWS * COLUMNS;
 
-/// Cell of equal solid angle of the upper hemisphere; the last for directions below.
+/// Number of the cell, of equal solid angle, that contains a direction of the upper hemisphere; the last cell
+/// for directions below.
 fn cell(direction: Vec3) -> usize {
     if direction.y < 0.0 {
         return CELLS;
@@ -55,7 +55,7 @@ fn cell(direction: Vec3) -> usize {
     row * COLUMNS + ((turn * COLUMNS as f32) as usize).min(COLUMNS - 1)
 }
 
-/// Probabilities of the cells, by a quadrature of the density.
+/// Probabilities of the cells, from quadrature of the density.
 fn probabilities(reflector: &Reflector) -> Vec<f64> {
     const FINE: usize = 24;
     let mut sums = vec![0.0_f64; CELLS + 1];
@@ -70,8 +70,9 @@ fn probabilities(reflector: &Reflector) -> Vec<f64> {
     sums
 }
 
-/// Pearson's test: of `n` cells with 8 expected samples or more, the sum of `(found - expected)^2 / expected`
-/// has the mean `n` and the variance `2 n`. Density and samples are of single precision.
+/// Pearson's chi-squared test. For `n` cells with at least 8 expected samples, the sum of
+/// `(found - expected)^2 / expected` has the mean `n` and the variance `2 n`. Density and samples are single
+/// precision.
 #[test]
 fn samples_follow_their_density() {
     const SAMPLES: u32 = 40_000;
@@ -115,7 +116,7 @@ fn weights_are_the_value_times_the_cosine_over_the_density() {
 }
 
 #[test]
-fn light_may_go_either_way() {
+fn every_lobe_is_reciprocal() {
     for roughness in [0.1, 0.4, 0.9] {
         for (o, i) in [(0.9, 0.2), (0.5, 0.5), (0.05, 0.7)] {
             let [outgoing, incident] = [at(o, 0.3), at(i, 3.0)];

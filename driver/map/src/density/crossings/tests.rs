@@ -19,7 +19,7 @@ impl Kernel for Sort<'_> {
     }
 }
 
-/// Layers whose keys are few, so that many are equal. The slope is the number of the layer.
+/// Layers with few distinct keys, so that many are equal. The slope is the number of the layer.
 fn layers(count: u32) -> Vec<Layer> {
     let random = |layer: u32, lane: u32| hash(hash(layer).wrapping_add(lane)) % 11;
     let layer = |layer: u32| Layer {
@@ -52,7 +52,7 @@ fn crossings_of_a_chord_descend_and_equal_ones_keep_their_order() {
 }
 
 #[test]
-fn keys_ascend_with_heights_and_give_them_back() {
+fn keys_ascend_with_heights_and_decode_to_them() {
     let heights = [-1.0, -0.5, -f32::MIN_POSITIVE, -0.0, 0.0, 1e-30, 0.1, 1.0];
     let keys = heights.map(|at| [false, true].map(|is_front| key(at, is_front)));
     assert!(keys.as_flattened().is_sorted_by(|a, b| a < b) && keys[0][0] > 0);

@@ -1,4 +1,4 @@
-//! Properties of disc fractions: rays and the list of triangles agree.
+//! Properties of disc fractions: rays and the list of triangles give equal results.
 
 use photoncard_scene::gltf;
 
@@ -7,9 +7,9 @@ use crate::pack::PackedScene;
 use crate::photon::trace;
 use crate::photon_map::store_photons;
 
-/// In rooms and on curved columns.
+/// Compared in rooms and on curved columns.
 #[test]
-fn the_triangles_around_a_photon_are_what_rays_meet() {
+fn rays_hit_the_triangles_listed_around_a_photon() {
     for (name, photons) in [("cornell.gltf", 3000), ("atrium.glb", 10_000)] {
         let path = format!("{}/../../scenes/{name}", env!("CARGO_MANIFEST_DIR"));
         let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");

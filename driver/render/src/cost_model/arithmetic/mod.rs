@@ -1,10 +1,10 @@
-//! Arithmetic of a frame, counted: the steps of each unit of the chip, times the floating-point operations of
-//! a step.
+//! Counts the arithmetic of a frame: the number of steps of each unit of the chip, times the floating-point
+//! operations per step.
 //!
-//! Counters and the contents of the lines that a chip reads give the number of each [`Step`]. Its operations
-//! are constants of the firmware ([`OPERATIONS`]), counted where the firmware runs without floating-point
-//! instructions, so that each operation is a call (`tests/operations.sh`). `tests/tests/operations.rs` counts
-//! them again. A lane of a vector counts only where it is used.
+//! The number of each [`Step`] follows from counters and the contents of the lines that a chip reads. The
+//! operations per step are constants of the firmware ([`OPERATIONS`]). They were counted on a target without
+//! floating-point instructions, where each operation is a function call (`tests/operations.sh`);
+//! `tests/tests/operations.rs` counts them again. A vector lane counts only if its result is used.
 
 mod operations;
 mod step;
@@ -19,12 +19,12 @@ use photoncard_picture::choice::Choice;
 /// Number of units.
 pub const UNITS: usize = Unit::ALL.len();
 
-/// Operations of each unit of the chip, in the order of [`Unit::ALL`].
+/// Floating-point operations of each unit of the chip, in the order of [`Unit::ALL`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arithmetic(pub [Operations; UNITS]);
 
 impl Arithmetic {
-    /// Operations of some work: the number of each step times the operations of one.
+    /// Operations of some work: the sum over steps of their number times the operations per step.
     pub fn of(work: &Work) -> Self {
         let mut arithmetic = Self::default();
         for (step, operations) in Step::ALL.iter().zip(OPERATIONS) {
@@ -33,12 +33,12 @@ impl Arithmetic {
         arithmetic
     }
 
-    /// Adds other operations.
+    /// Adds the operations of `other`.
     pub fn add(&mut self, other: &Self) {
         self.0.iter_mut().zip(&other.0).for_each(|(operations, other)| operations.add(other));
     }
 
-    /// The operations of `count` repetitions.
+    /// Operations of `count` repetitions.
     #[must_use]
     pub fn times(&self, count: f64) -> Self {
         Self(self.0.map(|operations| operations.times(count)))
@@ -49,7 +49,7 @@ impl Arithmetic {
         &self.0[unit as usize]
     }
 
-    /// Operations of the units that `chosen` selects.
+    /// Sum of the operations of the units that `chosen` selects.
     pub fn sum(&self, chosen: impl Fn(Unit) -> bool) -> Operations {
         let mut sum = Operations::default();
         for unit in Unit::ALL.iter().copied().filter(|&unit| chosen(unit)) {
@@ -66,7 +66,7 @@ mod tests {
     use photoncard_shared::counters::Counters;
 
     #[test]
-    fn a_box_of_a_node_costs_what_its_slab_test_says() {
+    fn a_box_costs_the_operations_of_its_slab_test() {
         // For each of six planes a product and a sum; six comparisons of planes, of near with far, and with 0
         // or the limit.
         let boxes = Contents { boxes: 1, ..Contents::ZERO };

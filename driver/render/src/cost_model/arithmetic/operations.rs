@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Numbers of operations, of one lane each.
+/// Numbers of operations by kind. A vector operation counts once per lane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Operations {
     /// Additions and subtractions.
@@ -13,10 +13,10 @@ pub struct Operations {
     pub divide: f64,
     /// Square roots.
     pub square_root: f64,
-    /// Comparisons, minima and maxima; squared distances that are compared by their bits included.
+    /// Comparisons, minima and maxima, including comparisons of squared distances by their bits.
     pub compare: f64,
-    /// Conversions between integers and floating point, and roundings to whole numbers: not in
-    /// [`Self::flops`].
+    /// Conversions between integers and floating point, and roundings to integers. [`Self::flops`] excludes
+    /// them.
     pub convert: f64,
 }
 
@@ -31,7 +31,7 @@ impl Operations {
         [self.add, self.multiply, self.divide, self.square_root, self.compare, self.convert]
     }
 
-    /// The operations of `count` repetitions.
+    /// Operations of `count` repetitions.
     #[must_use]
     pub fn times(&self, count: f64) -> Self {
         Self {
@@ -44,7 +44,7 @@ impl Operations {
         }
     }
 
-    /// Adds other operations.
+    /// Adds the operations of `other`.
     pub fn add(&mut self, other: &Self) {
         self.add += other.add;
         self.multiply += other.multiply;

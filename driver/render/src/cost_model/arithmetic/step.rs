@@ -1,4 +1,4 @@
-//! Units of a chip, and the steps that they take.
+//! Units of a chip, and the steps that they perform.
 
 use photoncard_picture::choice::choices;
 use photoncard_shared::counters::Counters;
@@ -8,21 +8,21 @@ use crate::emulator::contents::Contents;
 /// Unit of a chip, by the kind of its arithmetic.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
-    /// Rays against boxes.
+    /// Intersection of rays with boxes.
     Traversal,
-    /// Rays against triangles.
+    /// Intersection of rays with triangles.
     Triangles,
-    /// Distances to photons and to boxes of photons.
+    /// Distances from queries to photons and to boxes of photons.
     Search,
-    /// The k nearest of a search's candidates.
+    /// Selection of the k nearest candidates of a search.
     Selection,
-    /// The density estimate and the reflection of photons.
+    /// Density estimate, and reflection of photons.
     Reflection,
-    /// Surfaces where rays end.
+    /// Evaluation of surfaces at the ends of rays.
     Shading,
     /// Direct light: choice of a light, and its reflection.
     Light,
-    /// Directions of gather rays.
+    /// Choice of the directions of gather rays.
     Sampling,
     /// Irradiance cache: surveys, gradients, interpolation.
     IrradianceCache,
@@ -46,16 +46,16 @@ choices!(Unit {
 /// Part of a chip in the cost model of Table 7.1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChipPart {
-    /// Rays and the surfaces where they end.
+    /// Casts rays and evaluates the surfaces at their ends.
     RayCaster,
-    /// Directions of gather rays, irradiance cache, pixels.
+    /// Generates eye rays and directions of gather rays, and computes the irradiance cache and pixels.
     Controller,
-    /// Searches and all reflection, direct light included.
+    /// Searches for photons and computes all reflection, including that of direct light.
     GatherUnit,
 }
 
 impl Unit {
-    /// The part of the chip that the unit is in.
+    /// Part of the chip that contains the unit.
     pub fn part(self) -> ChipPart {
         match self {
             Self::Traversal | Self::Triangles | Self::Shading => ChipPart::RayCaster,
@@ -65,58 +65,58 @@ impl Unit {
     }
 }
 
-/// Piece of work with a fixed or nearly fixed number of operations.
+/// Step of a unit, with a fixed or nearly fixed number of operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
     /// Preparation of a ray.
     Ray,
-    /// A node of the hierarchy: what is common to its boxes.
+    /// Computation that all boxes of a hierarchy node share.
     Node,
-    /// A box of a node.
+    /// Test of one box of a node.
     Box,
-    /// A vertex of a leaf, sheared.
+    /// Shear of one vertex of a leaf.
     Vertex,
-    /// A triangle of a leaf, excluded or not.
+    /// Edge functions of one triangle of a leaf, whether it is excluded or not.
     Triangle,
-    /// The triangles of a leaf that were not excluded.
+    /// Intersection of those triangles of a leaf that were not excluded.
     Leaf,
-    /// A box of photons.
+    /// Distance to one box of photons.
     PhotonBox,
-    /// A photon of a leaf.
+    /// Distance to one photon of a leaf.
     Photon,
-    /// A photon of the kd-tree.
+    /// Distance to one photon of the kd-tree.
     TreePhoton,
-    /// A candidate that a selection reads: guesses of an interval.
+    /// Share of one candidate in the guesses of a selection's interval.
     Selected,
-    /// A comparison of two distances.
+    /// Comparison of two distances.
     Compared,
-    /// A gather at the end of a ray.
+    /// Gather at the end of a ray.
     Gather,
-    /// A photon's normal.
+    /// Decoding of a photon's normal.
     Normal,
-    /// A photon that a lobe reflects.
+    /// Reflection of a photon by a lobe.
     Reflected,
-    /// The value of a Phong lobe for a photon.
+    /// Value of a Phong lobe for a photon.
     Phong,
-    /// The value of a microfacet lobe for a photon.
+    /// Value of a microfacet lobe for a photon.
     Microfacets,
-    /// A surface that is read.
+    /// Evaluation of a surface.
     Surface,
-    /// A record of a light.
+    /// Evaluation of a light's record.
     LightRecord,
     /// A shadow ray.
     ShadowRay,
     /// A gather ray.
     GatherRay,
-    /// A table of directions.
+    /// Construction of a direction table.
     Table,
-    /// A photon of a table of directions.
+    /// Contribution of a photon to a direction table.
     TablePhoton,
     /// A survey ray.
     SurveyRay,
-    /// A gather ray of a record.
+    /// A gather ray of an irradiance record.
     RecordRay,
-    /// A sample that is interpolated.
+    /// Interpolation of a sample's irradiance.
     Interpolated,
     /// An eye ray.
     EyeRay,
@@ -160,14 +160,14 @@ pub struct Work {
 }
 
 impl Work {
-    /// Work that was counted, in a frame with `gather_rays` gather rays a sample.
+    /// Counted work of a frame with `gather_rays` gather rays per sample.
     pub fn new(counters: &Counters, contents: &Contents, gather_rays: f64) -> Self {
         Self { counters: *counters, contents: *contents, gather_rays }
     }
 }
 
 impl Step {
-    /// The unit that takes the step.
+    /// Unit that performs the step.
     pub fn unit(self) -> Unit {
         match self {
             Self::Ray | Self::Node | Self::Box => Unit::Traversal,
@@ -228,7 +228,7 @@ impl Step {
     }
 }
 
-/// Photons of the searches for direction tables, at the mean of all searches.
+/// Photons found by the searches for direction tables, assuming the mean of all searches.
 fn photons_of_tables(counters: &Counters) -> f64 {
     counters.photons_found as f64 * counters.tables as f64 / counters.gathers.max(1) as f64
 }

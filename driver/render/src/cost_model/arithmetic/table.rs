@@ -1,11 +1,11 @@
-//! Operations of a step. Written by `tests/operations.sh`.
+//! Operations per step. Written by `tests/operations.sh`.
 
 use photoncard_picture::choice::Choice;
 
 use super::operations::Operations;
 use super::step::Step;
 
-/// Operations of one step of each kind, in the order of [`Step::ALL`]: means over tiles of several scenes.
+/// Operations per step, in the order of [`Step::ALL`]: means over tiles of several scenes.
 #[rustfmt::skip] // One step a line.
 pub const OPERATIONS: [Operations; Step::ALL.len()] = [
     // Preparation of a ray

@@ -1,12 +1,12 @@
-//! Time of a chip whose reads take their time: three units, the queue of gathers between two of them, and the
-//! DRAM that they share.
+//! Timing model of a chip whose reads have latency: three units, the queue of gathers between two of them,
+//! and the DRAM that they share.
 //!
-//! A task, a ray or a gather, is a chain of steps: a read of a line and the arithmetic on it. Each unit has
-//! as many tasks in flight as the [`Machine`] states, each at one step. A read that misses the cache waits
-//! for the DRAM's bus, then for its latency; arithmetic waits for the unit. Both serve in the order of
-//! arrival. A ray passes from the ray caster to the controller; if it hits, its gather enters the queue,
-//! where a place was kept for it when the ray began. A [`Policy`] says when the queue is drained. What a DRAM
-//! does with rows and banks is left to its simulators (`tests/peers/dram.sh`).
+//! A task (a ray or a gather) is a chain of steps; a step is a read of a line and the arithmetic on it. Each
+//! unit has as many tasks in flight as the [`Machine`] states, each at one step. A read that misses the cache
+//! waits for the DRAM's bus, then for its latency; arithmetic waits for the unit. Both are served in the
+//! order of arrival. A ray passes from the ray caster to the controller. If it hits, its gather enters the
+//! queue, where a place was reserved when the ray began. A [`Policy`] determines when the queue is drained.
+//! Rows and banks of a DRAM are left to DRAM simulators (`tests/peers/dram.sh`).
 
 mod quantities;
 mod simulation;
@@ -17,29 +17,30 @@ pub use self::quantities::{FrameTimes, Load, UnitTimes};
 use self::simulation::{Plan, Task, run};
 use super::{Cost, Machine};
 
-/// Policy by which a chip casts rays while its queue drains.
+/// Policy that determines whether a chip casts rays while its queue is drained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Policy {
-    /// Nothing is cast while the queue drains: each unit has all of the chip's arithmetic while it works.
+    /// No rays are cast while the queue is drained. Each unit has all of the chip's arithmetic while it
+    /// works.
     Alternate,
     /// The ray caster fills one half of the queue while the gather unit drains the other, each with its share
     /// of the arithmetic. A queue of one entry has no halves: it is filled and drained in turn.
     Overlapped(Shares),
 }
 
-/// Shares of the chip's arithmetic that its units have.
+/// Fractions of the chip's arithmetic that its units have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shares {
-    /// The ray caster's.
+    /// Fraction of the ray caster.
     pub ray_caster: f64,
-    /// The controller's.
+    /// Fraction of the controller.
     pub controller: f64,
-    /// The gather unit's.
+    /// Fraction of the gather unit.
     pub gather_unit: f64,
 }
 
 impl Shares {
-    /// Shares in proportion to a cost's arithmetic; equal ones if it has none.
+    /// Shares in proportion to a cost's arithmetic; equal shares if it has none.
     pub fn of(cost: &Cost) -> Self {
         let total = cost.total().flops;
         let share = |flops: f64| if total > 0.0 { flops / total } else { 1.0 / 3.0 };
@@ -51,47 +52,48 @@ impl Shares {
     }
 }
 
-/// A chip, as its time depends on it.
+/// Parameters of a chip that determine its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedChip {
     /// DRAM, arithmetic and tasks in flight.
     pub machine: Machine,
-    /// Entries of the queue of gathers, at least 1; of both halves together.
+    /// Number of entries of the queue of gathers, at least 1, in both halves together.
     pub queue: u64,
-    /// When the queue is drained.
+    /// Policy by which the queue is drained.
     pub policy: Policy,
 }
 
-/// Work of a frame, as its time depends on it.
+/// Work of a frame that determines its time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameLoad {
-    /// Rays in the ray caster, with their reads of the scene.
+    /// Rays in the ray caster, and their reads of the scene.
     pub rays: Load,
-    /// Floating-point operations of the controller, spread over all rays.
+    /// Floating-point operations of the controller, distributed evenly over all rays.
     pub controller_flops: f64,
-    /// Gathers, with their reads of the photon map, spread over all rays.
+    /// Gathers and their reads of the photon map, distributed evenly over all rays.
     pub gathers: Load,
 }
 
-/// Minimum number of drains that are simulated. The frame's time is linear in its number of drains, from the
-/// first on.
+/// Minimum number of drains that are simulated. From the first on, a frame's time is linear in its number of
+/// drains.
 const MIN_DRAINS: f64 = 4.0;
-/// Number of steps that are simulated as far as drains are short: each drain more takes a few.
+/// Number of steps that are simulated if drains are short. Each further drain takes a few.
 const STEPS: f64 = 65_536.0;
-/// Maximum number of entries of a queue that is simulated: what a longer one saves a gather is less than the
-/// tasks in flight over it.
+/// Maximum number of entries of a queue that is simulated. A longer queue would save less per gather than the
+/// tasks in flight divided by its length.
 const MAX_QUEUE: u64 = 32_768;
 
 impl FrameLoad {
-    /// Seconds of the frame if nothing waits for anything else: the longer of arithmetic and DRAM.
+    /// Seconds of the frame if nothing waits for anything else: the longer of the times of arithmetic and
+    /// DRAM.
     pub fn bound(&self, machine: &Machine) -> f64 {
         let bytes = self.rays.dram_bytes + self.gathers.dram_bytes;
         let flops = self.rays.flops + self.controller_flops + self.gathers.flops;
         (bytes / machine.bandwidth).max(flops / machine.flops)
     }
 
-    /// Seconds of the frame on a chip, in reads of `line_bytes`. Simulated are as many drains as make a
-    /// sample; the rest takes what the second half of these does, drain by drain.
+    /// Times of the frame on a chip that reads `line_bytes` bytes at once. A sample of the drains is
+    /// simulated. Each remaining drain takes the mean time of the sample's second half.
     pub fn times(&self, chip: &TimedChip, line_bytes: f64) -> FrameTimes {
         // Pieces of the rays' work, of which each leads to one gather or none.
         let pieces = self.rays.tasks.max(self.gathers.tasks);

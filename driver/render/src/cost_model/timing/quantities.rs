@@ -3,9 +3,9 @@
 /// Equal tasks of a frame in one unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
-    /// Number of tasks: rays, or gathers.
+    /// Number of tasks (rays or gathers).
     pub tasks: f64,
-    /// Reads of lines, hits and misses.
+    /// Number of reads of lines, hits and misses.
     pub requests: f64,
     /// Bytes fetched from DRAM.
     pub dram_bytes: f64,
@@ -13,36 +13,36 @@ pub struct Load {
     pub flops: f64,
 }
 
-/// Seconds of a unit. The rest of the frame it waits for other units, or has ended.
+/// Times of a unit in a frame, seconds. In the remaining time it waits for other units, or has finished.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct UnitTimes {
-    /// Arithmetic.
+    /// Time of arithmetic.
     pub busy: f64,
-    /// All of its tasks in flight wait for reads.
+    /// Time in which all tasks in flight wait for reads.
     pub memory: f64,
-    /// The ray caster waits for places in the queue, the gather unit for gathers to drain.
+    /// Time in which the ray caster waits for places in the queue, or the gather unit for gathers.
     pub queue: f64,
 }
 
-/// Seconds of a frame on a chip.
+/// Times of a frame on a chip, seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameTimes {
-    /// The whole frame.
+    /// Time of the whole frame.
     pub seconds: f64,
-    /// Part of it in which the queue is drained.
+    /// Time in which the queue is drained.
     pub draining: f64,
-    /// The ray caster.
+    /// Times of the ray caster.
     pub ray_caster: UnitTimes,
-    /// Arithmetic of the controller.
+    /// Time of the controller's arithmetic.
     pub controller: f64,
-    /// The gather unit.
+    /// Times of the gather unit.
     pub gather_unit: UnitTimes,
-    /// Transfers on the DRAM's bus.
+    /// Time of transfers on the DRAM's bus.
     pub dram: f64,
 }
 
 impl FrameTimes {
-    /// Times that grow linearly: `factor` times the way from these to `later`.
+    /// Extrapolates linearly: these times plus `factor` times the difference to `later`.
     pub(super) fn extrapolated(&self, later: &Self, factor: f64) -> Self {
         let time = |of: fn(&Self) -> f64| of(self) + (of(later) - of(self)) * factor;
         let unit = |of: fn(&Self) -> &UnitTimes| {

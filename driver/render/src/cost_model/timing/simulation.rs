@@ -1,5 +1,5 @@
-//! Simulation of a frame by discrete events: the ends of reads, of arithmetic, and of the controller's work
-//! on a ray.
+//! Discrete-event simulation of a frame. Events are the ends of reads, of arithmetic, and of the controller's
+//! work on a ray.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -7,13 +7,14 @@ use std::collections::BinaryHeap;
 use super::super::Machine;
 use super::quantities::{FrameTimes, Load, UnitTimes};
 
-/// Ticks of the simulation in a second.
+/// Number of ticks of the simulation per second.
 const TICKS: f64 = 1e14;
-/// Maximum number of steps of a task. A task of more is simulated in as many, each with the arithmetic, the
-/// bus and the latencies of several: neither its waits nor its use of each resource change in sum.
+/// Maximum number of steps of a task. A task with more is simulated with this number, and each step has the
+/// arithmetic, bus time and latencies of several. The sums of its waits and of its use of each resource do
+/// not change.
 const MAX_STEPS: f64 = 4.0;
 
-/// Whole numbers with a real number as their mean, as evenly spread as they can be.
+/// Sequence of integers with a real number as mean, distributed as evenly as possible.
 #[derive(Clone, Copy)]
 pub(super) struct Spread {
     each: u64,
@@ -27,7 +28,7 @@ impl Spread {
         Self { each: (mean * Self::ONE as f64).round() as u64, owed: 0 }
     }
 
-    /// The mean.
+    /// Mean of the sequence.
     pub(super) fn mean(&self) -> f64 {
         self.each as f64 / Self::ONE as f64
     }
@@ -40,18 +41,18 @@ impl Spread {
     }
 }
 
-/// Steps of the tasks of a unit, in ticks.
+/// Steps of the tasks of a unit; times in ticks.
 #[derive(Clone, Copy)]
 pub(super) struct Task {
-    /// Steps of a task.
+    /// Number of steps of a task.
     pub(super) steps: Spread,
-    /// Misses of a step.
+    /// Number of cache misses of a step.
     misses: Spread,
-    /// Arithmetic of a step.
+    /// Time of the arithmetic of a step.
     pub(super) arithmetic: u64,
-    /// The DRAM's bus, for a miss.
+    /// Time on the DRAM's bus per miss.
     bus: u64,
-    /// Latency of a miss.
+    /// Latency per miss.
     latency: u64,
 }
 
@@ -63,13 +64,13 @@ fn seconds(ticks: u64) -> f64 {
     ticks as f64 / TICKS
 }
 
-/// A ratio that is 0 where there is nothing to divide.
+/// Ratio `amount / by`; 0 if the amount is 0.
 fn ratio(amount: f64, by: f64) -> f64 {
     if amount > 0.0 { amount / by } else { 0.0 }
 }
 
 impl Task {
-    /// Tasks of a load in a unit with a share of the machine's arithmetic.
+    /// Tasks of a load, in a unit with the fraction `share` of the machine's arithmetic.
     pub(super) fn new(load: &Load, machine: &Machine, share: f64, line_bytes: f64) -> Self {
         let tasks = load.tasks.max(1.0);
         let requests = load.requests.max(tasks);
@@ -85,19 +86,19 @@ impl Task {
     }
 }
 
-/// A frame and a chip in ticks.
+/// Parameters of a frame and a chip, in ticks.
 pub(super) struct Plan {
     pub(super) rays: Task,
-    /// Arithmetic of the controller for a ray.
+    /// Time of the controller's arithmetic per ray.
     pub(super) controller: u64,
     pub(super) gathers: Task,
-    /// Share of the rays that lead to a gather.
+    /// Fraction of the rays that lead to a gather.
     pub(super) hits: f64,
-    /// Maximum number of tasks in flight of a unit.
+    /// Maximum number of tasks in flight per unit.
     pub(super) in_flight: u64,
-    /// Entries of the queue.
+    /// Number of entries of the queue.
     pub(super) queue: u64,
-    /// True if all units have one arithmetic unit, and nothing is cast while the queue drains.
+    /// True if all units share one arithmetic unit, and no rays are cast while the queue is drained.
     pub(super) is_shared: bool,
 }
 
@@ -106,12 +107,12 @@ impl Plan {
         self.is_shared || self.queue < 2
     }
 
-    /// Entries that a drain begins with.
+    /// Number of entries at the beginning of a drain.
     pub(super) fn entries(&self) -> u64 {
         if self.alternates() { self.queue } else { self.queue / 2 }
     }
 
-    /// Entries that rays can fill.
+    /// Number of entries that rays can fill.
     fn room(&self, is_draining: bool) -> u64 {
         match (self.alternates(), is_draining) {
             (true, true) => 0,
@@ -121,7 +122,7 @@ impl Plan {
     }
 }
 
-/// Resource that serves one at a time, in the order of arrival.
+/// Resource that serves one request at a time, in the order of arrival.
 #[derive(Clone, Copy, Default)]
 struct Server {
     is_free: u64,
@@ -129,7 +130,7 @@ struct Server {
 }
 
 impl Server {
-    /// Serves for a time. Returns its end. No time is no wait either.
+    /// Serves a request of length `time`. Returns its end. A request of length 0 does not wait.
     fn serve(&mut self, now: u64, time: u64) -> u64 {
         if time == 0 {
             return now;
@@ -140,7 +141,7 @@ impl Server {
     }
 }
 
-/// A unit with tasks.
+/// A unit that has tasks.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Unit {
     RayCaster,
@@ -150,19 +151,20 @@ enum Unit {
 /// End of a task's wait.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Event {
-    /// Data are there; as many steps are left, this one included.
+    /// The data have arrived. The number counts the remaining steps, including this one.
     Read(Unit, u64),
-    /// Arithmetic is done; as many steps are left after this one.
+    /// The arithmetic is done. The number counts the remaining steps, excluding this one.
     Computed(Unit, u64),
-    /// The controller is done with a ray.
+    /// The controller has finished a ray.
     Controlled,
 }
 
-/// A unit's tasks, and the times in which none of them computes.
+/// Tasks of a unit, and the times in which none of them computes.
 struct UnitState {
     task: Task,
     busy: u64,
-    /// Tasks that wait for reads, and tasks that compute or wait for it.
+    /// Number of tasks that wait for reads. `computing` is the number of those that compute or wait for
+    /// arithmetic.
     reading: u64,
     computing: u64,
     memory_wait: u64,
@@ -174,7 +176,7 @@ impl UnitState {
         Self { task, busy: 0, reading: 0, computing: 0, memory_wait: 0, queue_wait: 0 }
     }
 
-    /// Accounts for a time without events.
+    /// Accounts for a time span without events.
     fn pass(&mut self, time: u64, waits_for_queue: bool) {
         if self.computing > 0 {
             return;
@@ -198,28 +200,28 @@ impl UnitState {
 struct Simulation<'a> {
     plan: &'a Plan,
     now: u64,
-    /// Events by time, then in the order in which they were foreseen.
+    /// Events in the order of time, then in the order in which they were scheduled.
     events: BinaryHeap<Reverse<(u64, u64, Event)>>,
     foreseen: u64,
-    /// Arithmetic of ray caster, gather unit and controller; the first serves all if it is shared.
+    /// Arithmetic of ray caster, gather unit and controller. If it is shared, the first serves all.
     arithmetic: [Server; 3],
     bus: Server,
     units: [UnitState; 2],
     controller_busy: u64,
     hits: Spread,
-    /// Rays that have not begun.
+    /// Number of rays that have not begun.
     rays: u64,
-    /// Rays in flight, each with a place in the queue.
+    /// Number of rays in flight. Each has a reserved place in the queue.
     casting: u64,
-    /// Gathers in the half that is being filled.
+    /// Number of gathers in the half that is being filled.
     filling: u64,
-    /// Gathers of the drain that have not begun, and those that have not ended.
+    /// Number of gathers of the drain that have not begun; `draining` counts those that have not ended.
     ready: u64,
     draining: u64,
     drain_time: u64,
 }
 
-/// Times of as many rays, and of the gathers that they lead to.
+/// Simulates `rays` rays and the gathers that they lead to. Returns their times.
 pub(super) fn run(plan: &Plan, rays: u64) -> FrameTimes {
     let mut simulation = Simulation::new(plan, rays);
     simulation.begin_tasks();
@@ -328,7 +330,8 @@ impl<'a> Simulation<'a> {
         self.foresee(end, Event::Computed(unit, steps - 1));
     }
 
-    /// Arithmetic of a unit, or of the controller, which is behind all units. Returns its end.
+    /// Schedules arithmetic of a unit, or of the controller, whose number follows those of the units. Returns
+    /// its end.
     fn serve(&mut self, unit: usize, time: u64) -> u64 {
         let server = if self.plan.is_shared { 0 } else { unit };
         self.arithmetic[server].serve(self.now, time)

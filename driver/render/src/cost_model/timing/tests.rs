@@ -1,23 +1,24 @@
-//! Times against closed forms, and bounds that hold for any frame.
+//! Compares times with closed forms, and with bounds that hold for any frame.
 
 use proptest::prelude::*;
 
 use super::*;
 
 const LINE: f64 = 128.0;
-/// A line takes 2 ns on the bus, 100 FLOPs take 1 ns.
+/// Machine on which a line takes 2 ns on the bus, and 100 FLOPs take 1 ns.
 const MACHINE: Machine =
     Machine { bandwidth: 64e9, flops: 100e9, latency: 100e-9, tasks: 1, ..Machine::NOMINAL };
 const NANOSECOND: f64 = 1e-9;
 
-/// Shares with which each unit has as much arithmetic as the chip.
+/// Shares that give each unit all of the chip's arithmetic.
 const WHOLE: Shares = Shares { ray_caster: 1.0, controller: 1.0, gather_unit: 1.0 };
 
 fn chip(tasks: u32, queue: u64, policy: Policy) -> TimedChip {
     TimedChip { machine: Machine { tasks, ..MACHINE }, queue, policy }
 }
 
-/// Tasks of `steps` steps, of which a share misses, with FLOPs of each step.
+/// Tasks with `steps` steps each. `misses` is the fraction of the steps that miss, `flops` the FLOPs per
+/// step.
 fn load(tasks: f64, steps: f64, misses: f64, flops: f64) -> Load {
     let requests = tasks * steps;
     Load { tasks, requests, dram_bytes: requests * misses * LINE, flops: requests * flops }
@@ -48,7 +49,7 @@ fn one_task_waits_for_everything_in_turn() {
 }
 
 #[test]
-fn tasks_share_what_one_waits_until_a_resource_is_busy() {
+fn tasks_hide_latency_until_a_resource_is_busy() {
     // Where every step misses the queues are deterministic: max(arithmetic, bus, (arithmetic + bus + latency)
     // / tasks).
     for (tasks, flops, nanoseconds) in
@@ -63,7 +64,7 @@ fn tasks_share_what_one_waits_until_a_resource_is_busy() {
 }
 
 #[test]
-fn alternating_parts_take_the_sum_of_both() {
+fn alternating_units_take_the_sum_of_both_times() {
     let (rays, gathers) = (load(2e6, 3.0, 0.2, 400.0), load(1e6, 6.0, 0.5, 900.0));
     let chip = chip(32, 10_000, Policy::Alternate);
     let alone = |frame| seconds(&frame, &chip);
@@ -74,7 +75,7 @@ fn alternating_parts_take_the_sum_of_both() {
 }
 
 #[test]
-fn overlapped_parts_take_the_longer_and_a_fill_or_a_drain_of_one_half() {
+fn overlapped_units_take_the_longer_time_and_one_fill_or_drain_of_a_half() {
     // Without reads: 100 halves of 50 gathers, each of a ray of 4 or 8 ns and a gather of 6 ns.
     for (ray, longer, rest) in [(400.0, 6.0, 4.0), (800.0, 8.0, 6.0)] {
         let both = frame(load(5000.0, 1.0, 0.0, ray), load(5000.0, 1.0, 0.0, 600.0));
@@ -111,7 +112,7 @@ fn a_bus_that_both_units_fill_takes_the_sum_of_their_bytes() {
 }
 
 #[test]
-fn units_with_shares_of_the_arithmetic_take_as_long_as_their_slowest() {
+fn units_with_shares_of_the_arithmetic_take_as_long_as_the_slowest() {
     // By their work all three units need as long as the chip does for the sum; by equal shares the gather
     // unit is the slowest.
     let work = FrameLoad {
@@ -152,7 +153,7 @@ fn a_unit_whose_tasks_all_read_waits_for_memory() {
 }
 
 #[test]
-fn a_sample_of_drains_stands_for_the_rest() {
+fn a_sample_of_drains_extrapolates_to_all() {
     let of = |count: f64| frame(load(2.0 * count, 3.0, 0.3, 300.0), load(count, 2.0, 0.4, 500.0));
     for policy in [Policy::Alternate, Policy::Overlapped(WHOLE)] {
         let chip = chip(16, 1000, policy);
@@ -177,7 +178,7 @@ fn twice_the_tasks_take_half_the_time_while_no_resource_is_busy() {
 }
 
 #[test]
-fn nothing_takes_no_time() {
+fn a_frame_without_work_takes_no_time() {
     for policy in [Policy::Alternate, Policy::Overlapped(Shares::of(&Cost::default()))] {
         assert_eq!(FrameLoad::default().times(&chip(8, 8, policy), LINE), FrameTimes::default());
         let free = frame(load(1e3, 2.0, 0.0, 0.0), load(1e3, 2.0, 0.0, 0.0));
@@ -185,7 +186,7 @@ fn nothing_takes_no_time() {
     }
 }
 
-/// Seconds of everything in series.
+/// Seconds of a frame if all of its work is done in series.
 fn in_series(frame: &FrameLoad, shares: &Shares) -> f64 {
     let reads = |load: &Load| load.dram_bytes / MACHINE.bandwidth + load.dram_bytes / LINE * MACHINE.latency;
     let arithmetic = frame.rays.flops / shares.ray_caster

@@ -2,30 +2,31 @@
 
 use super::super::number;
 
-/// Maximum number of intervals between the ticks of a linear axis, before its ends are rounded outward.
+/// Maximum number of intervals between the ticks of a linear axis, before its ends are rounded outwards.
 const INTERVALS: f64 = 10.0;
 /// Maximum number of tick labels of an axis.
 const MAX_TICKS: usize = 12;
-/// Maximum length, in steps of 1-2-5, of a logarithmic axis that ends at any step; a longer one ends at whole
-/// decades.
+/// Maximum length, in steps of 1-2-5, of a logarithmic axis that can end at any step. A longer axis ends at
+/// whole decades.
 const MAX_STEPS: i32 = 9;
-/// Bound below which a linear axis takes its values for zeros, if the magnitudes of all are below it.
+/// Magnitude below which all values of a linear axis are taken as zeros.
 const SMALLEST: f64 = 1e-290;
-/// Tolerance for rounding of logarithms that should be whole numbers.
+/// Tolerance for the rounding of logarithms that should be integers.
 const WHOLE: f64 = 1e-9;
 
-/// A mapping of values to positions from 0 to 1 along an axis.
+/// Mapping of values to positions from 0 to 1 along an axis.
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     kind: Kind,
-    /// The axis' ends in its own measure: values, logarithms, or indices of categories.
+    /// Lower end of the axis, in its own measure: a value, a logarithm, or the index of a category. `high` is
+    /// the upper end.
     low: f64,
     high: f64,
 }
 
 #[derive(Clone, Debug)]
 enum Kind {
-    /// Linear, with ticks at multiples of `step`.
+    /// Linear axis with ticks at multiples of `step`.
     Linear {
         step: Step,
     },
@@ -34,7 +35,7 @@ enum Kind {
     Categories(Vec<String>),
 }
 
-/// A labelled position.
+/// A labelled position on an axis.
 #[derive(Clone, Debug)]
 pub(super) struct Tick {
     /// Position along the axis, 0 to 1.
@@ -42,12 +43,13 @@ pub(super) struct Tick {
     pub(super) label: String,
 }
 
-/// The step `digit * 10^exponent` with the digit 1, 2 or 5, as `3 exponent` plus the digit's index.
+/// A step `digit * 10^exponent`, where the digit is 1, 2 or 5. It is stored as `3 exponent` plus the index of
+/// the digit.
 #[derive(Clone, Copy, Debug)]
 struct Step(i32);
 
 impl Step {
-    /// The smallest step that is at least `value`, which is positive.
+    /// Smallest step that is at least `value`, which must be positive.
     fn at_least(value: f64) -> Self {
         let mut step = Self(3 * value.log10().floor() as i32);
         while step.value() < value * (1.0 - WHOLE) {
@@ -70,7 +72,7 @@ impl Step {
 }
 
 impl Axis {
-    /// A linear axis over the values from `low` to `high`, extended to whole steps.
+    /// Linear axis over the values from `low` to `high`, extended to whole steps.
     pub(super) fn linear(low: f64, high: f64) -> Self {
         let size = low.abs().max(high.abs());
         let (low, high) = match high - low > size * 1e-9 {
@@ -87,15 +89,15 @@ impl Axis {
         Self { kind: Kind::Linear { step }, low: outward(low, f64::floor), high: outward(high, f64::ceil) }
     }
 
-    /// A logarithmic axis over the positive values from `low` to `high`, extended to whole powers of two.
+    /// Logarithmic axis over the positive values from `low` to `high`, extended to whole powers of two.
     pub(super) fn log2(low: f64, high: f64) -> Self {
         let (low, high) = ((low.log2() + WHOLE).floor(), (high.log2() - WHOLE).ceil());
         let widen = if low < high { 0.0 } else { 1.0 };
         Self { kind: Kind::Log2, low: low - widen, high: high + widen }
     }
 
-    /// A logarithmic axis over the positive values from `low` to `high`, extended to 1, 2 or 5 times a power
-    /// of ten.
+    /// Logarithmic axis over the positive values from `low` to `high`, extended to 1, 2 or 5 times a power of
+    /// ten.
     pub(super) fn log10(low: f64, high: f64) -> Self {
         let (mut low_step, mut high_step) = (Step::at_least(low), Step::at_least(high));
         if low_step.value() > low * (1.0 + WHOLE) || low_step.0 == high_step.0 {
@@ -111,7 +113,7 @@ impl Axis {
         Self { kind: Kind::Log10, low: low_step.value().log10(), high: high_step.value().log10() }
     }
 
-    /// An axis of names; the values are their indices.
+    /// Axis of names. The values are their indices.
     pub(super) fn categories(names: Vec<String>) -> Self {
         let high = names.len().max(1) as f64 - 0.5;
         Self { kind: Kind::Categories(names), low: -0.5, high }
@@ -136,7 +138,7 @@ impl Axis {
         }
     }
 
-    /// Exponent of the power of ten that the labels leave out: 0 unless they would need many zeros.
+    /// Exponent of the power of ten that the labels omit. It is 0 unless the labels would need many zeros.
     pub(super) fn omitted_exponent(&self) -> i32 {
         let size = self.low.abs().max(self.high.abs());
         match self.kind {
@@ -145,7 +147,7 @@ impl Axis {
         }
     }
 
-    /// The ticks in ascending order, as dense as `fits` admits.
+    /// Ticks in ascending order, as dense as `fits` allows.
     pub(super) fn ticks(&self, fits: impl Fn(&[Tick]) -> bool) -> Vec<Tick> {
         if matches!(self.kind, Kind::Categories(_)) {
             return self.candidate(0);
@@ -160,7 +162,7 @@ impl Axis {
         ticks
     }
 
-    /// The ticks after `sparsity` denser choices did not fit.
+    /// Ticks to try after `sparsity` denser choices did not fit.
     fn candidate(&self, sparsity: i32) -> Vec<Tick> {
         match &self.kind {
             Kind::Linear { step } => self.linear_ticks(Step(step.0 + sparsity)),
@@ -256,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn many_zeros_go_to_the_axis_label() {
+    fn a_power_of_ten_moves_to_the_axis_label() {
         let axis = Axis::linear(0.0, 6e9);
         assert_eq!((labels(&axis)[1].as_str(), axis.omitted_exponent()), ("1", 9));
         let axis = Axis::linear(0.0, 8e-6);
@@ -265,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn every_range_has_at_least_two_ticks_and_holds_its_ends() {
+    fn every_axis_has_at_least_two_ticks_and_contains_its_range() {
         let ranges = [
             (0.0, 0.0),
             (5.0, 5.0),

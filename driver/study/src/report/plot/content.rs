@@ -1,8 +1,8 @@
-//! Panels, axes and series: the content of a plot.
+//! Content of a plot: panels, axes and series.
 
 use super::super::number;
 
-/// Pair of axes with the series over them.
+/// A pair of axes, and the series drawn over them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Panel {
     /// Title of the panel; may be empty.
@@ -11,7 +11,7 @@ pub struct Panel {
     pub x: XAxis,
     /// Vertical axis.
     pub y: YAxis,
-    /// Data.
+    /// Series drawn in the panel.
     pub series: Vec<Series>,
 }
 
@@ -29,13 +29,13 @@ pub struct XAxis {
 /// Mapping of horizontal values to positions.
 #[derive(Clone, Debug, PartialEq)]
 pub enum XScale {
-    /// Linear.
+    /// Linear scale.
     Linear,
-    /// Logarithmic, with labels at powers of two.
+    /// Logarithmic scale with labels at powers of two.
     Log2,
-    /// Logarithmic, with labels at 1, 2 and 5 times powers of ten.
+    /// Logarithmic scale with labels at 1, 2 and 5 times powers of ten.
     Log10,
-    /// Categorical: a point's `x` is the index of its name.
+    /// Categorical scale: a point's `x` is the index of its name.
     Categories(Vec<String>),
 }
 
@@ -53,32 +53,32 @@ pub struct YAxis {
 /// Mapping of vertical values to positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum YScale {
-    /// Linear, over the range of the data.
+    /// Linear scale over the range of the data.
     Linear,
-    /// Linear, over a range that includes zero.
+    /// Linear scale over a range that includes zero.
     LinearFromZero,
-    /// Logarithmic, with labels at 1, 2 and 5 times powers of ten.
+    /// Logarithmic scale with labels at 1, 2 and 5 times powers of ten.
     Log10,
 }
 
-/// Named line.
+/// A named line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Series {
-    /// Name in the legend; a series without a name is not in the legend.
+    /// Name in the legend. A series with an empty name is not in the legend.
     pub name: String,
-    /// Points in the order in which the line joins them.
+    /// Points, in the order in which the line joins them.
     pub points: Vec<Point>,
 }
 
-/// Point in the units of the axes. Values that are not finite, and on a logarithmic axis values of zero or
-/// less, are not drawn; a note below the plot reports them.
+/// A point in the units of the axes. Values that are not finite are not drawn, and neither are values of zero
+/// or less on a logarithmic axis; a note below the plot reports them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Point {
     /// Horizontal value.
     pub x: f64,
     /// Vertical value.
     pub y: f64,
-    /// Half the width of the confidence interval of `y`: the extent of the error bar in both directions.
+    /// Half-width of the confidence interval of `y`: the extent of the error bar in either direction.
     pub half_width: Option<f64>,
 }
 

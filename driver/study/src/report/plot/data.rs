@@ -1,16 +1,16 @@
-//! Data that can be drawn, the points that cannot, and the axes over them.
+//! Separates the data that can be drawn from the points that cannot, and creates the axes.
 
 use super::axis::Axis;
 use super::content::{Panel, Point, XScale, YScale};
 
 /// Maximum magnitude of a value that is drawn.
 const LARGEST: f64 = 1e300;
-/// Minimum of the values that are drawn on a logarithmic axis.
+/// Minimum value that is drawn on a logarithmic axis.
 const SMALLEST: f64 = 1e-300;
-/// Share of a value below which its error bar does not extend a logarithmic axis.
+/// Fraction of a value below which the end of its error bar does not extend a logarithmic axis.
 const BAR_SHARE: f64 = 0.1;
 
-/// The points of one series that can be drawn, in runs that a line joins.
+/// Points of one series that can be drawn, in runs that are joined by a line.
 pub(super) struct Drawable<'a> {
     pub(super) name: &'a str,
     pub(super) runs: Vec<Vec<Mark>>,
@@ -23,7 +23,7 @@ pub(super) struct Mark {
     pub(super) bar: Option<[f64; 2]>,
 }
 
-/// Reason that a point is not drawn.
+/// Reason why a point is not drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Reason {
     NotFinite,
@@ -31,14 +31,14 @@ pub(super) enum Reason {
     NoCategory,
 }
 
-/// Points of a series that are not drawn for one reason.
+/// Points of a series that are not drawn, for one reason.
 pub(super) struct LeftOut<'a> {
     pub(super) reason: Reason,
     pub(super) name: &'a str,
     pub(super) count: usize,
 }
 
-/// Separates the points of a panel that can be drawn from those that cannot; the latter interrupt their
+/// Separates the points of a panel that can be drawn from those that cannot. The latter interrupt their
 /// lines.
 pub(super) fn clean(panel: &Panel) -> (Vec<Drawable<'_>>, Vec<LeftOut<'_>>) {
     let mut left_out: Vec<LeftOut> = Vec::new();
@@ -89,7 +89,7 @@ fn mark(point: &Point) -> Mark {
     Mark { x: point.x, y: point.y, bar }
 }
 
-/// The horizontal axis of a panel.
+/// Creates the horizontal axis of a panel.
 pub(super) fn x_axis(panel: &Panel, drawable: &[Drawable]) -> Axis {
     let marks = drawable.iter().flat_map(|series| series.runs.iter().flatten());
     let range = range(marks.map(|mark| mark.x));
@@ -110,7 +110,7 @@ pub(super) fn x_axis(panel: &Panel, drawable: &[Drawable]) -> Axis {
     }
 }
 
-/// The vertical axis of a scale over all of the series, error bars included.
+/// Creates the vertical axis for all series, including their error bars.
 pub(super) fn y_axis<'a>(scale: YScale, drawable: impl Iterator<Item = &'a Drawable<'a>>) -> Axis {
     let marks = drawable.flat_map(|series| series.runs.iter().flatten());
     let values = |mark: &Mark| {

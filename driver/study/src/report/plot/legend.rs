@@ -1,28 +1,28 @@
-//! The legend, below the panels: it never covers data.
+//! Legend of a plot. It is below the panels, so that it never covers data.
 
 use super::style::Style;
 use super::svg::{self, Anchor};
 use super::text;
 
-/// Width of the sample of a line, and of the gap between sample and name, in pixels.
+/// Width of a line's sample in the legend, in pixels.
 const SAMPLE: f64 = 46.0;
 const GAP: f64 = 8.0;
-/// The space between columns, and above and below the legend, in pixels.
+/// Space between columns, in pixels.
 const COLUMN_GAP: f64 = 22.0;
 const PADDING: f64 = 8.0;
-/// Minimum distance of rows, in pixels.
+/// Minimum distance between rows, in pixels.
 const ROW: f64 = 20.0;
 
-/// The legend, laid out: samples and names in columns of equal width.
+/// A laid-out legend: samples and names in columns of equal width.
 pub(super) struct Legend {
-    /// Index and wrapped name of each series with a name.
+    /// Index and wrapped name of each series that has a name.
     entries: Vec<(usize, Vec<String>)>,
     columns: usize,
     column_width: f64,
 }
 
 impl Legend {
-    /// Lays out the series that have names within a width of `room` pixels.
+    /// Lays out the series that have names, within a width of `room` pixels.
     pub(super) fn new(names: &[&str], room: f64) -> Self {
         let name_room = room - SAMPLE - GAP;
         let entries: Vec<_> = names

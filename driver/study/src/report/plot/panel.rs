@@ -1,4 +1,4 @@
-//! One panel: its layout and its drawing.
+//! Layout and drawing of one panel.
 
 use super::axis::{Axis, Tick};
 use super::content::{Panel, XScale, axis_label};
@@ -9,20 +9,20 @@ use super::text::{self, LABEL, TICK};
 
 /// The height of a plotting area, in pixels.
 const AREA_HEIGHT: f64 = 290.0;
-/// Space between the frame and the ends of an axis, so that markers lie inside, in pixels.
+/// Space between the frame and the ends of an axis, in pixels. It keeps markers inside the frame.
 const INSET: f64 = 12.0;
-/// Length of a tick, space between the parts around the frame, minimum space between tick labels, in pixels.
+/// Length of a tick, in pixels.
 const TICK_LENGTH: f64 = 5.0;
 const GAP: f64 = 6.0;
 const LABEL_GAP: f64 = 8.0;
-/// Maximum length of the name of a category that is written slantwise, in pixels.
+/// Maximum length of a slanted category name, in pixels.
 const SLANTED_ROOM: f64 = 220.0;
-/// Minimum distance of categories whose names are written slantwise, in pixels.
+/// Minimum distance between categories with slanted names, in pixels.
 const SLANTED_PITCH: f64 = 24.0;
 /// Half the width of an error bar's cap, in pixels.
 const CAP: f64 = 3.5;
 
-/// A panel, laid out.
+/// A laid-out panel.
 pub(super) struct Drawing<'a> {
     panel: &'a Panel,
     data: Vec<Drawable<'a>>,
@@ -36,15 +36,15 @@ pub(super) struct Drawing<'a> {
     title: Vec<String>,
     x_label: Vec<String>,
     y_label: Vec<String>,
-    /// The plotting area's width, and the room left and right of it, in pixels.
+    /// Width of the plotting area, in pixels. `left` and `right` are the space beside it.
     area: f64,
     left: f64,
     right: f64,
 }
 
 impl<'a> Drawing<'a> {
-    /// Lays out a panel with a plotting area that is `area` pixels wide, or wider if its categories need it.
-    /// `names` are the names of all series of the plot, which select their styles.
+    /// Lays out a panel whose plotting area is `area` pixels wide, or wider if its categories need it.
+    /// `names` are the names of all series of the plot, which determine their styles.
     pub(super) fn new(panel: &'a Panel, data: Vec<Drawable<'a>>, y: Axis, names: &[&str], area: f64) -> Self {
         let area = match &panel.x.scale {
             XScale::Categories(names) => area.max(SLANTED_PITCH * names.len() as f64),
@@ -89,17 +89,17 @@ impl<'a> Drawing<'a> {
         self.left + self.area + self.right
     }
 
-    /// The room above the plotting area, in pixels.
+    /// Height of the space above the plotting area, in pixels.
     pub(super) fn above(&self) -> f64 {
         text::height(self.title.len(), LABEL) + GAP
     }
 
-    /// The height of the plotting area and of all below it, in pixels.
+    /// Height of the plotting area and of everything below it, in pixels.
     pub(super) fn below_top(&self) -> f64 {
         AREA_HEIGHT + self.x_tick_room() + text::height(self.x_label.len(), LABEL) + GAP
     }
 
-    /// SVG of the panel, with its left side at `left` and the top of its plotting area at `top`.
+    /// Draws the panel as SVG. `left` is its left side, `top` the top of its plotting area.
     pub(super) fn draw(&self, [left, top]: [f64; 2]) -> String {
         let frame = Frame {
             left: left + self.left,
@@ -128,7 +128,7 @@ impl<'a> Drawing<'a> {
         drawn + "</g>\n"
     }
 
-    /// The room left and right of the plotting area, in pixels.
+    /// Width of the space to the left and right of the plotting area, in pixels.
     fn side_room(&self) -> [f64; 2] {
         let widest = self.y_ticks.iter().map(|tick| text::width(&tick.label, TICK)).fold(0.0, f64::max);
         let labels = text::height(self.y_label.len(), LABEL) + GAP + widest + GAP + TICK_LENGTH;
@@ -148,7 +148,7 @@ impl<'a> Drawing<'a> {
         [left, right]
     }
 
-    /// The height of the horizontal axis' ticks and their labels, in pixels.
+    /// Height of the ticks and labels of the horizontal axis, in pixels.
     fn x_tick_room(&self) -> f64 {
         let widest = self.x_ticks.iter().map(|tick| text::width(&tick.label, TICK)).fold(0.0, f64::max);
         let labels = if self.is_slanted { 0.71 * (widest + TICK) } else { text::height(1, TICK) };
@@ -239,7 +239,7 @@ impl<'a> Drawing<'a> {
     }
 }
 
-/// The plotting area, in pixels.
+/// Rectangle of the plotting area, in pixels.
 struct Frame {
     left: f64,
     top: f64,
@@ -257,7 +257,7 @@ impl Frame {
     }
 }
 
-/// Returns whether labels that are centred at ticks along `length` pixels keep apart.
+/// Returns whether labels centred at ticks along `length` horizontal pixels do not overlap.
 fn fit_side_by_side(ticks: &[Tick], length: f64) -> bool {
     let is_apart = |pair: &[Tick]| {
         let half_widths = 0.5 * (text::width(&pair[0].label, TICK) + text::width(&pair[1].label, TICK));
@@ -266,7 +266,7 @@ fn fit_side_by_side(ticks: &[Tick], length: f64) -> bool {
     ticks.windows(2).all(is_apart)
 }
 
-/// Returns whether labels at ticks along `length` pixels upward keep apart.
+/// Returns whether labels at ticks along `length` vertical pixels do not overlap.
 fn fit_above_each_other(ticks: &[Tick], length: f64) -> bool {
     let line = text::height(1, TICK);
     ticks.windows(2).all(|pair| (pair[1].place - pair[0].place) * length >= line)

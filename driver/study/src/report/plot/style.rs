@@ -1,4 +1,4 @@
-//! Styles of series: dashes and markers, which differ in black and white too, and colours.
+//! Styles of series: dashes and markers, which can be distinguished in black and white, and colours.
 
 use std::fmt::Write;
 
@@ -7,10 +7,10 @@ use super::svg::px;
 /// Half the extent of a marker, in pixels.
 pub(super) const MARKER: f64 = 4.5;
 
-/// Lengths of dashes and gaps, in pixels: SVG's `stroke-dasharray`; empty for a solid line.
+/// Lengths of dashes and gaps, in pixels, as in SVG's `stroke-dasharray`; empty for a solid line.
 const DASHES: [&str; 7] = ["", "8 4", "2 3", "10 3 2 3", "16 4", "5 2", "10 3 2 3 2 3"];
 
-/// Shapes of markers; true if filled.
+/// Shapes of markers, and whether they are filled.
 const MARKERS: [(Shape, bool); 12] = [
     (Shape::Circle, true),
     (Shape::Square, false),
@@ -26,8 +26,8 @@ const MARKERS: [(Shape, bool); 12] = [
     (Shape::Star, false),
 ];
 
-/// Colours whose lightness differs pairwise by at least 5 of 100, the first six by 11, and that stay apart
-/// for protanopes, deuteranopes and tritanopes (CIE76 difference above 20 after Machado et al. 2009).
+/// Colours. Their lightness differs pairwise by at least 5 of 100, that of the first six by 11. Protanopes,
+/// deuteranopes and tritanopes can distinguish them (CIE76 difference above 20 after Machado et al. 2009).
 const COLOURS: [&str; 12] = [
     "#000000", "#EB676C", "#4D1055", "#CAAE30", "#6C6DB6", "#873000", "#0046E1", "#7F5C71", "#507BEB",
     "#54079A", "#002900", "#76A8B0",
@@ -45,7 +45,7 @@ enum Shape {
     Star,
 }
 
-/// Style of one series. Dash and marker together are unique among the first 84 series, the marker among the
+/// Style of one series. The pair of dash and marker is unique among the first 84 series, the marker among the
 /// first 12.
 #[derive(Clone, Copy)]
 pub(super) struct Style {
@@ -56,13 +56,13 @@ pub(super) struct Style {
 }
 
 impl Style {
-    /// The style of the series of an index.
+    /// Style of series number `index`.
     pub(super) fn of(index: usize) -> Self {
         let (shape, is_filled) = MARKERS[index % MARKERS.len()];
         Self { dash: DASHES[index % DASHES.len()], shape, is_filled, colour: COLOURS[index % COLOURS.len()] }
     }
 
-    /// A line through the points, `width` pixels wide.
+    /// SVG of a line through the points, `width` pixels wide.
     pub(super) fn line(&self, points: &[[f64; 2]], width: f64) -> String {
         let mut path = String::new();
         for [x, y] in points {
@@ -80,7 +80,7 @@ impl Style {
         )
     }
 
-    /// The marker at a point.
+    /// SVG of the marker at a point.
     pub(super) fn marker(&self, x: f64, y: f64) -> String {
         let fill = if self.is_filled { self.colour } else { "#ffffff" };
         format!(

@@ -4,11 +4,11 @@ use super::super::markup::escape;
 use super::super::number;
 use super::text;
 
-/// The colours of frames and of grid lines.
+/// Colour of frames.
 pub(super) const FRAME: &str = "#777777";
 pub(super) const GRID: &str = "#dddddd";
 
-/// Part of a text that lies at its position: SVG's `text-anchor`.
+/// Part of a text that is at its position, as in SVG's `text-anchor`.
 #[derive(Clone, Copy)]
 pub(super) enum Anchor {
     Start,
@@ -16,7 +16,7 @@ pub(super) enum Anchor {
     End,
 }
 
-/// A line of text, at the position of its base line.
+/// A line of text. Its position is on the base line.
 pub(super) struct Text<'a> {
     pub(super) class: &'a str,
     pub(super) text: &'a str,
@@ -30,12 +30,12 @@ pub(super) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// An upright line of text.
+    /// Creates an upright line of text.
     pub(super) fn new(class: &'a str, text: &'a str, [x, y]: [f64; 2], size: f64, anchor: Anchor) -> Self {
         Self { class, text, x, y, size, anchor, turn: 0.0, is_bold: false }
     }
 
-    /// The SVG element.
+    /// Draws the text as an SVG element.
     pub(super) fn draw(&self) -> String {
         let anchor = match self.anchor {
             Anchor::Start => "start",
@@ -57,7 +57,7 @@ impl<'a> Text<'a> {
     }
 }
 
-/// Lines of text below each other, all anchored at `x`, the first below `top`.
+/// SVG of lines of text below each other. All are anchored at `x`; the first is below `top`.
 pub(super) fn lines(class: &str, lines: &[String], [x, top]: [f64; 2], size: f64, anchor: Anchor) -> String {
     let draw = |(index, line): (usize, &String)| {
         let y = top + text::height(index, size) + size;
@@ -66,7 +66,7 @@ pub(super) fn lines(class: &str, lines: &[String], [x, top]: [f64; 2], size: f64
     lines.iter().enumerate().map(draw).collect()
 }
 
-/// A straight line between two points.
+/// SVG of a straight line between two points.
 pub(super) fn segment(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], colour: &str) -> String {
     format!(
         "<line class=\"{class}\" x1=\"{}\" y1=\"{}\" x2=\"{}\" y2=\"{}\" stroke=\"{colour}\"/>\n",
@@ -77,7 +77,7 @@ pub(super) fn segment(class: &str, [x1, y1]: [f64; 2], [x2, y2]: [f64; 2], colou
     )
 }
 
-/// A coordinate, rounded to hundredths of a pixel.
+/// Formats a coordinate, rounded to hundredths of a pixel.
 pub(super) fn px(value: f64) -> String {
     number::full((value * 100.0).round() / 100.0 + 0.0)
 }

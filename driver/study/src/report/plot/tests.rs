@@ -89,7 +89,7 @@ fn view_box(svg: &[Element]) -> [f64; 2] {
     [numbers[2], numbers[3]]
 }
 
-/// Left, top, right and bottom of a text, by the upper bound of its width that it is laid out with.
+/// Left, top, right and bottom of a text, with the upper bound of its width that the layout assumes.
 fn text_box(element: &Element) -> [f64; 4] {
     let [x, y, size] = ["x", "y", "font-size"].map(|name| element.number(name).unwrap());
     let width = text::width(&element.text.trim_end_matches('\n').replace('\n', " "), size);
@@ -174,7 +174,7 @@ fn of_class<'a>(svg: &'a [Element], class: &str) -> Vec<&'a Element> {
     svg.iter().filter(|element| element.get("class") == Some(class)).collect()
 }
 
-/// Returns whether two parallel lines of text do not overlap: across their direction, or by their boxes.
+/// Returns whether two parallel lines of text do not overlap.
 fn are_apart(a: &Element, b: &Element) -> bool {
     let (p, q) = (text_box(a), text_box(b));
     if a.get("transform").is_some() {
@@ -185,7 +185,7 @@ fn are_apart(a: &Element, b: &Element) -> bool {
 }
 
 #[test]
-fn tick_labels_keep_apart() {
+fn tick_labels_do_not_overlap() {
     for plot in nasty_plots() {
         let svg = elements(&plot.to_svg());
         for class in ["x-tick", "y-tick"] {
@@ -198,7 +198,7 @@ fn tick_labels_keep_apart() {
 }
 
 #[test]
-fn labels_keep_clear_of_each_other_and_of_the_legend() {
+fn labels_overlap_neither_each_other_nor_the_legend() {
     for plot in nasty_plots() {
         let svg = elements(&plot.to_svg());
         let bottom = of_class(&svg, "x-tick").into_iter().map(|label| text_box(label)[3]).fold(0.0, f64::max);
@@ -226,7 +226,7 @@ fn twelve() -> Plot {
     plot(vec![panel(XScale::Log2, YScale::LinearFromZero, series)])
 }
 
-/// The shape of a marker, relative to its first point, and whether it is hollow.
+/// Shape of a marker relative to its first point, and whether it is hollow.
 fn shape(marker: &Element) -> (Vec<[i32; 2]>, bool) {
     let points = coordinates(marker);
     let first = points[0];
@@ -236,7 +236,7 @@ fn shape(marker: &Element) -> (Vec<[i32; 2]>, bool) {
 }
 
 #[test]
-fn no_two_series_look_the_same_without_colours() {
+fn series_can_be_distinguished_without_colours() {
     let svg = elements(&twelve().to_svg());
     let mut looks = Vec::new();
     for (index, element) in svg.iter().enumerate() {
@@ -271,7 +271,7 @@ fn a_series_looks_the_same_in_every_panel_and_is_once_in_the_legend() {
 }
 
 #[test]
-fn what_is_left_out_is_said_and_interrupts_the_line() {
+fn omitted_points_are_reported_and_interrupt_the_line() {
     let points = [(1.0, 1.0), (2.0, 2.0), (3.0, 0.0), (4.0, f64::NAN), (5.0, 1.0), (6.0, -1.0), (7.0, 2.0)];
     let svg =
         elements(&plot(vec![panel(XScale::Linear, YScale::Log10, vec![series("a", &points)])]).to_svg());

@@ -1,27 +1,29 @@
-//! Size of text. Plots are drawn without a font at hand, so widths are those of the widest common fonts.
+//! Size of text. No font is available while plots are drawn, so that widths are those of the widest common
+//! fonts.
 
-/// Font sizes of titles, of labels and of tick labels, in pixels.
+/// Font size of titles, in pixels.
 pub(super) const TITLE: f64 = 16.0;
 pub(super) const LABEL: f64 = 13.0;
 pub(super) const TICK: f64 = 12.0;
 
-/// Upper bound of the width of bold text over the width of regular text.
+/// Upper bound of the ratio of the widths of bold and regular text.
 pub(super) const BOLD: f64 = 1.12;
 
-/// Distance of two lines of text over the font size.
+/// Distance between two lines of text, divided by the font size.
 const LEADING: f64 = 1.3;
 
-/// An upper bound of the width of `text` at `size`, in pixels.
+/// Upper bound of the width of `text` at font size `size`, in pixels.
 pub(super) fn width(text: &str, size: f64) -> f64 {
     text.chars().map(|character| advance(character) * size).sum()
 }
 
-/// The height of `lines` lines of text at `size`, in pixels.
+/// Height of `lines` lines of text at font size `size`, in pixels.
 pub(super) fn height(lines: usize, size: f64) -> f64 {
     lines as f64 * size * LEADING
 }
 
-/// `text` in lines of at most `room` pixels, broken at spaces, and within words that are longer than a line.
+/// Breaks `text` into lines of at most `room` pixels, at spaces, and within words that are longer than a
+/// line.
 pub(super) fn wrap(text: &str, size: f64, room: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
@@ -36,7 +38,7 @@ pub(super) fn wrap(text: &str, size: f64, room: f64) -> Vec<String> {
     lines
 }
 
-/// `text`, or its longest prefix that fits into `room` pixels with an ellipsis.
+/// Returns `text` if it fits into `room` pixels, otherwise its longest prefix that fits with an ellipsis.
 pub(super) fn shorten(text: &str, size: f64, room: f64) -> String {
     if width(text, size) <= room {
         return text.to_owned();
@@ -67,7 +69,7 @@ fn break_word(word: &str, size: f64, room: f64) -> Vec<String> {
     pieces
 }
 
-/// Width of a character over the font size, in `DejaVu Sans`, rounded up.
+/// Width of a character in `DejaVu Sans`, divided by the font size, rounded up.
 fn advance(character: char) -> f64 {
     match character {
         ' ' | '.' | ',' | ':' | ';' | '\'' | '|' | 'i' | 'j' | 'l' | 'I' => 0.36,

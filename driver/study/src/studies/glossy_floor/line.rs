@@ -1,4 +1,4 @@
-//! Lines of figure 6.17: the renders of each, and how flat a curve is.
+//! Lines of figure 6.17: the renders of each, and a measure of the flatness of a curve.
 
 use photoncard_cards::scheduler::GatherOrder::{self, DirectionBins, Hash, Naive, Sort, Tiled};
 use photoncard_picture::choice::Choice;
@@ -10,10 +10,10 @@ use super::super::super::sample::Estimate;
 use super::super::super::scale::Scale;
 use super::super::scenes::GLOSSY;
 
-/// Order of the gathers and sampling of the rays.
+/// A line of the figure: order of the gathers, and sampling of the rays.
 pub(super) type Line = (GatherOrder, Sampling);
 
-/// Lines of the figure: order of the gathers and sampling of the rays.
+/// Lines of the figure: order of the gathers, and sampling of the rays.
 pub(super) const LINES: [Line; 7] = [
     (Naive, Sampling::Reflection),
     (Tiled, Sampling::Reflection),
@@ -23,7 +23,7 @@ pub(super) const LINES: [Line; 7] = [
     (DirectionBins, Sampling::Product),
     (Hash, Sampling::Product),
 ];
-/// Exponents of the floor.
+/// Phong exponents of the floor.
 pub(super) fn exponents(scale: &Scale) -> Vec<u32> {
     scale.pick(&[1, 2, 4, 8, 16, 32, 64, 128], &[1, 16, 128])
 }
@@ -36,7 +36,7 @@ pub(super) fn line_name((order, sampling): Line) -> String {
     }
 }
 
-/// Point of a line at an exponent, without or with the irradiance cache.
+/// Point of a line at an exponent, with or without the irradiance cache.
 pub(super) fn point(scale: &Scale, (order, sampling): Line, is_cached: bool, exponent: u32) -> Point {
     let settings = scale.settings(order).with(|s| {
         s.picture.camera = Some("floor".to_owned());
@@ -47,7 +47,7 @@ pub(super) fn point(scale: &Scale, (order, sampling): Line, is_cached: bool, exp
     Point { assignments, ..scale.traffic(GLOSSY, settings) }
 }
 
-/// Bytes of the photon map from DRAM of a picture at each exponent.
+/// Bytes of the photon map fetched from DRAM for a picture, at each exponent.
 pub(super) fn curve(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Vec<Estimate> {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent)).photon_map_bytes();
     exponents(scale).into_iter().map(of).collect()

@@ -1,4 +1,4 @@
-//! Figure 6.17: memory traffic over the exponent of a glossy floor.
+//! Figure 6.17: memory traffic as a function of the exponent of a glossy floor.
 
 mod line;
 mod strip;
@@ -76,7 +76,7 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
     Report { figures, ..page("Figure 6.17: a glossy floor", introduction, sections) }
 }
 
-/// Figures of a line in one of the panels.
+/// Key figures of a line in one of the panels.
 fn picture_figures(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> [Figure; 3] {
     let curve = curve(scale, results, line, is_cached);
     let mean = |curve: &[Estimate]| {
@@ -134,8 +134,9 @@ fn traffic(scale: &Scale, results: &Results) -> Table {
     table
 }
 
-/// Decrease of the bytes from DRAM from the first to the last exponent. Both renders have equal tiles, so it
-/// is estimated from the differences of each tile (paired samples): the variance between tiles cancels.
+/// Decrease of the bytes from DRAM from the first to the last exponent. It is estimated from the differences
+/// of each tile (paired samples), because both renders have the same tiles; the variance between tiles
+/// cancels.
 fn fall(scale: &Scale, results: &Results, line: Line, is_cached: bool) -> Estimate {
     let of = |exponent| results.traffic(&point(scale, line, is_cached, exponent));
     let exponents = exponents(scale);

@@ -1,6 +1,6 @@
-//! Strip of the picture that shows the floor alone.
+//! Strip of the picture that shows only the floor.
 //!
-//! The rest of the picture hardly changes with the floor's exponent, and flattens every line.
+//! The remaining picture hardly changes with the floor's exponent, and thus flattens every line.
 
 use photoncard_picture::film::Window;
 
@@ -13,12 +13,12 @@ use super::super::present::{columns, gigabytes, key, say, table, text};
 use super::super::scenes::GLOSSY;
 use super::line::{self, LINES, Line, change, exponents, line_name, spread};
 
-/// Height of the strip at the picture's lower edge, as a divisor of the picture's.
+/// Height of the strip at the picture's lower edge: the picture's height divided by this number.
 const DIVISOR: u32 = 32;
-/// Maximum of greatest over least of a curve that is called nearly flat here.
+/// Maximum ratio of a curve's greatest to its least value at which the report calls it nearly flat.
 const NEARLY_FLAT: f64 = 1.1;
 
-/// All tiles of the strip, without the irradiance cache.
+/// Point that renders all tiles of the strip, without the irradiance cache.
 fn point(scale: &Scale, line: Line, exponent: u32) -> Point {
     let Point { scene, assignments, mut settings, mut task } = line::point(scale, line, false, exponent);
     let full = Window::full(scale.side, scale.side);
@@ -34,7 +34,7 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
     exponents(scale).into_iter().flat_map(at).collect()
 }
 
-/// Bytes of the photon map from DRAM at each exponent.
+/// Bytes of the photon map fetched from DRAM, at each exponent.
 fn curve(scale: &Scale, results: &Results, line: Line) -> Vec<Estimate> {
     let of = |exponent| results.traffic(&point(scale, line, exponent)).photon_map_bytes();
     exponents(scale).into_iter().map(of).collect()
@@ -75,7 +75,7 @@ fn ends(scale: &Scale) -> (u32, u32) {
     (first, last)
 }
 
-/// Sentence on which reordered lines are nearly flat over the floor alone.
+/// Sentence that states which reordered lines are nearly flat over the floor.
 fn verdict(scale: &Scale, results: &Results) -> String {
     let named = |line| (line_name(line), curve(scale, results, line));
     let naive = named(LINES[0]).1;

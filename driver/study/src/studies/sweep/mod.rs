@@ -1,4 +1,4 @@
-//! Sweep: a study of a scene of the user's own, over any settings of the render and of the chip.
+//! Sweep: a study of a user's scene, over any settings of the render and of the chip.
 
 mod report;
 
@@ -17,16 +17,16 @@ use super::super::report::Report;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sweep {
     axes: Axes,
-    /// Points in the order of [`Axes::combinations`]; their task is [`Task::Traffic`].
+    /// Points, in the order of [`Axes::combinations`]. Their task is [`Task::Traffic`].
     points: Vec<Point>,
 }
 
 impl Sweep {
-    /// The sweep over `axes`. `point` makes the point of names and values, one of each axis; its task must be
-    /// [`Task::Traffic`].
+    /// Creates the sweep over `axes`. `point` creates the point for names and values, one per axis; its task
+    /// must be [`Task::Traffic`].
     ///
     /// # Errors
-    /// If the axes make no sweep, or `point` fails.
+    /// If the axes cannot form a sweep, or `point` fails.
     pub fn new<E: From<AxisError>>(
         axes: Vec<Axis>,
         point: impl FnMut(Vec<(&str, &str)>) -> Result<Point, E>,
@@ -37,12 +37,12 @@ impl Sweep {
         Ok(Self { points: points?, axes })
     }
 
-    /// The points.
+    /// Points of the sweep.
     pub fn points(&self) -> &[Point] {
         &self.points
     }
 
-    /// Report on the results, without provenance. Times are of one chip of `machine`.
+    /// Creates the report on the results, without provenance. Times are those of one chip of `machine`.
     ///
     /// # Panics
     /// If `results` lack one of the points.
@@ -50,7 +50,8 @@ impl Sweep {
         report::report(scene, &self.axes, &self.points, results, machine)
     }
 
-    /// Settings of the points by name, for a report's provenance; those in which points differ are marked.
+    /// Names and values of the points' settings, for a report's provenance. Settings in which points differ
+    /// are marked.
     pub(crate) fn rows(&self) -> Vec<(String, String)> {
         let all: Vec<_> = self.points.iter().map(settings).collect();
         let names: BTreeSet<_> = all.iter().flatten().map(|(name, _)| name).collect();
@@ -66,7 +67,7 @@ impl Sweep {
     }
 }
 
-/// Settings of a point by name.
+/// Names and values of a point's settings.
 fn settings(point: &Point) -> Vec<(String, String)> {
     let text = |value: Value| match value {
         Value::String(text) => text,

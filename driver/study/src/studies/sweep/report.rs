@@ -59,13 +59,13 @@ impl Swept<'_> {
         self.results.traffic(&self.points[self.axes.point(indices)])
     }
 
-    /// Columns of the axes, and others.
+    /// Columns for the axes, followed by others.
     fn heads(&self, others: &[(&str, &str)]) -> Vec<Column> {
         let axes = self.axes.list().iter().map(|axis| Column::new(axis.name.as_str(), ""));
         axes.chain(columns(others)).collect()
     }
 
-    /// Cells of the values of a combination.
+    /// Cells with the values of a combination.
     fn values(&self, indices: &[usize]) -> Vec<Cell> {
         self.axes.values(indices).into_iter().map(|(_, value)| value.into()).collect()
     }
@@ -146,8 +146,8 @@ impl Swept<'_> {
         table
     }
 
-    /// Plot over an axis, of photon map and scene, with a line for each combination of the other axes: as
-    /// many of them as make at most [`MAX_LINES`] lines; the others keep their first value.
+    /// Plot of photon map and scene over an axis. There is a line for each combination of the other axes, as
+    /// many of them as give at most [`MAX_LINES`] lines; the remaining axes keep their first value.
     fn plot(&self, axis: usize) -> Block {
         let (varied, kept) = self.other_axes(axis);
         let lines: Vec<Vec<usize>> = (self.axes.combinations())
@@ -170,7 +170,7 @@ impl Swept<'_> {
         plot(&format!("by-{name}"), &format!("Bytes from DRAM by {name}"), &self.caption(&kept), panels)
     }
 
-    /// Plot over an axis with a line for each structure; the other axes have their first value.
+    /// Plot over an axis with a line for each structure. The other axes have their first value.
     fn plot_of_structures(&self, axis: usize) -> Block {
         let first = vec![0; self.axes.list().len()];
         let lines = self.read_structures().into_iter().map(|structure| {
@@ -186,7 +186,7 @@ impl Swept<'_> {
         plot(&format!("structures-by-{name}"), &title, &self.caption(&others), vec![axes])
     }
 
-    /// Line over an axis from the combination `indices`.
+    /// Line over an axis, starting from the combination `indices`.
     fn line(
         &self,
         name: String,
@@ -207,7 +207,8 @@ impl Swept<'_> {
         series(name, points)
     }
 
-    /// The other axes with several values: those that lines differ in, and those that keep their first value.
+    /// Divides the other axes with several values into those in which lines differ, and those that keep their
+    /// first value.
     fn other_axes(&self, axis: usize) -> (Vec<usize>, Vec<usize>) {
         let (mut varied, mut kept, mut lines) = (Vec::new(), Vec::new(), 1);
         for (other, Axis { values, .. }) in
@@ -223,7 +224,7 @@ impl Swept<'_> {
         (varied, kept)
     }
 
-    /// Values of the axes that keep their first one.
+    /// Caption with the values of the axes that keep their first value.
     fn caption(&self, kept: &[usize]) -> String {
         let axes = kept.iter().map(|&axis| &self.axes.list()[axis]);
         let values: Vec<_> = axes.map(|axis| format!("{} {}", axis.name, axis.values[0])).collect();
@@ -231,7 +232,7 @@ impl Swept<'_> {
     }
 }
 
-/// Horizontal places of the values: numbers and sizes are at their value, other texts at their index.
+/// Horizontal positions of the values: numbers and sizes at their value, other texts at their index.
 fn places(axis: &Axis) -> Vec<f64> {
     numbers(axis).unwrap_or_else(|| (0..axis.values.len()).map(|index| index as f64).collect())
 }
@@ -243,8 +244,8 @@ fn scale(axis: &Axis) -> XScale {
     }
 }
 
-/// The values as positive numbers, if all of them are; K and M stand for 2^10 and 2^20, as in sizes of
-/// caches.
+/// Converts the values to positive numbers; `None` if any is not one. K and M stand for 2^10 and 2^20, as in
+/// sizes of caches.
 fn numbers(axis: &Axis) -> Option<Vec<f64>> {
     let number = |text: &String| {
         let (digits, unit) = match text.strip_suffix('K') {
@@ -257,7 +258,7 @@ fn numbers(axis: &Axis) -> Option<Vec<f64>> {
     axis.values.iter().map(number).collect()
 }
 
-/// Seconds that the memory and the arithmetic of one chip take for a frame.
+/// Time that the memory and the arithmetic of one chip take for a frame, seconds.
 fn chip_seconds(point: &Point, measured: &Measurement, machine: &Machine) -> [f64; 2] {
     let symbols = symbols(&point.settings);
     let workload = of_frame(measured, symbols.pixels(), &symbols);

@@ -1,5 +1,5 @@
-//! Each technique alone and all together: rays, traffic and error, at equal numbers of rays and at equal
-//! quality.
+//! Study of each technique by itself and of all together: rays, traffic and error, at equal numbers of rays
+//! and at equal quality.
 
 mod technique;
 mod worth;
@@ -115,7 +115,7 @@ fn bytes(measured: &Measured, name: &str) -> Table {
     table
 }
 
-/// Sentence on the noise of a scene's reference.
+/// Sentence that states the noise of a scene's reference.
 fn reference(measured: &Measured) -> String {
     let quality = measured.quality(&NAIVE, measured.scale.gather_rays);
     format!(
@@ -125,7 +125,7 @@ fn reference(measured: &Measured) -> String {
     )
 }
 
-/// The cells of a ratio and its interval.
+/// Cells with a ratio and its interval.
 fn ratio_cells(ratio: Option<Ratio>) -> [Cell; 3] {
     match ratio {
         Some(Ratio { value, lower, upper }) => [value, lower, upper].map(Cell::from),
@@ -181,8 +181,8 @@ fn curves(file: &str, measured: &Measured, name: &str) -> Block {
     plot(file, &format!("{name}: error of indirect light by traffic"), caption, vec![axes])
 }
 
-/// Exact reordering and all techniques together, on the reference chip and on the large one with tiles in
-/// flight, in all scenes.
+/// Table of exact reordering and of all techniques together, on the reference chip, and on the large chip
+/// with tiles in flight, in all scenes.
 fn together(scenes: &[(Measured, &str)]) -> Table {
     let heads = [
         ("scene", ""),
@@ -214,7 +214,7 @@ fn together(scenes: &[(Measured, &str)]) -> Table {
     table
 }
 
-/// Comparisons at equal quality whose outcome is stated in words: name, base, technique.
+/// Comparisons at equal quality whose outcome the report states in words: name, base, technique.
 const COMPARISONS: [(&str, &Technique, &Technique); 3] = [
     ("irradiance cache alone, against tiles without it", &TILED, &CACHE),
     ("combined sampling alone, against naive", &NAIVE, &COMBINED),

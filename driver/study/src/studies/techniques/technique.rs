@@ -18,12 +18,12 @@ pub(super) struct Technique {
     pub(super) radiance: Radiance,
     pub(super) layout: PhotonLayout,
     pub(super) tile: u32,
-    /// Chip that renders whole frames with several tiles in flight; `None` for sampled tiles, one at a time
-    /// on reference chips.
+    /// Chip that renders whole frames with several tiles in flight; `None` to sample tiles on reference
+    /// chips, one at a time.
     pub(super) in_flight: Option<Setup>,
 }
 
-/// Maximum number of gather rays with which bytes are measured.
+/// Maximum number of gather rays at which bytes are measured.
 pub(super) const MAX_TRAFFIC_RAYS: u32 = 200;
 pub(super) const NAIVE: Technique = Technique {
     name: "naive",
@@ -64,8 +64,8 @@ pub(super) const ALL_ON_LARGE: Technique = Technique {
     in_flight: Some(LARGE_IN_FLIGHT),
     ..ALL_IN_LINES
 };
-/// The combinations that are measured. The irradiance cache has square tiles: rows of pixels share few
-/// records.
+/// Combinations that are measured. Those with the irradiance cache have square tiles, because rows of pixels
+/// share few records.
 pub(super) const TECHNIQUES: [Technique; 13] = [
     NAIVE,
     Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
@@ -110,8 +110,8 @@ impl Technique {
         }
     }
 
-    /// The point of the technique's error. Order, layout and tiles do not change pixels: techniques that
-    /// differ in them alone share the point.
+    /// Point that measures the technique's error. Techniques that differ only in order, layout or tiles share
+    /// it, because these do not change pixels.
     pub(super) fn quality(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
         let settings = self.settings(scale, rays);
         let shared = scale.settings(GatherOrder::Sort);
@@ -128,8 +128,8 @@ impl Technique {
         self.irradiance_error.is_some() || self.sampling != NAIVE.sampling || self.radiance != NAIVE.radiance
     }
 
-    /// Numbers of gather rays that the technique's error is measured with, ascending. Combined sampling alone
-    /// takes about as many rays as the naive render; interpolated light may take fewer or more.
+    /// Numbers of gather rays at which the technique's error is measured, ascending. Combined sampling by
+    /// itself takes about as many rays as the naive render; interpolated light may take fewer or more.
     pub(super) fn sweep(&self, scale: &Scale) -> Vec<u32> {
         if !self.changes_pixels() {
             return vec![scale.gather_rays];
@@ -140,8 +140,8 @@ impl Technique {
         with_equal_rays(scale, scale.pick(&[6, 12, 25, 50, 100, 200, 400], &[6, 12, 25, 50, 100]))
     }
 
-    /// Numbers of gather rays that the technique's bytes are measured with, ascending: up to 200, as bytes
-    /// hardly bend beyond, and fewer for whole frames.
+    /// Numbers of gather rays at which the technique's bytes are measured, ascending. There are at most 200
+    /// rays, because the curve of the bytes is nearly straight beyond, and fewer for whole frames.
     pub(super) fn traffic_sweep(&self, scale: &Scale) -> Vec<u32> {
         let mut rays = match self.in_flight {
             Some(_) => with_equal_rays(scale, scale.pick(&[25, 50, 100, 200], &[12, 50])),
@@ -152,7 +152,7 @@ impl Technique {
     }
 }
 
-/// Numbers of rays with the scale's own among them, ascending.
+/// Adds the scale's own number of rays to the numbers, ascending.
 fn with_equal_rays(scale: &Scale, mut rays: Vec<u32>) -> Vec<u32> {
     rays.push(scale.gather_rays);
     rays.sort_unstable();

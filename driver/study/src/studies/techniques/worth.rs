@@ -1,5 +1,5 @@
-//! Worth of techniques at equal quality: rays and bytes that reach an error, factors between techniques with
-//! their intervals, and what follows from them.
+//! Worth of techniques at equal quality: rays and bytes needed to reach an error, factors between techniques
+//! with their intervals, and conclusions.
 
 use super::super::super::laboratory::Results;
 use super::super::super::measure::Measurement;
@@ -9,14 +9,14 @@ use super::super::super::scale::Scale;
 use super::super::present::say;
 use super::technique::{NAIVE, Technique};
 
-/// Number of gather rays with which a technique reaches an error.
+/// Number of gather rays at which a technique reaches an error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum AtQuality {
-    /// The error is reached with these rays.
+    /// The error is reached with this number of rays.
     Met(f64),
-    /// The error is already reached with the fewest rays that were measured: fewer may do.
+    /// The error is already reached with this number, the fewest rays that were measured. Fewer may suffice.
     AtMost(f64),
-    /// The error is not reached with the most rays that were measured.
+    /// The error is not reached with this number, the most rays that were measured.
     Missed(f64),
 }
 
@@ -28,7 +28,7 @@ impl AtQuality {
 }
 
 /// First crossing of an error by a curve of rays and errors in ascending order of rays, interpolated linearly
-/// in the logarithms; `None` for an empty curve.
+/// in logarithms; `None` for an empty curve.
 fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
     let &[rays, first] = curve.first()?;
     if first <= rmse {
@@ -44,8 +44,7 @@ fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
     curve.last().map(|&[rays, _]| AtQuality::Missed(rays))
 }
 
-/// Bytes at a number of rays, linear in the logarithms between the numbers that were measured, and beyond
-/// them.
+/// Bytes at a number of rays, interpolated and extrapolated linearly in logarithms.
 fn bytes_at(curve: &[(f64, Estimate)], rays: f64) -> Estimate {
     let after = curve.iter().position(|(more, _)| *more >= rays).unwrap_or(curve.len());
     let after = after.clamp(1, curve.len().saturating_sub(1).max(1));
@@ -60,16 +59,16 @@ fn bytes_at(curve: &[(f64, Estimate)], rays: f64) -> Estimate {
 
 /// Rays and bytes with which a technique reaches the error of the naive render.
 pub(super) struct Worth {
-    /// Gather rays.
+    /// Number of gather rays.
     pub(super) at: AtQuality,
     /// Bytes from DRAM.
     pub(super) bytes: Estimate,
-    /// Half the width of the 95 % interval of the bytes' logarithm, by the tiles in which errors were
+    /// Half-width of the 95 % interval of the bytes' logarithm, estimated from the tiles in which errors were
     /// measured.
     spread: f64,
 }
 
-/// Results of a scene.
+/// Results for one scene.
 #[derive(Clone, Copy)]
 pub(super) struct Measured<'a> {
     pub(super) scale: &'a Scale,
@@ -95,7 +94,8 @@ impl Measured<'_> {
         Ratio::new(bytes(&NAIVE), bytes(technique), 0.0)
     }
 
-    /// Rays with which a technique reaches the naive render's error, from all tiles or without one of them.
+    /// Number of rays at which a technique reaches the naive render's error, from all tiles or without tile
+    /// `omitted`.
     fn at_quality(&self, technique: &Technique, omitted: Option<usize>) -> AtQuality {
         let rmse = |technique, rays| {
             let quality = self.quality(technique, rays);
@@ -130,14 +130,15 @@ impl Measured<'_> {
         Ratio::new(base.bytes, worth.bytes, base.spread.hypot(worth.spread))
     }
 
-    /// Ratio of the naive render's bytes to those of a technique at the naive render's error; `None` if that
-    /// is not reached.
+    /// Ratio of the naive render's bytes to those of a technique at the naive render's error; `None` if the
+    /// technique does not reach it.
     pub(super) fn factor_at_quality(&self, technique: &Technique) -> Option<Ratio> {
         let is_reached = !matches!(self.worth(technique).at, AtQuality::Missed(_));
         is_reached.then(|| self.factor(&NAIVE, technique))
     }
 
-    /// Sentence part on whether a technique reads less than another at the naive render's error.
+    /// Part of a sentence that states whether a technique reads less than another at the naive render's
+    /// error.
     pub(super) fn verdict(&self, base: &Technique, technique: &Technique) -> String {
         let at = self.worth(technique).at;
         let factor = self.factor(base, technique);
@@ -164,7 +165,7 @@ impl Measured<'_> {
     }
 }
 
-/// The interval of a ratio in words.
+/// Text of the interval of a ratio.
 fn range(ratio: Ratio) -> String {
     format!("{} to {}", say(ratio.lower), say(ratio.upper))
 }
@@ -178,8 +179,8 @@ enum Verdict {
 }
 
 impl Verdict {
-    /// The verdict on a technique that reaches the error `at` some rays and reads `factor` times less there:
-    /// with the fewest rays the factor is a lower bound, with the most an upper one.
+    /// Verdict on a technique that reaches the error with `at` rays and reads `factor` times less there. If
+    /// it does so with the fewest rays measured, the factor is a lower bound; with the most, an upper bound.
     fn new(at: AtQuality, factor: Ratio) -> Self {
         match at {
             AtQuality::Met(_) | AtQuality::AtMost(_) if factor.lower > 1.0 => Self::Pays,
@@ -214,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_follow_rays_within_and_beyond_what_was_measured() {
+    fn bytes_are_interpolated_and_extrapolated_over_rays() {
         let curve = [25.0, 100.0, 400.0]
             .map(|rays: f64| (rays, Estimate { value: 7.0 * rays, half_width: 0.7 * rays }));
         for rays in [10.0, 25.0, 64.0, 100.0, 300.0, 400.0, 500.0] {
@@ -227,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn a_verdict_needs_an_interval_beside_one_and_bounds_decide_one_way_only() {
+    fn a_verdict_needs_an_interval_that_excludes_one() {
         let ratio = |lower, upper| Ratio { value: 1.0, lower, upper };
         let (met, at_most, missed) = (AtQuality::Met(9.0), AtQuality::AtMost(9.0), AtQuality::Missed(9.0));
         for (at, factor, verdict) in [
