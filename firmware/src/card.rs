@@ -17,7 +17,7 @@ use photoncard_shared::transport::Transport;
 use self::engine::{Engine, TILE_QUEUE, send};
 pub use self::frame::{MAX_PICTURE_SIDE, MIN_IRRADIANCE_ERROR};
 use crate::chip::Chip;
-use crate::kind::{ChipKind, Micro, Reference, cache_bytes};
+use crate::kind::{ChipKind, FixedKind, Micro, Reference, cache_bytes};
 use crate::memory::{CardMemory, Dram};
 
 /// A card with one chip: its memory, the chip, and both directions of its link.
@@ -27,11 +27,18 @@ pub struct Card<K: ChipKind, M> {
     engine: Engine<K>,
 }
 
-impl<K: ChipKind, M: CardMemory> Card<K, M> {
+impl<K: FixedKind, M: CardMemory> Card<K, M> {
     /// Creates a card that has had no session.
     pub const fn new(memory: M) -> Self {
         const { check::<K>() };
-        Self { memory, transport: Transport::card(), engine: Engine::new() }
+        Self::with_chip(Chip::new(), memory)
+    }
+}
+
+impl<K: ChipKind, M: CardMemory> Card<K, M> {
+    /// Creates a card of a chip. It has had no session.
+    pub const fn with_chip(chip: Chip<K>, memory: M) -> Self {
+        Self { memory, transport: Transport::card(), engine: Engine::new(chip) }
     }
 
     /// Memory of the card, including its counters if it counts.
@@ -109,12 +116,12 @@ pub type ReferenceCard<M> = Card<Reference, M>;
 pub type MicroCard<M> = Card<Micro, M>;
 
 /// On-chip memory of a card, bytes: its buffers, and caches and stack of the budget.
-pub const fn sram_bytes<K: ChipKind>() -> usize {
+pub const fn sram_bytes<K: FixedKind>() -> usize {
     size_of::<Card<K, Dram<'static>>>() + cache_bytes(&K::BUDGET) + K::BUDGET.stack_bytes as usize
 }
 
 /// Checks at compile time that a card of a kind fits its budget.
-const fn check<K: ChipKind>() {
+const fn check<K: FixedKind>() {
     assert!(
         sram_bytes::<K>() <= K::BUDGET.sram_bytes as usize,
         "the card's buffers exceed the budget's SRAM"

@@ -7,6 +7,7 @@ use std::sync::LazyLock;
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use glam::Vec3;
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::direct::render_tiles;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -14,7 +15,6 @@ use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, m
 use photoncard_driver::render::{RenderSettings, Schedule};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
-use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::photon::{CandidateBuffer, NearestPhotons, PhotonMap, gather};
 use photoncard_firmware::render::RenderJob;
@@ -175,7 +175,7 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
     let frame = settings.frame(CORNELL.scene.camera(None).expect("a camera"), CORNELL.max_distance, None);
     let (scene, _) = CORNELL.image.view();
     let mut job = RenderJob { scene: &scene, memory: &mut memory, frame: &frame, outlet: None };
-    let mut chip = Box::new(ReferenceChip::new());
+    let mut chip = EmulatedKind::Reference.emulated().chip();
     let tile = Tile { id: 0, x: 256, y: 256, width: 16, height: 16 };
     bencher.counter(ItemsCount::new(256_usize)).bench_local(|| {
         render_tiles(&mut chip, &mut job, &[tile], |_, _| true).expect("sound");

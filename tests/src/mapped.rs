@@ -2,13 +2,13 @@
 
 use glam::Vec3;
 use photoncard_driver::emulator::direct::render_tile;
+use photoncard_driver::emulator::{EmulatedChip, EmulatedKind};
 use photoncard_driver::film::{SumFormat, Window};
 use photoncard_driver::pack::{CardImage, PackedScene};
 use photoncard_driver::photon_map::{MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::tiles;
-use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::gather::{GatherTarget, PointIndex};
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::photon::CandidateBuffer;
@@ -59,9 +59,9 @@ impl MappedScene {
         let camera = settings.camera(&self.scene).expect("a camera");
         let frame = settings.frame(&camera, self.max_distance, self.caustics);
         let tiles = tiles(window, settings.tile_side(&[REFERENCE]), settings.schedule.order);
-        let pool = rayon::ThreadPoolBuilder::new().stack_size(16 << 20).build().expect("threads");
+        let pool = rayon::ThreadPoolBuilder::new().build().expect("threads");
         let parts: Vec<(Tile, Vec<Vec3>, Counters)> = pool.install(|| {
-            let new_chip = || Box::new(ReferenceChip::new());
+            let new_chip = || EmulatedKind::Reference.emulated().chip();
             tiles.into_par_iter().map_init(new_chip, |chip, tile| self.tile(chip, &frame, tile)).collect()
         });
         collect(window, &parts)
@@ -69,7 +69,7 @@ impl MappedScene {
 
     fn tile(
         &self,
-        chip: &mut ReferenceChip,
+        chip: &mut EmulatedChip,
         frame: &FrameParameters,
         tile: Tile,
     ) -> (Tile, Vec<Vec3>, Counters) {

@@ -1,7 +1,7 @@
 //! A card on a lossless link, driven command by command.
 
 use photoncard_firmware::card::Card;
-use photoncard_firmware::kind::{ChipKind, Micro};
+use photoncard_firmware::kind::{FixedKind, Micro};
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::checksum::image_checksum;
@@ -12,7 +12,7 @@ use photoncard_shared::message::{
 use photoncard_shared::transport::Transport;
 
 /// A card, and the host's end of its link, through which a test gives commands.
-pub struct Wire<'a, K: ChipKind = Micro> {
+pub struct Wire<'a, K: FixedKind = Micro> {
     /// The card.
     pub card: Box<Card<K, Dram<'a>>>,
     host: Transport,
@@ -51,7 +51,7 @@ impl<'a> Wire<'a> {
     }
 }
 
-impl<'a, K: ChipKind> Wire<'a, K> {
+impl<'a, K: FixedKind> Wire<'a, K> {
     /// A card of a kind that was just switched on, with `memory` for its DRAM.
     pub fn of_kind(memory: &'a mut [Line]) -> Self {
         let card = Box::new(Card::new(Dram::new(memory)));

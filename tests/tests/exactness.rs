@@ -9,7 +9,7 @@ use photoncard_driver::render::{
 };
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::GatherOrder;
-use photoncard_firmware::kind::{Capacity, ChipKind, MICRO, REFERENCE, Reference};
+use photoncard_firmware::kind::{ChipKind, FixedCapacity, MICRO, REFERENCE, Reference};
 use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
 use proptest::prelude::*;

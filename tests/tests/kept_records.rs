@@ -1,13 +1,14 @@
 //! Irradiance records that a chip keeps from one frame of a picture to the next: they are gathered once, as
 //! far as there is room, and no pixel depends on that.
 
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tiles};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::{MappedImage, map_photons};
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scheduler::tiles;
 use photoncard_firmware::chip::{Chip, MicroChip};
-use photoncard_firmware::kind::{ChipKind, Large, MICRO};
+use photoncard_firmware::kind::{ChipKind, MICRO};
 use photoncard_firmware::memory::{Counted, Dram, MemoryPort, Stage};
 use photoncard_firmware::render::RenderJob;
 use photoncard_firmware::sampler::hash;
@@ -99,13 +100,13 @@ impl World {
     }
 }
 
-/// Two passes on one chip, for each room beyond the image.
-fn check_passes<K: ChipKind>(world: &World) {
+/// Two passes on one new chip, for each room beyond the image.
+fn check_passes<K: ChipKind>(world: &World, new_chip: impl Fn() -> Box<Chip<K>>) {
     let passes = [world.samples(0, 2), world.samples(2, 1)];
     let alone = passes.map(|frame| world.alone(&frame));
     let mut kept = Vec::new();
     for room in [0, DIRECTORY, DIRECTORY + 1, DIRECTORY + 40, DIRECTORY + 200, PLENTY] {
-        let mut chip = Box::new(Chip::<K>::new());
+        let mut chip = new_chip();
         let mut lines = world.memory(room);
         for (frame, (expected, alone)) in passes.iter().zip(&alone) {
             let memory = &mut Dram::new(&mut lines);
@@ -126,9 +127,10 @@ fn check_passes<K: ChipKind>(world: &World) {
 fn a_chip_keeps_as_many_records_as_have_room_and_gathers_the_others_again() {
     with_room_for_a_card(|| {
         let world = World::new();
-        check_passes::<photoncard_firmware::kind::Micro>(&world);
+        check_passes(&world, || Box::new(MicroChip::new()));
+        check_passes(&world, || Box::new(EmulatedKind::Micro.emulated().chip()));
         // Several tiles in flight write their blocks in turn.
-        check_passes::<Large>(&world);
+        check_passes(&world, || Box::new(EmulatedKind::Large.emulated().chip()));
     });
 }
 

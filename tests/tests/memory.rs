@@ -3,6 +3,7 @@
 use photoncard_driver::emulator::contents::Inspected;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
 use photoncard_driver::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use photoncard_driver::emulator::{EmulatedChip, EmulatedKind};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::{MappedImage, PhotonLayout, map_photons};
 use photoncard_driver::render::{
@@ -11,7 +12,6 @@ use photoncard_driver::render::{
 };
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_driver::scheduler::{GatherOrder, tiles};
-use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_firmware::memory::{
     CacheEntry, CacheShape, Counted, LineCache, LineCaches, Lines, MemoryPort, SetIndex, Stage,
@@ -71,7 +71,7 @@ impl Frame {
         self.mapped.image.view().1
     }
 
-    fn tile(&self, chip: &mut ReferenceChip, memory: impl MeasuredMemory, tile: Tile) -> RenderedTile {
+    fn tile(&self, chip: &mut EmulatedChip, memory: impl MeasuredMemory, tile: Tile) -> RenderedTile {
         let (scene, _) = self.mapped.image.view();
         render_tile(chip, &scene, memory, &self.frame, tile, None).expect("a sound image")
     }
@@ -116,7 +116,7 @@ impl<M: MeasuredMemory> MeasuredMemory for Recorder<'_, M> {
 #[test]
 fn a_tile_hits_and_misses_as_the_definition_of_its_caches_says() {
     with_room_for_a_card(|| {
-        let mut chip = Box::new(ReferenceChip::new());
+        let mut chip = EmulatedKind::Reference.emulated().chip();
         let split = |_| LruOracle::new(32, 4, 1, |block| block % 32);
         let shape = CacheShape::new(9 << 10, 384, 3, SetIndex::Hashed).unwrap();
         for layout in [PhotonLayout::Jensen, PhotonLayout::Lines] {
@@ -152,7 +152,7 @@ fn a_tile_hits_and_misses_as_the_definition_of_its_caches_says() {
 #[test]
 fn a_cache_in_arrays_is_the_cache_in_vectors() {
     with_room_for_a_card(|| {
-        let mut chip = Box::new(ReferenceChip::new());
+        let mut chip = EmulatedKind::Reference.emulated().chip();
         let frame = Frame::new(&settings());
         let shape = CacheShape::new(16 << 10, 128, 4, SetIndex::Modulo).unwrap();
         let in_array = || LineCache::new(shape, [CacheEntry::EMPTY; 128], [Line::ZERO; 128]).unwrap();
@@ -242,7 +242,7 @@ fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
         // Chips without cards, one for all tiles, in reverse order.
         with_room_for_a_card(|| {
             let frame = Frame::new(&with("emulated:1"));
-            let mut chip = Box::new(ReferenceChip::new());
+            let mut chip = EmulatedKind::Reference.emulated().chip();
             let mut traffic = MemoryTraffic::ZERO;
             for tile in frame.tiles.iter().rev() {
                 traffic.add(&frame.tile(&mut chip, caches(SPLIT).over(frame.lines()), *tile).traffic);

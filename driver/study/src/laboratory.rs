@@ -7,7 +7,6 @@ use std::path::{Path, PathBuf};
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{MappedImage, check_image, check_packed, map_photons};
 use photoncard_render::RenderError;
-use photoncard_render::emulator::THREAD_STACK;
 use photoncard_scene::Scene;
 use photoncard_scene::gltf;
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -123,8 +122,7 @@ impl<'a> Laboratory<'a> {
         threads: Option<usize>,
         observer: &'a dyn StudyObserver,
     ) -> Result<Self, StudyError> {
-        let pool =
-            ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).stack_size(THREAD_STACK).build()?;
+        let pool = ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0)).build()?;
         let store = PointStore::open(folder)?;
         Ok(Self {
             scenes: scenes.to_owned(),

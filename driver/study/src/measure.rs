@@ -1,12 +1,11 @@
 //! Measures a point: work and memory traffic of a sample of a picture's tiles.
 
 use photoncard_cards::scheduler::tiles;
-use photoncard_firmware::kind::{ChipKind, Large, Micro, Reference};
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::render::RenderJob;
 use photoncard_map::photon_map::{MappedImage, PhotonMapSize};
 use photoncard_render::emulator::contents::Contents;
-use photoncard_render::emulator::direct::{RenderedTile, new_chip, render_tiles, render_tiles_apart};
+use photoncard_render::emulator::direct::{RenderedTile, render_tiles, render_tiles_apart};
 use photoncard_render::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use photoncard_render::emulator::whole_frame::{CurveJob, render_along_curve};
 use photoncard_render::emulator::{EmulatedKind, Measured};
@@ -150,18 +149,20 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders tiles on chips of kind `K`. `model` creates a new memory for each tile, so that every tile
+    /// Renders tiles on chips of a kind. `model` creates a new memory for each tile, so that every tile
     /// begins with empty caches.
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.
-    pub fn render<'b, K: ChipKind, M: MeasuredMemory>(
+    pub fn render<'b, M: MeasuredMemory>(
         &'b self,
+        chip: EmulatedKind,
         frame: &FrameParameters,
         tiles: &[Tile],
         model: &(impl Fn(Lines<'b>) -> M + Sync),
     ) -> Result<Vec<RenderedTile>, RenderError> {
-        Ok(render_tiles_apart::<K, M>(self.pool, &self.mapped.image, frame, tiles, model, self.is_stopped)?)
+        let image = &self.mapped.image;
+        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, model, self.is_stopped)?)
     }
 
     /// Measures the work and memory traffic of a frame, from a sample of its tiles. All tiles are rendered if
@@ -185,20 +186,12 @@ impl Bench<'_> {
             return self.whole_frame(&frame, &all, caches);
         }
         if settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1 {
-            return match chip {
-                EmulatedKind::Reference => self.in_flight::<Reference>(&frame, &all, caches),
-                EmulatedKind::Large => self.in_flight::<Large>(&frame, &all, caches),
-                EmulatedKind::Micro => self.in_flight::<Micro>(&frame, &all, caches),
-            };
+            return self.in_flight(chip, &frame, &all, caches);
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
         let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
         let model = |memory| Measured::new(caches.over(memory));
-        let rendered = match chip {
-            EmulatedKind::Reference => self.render::<Reference, _>(&frame, &tiles, &model),
-            EmulatedKind::Large => self.render::<Large, _>(&frame, &tiles, &model),
-            EmulatedKind::Micro => self.render::<Micro, _>(&frame, &tiles, &model),
-        }?;
+        let rendered = self.render(chip, &frame, &tiles, &model)?;
         let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
             TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
         });
@@ -211,8 +204,9 @@ impl Bench<'_> {
 
     /// Measures all tiles on one chip, in the picture's order and with as many in flight as the frame allows.
     /// The reads of a tile then depend on the tiles that are in flight with it.
-    fn in_flight<K: ChipKind>(
+    fn in_flight(
         &self,
+        chip: EmulatedKind,
         frame: &FrameParameters,
         tiles: &[Tile],
         caches: &CacheSettings,
@@ -222,7 +216,7 @@ impl Bench<'_> {
         let mut counters = Counters::ZERO;
         let mut stopped = (self.is_stopped)();
         self.pool.install(|| {
-            let mut chip = new_chip::<K>();
+            let mut chip = chip.emulated().chip();
             let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
             render_tiles(&mut chip, job, tiles, |_, tile| {
                 counters.add(&tile.counters);

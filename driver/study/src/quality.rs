@@ -14,9 +14,9 @@
 //! card image therefore has no emission: its layer of indirect light is `L_indirect` for every technique.
 
 use photoncard_cards::scheduler::{GatherOrder, tiles};
-use photoncard_firmware::kind;
 use photoncard_map::photon_map::MappedImage;
 use photoncard_picture::sums::{FilmPixel, SumFormat};
+use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::direct::RenderedTile;
 use photoncard_render::{RenderError, RenderSettings, Schedule};
 use photoncard_shared::message::{Radiance, Sampling, Tile};
@@ -257,7 +257,7 @@ fn pixels(
     let chosen = choose(&tiles(settings.window(), TILE, settings.schedule.order), count);
     let chosen: Vec<Tile> = chosen.into_iter().map(|chosen| chosen.tile).collect();
     let format = SumFormat::new(&bench.mapped.image.view().0.header, &frame);
-    let rendered = bench.render::<kind::Reference, _>(&frame, &chosen, &|memory| memory)?;
+    let rendered = bench.render(EmulatedKind::Reference, &frame, &chosen, &|memory| memory)?;
     let of_tile =
         |tile: &RenderedTile| tile.pixels(format).map(|pixel| light(&pixel).map(f64::from)).collect();
     Ok(rendered.iter().map(of_tile).collect())
@@ -269,7 +269,6 @@ mod tests {
 
     use photoncard_map::pack::PackedScene;
     use photoncard_map::photon_map::map_photons;
-    use photoncard_render::emulator::THREAD_STACK;
     use photoncard_render::{Integrator, PhotonMaps, Picture};
     use photoncard_scene::{Scene, gltf};
 
@@ -293,7 +292,7 @@ mod tests {
                 integrator: Integrator { gather_rays: 16, ..Integrator::default() },
                 ..RenderSettings::default()
             };
-            let pool = ThreadPoolBuilder::new().num_threads(2).stack_size(THREAD_STACK).build();
+            let pool = ThreadPoolBuilder::new().num_threads(2).build();
             let pool = pool.expect("threads start");
             let packed = PackedScene::new(&scene).expect("packs");
             let mapped = map_photons(packed, &settings.photon_settings(&scene), &|_| true).expect("maps");

@@ -56,9 +56,9 @@ const DATA_BYTES: usize = PIXELS_BYTES;
 const _: () = assert!(CHECKSUMS_BYTES <= DATA_BYTES && CASES_PER_COMMAND * RESULT_BYTES <= DATA_BYTES);
 
 impl<K: ChipKind> Engine<K> {
-    pub(super) const fn new() -> Self {
+    pub(super) const fn new(chip: Chip<K>) -> Self {
         Self {
-            chip: Chip::new(),
+            chip,
             image: ImageState::None,
             measure: None,
             written: 0,
@@ -86,7 +86,11 @@ impl<K: ChipKind> Engine<K> {
         match *command {
             Command::Hello { .. } => {
                 self.forget();
-                Ok(Some(hello(&K::BUDGET, self.written, self.measure.map(|measure| measure()))))
+                Ok(Some(hello(
+                    self.chip.kind().budget(),
+                    self.written,
+                    self.measure.map(|measure| measure()),
+                )))
             }
             Command::ReadChecksums { first, count } => {
                 if self.is_at_work() {
@@ -112,7 +116,7 @@ impl<K: ChipKind> Engine<K> {
             }
             Command::BeginFrame(frame) => {
                 let scene = self.image.scene().filter(|_| self.checksums.is_none()).ok_or(OUT_OF_ORDER)?;
-                check_frame(&K::BUDGET, &scene.header, &frame)?;
+                check_frame(self.chip.kind().budget(), &scene.header, &frame)?;
                 let room = scene.header.lines..memory.lines();
                 self.drop_tiles();
                 self.chip.begin_frame(&frame, room);
@@ -202,7 +206,7 @@ impl<K: ChipKind> Engine<K> {
             return Err(Fault { code: FaultCode::Tile, detail: tile.id });
         }
         let too_many = Fault { code: FaultCode::TooManyTiles, detail: tile.id };
-        if self.tiles.len() + self.begun >= K::BUDGET.tiles as usize {
+        if self.tiles.len() + self.begun >= self.chip.kind().budget().tiles as usize {
             return Err(too_many);
         }
         self.is_flushed = false;

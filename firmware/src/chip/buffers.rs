@@ -1,5 +1,7 @@
 //! Buffers that all tiles in flight of a chip share.
 
+use photoncard_shared::budget::{Budget, gather_candidates};
+
 use super::gathers::Gathers;
 use super::pixel_sums::PixelSums;
 use super::points::Points;
@@ -23,5 +25,12 @@ impl<K: ChipKind> Shared<K> {
             gathers: Gathers::new(),
             store: RecordStore::EMPTY,
         }
+    }
+
+    /// Sets the capacities that a budget states, and the one for gather points, unless the types do.
+    pub(super) fn reserve(&mut self, budget: &Budget, points: usize) {
+        self.points.reserve(points);
+        self.sums.reserve(budget.tile_pixels as usize);
+        self.gathers.reserve(gather_candidates(budget.neighbors), budget.gather_queue as usize);
     }
 }

@@ -57,6 +57,13 @@ impl<K: ChipKind> Vacant for Flight<K> {
 }
 
 impl<K: ChipKind> Flight<K> {
+    /// Sets the capacities for pixels and irradiance records, unless the types do.
+    pub(super) fn reserve(&mut self, pixels: usize, records: usize) {
+        self.sums.reserve(pixels);
+        self.paths.reserve(pixels);
+        self.cache.reserve(records);
+    }
+
     pub(super) fn begin(&mut self, tile: Tile) {
         self.vacate();
         self.tile = tile;
@@ -91,9 +98,9 @@ impl<K: ChipKind> Flight<K> {
     pub(super) fn begin_block(&mut self, frame: &FrameParameters) -> Result<(), Fault> {
         self.block = self.blocks.pop().ok_or(Invariant::Block.fault())?;
         self.set_all_sums(PLAIN)?;
-        self.paths.view_mut().clear();
-        let pixels = self.block.pixels() as usize;
-        self.paths.view_mut().resize(pixels, Paths::ONE).map_err(|_| Invariant::Pixels.fault())?;
+        self.paths.clear();
+        let has_room = self.paths.resize(self.block.pixels() as usize, Paths::ONE);
+        has_room.then_some(()).ok_or(Invariant::Pixels.fault())?;
         match allowed_error(frame) {
             None if frame.gather_rays == 0 => self.position = Position::at(Pass::CompletePlain),
             None => self.do_without_records()?,
@@ -128,9 +135,9 @@ impl<K: ChipKind> Flight<K> {
     }
 
     fn set_all_sums(&mut self, sum: u16) -> Result<(), Fault> {
-        let pixels = self.block.pixels() as usize;
-        self.sums.view_mut().clear();
-        self.sums.view_mut().resize(pixels, sum).map_err(|_| Invariant::Pixels.fault())
+        self.sums.clear();
+        let has_room = self.sums.resize(self.block.pixels() as usize, sum);
+        has_room.then_some(()).ok_or(Invariant::Pixels.fault())
     }
 
     pub(super) fn window(&self) -> Window {
@@ -153,12 +160,12 @@ impl<K: ChipKind> Flight<K> {
 
     /// Number of paths per sample of the block's pixel `index`.
     pub(super) fn paths(&self, index: u32) -> Paths {
-        self.paths.view().get(index as usize).copied().unwrap_or(Paths::ONE)
+        self.paths.values().get(index as usize).copied().unwrap_or(Paths::ONE)
     }
 
     /// Sets the number of paths per sample of the block's pixel `index`.
     pub(super) fn set_paths(&mut self, index: u32, paths: Paths) -> Result<(), Fault> {
-        let of_pixel = self.paths.view_mut().get_mut(index as usize);
+        let of_pixel = self.paths.values_mut().get_mut(index as usize);
         *of_pixel.ok_or(Invariant::Pixels.fault())? = paths;
         Ok(())
     }
@@ -176,12 +183,12 @@ impl<K: ChipKind> Flight<K> {
 
     /// Number of the sum of the block's pixel `index`; `None` if it has none.
     pub(super) fn sum(&self, index: u32) -> Option<u16> {
-        self.sums.view().get(index as usize).copied().filter(|&number| number < UNSUMMED)
+        self.sums.values().get(index as usize).copied().filter(|&number| number < UNSUMMED)
     }
 
     /// First pixel with gather rays among `pixels` of the block; `None` if there is none.
     pub(super) fn first_with_rays(&self, pixels: Range<u32>) -> Option<u32> {
-        let states = self.sums.view().get(pixels.start as usize..pixels.end as usize)?;
+        let states = self.sums.values().get(pixels.start as usize..pixels.end as usize)?;
         let index = states.iter().position(|&state| state != PLAIN)?;
         Some(pixels.start + index as u32)
     }
@@ -193,7 +200,7 @@ impl<K: ChipKind> Flight<K> {
 
     /// Sets the number of the sum of the block's pixel `index`.
     pub(super) fn set_sum(&mut self, index: u32, number: u16) -> Result<(), Fault> {
-        let sum = self.sums.view_mut().get_mut(index as usize);
+        let sum = self.sums.values_mut().get_mut(index as usize);
         *sum.ok_or(Invariant::Pixels.fault())? = number;
         Ok(())
     }

@@ -21,6 +21,12 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         Self { candidates: CandidateStorage::EMPTY, queue: GatherQueue::new() }
     }
 
+    /// Sets the capacities for candidates and queued gathers, unless the types do.
+    pub(super) fn reserve(&mut self, candidates: usize, queue: usize) {
+        self.candidates.reserve(candidates);
+        self.queue.reserve(queue);
+    }
+
     /// Candidate buffer, for a photon search that is not a gather.
     pub(super) fn candidates(&mut self) -> Candidates<'_> {
         self.candidates.view()
@@ -41,10 +47,10 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.is_draining()
     }
 
-    /// Returns true if the queue has reached the frame's limit. It must then be drained before another ray is
-    /// cast.
+    /// Returns true if the queue has reached the frame's limit or its own capacity. It must then be drained
+    /// before another ray is cast.
     pub(super) fn is_full(&self, frame: &FrameParameters) -> bool {
-        self.queue.len() >= most_waiting::<Q>(frame)
+        self.queue.len() >= (frame.queue as usize).clamp(1, self.queue.capacity())
     }
 
     /// Queues a gather, or does it at once and returns its radiance. It is done at once without deferred
@@ -96,9 +102,4 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
     ) -> Result<Vec3, Fault> {
         gathered(context, request, self.candidates.view())
     }
-}
-
-/// Maximum number of queued gathers in a frame: the frame's limit, at most the capacity of the queue.
-fn most_waiting<Q: Capacity>(frame: &FrameParameters) -> usize {
-    (frame.queue as usize).clamp(1, Q::ENTRIES)
 }

@@ -47,7 +47,9 @@ use self::position::{Pass, Position};
 use crate::gather::{GatherQueue, PointIndex};
 use crate::importance::DirectionTable;
 use crate::irradiance_cache::IrradianceCache;
-use crate::kind::{self, Array, Capacity, ChipKind, Micro, Reference, TechniqueMemory};
+use crate::kind::{
+    self, Array, Capacity, ChipKind, FixedCapacity, FixedKind, Micro, Reference, TechniqueMemory,
+};
 use crate::memory::MemoryPort;
 use crate::render::RenderJob;
 
@@ -58,6 +60,7 @@ pub type MicroChip = Chip<Micro>;
 
 /// A chip of kind `K`, which determines the capacities of all buffers.
 pub struct Chip<K: ChipKind> {
+    kind: K,
     flights: <K::Flights as Capacity>::Array<Flight<K>>,
     /// Number of the tile in flight whose rays are being cast.
     active: Option<usize>,
@@ -85,13 +88,13 @@ pub enum Progress {
     Idle,
 }
 
-impl<K: ChipKind> Default for Chip<K> {
+impl<K: FixedKind> Default for Chip<K> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<K: ChipKind> Chip<K> {
+impl<K: FixedKind> Chip<K> {
     /// On-chip memory that each technique adds to the chip.
     pub const TECHNIQUES: TechniqueMemory = TechniqueMemory {
         reordering: size_of::<GatherQueue<K::GatherQueue>>(),
@@ -102,12 +105,36 @@ impl<K: ChipKind> Chip<K> {
     /// Creates a chip without tiles.
     pub const fn new() -> Self {
         const { kind::check::<K>() };
-        Self { flights: Array::VACANT, active: None, shared: Shared::new() }
+        Self::vacant_of(K::KIND)
+    }
+}
+
+impl<K: ChipKind> Chip<K> {
+    const fn vacant_of(kind: K) -> Self {
+        Self { kind, flights: Array::VACANT, active: None, shared: Shared::new() }
+    }
+
+    /// A chip without a tile, of a kind whose capacities are values: those of its budget, and `points` gather
+    /// points whose rays are cast together.
+    pub fn sized(kind: K, points: usize) -> Self {
+        let budget = *kind.budget();
+        let mut chip = Self::vacant_of(kind);
+        chip.flights.reserve(budget.in_flight as usize);
+        for flight in chip.flights.values_mut() {
+            flight.reserve(budget.tile_pixels as usize, budget.irradiance_records as usize);
+        }
+        chip.shared.reserve(&budget, points);
+        chip
+    }
+
+    /// The kind of the chip.
+    pub fn kind(&self) -> &K {
+        &self.kind
     }
 
     /// Maximum number of pixels of a tile in a frame.
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
-        u64::from(K::BUDGET.pixels_of_tile(frame.layers))
+        u64::from(self.kind.budget().pixels_of_tile(frame.layers))
     }
 
     /// Drops all tiles.

@@ -43,15 +43,20 @@ impl<C: Capacity> PixelSums<C> {
         Self { sums: Buffer::EMPTY, runs: [Run::EMPTY; MAX_IN_FLIGHT as usize], end: 0 }
     }
 
+    /// Sets the capacity for sums, unless the type does.
+    pub(super) fn reserve(&mut self, sums: usize) {
+        self.sums.reserve(sums);
+    }
+
     /// Number of pixels in the ring's capacity, at least 1.
-    fn places(frame: &FrameParameters) -> NonZeroU32 {
-        NonZeroU32::new(C::ENTRIES as u32 / sums_of_pixel(frame.layers)).unwrap_or(NonZeroU32::MIN)
+    fn places(&self, frame: &FrameParameters) -> NonZeroU32 {
+        NonZeroU32::new(self.sums.capacity() as u32 / sums_of_pixel(frame.layers)).unwrap_or(NonZeroU32::MIN)
     }
 
     /// Begins the run of a tile in flight, after all other runs.
     pub(super) fn begin(&mut self, flight: usize) {
         // Always fits: the buffer's own capacity.
-        let _ = self.sums.view_mut().resize(C::ENTRIES, ColourSum::ZERO);
+        let _ = self.sums.resize(self.sums.capacity(), ColourSum::ZERO);
         // The ring of a frame with layers has fewer places.
         if self.runs.iter().all(|run| run.count == 0) {
             self.end = 0;
@@ -70,19 +75,19 @@ impl<C: Capacity> PixelSums<C> {
 
     /// Returns true if there is room for another pixel.
     pub(super) fn has_room(&self, frame: &FrameParameters) -> bool {
-        let places = Self::places(frame);
+        let places = self.places(frame);
         !self.runs.iter().any(|run| run.holds(self.end, places))
     }
 
     /// Appends a pixel without light to the run that began last. Returns its number in the run.
     /// [`Self::has_room`] must be true.
     pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> Result<u16, Fault> {
-        let count = sums_of_pixel(frame.layers) as usize;
+        let (count, places) = (sums_of_pixel(frame.layers) as usize, self.places(frame));
         let first = self.end as usize * count;
-        let sums = self.sums.view_mut().get_mut(first..first + count);
+        let sums = self.sums.values_mut().get_mut(first..first + count);
         let (sums, run) = sums.zip(self.runs.get_mut(flight)).ok_or(Invariant::Sums.fault())?;
         sums.fill(ColourSum::ZERO);
-        self.end = (self.end + 1) % Self::places(frame);
+        self.end = (self.end + 1) % places;
         run.count += 1;
         // Below the pixels of a tile, which fit 15 bits.
         Ok((run.count - 1) as u16)
@@ -91,7 +96,7 @@ impl<C: Capacity> PixelSums<C> {
     fn place(&self, frame: &FrameParameters, flight: usize, number: u16) -> Result<usize, Fault> {
         let run = self.runs.get(flight).filter(|run| u32::from(number) < run.count);
         let run = run.ok_or(Invariant::Sums.fault())?;
-        Ok(((run.first + u32::from(number)) % Self::places(frame)) as usize)
+        Ok(((run.first + u32::from(number)) % self.places(frame)) as usize)
     }
 
     /// Adds light, in the image's radiance units, to a component of pixel `number` of a tile in flight.
@@ -104,7 +109,7 @@ impl<C: Capacity> PixelSums<C> {
         brought: Vec3,
     ) -> Result<(), Fault> {
         let place = component.sum_of(frame, self.place(frame, flight, number)?);
-        let sum = self.sums.view_mut().get_mut(place).ok_or(Invariant::Sums.fault())?;
+        let sum = self.sums.values_mut().get_mut(place).ok_or(Invariant::Sums.fault())?;
         sum.add_light(brought);
         Ok(())
     }
@@ -117,7 +122,7 @@ impl<C: Capacity> PixelSums<C> {
     ) -> Result<PixelLight, Fault> {
         let count = sums_of_pixel(frame.layers) as usize;
         let first = self.place(frame, flight, number)? * count;
-        let sums = self.sums.view().get(first..first + count).ok_or(Invariant::Sums.fault())?;
+        let sums = self.sums.values().get(first..first + count).ok_or(Invariant::Sums.fault())?;
         Ok(PixelLight::of(sums))
     }
 }
@@ -137,7 +142,7 @@ mod tests {
         for layers in [false, true] {
             let frame = &FrameParameters { layers, ..frame() };
             let mut sums = PixelSums::<Entries<24>>::new();
-            let places = PixelSums::<Entries<24>>::places(frame).get() as u16;
+            let places = sums.places(frame).get() as u16;
             let mut held: [Vec<f32>; 3] = Default::default();
             for step in 0..3000_u32 {
                 let flight = (crate::sampler::hash(step) % 3) as usize;

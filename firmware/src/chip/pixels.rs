@@ -70,21 +70,22 @@ fn gather_point<M, R: Capacity>(
 }
 
 impl<K: ChipKind> Flight<K> {
-    /// Number of pixels of the stripe. Each of them may have a gather point.
-    fn stripe(&self) -> u32 {
-        self.block.pixels().saturating_sub(self.position.first).min(K::Points::ENTRIES as u32)
+    /// Number of pixels of the stripe. Each of them may have one of the `points` gather points.
+    fn stripe(&self, points: u32) -> u32 {
+        self.block.pixels().saturating_sub(self.position.first).min(points)
     }
 
     /// Returns true if the pixel of the next eye ray has a sum, or there is room for one.
     pub(super) fn has_room(&self, frame: &FrameParameters, shared: &Shared<K>) -> bool {
-        shared.sums.has_room(frame) || self.next_pixel(frame).is_none_or(|pixel| self.sum(pixel).is_some())
+        let next = || self.next_pixel(frame, self.stripe(shared.points.capacity()));
+        shared.sums.has_room(frame) || next().is_none_or(|pixel| self.sum(pixel).is_some())
     }
 
-    /// Next pixel of the stripe that has gather rays and whose samples have the current path; `None` after
-    /// the last.
-    fn next_pixel(&self, frame: &FrameParameters) -> Option<u32> {
+    /// Next of the stripe's `stripe` pixels that has gather rays and whose samples have the current path;
+    /// `None` after the last.
+    fn next_pixel(&self, frame: &FrameParameters, stripe: u32) -> Option<u32> {
         let first = self.position.first;
-        self.first_with_path(frame, first + self.position.index..first + self.stripe())
+        self.first_with_path(frame, first + self.position.index..first + stripe)
     }
 
     /// Traces the current path of the next pixel with gather rays.
@@ -97,8 +98,8 @@ impl<K: ChipKind> Flight<K> {
         if self.position.index == 0 {
             shared.points.clear();
         }
-        let [first, stripe] = [self.position.first, self.stripe()];
-        let next = self.next_pixel(job.frame);
+        let [first, stripe] = [self.position.first, self.stripe(shared.points.capacity())];
+        let next = self.next_pixel(job.frame, stripe);
         self.position.index = next.map_or(stripe, |pixel| pixel - first);
         if let Some(pixel) = next {
             self.store_point(job, shared, (flight, pixel))?;
@@ -107,7 +108,7 @@ impl<K: ChipKind> Flight<K> {
             if shared.points.len() > 0 {
                 self.position.pass = Pass::Direct;
             } else {
-                self.end_path(job.frame);
+                self.end_path(job.frame, shared.points.capacity());
             }
         }
         Ok(())
@@ -190,7 +191,7 @@ impl<K: ChipKind> Flight<K> {
     ) -> Result<(), Fault> {
         let Some((index, pixel)) = shared.points.next(&self.position) else {
             if self.position.end_bin(job.frame.bins) {
-                self.end_path(job.frame);
+                self.end_path(job.frame, shared.points.capacity());
             }
             return Ok(());
         };
@@ -227,17 +228,18 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Advances to the next path of the stripe's current sample, to its next sample, or to the next stripe.
-    fn end_path(&mut self, frame: &FrameParameters) {
+    /// Advances to the next path of the stripe's current sample, to its next sample, or to the next stripe of
+    /// up to `points` pixels.
+    fn end_path(&mut self, frame: &FrameParameters, points: u32) {
         self.position.pass = Pass::Eye;
         self.position.path += 1;
         let first = self.position.first;
-        if self.first_with_path(frame, first..first + self.stripe()).is_some() {
+        if self.first_with_path(frame, first..first + self.stripe(points)).is_some() {
             return;
         }
         let position = &mut self.position;
         if position.next_sample(frame) {
-            position.first += K::Points::ENTRIES as u32;
+            position.first += points;
             if position.first >= self.block.pixels() {
                 position.pass = Pass::Wait;
             }

@@ -24,30 +24,42 @@ impl<C: Capacity> Points<C> {
         Self { points: Buffer::EMPTY, owners: Buffer::EMPTY, bins: Buffer::EMPTY }
     }
 
+    /// Sets the capacity for points, unless the type does.
+    pub(super) fn reserve(&mut self, points: usize) {
+        self.points.reserve(points);
+        self.owners.reserve(points);
+        self.bins.reserve(points);
+    }
+
+    /// Maximum number of points.
+    pub(super) fn capacity(&self) -> u32 {
+        self.owners.capacity() as u32
+    }
+
     pub(super) fn clear(&mut self) {
-        self.points.view_mut().clear();
-        self.owners.view_mut().clear();
-        self.bins.view_mut().clear();
+        self.points.clear();
+        self.owners.clear();
+        self.bins.clear();
     }
 
     pub(super) fn len(&self) -> u32 {
-        self.owners.view().len() as u32
+        self.owners.values().len() as u32
     }
 
     /// Appends a point with the bin of its first ray. There is room for one point per pixel of a stripe, and
     /// per record of a block.
     pub(super) fn push(&mut self, owner: u16, point: StoredPoint, bin: u32) -> Result<(), Fault> {
         let full = Invariant::Points.fault();
-        self.points.view_mut().push(point).map_err(|_| full)?;
-        self.owners.view_mut().push(owner).map_err(|_| full)?;
-        self.bins.view_mut().push(bin as u8).map_err(|_| full)
+        self.points.push(point).map_err(|_| full)?;
+        self.owners.push(owner).map_err(|_| full)?;
+        self.bins.push(bin as u8).map_err(|_| full)
     }
 
     /// Owner and point at `index`.
     #[inline(always)]
     pub(super) fn get(&self, index: u32) -> Result<(u16, &StoredPoint), Fault> {
         let at = index as usize;
-        let point = self.owners.view().get(at).copied().zip(self.points.view().get(at));
+        let point = self.owners.values().get(at).copied().zip(self.points.values().get(at));
         point.ok_or(Invariant::Points.fault())
     }
 
@@ -55,9 +67,9 @@ impl<C: Capacity> Points<C> {
     #[inline(always)]
     pub(super) fn next(&self, position: &Position) -> Option<(u32, u16)> {
         let first = position.index as usize;
-        let others = self.bins.view().get(first..)?.iter();
+        let others = self.bins.values().get(first..)?.iter();
         let index = first + others.into_iter().position(|&bin| u32::from(bin) == position.bin)?;
-        Some((index as u32, *self.owners.view().get(index)?))
+        Some((index as u32, *self.owners.values().get(index)?))
     }
 
     /// Takes the next rays of point `index` in the current bin, of `bins`. Advances the position past them.
@@ -70,7 +82,7 @@ impl<C: Capacity> Points<C> {
         bins: u32,
     ) -> Result<Range<u32>, Fault> {
         let at = index as usize;
-        let point = self.points.view().get(at).zip(self.bins.view_mut().get_mut(at));
+        let point = self.points.values().get(at).zip(self.bins.values_mut().get_mut(at));
         let (point, bin) = point.ok_or(Invariant::Points.fault())?;
         let (rays, next) = point.next_rays(pattern, position.rays_cast(), [position.bin, bins]);
         *bin = next.map_or(*bin, |next| next as u8);

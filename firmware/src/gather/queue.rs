@@ -7,7 +7,7 @@ use photoncard_shared::message::Drain;
 use super::GatherRequest;
 use crate::kind::{Buffer, Capacity};
 
-/// Queue of up to [`Capacity::ENTRIES`] gather requests, 24 bytes each.
+/// Queue of gather requests, 24 bytes each.
 pub struct GatherQueue<C: Capacity> {
     waiting: C::Buffer<GatherRequest>,
     draining: bool,
@@ -25,20 +25,30 @@ impl<C: Capacity> GatherQueue<C> {
         Self { waiting: Buffer::EMPTY, draining: false }
     }
 
+    /// Sets the capacity for requests, unless the type does.
+    pub fn reserve(&mut self, requests: usize) {
+        self.waiting.reserve(requests);
+    }
+
+    /// Maximum number of requests.
+    pub fn capacity(&self) -> usize {
+        self.waiting.capacity()
+    }
+
     /// Drops all queued requests.
     pub fn clear(&mut self) {
-        self.waiting.view_mut().clear();
+        self.waiting.clear();
         self.draining = false;
     }
 
     /// Number of queued requests.
     pub fn len(&self) -> usize {
-        self.waiting.view().len()
+        self.waiting.values().len()
     }
 
     /// Returns true if no request is queued.
     pub fn is_empty(&self) -> bool {
-        self.waiting.view().is_empty()
+        self.waiting.values().is_empty()
     }
 
     /// Returns true between [`Self::begin_drain`] and the end of the drain.
@@ -51,24 +61,24 @@ impl<C: Capacity> GatherQueue<C> {
     /// # Errors
     /// Returns the request if the queue is full.
     pub fn push(&mut self, request: GatherRequest) -> Result<(), GatherRequest> {
-        self.waiting.view_mut().push(request)
+        self.waiting.push(request)
     }
 
     /// Begins a drain by sorting the requests in the order of `drain`.
     pub fn begin_drain(&mut self, drain: Drain) {
         // In descending order, as requests are popped from the end.
-        self.waiting.view_mut().sort_unstable_by_key(|request| u64::MAX - request.position.key(drain));
+        self.waiting.values_mut().sort_unstable_by_key(|request| u64::MAX - request.position.key(drain));
         self.draining = true;
     }
 
     /// First request of a drain that has begun.
     pub fn first(&self) -> Option<&GatherRequest> {
-        self.waiting.view().last()
+        self.waiting.values().last()
     }
 
     /// Takes the next request; `None` ends the drain.
     pub fn take(&mut self) -> Option<GatherRequest> {
-        let next = self.waiting.view_mut().pop();
+        let next = self.waiting.pop();
         self.draining = next.is_some();
         next
     }

@@ -59,9 +59,9 @@ use crate::vector::max;
 /// Maximum number of coarsest cells that a block may overlap.
 const MAX_ROOTS: usize = 16;
 /// Maximum number of records of a block of one pixel: 4 corners, and 5 further points per division.
-const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
+pub(crate) const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
-/// Irradiance records of a block. The capacity `R` is a power of two.
+/// Irradiance records of a block.
 pub struct IrradianceCache<R: Capacity> {
     /// Records by lattice point; `None` at a point that sees no surface with a Lambertian part.
     records: R::Map<LatticePoint, Option<Record>>,
@@ -82,12 +82,14 @@ impl<R: Capacity> Default for IrradianceCache<R> {
 }
 
 impl<R: Capacity> IrradianceCache<R> {
-    const SUFFICES: () = assert!(R::ENTRIES >= MIN_RECORDS, "a block of one pixel must fit");
-
     /// A cache without records.
     pub const fn new() -> Self {
-        let () = Self::SUFFICES;
         Self { records: Map::EMPTY, roots: Vec::new(), survey: Survey::BEGIN }
+    }
+
+    /// Sets the capacity for records, a power of two, unless the type does.
+    pub fn reserve(&mut self, records: usize) {
+        self.records.reserve(records);
     }
 
     /// Removes all records and sets up the coarsest cells of a window of the picture.

@@ -89,7 +89,7 @@ impl RecordStore {
         context.memory.enter(Stage::Survey);
         let Some((at, head)) = self.find(context.memory, window)? else { return Ok(Recalled::Nothing) };
         let Some(count) = head.records else { return Ok(Recalled::TooMany) };
-        if cache.begin(window).is_err() || count as usize > R::ENTRIES {
+        if cache.begin(window).is_err() || count as usize > cache.records.capacity() {
             return Ok(Recalled::Nothing);
         }
         for address in (at..).skip(1).take(count as usize) {

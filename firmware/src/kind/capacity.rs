@@ -1,63 +1,122 @@
-//! Capacities as types. Each is a family of containers with a fixed number of entries.
+//! Families of containers of one capacity, which is a type on a board and a value where chips are emulated.
 
 use core::hash::Hash;
 
+use heapless::Vec;
 use heapless::index_map::FnvIndexMap;
-use heapless::{Vec, VecView};
 
 use crate::photon::{CandidateBuffer, CandidateStorage};
 
-/// A number of entries, and the containers of that capacity.
+/// A family of containers with one capacity: a maximum number of entries.
 ///
-/// It replaces a const generic parameter where the number follows from a [`ChipKind`](super::ChipKind). The
-/// containers are associated types, so that a chip has one type parameter instead of one per container.
+/// The containers are associated types, so that a chip has one type parameter instead of one per container.
 pub trait Capacity: 'static {
+    /// A vector.
+    type Buffer<T>: Buffer<T>;
+    /// A hash map, whose capacity must be a power of two.
+    type Map<K: Copy + Eq + Hash, V>: Map<K, V>;
+    /// An array of values that always exist.
+    type Array<T: Vacant>: Array<T>;
+    /// A buffer of candidates of a photon search.
+    type Candidates: CandidateStorage;
+}
+
+/// A family of containers whose capacity is part of their type.
+pub trait FixedCapacity: Capacity {
     /// Maximum number of entries.
     const ENTRIES: usize;
-    /// A vector of up to [`Self::ENTRIES`] values.
-    type Buffer<T>: Buffer<T>;
-    /// A hash map of up to [`Self::ENTRIES`] values. The number must be a power of two.
-    type Map<K: Eq + Hash, V>: Map<K, V>;
-    /// An array of [`Self::ENTRIES`] values that always exist.
-    type Array<T: Vacant>: Array<T>;
-    /// A buffer of [`Self::ENTRIES`] candidates of a photon search.
-    type Candidates: CandidateStorage;
 }
 
 /// Capacity of `N` entries.
 pub struct Entries<const N: usize>;
 
 impl<const N: usize> Capacity for Entries<N> {
-    const ENTRIES: usize = N;
     type Buffer<T> = Vec<T, N>;
-    type Map<K: Eq + Hash, V> = FnvIndexMap<K, V, N>;
+    type Map<K: Copy + Eq + Hash, V> = FnvIndexMap<K, V, N>;
     type Array<T: Vacant> = [T; N];
     type Candidates = CandidateBuffer<N>;
 }
 
-/// A vector of fixed capacity.
+impl<const N: usize> FixedCapacity for Entries<N> {
+    const ENTRIES: usize = N;
+}
+
+/// A vector of limited capacity.
 pub trait Buffer<T> {
     /// Vector without values.
     const EMPTY: Self;
 
+    /// Sets the capacity, unless the type does.
+    fn reserve(&mut self, _entries: usize) {}
+
+    /// Maximum number of values.
+    fn capacity(&self) -> usize;
+
     /// Values, read-only.
-    fn view(&self) -> &VecView<T>;
+    fn values(&self) -> &[T];
 
     /// Values, mutable.
-    fn view_mut(&mut self) -> &mut VecView<T>;
+    fn values_mut(&mut self) -> &mut [T];
+
+    /// Removes all values.
+    fn clear(&mut self);
+
+    /// Appends a value.
+    ///
+    /// # Errors
+    /// The value itself if the vector is full.
+    fn push(&mut self, value: T) -> Result<(), T>;
+
+    /// Removes the last value.
+    fn pop(&mut self) -> Option<T>;
+
+    /// Sets the number of values. Added values are `value`. Returns false, and changes nothing, if the number
+    /// exceeds the capacity.
+    #[must_use]
+    fn resize(&mut self, count: usize, value: T) -> bool
+    where
+        T: Clone;
 }
 
 impl<T, const N: usize> Buffer<T> for Vec<T, N> {
     const EMPTY: Self = Self::new();
 
     #[inline(always)]
-    fn view(&self) -> &VecView<T> {
-        self.as_view()
+    fn capacity(&self) -> usize {
+        N
     }
 
     #[inline(always)]
-    fn view_mut(&mut self) -> &mut VecView<T> {
-        self.as_mut_view()
+    fn values(&self) -> &[T] {
+        self
+    }
+
+    #[inline(always)]
+    fn values_mut(&mut self) -> &mut [T] {
+        self
+    }
+
+    #[inline(always)]
+    fn clear(&mut self) {
+        self.as_mut_view().clear();
+    }
+
+    #[inline(always)]
+    fn push(&mut self, value: T) -> Result<(), T> {
+        self.as_mut_view().push(value)
+    }
+
+    #[inline(always)]
+    fn pop(&mut self) -> Option<T> {
+        self.as_mut_view().pop()
+    }
+
+    #[inline(always)]
+    fn resize(&mut self, count: usize, value: T) -> bool
+    where
+        T: Clone,
+    {
+        self.as_mut_view().resize(count, value).is_ok()
     }
 }
 
@@ -67,10 +126,13 @@ pub trait Vacant {
     const VACANT: Self;
 }
 
-/// An array of fixed length.
+/// An array of values without a use at first.
 pub trait Array<T> {
-    /// Array of values that are not in use.
+    /// Array of values that are not in use, before [`Self::reserve`].
     const VACANT: Self;
+
+    /// Sets the length, unless the type does.
+    fn reserve(&mut self, _entries: usize) {}
 
     /// Values, read-only.
     fn values(&self) -> &[T];
@@ -98,6 +160,12 @@ pub trait Map<K, V> {
     /// The map without entries.
     const EMPTY: Self;
 
+    /// Sets the capacity, unless the type does.
+    fn reserve(&mut self, _entries: usize) {}
+
+    /// Maximum number of entries.
+    fn capacity(&self) -> usize;
+
     /// Number of entries.
     fn entries(&self) -> usize;
 
@@ -120,6 +188,11 @@ pub trait Map<K, V> {
 
 impl<K: Eq + Hash, V, const N: usize> Map<K, V> for FnvIndexMap<K, V, N> {
     const EMPTY: Self = Self::new();
+
+    #[inline(always)]
+    fn capacity(&self) -> usize {
+        N
+    }
 
     #[inline(always)]
     fn entries(&self) -> usize {

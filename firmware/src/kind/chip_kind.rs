@@ -3,15 +3,12 @@
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::{Budget, MAX_IN_FLIGHT, MAX_TILE_PIXELS, gather_candidates};
 
-use super::capacity::Capacity;
+use super::capacity::{Capacity, FixedCapacity};
+use crate::irradiance_cache::MIN_RECORDS;
 use crate::memory::CacheEntry;
 
-/// A kind of chip.
+/// A kind of chip: the containers of its buffers, and their capacities.
 pub trait ChipKind: 'static {
-    /// Capacities, as a card reports them when a session begins.
-    const BUDGET: Budget;
-    /// Upper limits of the on-chip memory that each technique adds.
-    const TECHNIQUE_LIMITS: TechniqueMemory;
     /// Capacity [`Budget::tile_pixels`].
     type TilePixels: Capacity;
     /// Capacity [`gather_candidates`] of [`Budget::neighbors`].
@@ -25,6 +22,28 @@ pub trait ChipKind: 'static {
     type Points: Capacity;
     /// Capacity [`Budget::in_flight`].
     type Flights: Capacity;
+
+    /// Capacities, as a card reports them when a session begins.
+    fn budget(&self) -> &Budget;
+}
+
+/// A kind of chip whose capacities are types, as a board needs them.
+pub trait FixedKind:
+    ChipKind<
+        TilePixels: FixedCapacity,
+        Candidates: FixedCapacity,
+        GatherQueue: FixedCapacity,
+        IrradianceRecords: FixedCapacity,
+        Points: FixedCapacity,
+        Flights: FixedCapacity,
+    >
+{
+    /// The kind as a value.
+    const KIND: Self;
+    /// [`ChipKind::budget`].
+    const BUDGET: Budget;
+    /// Upper limits of the on-chip memory that each technique adds.
+    const TECHNIQUE_LIMITS: TechniqueMemory;
 }
 
 /// On-chip memory that each technique adds to a chip, bytes.
@@ -49,7 +68,7 @@ impl TechniqueMemory {
 
 /// Checks at compile time that the capacities of a kind equal those of its budget, and fit the chip's index
 /// types.
-pub(crate) const fn check<K: ChipKind>() {
+pub(crate) const fn check<K: FixedKind>() {
     let budget = K::BUDGET;
     assert!(K::TilePixels::ENTRIES == budget.tile_pixels as usize, "TilePixels is not of the budget");
     assert!(K::Candidates::ENTRIES == gather_candidates(budget.neighbors), "Candidates is not of the budget");
@@ -58,6 +77,7 @@ pub(crate) const fn check<K: ChipKind>() {
     assert!(records == budget.irradiance_records as usize, "IrradianceRecords is not of the budget");
     assert!(K::Flights::ENTRIES == budget.in_flight as usize, "Flights is not of the budget");
     assert!(K::Points::ENTRIES >= records, "all records of a block are gathered together");
+    assert!(records >= MIN_RECORDS, "a block of one pixel must fit");
     assert!(budget.tile_pixels <= MAX_TILE_PIXELS, "the target of a gather has 15 bits for a pixel");
     assert!(records <= MAX_TILE_PIXELS as usize, "the target of a gather has 15 bits for a record");
     assert!(

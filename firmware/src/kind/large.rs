@@ -3,7 +3,7 @@
 use photoncard_shared::budget::{Budget, gather_candidates};
 
 use super::capacity::Entries;
-use super::chip_kind::{ChipKind, TechniqueMemory};
+use super::chip_kind::{ChipKind, FixedKind, TechniqueMemory};
 use super::reference::REFERENCE;
 
 /// Budget of the large chip: a longer gather queue, enough tiles in flight to fill it, and a scene cache of
@@ -19,19 +19,27 @@ pub const LARGE: Budget = Budget {
 
 /// Kind of the large chip ([`LARGE`]).
 #[derive(Clone, Copy, Debug)]
-pub enum Large {}
+pub struct Large;
 
 impl ChipKind for Large {
-    const BUDGET: Budget = LARGE;
-    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
-        reordering: 752 << 10,
-        irradiance_cache: 640 << 10,
-        importance_sampling: 136 << 10,
-    };
     type TilePixels = Entries<{ LARGE.tile_pixels as usize }>;
     type Candidates = Entries<{ gather_candidates(LARGE.neighbors) }>;
     type GatherQueue = Entries<{ LARGE.gather_queue as usize }>;
     type IrradianceRecords = Entries<{ LARGE.irradiance_records as usize }>;
     type Points = Entries<{ LARGE.tile_pixels as usize }>;
     type Flights = Entries<{ LARGE.in_flight as usize }>;
+
+    fn budget(&self) -> &Budget {
+        &LARGE
+    }
+}
+
+impl FixedKind for Large {
+    const KIND: Self = Self;
+    const BUDGET: Budget = LARGE;
+    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
+        reordering: 752 << 10,
+        irradiance_cache: 640 << 10,
+        importance_sampling: 136 << 10,
+    };
 }

@@ -3,7 +3,7 @@
 use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, gather_candidates};
 
 use super::capacity::Entries;
-use super::chip_kind::{ChipKind, TechniqueMemory};
+use super::chip_kind::{ChipKind, FixedKind, TechniqueMemory};
 
 /// Budget of the micro chip: 256 KB of SRAM.
 pub const MICRO: Budget = Budget {
@@ -25,19 +25,27 @@ pub const MICRO: Budget = Budget {
 
 /// Kind of the micro chip ([`MICRO`]).
 #[derive(Clone, Copy, Debug)]
-pub enum Micro {}
+pub struct Micro;
 
 impl ChipKind for Micro {
-    const BUDGET: Budget = MICRO;
-    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
-        reordering: (24 << 10) + 64,
-        irradiance_cache: 48 << 10,
-        importance_sampling: 8704,
-    };
     type TilePixels = Entries<{ MICRO.tile_pixels as usize }>;
     type Candidates = Entries<{ gather_candidates(MICRO.neighbors) }>;
     type GatherQueue = Entries<{ MICRO.gather_queue as usize }>;
     type IrradianceRecords = Entries<{ MICRO.irradiance_records as usize }>;
     type Points = Entries<256>;
     type Flights = Entries<{ MICRO.in_flight as usize }>;
+
+    fn budget(&self) -> &Budget {
+        &MICRO
+    }
+}
+
+impl FixedKind for Micro {
+    const KIND: Self = Self;
+    const BUDGET: Budget = MICRO;
+    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
+        reordering: (24 << 10) + 64,
+        irradiance_cache: 48 << 10,
+        importance_sampling: 8704,
+    };
 }

@@ -3,7 +3,7 @@
 use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, REFERENCE_DRAM_BYTES, gather_candidates};
 
 use super::capacity::Entries;
-use super::chip_kind::{ChipKind, TechniqueMemory};
+use super::chip_kind::{ChipKind, FixedKind, TechniqueMemory};
 use crate::photon::CandidateBuffer;
 
 /// Budget of the reference chip: a photon cache of 128 KB (section 6.5) and a ray caster cache of 75 KB
@@ -28,21 +28,29 @@ pub const REFERENCE: Budget = Budget {
 
 /// Kind of the reference chip ([`REFERENCE`]).
 #[derive(Clone, Copy, Debug)]
-pub enum Reference {}
+pub struct Reference;
 
 impl ChipKind for Reference {
-    const BUDGET: Budget = REFERENCE;
-    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
-        reordering: 408 << 10,
-        irradiance_cache: 159 << 10,
-        importance_sampling: 136 << 10,
-    };
     type TilePixels = Entries<{ REFERENCE.tile_pixels as usize }>;
     type Candidates = Entries<{ gather_candidates(REFERENCE.neighbors) }>;
     type GatherQueue = Entries<{ REFERENCE.gather_queue as usize }>;
     type IrradianceRecords = Entries<{ REFERENCE.irradiance_records as usize }>;
     type Points = Entries<2048>;
     type Flights = Entries<{ REFERENCE.in_flight as usize }>;
+
+    fn budget(&self) -> &Budget {
+        &REFERENCE
+    }
+}
+
+impl FixedKind for Reference {
+    const KIND: Self = Self;
+    const BUDGET: Budget = REFERENCE;
+    const TECHNIQUE_LIMITS: TechniqueMemory = TechniqueMemory {
+        reordering: 408 << 10,
+        irradiance_cache: 159 << 10,
+        importance_sampling: 136 << 10,
+    };
 }
 
 /// Buffer of candidates for a search with the maximum number of neighbours of [`REFERENCE`], used for

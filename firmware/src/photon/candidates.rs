@@ -90,10 +90,13 @@ impl Candidate {
     }
 }
 
-/// Storage of a fixed number of candidates.
+/// Storage of a number of candidates.
 pub trait CandidateStorage {
     /// Zeroed storage.
     const EMPTY: Self;
+
+    /// Sets the number of candidates, unless the type does.
+    fn reserve(&mut self, _entries: usize) {}
 
     /// View of the whole storage.
     fn view(&mut self) -> Candidates<'_>;
@@ -152,6 +155,12 @@ pub struct Candidates<'a> {
 }
 
 impl<'a> Candidates<'a> {
+    /// View of as many distances as contents.
+    #[inline(always)]
+    pub fn new(distances: &'a mut [u32], contents: &'a mut [u64]) -> Self {
+        Self { distances, contents }
+    }
+
     /// Reborrows the view for a shorter lifetime.
     #[inline(always)]
     pub fn reborrow(&mut self) -> Candidates<'_> {

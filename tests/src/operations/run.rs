@@ -4,6 +4,7 @@ use std::path::Path;
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::arithmetic::{Arithmetic, OPERATIONS, Operations, Step, Unit, Work};
+use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::contents::Contents;
 use photoncard_driver::emulator::direct::render_tile;
 use photoncard_driver::emulator::memory_model::CacheSettings;
@@ -12,7 +13,6 @@ use photoncard_driver::photon_map::map_photons;
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::tiles;
-use photoncard_firmware::chip::ReferenceChip;
 use photoncard_firmware::kind::REFERENCE;
 use photoncard_shared::counters::Counters;
 
@@ -46,7 +46,7 @@ impl Run {
         let chosen: Vec<_> = all.iter().skip(step / 2).step_by(step).copied().collect();
         let counted = instrument.count(&mapped.image, &frame, &chosen);
         let (mut counters, mut contents) = (Counters::ZERO, Contents::ZERO);
-        let mut chip = Box::new(ReferenceChip::new());
+        let mut chip = EmulatedKind::Reference.emulated().chip();
         for (&tile, counted) in chosen.iter().zip(&counted.counters) {
             let (image, memory) = mapped.image.view();
             let memory = CacheSettings::default().over(memory);

@@ -16,6 +16,7 @@ use rayon::ThreadPool;
 use rayon::prelude::*;
 
 use super::memory_model::{MeasuredMemory, MemoryTraffic};
+use super::{EmulatedChip, EmulatedKind};
 
 /// A rendered tile, with the work and memory traffic of rendering it.
 pub struct RenderedTile {
@@ -64,21 +65,14 @@ impl From<Fault> for TileError {
     }
 }
 
-/// Creates a chip. It is built on the stack first, in a stack frame of its own, because the caller's thread
-/// may have a small stack.
-#[inline(never)]
-pub fn new_chip<K: ChipKind>() -> Box<Chip<K>> {
-    Box::new(Chip::new())
-}
-
-/// Renders tiles on chips of kind `K`, one per thread of `pool`. The threads' stacks must have room for a
-/// chip while it is built. `model` creates a new memory for each tile, so that every tile begins with empty
-/// caches. `is_stopped` is polled before each tile.
+/// Renders tiles on chips of a kind, one per thread of `pool`. `model` creates a new memory for each tile, so
+/// that every tile begins with empty caches. `is_stopped` is polled before each tile.
 ///
 /// # Errors
 /// If the card image is malformed, or the work is stopped.
-pub fn render_tiles_apart<'a, K: ChipKind, M: MeasuredMemory>(
+pub fn render_tiles_apart<'a, M: MeasuredMemory>(
     pool: &ThreadPool,
+    kind: EmulatedKind,
     image: &'a CardImage,
     frame: &FrameParameters,
     tiles: &[Tile],
@@ -86,13 +80,14 @@ pub fn render_tiles_apart<'a, K: ChipKind, M: MeasuredMemory>(
     is_stopped: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<RenderedTile>, TileError> {
     let (scene, memory) = image.view();
-    let render_one = |chip: &mut Box<Chip<K>>, &tile: &Tile| {
+    let render_one = |chip: &mut EmulatedChip, &tile: &Tile| {
         if is_stopped() {
             return Err(TileError::Stopped);
         }
         Ok(render_tile(chip, &scene, model(memory), frame, tile, None)?)
     };
-    pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip::<K>, render_one).collect())
+    let new_chip = || kind.emulated().chip();
+    pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
 }
 
 /// Renders a tile on a chip with a memory of its own. With an `outlet`, the gathers of pixels are passed to
@@ -100,8 +95,8 @@ pub fn render_tiles_apart<'a, K: ChipKind, M: MeasuredMemory>(
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for the tile.
-pub fn render_tile<K: ChipKind>(
-    chip: &mut Chip<K>,
+pub fn render_tile(
+    chip: &mut EmulatedChip,
     scene: &SceneImage,
     mut memory: impl MeasuredMemory,
     frame: &FrameParameters,

@@ -4,6 +4,7 @@
 pub mod contents;
 pub mod direct;
 mod dram;
+mod emulated;
 mod measured;
 pub mod memory_model;
 mod tile_lines;
@@ -18,7 +19,7 @@ use std::thread::JoinHandle;
 use photoncard_firmware::card::{Card, sram_bytes};
 use photoncard_firmware::chip::Chip;
 use photoncard_firmware::kind::{
-    self, ChipKind as _, Large, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
+    self, FixedKind as _, Large, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
 };
 use photoncard_firmware::memory::CardMemory;
 use photoncard_firmware::serve::serve;
@@ -29,6 +30,7 @@ use photoncard_shared::transport::WINDOW;
 
 use self::dram::EmulatedDram;
 pub use self::dram::SharedImage;
+pub use self::emulated::{Emulated, EmulatedChip};
 pub use self::measured::Measured;
 use self::memory_model::{CacheSettings, CacheSpec, MeasuredMemory, MemoryTraffic};
 pub use self::tile_lines::TileLines;
@@ -90,6 +92,15 @@ impl EmulatedKind {
         }
     }
 
+    /// The kind of the emulator's chips that has these capacities.
+    pub fn emulated(self) -> Emulated {
+        match self {
+            Self::Reference => Emulated::like::<Reference>(),
+            Self::Large => Emulated::like::<Large>(),
+            Self::Micro => Emulated::like::<Micro>(),
+        }
+    }
+
     /// Budget of a chip of the kind.
     pub fn budget(self) -> Budget {
         match self {
@@ -119,8 +130,6 @@ impl EmulatedKind {
 const LINK_CAPACITY: usize = 64 << 10;
 /// Number of bytes from a card at which the host is woken: a third of the frames that may be in flight.
 const WOKEN_AT: usize = WINDOW * MAX_FRAME / 3;
-/// Stack of a chip's thread, bytes. The chip's buffers are built there before they move to the heap.
-pub const THREAD_STACK: usize = 16 << 20;
 
 /// Model of an emulated card's memory.
 pub struct MemoryModel {
@@ -170,7 +179,6 @@ impl EmulatedCard {
         let held = model.is_none().then_some(held);
         let thread = std::thread::Builder::new()
             .name("chip".into())
-            .stack_size(THREAD_STACK)
             .spawn(move || run(kind, model.map(|model| (model, noted)), dram, &mut card))?;
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
     }
@@ -232,7 +240,6 @@ pub fn serve_card(kind: EmulatedKind, port: &mut (dyn Port + Send)) -> std::io::
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("chip".into())
-            .stack_size(THREAD_STACK)
             .spawn_scoped(scope, || run(kind, None, dram, port))?;
         thread.join().map(drop).or_else(|panic| std::panic::resume_unwind(panic))
     })
@@ -267,20 +274,8 @@ fn serve_on<M: CardMemory, R>(
     port: &mut dyn Port,
     end: impl FnOnce(&mut M) -> R,
 ) -> R {
-    match kind {
-        EmulatedKind::Reference => serve_kind::<Reference, M, R>(memory, port, end),
-        EmulatedKind::Large => serve_kind::<Large, M, R>(memory, port, end),
-        EmulatedKind::Micro => serve_kind::<Micro, M, R>(memory, port, end),
-    }
-}
-
-fn serve_kind<K: kind::ChipKind, M: CardMemory, R>(
-    memory: M,
-    port: &mut dyn Port,
-    end: impl FnOnce(&mut M) -> R,
-) -> R {
-    let mut card = Box::new(Card::<K, M>::new(memory));
+    let mut card = Card::with_chip(kind.emulated().chip(), memory);
     // The end of the link is no error: a host ends a card by closing the link.
-    let _ = serve(&mut *card, port);
+    let _ = serve(&mut card, port);
     end(card.memory())
 }

@@ -8,7 +8,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::Vec3;
-use photoncard_firmware::chip::{Component, PixelView, ReferenceChip};
+use photoncard_firmware::chip::{Component, PixelView};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::kind::ReferenceCandidates;
@@ -23,10 +23,10 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelSums, Tile};
 use rayon::prelude::*;
 
-use super::THREAD_STACK;
-use super::direct::{RenderedTile, new_chip, render_tile};
+use super::direct::{RenderedTile, render_tile};
 use super::measured::Measured;
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use super::{EmulatedChip, EmulatedKind};
 
 /// Maximum number of gathers kept at once. With 32 bytes each they take 4.3 GB.
 const MAX_GATHERS: u64 = 1 << 27;
@@ -154,7 +154,7 @@ fn render_with<'a, M: MeasuredMemory>(
 ) -> Result<CurveOutcome, FrameError> {
     let CurveJob { frame, tiles, chips, .. } = job;
     let mut all = Frame::with_room_for(frame, tiles)?;
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).stack_size(THREAD_STACK).build()?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).build()?;
     // The rays of a tile count as a tenth of its work, its gathers as the rest.
     let total = tiles.len() as u64;
     let cast = AtomicU64::new(0);
@@ -247,7 +247,7 @@ fn cast_tiles<'a, M: MeasuredMemory>(
     tiles: &[Tile],
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<CastTile>, FrameError> {
-    let cast_one = |chip: &mut Box<ReferenceChip>, &tile: &Tile| {
+    let cast_one = |chip: &mut EmulatedChip, &tile: &Tile| {
         if !go_on() {
             return Err(FrameError::Stopped);
         }
@@ -256,7 +256,7 @@ fn cast_tiles<'a, M: MeasuredMemory>(
         let tile = render_tile(chip, &scene, model(memory), job.frame, tile, Some(&mut outlet))?;
         Ok(CastTile { tile, waiting: outlet.0 })
     };
-    tiles.par_iter().map_init(new_chip, cast_one).collect()
+    tiles.par_iter().map_init(|| EmulatedKind::Reference.emulated().chip(), cast_one).collect()
 }
 
 /// Stores the tiles in sinks.

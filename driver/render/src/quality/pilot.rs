@@ -1,7 +1,6 @@
 //! Pilot renders: pixels spread over the picture, rendered on emulated chips of this process.
 
 use glam::Vec3;
-use photoncard_firmware::kind::Reference;
 use photoncard_firmware::sampler::hash;
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{MappedImage, PhotonSettings, PhotonsFor, TracedPhotons, map_traced};
@@ -13,7 +12,7 @@ use rayon::ThreadPool;
 
 use super::paths::Deviations;
 use super::spread::Levels;
-use crate::emulator::THREAD_STACK;
+use crate::emulator::EmulatedKind;
 use crate::emulator::direct::{RenderedTile, render_tiles_apart};
 use crate::{Observer, Phase, RenderError, RenderSettings, Sampling};
 
@@ -99,7 +98,7 @@ pub(super) fn measure(
     observer: &dyn Observer,
 ) -> Result<Variances, RenderError> {
     let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
-    let pool = threads.stack_size(THREAD_STACK).build().map_err(RenderError::Chips)?;
+    let pool = threads.build().map_err(RenderError::Chips)?;
     let settings = &enlarged(settings);
     // Of the whole picture: a part of it has equal pixels.
     let window = Window::full(settings.picture.width, settings.picture.height);
@@ -288,7 +287,8 @@ impl<'a> Pilot<'a> {
     fn render(&self, frame: &FrameParameters, tiles: &[Tile]) -> Result<Vec<RenderedTile>, RenderError> {
         let is_stopped = || self.observer.is_stopped();
         let image = &self.mapped.image;
-        Ok(render_tiles_apart::<Reference, _>(self.pool, image, frame, tiles, &|memory| memory, &is_stopped)?)
+        let chip = EmulatedKind::Reference;
+        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, &|memory| memory, &is_stopped)?)
     }
 }
 

@@ -3,17 +3,17 @@
 use std::time::Duration;
 
 use photoncard_driver::dispatcher::Dispatcher;
+use photoncard_driver::emulator::Emulated;
 use photoncard_driver::scheduler::{CardNumber, SchedulerError, Standing};
 use photoncard_driver::session::{Session, SessionError};
 use photoncard_firmware::card::Card;
-use photoncard_firmware::kind::ChipKind;
 use photoncard_shared::frame::{Frame, FrameReader};
 use photoncard_shared::message::{self, Command};
 
 use super::conditions::Run;
 use super::liar::Voice;
 use super::line::{Queue, Random};
-use super::world::{Fixture, Memory, Several};
+use super::world::{Fixture, IN_FLIGHT, Memory};
 
 /// Virtual time of a step.
 const STEP: Duration = Duration::from_micros(100);
@@ -33,7 +33,7 @@ pub(crate) enum Health {
 /// Card with its link and its session.
 pub(crate) struct Station {
     pub(crate) number: CardNumber,
-    pub(crate) card: Box<Card<Several, Memory>>,
+    pub(crate) card: Box<Card<Emulated, Memory>>,
     pub(crate) session: Session,
     /// True after the card was silent for too long, until it is loaded again.
     pub(crate) is_lost: bool,
@@ -103,7 +103,7 @@ impl Station {
         }
         self.befall(run, step, random);
         let is_at_work = self.session.is_loaded() && self.card.is_busy();
-        let mut in_flight = self.tiles.iter().take(Several::BUDGET.in_flight as usize);
+        let mut in_flight = self.tiles.iter().take(IN_FLIGHT as usize);
         if is_at_work && in_flight.any(|tile| run.poison.contains(tile)) {
             self.reset_card(run);
         }

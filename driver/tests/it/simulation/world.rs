@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::Vec3;
+use photoncard_driver::emulator::{Emulated, EmulatedChip, EmulatedKind};
 use photoncard_driver::film::Film;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
@@ -12,10 +13,10 @@ use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
 use photoncard_driver::scheduler::{GatherOrder, Scheduler, tiles};
 use photoncard_driver::session::{Job, PixelLimits, Upload};
 use photoncard_firmware::card::Card;
-use photoncard_firmware::kind::{ChipKind, Entries, MICRO, TechniqueMemory};
+use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
-use photoncard_shared::budget::{Budget, gather_candidates};
+use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters};
 
 use super::line::Random;
@@ -99,19 +100,13 @@ impl CardMemory for Memory {
     }
 }
 
-/// The kind of a micro chip with several tiles in flight.
-pub(crate) enum Several {}
+/// Number of tiles in flight of a chip.
+pub(crate) const IN_FLIGHT: u32 = 3;
 
-impl ChipKind for Several {
-    const BUDGET: Budget = Budget { sram_bytes: 512 << 10, tiles: 4, in_flight: 3, ..MICRO };
-    const TECHNIQUE_LIMITS: TechniqueMemory =
-        TechniqueMemory { reordering: 32 << 10, irradiance_cache: 160 << 10, importance_sampling: 16 << 10 };
-    type TilePixels = Entries<{ MICRO.tile_pixels as usize }>;
-    type Candidates = Entries<{ gather_candidates(MICRO.neighbors) }>;
-    type GatherQueue = Entries<{ MICRO.gather_queue as usize }>;
-    type IrradianceRecords = Entries<{ MICRO.irradiance_records as usize }>;
-    type Points = Entries<{ MICRO.tile_pixels as usize }>;
-    type Flights = Entries<3>;
+/// A micro chip with several tiles in flight.
+fn chip() -> EmulatedChip {
+    let budget = Budget { sram_bytes: 512 << 10, tiles: 4, in_flight: IN_FLIGHT, ..MICRO };
+    EmulatedKind::Micro.emulated().with_budget(budget).chip()
 }
 
 /// Shared state of all runs.
@@ -199,8 +194,8 @@ impl Fixture {
     }
 
     /// Card that was just switched on.
-    pub(crate) fn card(&self) -> Box<Card<Several, Memory>> {
-        Box::new(Card::new(Memory { lines: vec![Line::ZERO; DRAM_LINES] }))
+    pub(crate) fn card(&self) -> Box<Card<Emulated, Memory>> {
+        Box::new(Card::with_chip(chip(), Memory { lines: vec![Line::ZERO; DRAM_LINES] }))
     }
 
     pub(crate) fn film(&self) -> Film {

@@ -12,7 +12,7 @@ use crate::memory::Lines;
 
 /// Engine whose reply buffer is full.
 fn full() -> Box<Engine<Micro>> {
-    let mut engine = Box::new(Engine::new());
+    let mut engine = Box::new(Engine::new(Chip::new()));
     engine.data.resize(DATA_BYTES, 0).unwrap();
     engine
 }
