@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Renders the pictures of docs/gallery.md, and writes that page: below each picture its command, and the CPU seconds that it took.
+# Renders the pictures of docs/gallery.md, the first of which is the README's, and writes that page: below each picture its command,
+# and the CPU seconds that it took.
 #
 #   docs/gallery.sh PHOTONCARD
 #
@@ -13,15 +14,15 @@ peers=$(realpath -m "${CARGO_TARGET_DIR:-target}")/peers
 # Title, name of the picture, scene, options.
 pictures() {
     cat <<END
-The Cornell box|cornell|scenes/cornell.gltf|
-With a glossy floor|cornell-glossy|scenes/cornell-glossy.gltf|
-With a mirror and a glass ball|cornell-spheres|scenes/cornell-spheres.glb|
-Lit from a spot of its ceiling|cornell-uplight|scenes/cornell-uplight.gltf|
-The court of the atrium|atrium|scenes/atrium.glb|
-Its gallery|gallery|scenes/atrium.glb|--camera gallery
-Under a sky|atrium-open|scenes/atrium-open.glb|--environment scenes/sky.exr
-A room of textures|room|scenes/room.glb|
-Metals and dielectrics|roughness|scenes/roughness.glb|
+The court of the atrium under a sky|../atrium|scenes/atrium-open.glb|--environment scenes/sky.exr --size 1000x625 --tonemap aces
+The court by panels of sky and sun|atrium|scenes/atrium.glb|--size 800x450
+Its gallery|gallery|scenes/atrium.glb|--size 800x450 --camera gallery
+The Cornell box|cornell|scenes/cornell.gltf|--size 720x720
+With a glossy floor|cornell-glossy|scenes/cornell-glossy.gltf|--size 720x720
+With a mirror and a glass ball|cornell-spheres|scenes/cornell-spheres.glb|--size 720x720
+Lit from a spot of its ceiling|cornell-uplight|scenes/cornell-uplight.gltf|--size 720x720
+A room of textures|room|scenes/room.glb|--size 800x600
+Metals and dielectrics|roughness|scenes/roughness.glb|--size 800x400
 A room made in Blender, by its exporter|blender-room|$peers/room/room.glb|--size 512x512
 Flight Helmet, Microsoft, CC0|flight-helmet|$peers/surfaces/flight-helmet.glb|--size 512x512 --environment 0.2,0.2,0.2
 END
@@ -31,7 +32,7 @@ page=docs/gallery.md
 {
     echo "# Gallery"
     echo
-    echo "Pictures of \`photoncard render\` by its defaults, written by [\`docs/gallery.sh\`](gallery.sh) with $("$photoncard" --version | head -n 1),"
+    echo "Pictures of \`photoncard render\` by its default quality, written by [\`docs/gallery.sh\`](gallery.sh) with $("$photoncard" --version | head -n 1),"
     echo "on $(nproc) cores; CPU seconds of all threads, from reading the scene to the picture's file."
 } >"$page.partial"
 while IFS='|' read -r title name scene options; do
@@ -42,11 +43,11 @@ while IFS='|' read -r title name scene options; do
     # shellcheck disable=SC2086 # options are words
     seconds=$({ TIMEFORMAT='%U %S' && time "$photoncard" render "$scene" -o "docs/gallery/$name.png" $options --quiet; } 2>&1)
     {
-        printf '\n## %s\n\n![%s](gallery/%s.png)\n\n' "$title" "$title" "$name"
+        printf '\n## %s\n\n![%s](gallery/%s.png)\n\n' "$title" "$title" "$name" | sed 's|gallery/\.\./||'
         # Files of others are not there when the commands of documents are tested.
-        kind=sh
+        kind='sh slow'
         [ "$scene" = "${scene#"$peers"}" ] || kind='sh network'
-        printf '```%s\nphotoncard render %s -o %s.png %s\n```\n\n' "$kind" "${scene#"$peers"/*/}" "$name" "$options" | sed 's/ *$//'
+        printf '```%s\nphotoncard render %s -o %s.png %s\n```\n\n' "$kind" "${scene#"$peers"/*/}" "${name##*/}" "$options" | sed 's/ *$//'
         awk '{ printf "%.0f CPU seconds.\n", $1 + $2 }' <<<"$seconds"
     } >>"$page.partial"
 done < <(pictures)

@@ -1,5 +1,9 @@
 //! `photoncard completions` and `photoncard man`: documents made from the arguments.
 
+// Packages have `photoncard study`, and so has the reference.
+#[cfg(all(test, feature = "study"))]
+mod tests;
+
 use std::path::Path;
 
 use clap::{Command, CommandFactory};

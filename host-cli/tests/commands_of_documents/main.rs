@@ -1,5 +1,5 @@
-//! Commands of the documents are those that the program has: README.md, docs/*.md, and the README.md of
-//! scenes and tests.
+//! Commands of the documents are those that the program has: README.md and others at the top, docs/*.md, and
+//! the README.md of scenes and tests.
 //!
 //! Each fenced block of a document states by its info string what it is:
 //!
@@ -87,6 +87,30 @@ fn documents_name_what_exists() {
     assert!(documents.len() > 10, "{} documents are not all", documents.len());
     let defects: Vec<_> = documents.iter().flat_map(|document| defects(&tree, document)).collect();
     assert!(defects.is_empty(), "\n{}", defects.join("\n"));
+}
+
+/// Cells of the rows of a table, spaces removed.
+fn rows(text: &str) -> Vec<Vec<&str>> {
+    let rows = text.lines().filter_map(|line| line.strip_prefix('|')?.strip_suffix('|'));
+    rows.map(|row| row.split('|').map(str::trim).collect()).collect()
+}
+
+#[test]
+fn the_readme_is_short_and_compares_by_the_figures_of_quality() {
+    let documents = markdown::documents();
+    let text = |name: &str| documents.iter().find(|document| document.name == name).expect(name).text();
+    let readme = text("README.md");
+    let words = readme.split_whitespace().count();
+    assert!(words <= 900, "README.md has {words} words; 900 is the most");
+    let measured = rows(text("docs/quality.md"));
+    let (_, table) = readme.split_once("| scene | CPU s |").expect("the table");
+    let table = rows(table);
+    assert!(table.len() > 5, "{table:?}");
+    for row in &table[1..] {
+        let of_scene = |cells: &&Vec<&str>| cells.len() == 10 && cells[..2] == [row[0], "`good`"];
+        let cells = measured.iter().find(of_scene).unwrap_or_else(|| panic!("{row:?}"));
+        assert_eq!(row[1..], [cells[2], cells[3], cells[7], cells[8]], "{}", row[0]);
+    }
 }
 
 #[test]

@@ -50,6 +50,11 @@ impl Document {
         Self { name: name.to_owned(), text: text.to_owned() }
     }
 
+    /// The whole document.
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Blocks of code, inline code and links, each with the number of its line.
     pub(crate) fn pieces(&self) -> Vec<(usize, Piece)> {
         let mut pieces = Vec::new();
