@@ -123,8 +123,8 @@
 //! Film -> exr, tone_mapping
 //! ```
 //!
-//! Terms are defined in `docs/glossary.md`, design decisions and "how to add" lists are in
-//! `docs/architecture.md`.
+//! Terms are defined in `docs/glossary.md`, design decisions are in `docs/architecture.md`, and "how to add"
+//! lists in `CONTRIBUTING.md`.
 #![forbid(unsafe_code)]
 
 pub use photoncard_cards::{dispatcher, link, scheduler, session};
