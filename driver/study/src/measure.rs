@@ -1,14 +1,12 @@
 //! Measures a point: work and memory traffic of a sample of a picture's tiles.
 
 use photoncard_cards::scheduler::tiles;
-use photoncard_firmware::memory::Lines;
-use photoncard_firmware::render::RenderJob;
 use photoncard_map::photon_map::{MappedImage, PhotonMapSize};
+use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::contents::Contents;
-use photoncard_render::emulator::direct::{RenderedTile, render_tiles, render_tiles_apart};
-use photoncard_render::emulator::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
+use photoncard_render::emulator::direct::{RenderedTile, render_tiles_apart, render_tiles_in_flight};
+use photoncard_render::emulator::memory_model::{CacheSettings, MemoryTraffic};
 use photoncard_render::emulator::whole_frame::{CurveJob, render_along_curve};
-use photoncard_render::emulator::{EmulatedKind, Measured};
 use photoncard_render::{RenderError, RenderSettings};
 use photoncard_scene::Scene;
 use photoncard_shared::address::{STRUCTURES, Structure};
@@ -149,20 +147,20 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders tiles on chips of a kind. `model` creates a new memory for each tile, so that every tile
-    /// begins with empty caches.
+    /// Renders tiles on chips of a kind. With `caches` the memory of each tile is modelled, and its caches are
+    /// empty at first.
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.
-    pub fn render<'b, M: MeasuredMemory>(
-        &'b self,
+    pub fn render(
+        &self,
         chip: EmulatedKind,
         frame: &FrameParameters,
         tiles: &[Tile],
-        model: &(impl Fn(Lines<'b>) -> M + Sync),
+        caches: Option<&CacheSettings>,
     ) -> Result<Vec<RenderedTile>, RenderError> {
         let image = &self.mapped.image;
-        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, model, self.is_stopped)?)
+        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, caches, self.is_stopped)?)
     }
 
     /// Measures the work and memory traffic of a frame, from a sample of its tiles. All tiles are rendered if
@@ -190,8 +188,7 @@ impl Bench<'_> {
         }
         let chosen = choose(&all, sample.count(all.len(), least_tiles));
         let tiles: Vec<Tile> = chosen.iter().map(|chosen| chosen.tile).collect();
-        let model = |memory| Measured::new(caches.over(memory));
-        let rendered = self.render(chip, &frame, &tiles, &model)?;
+        let rendered = self.render(chip, &frame, &tiles, Some(caches))?;
         let measured = chosen.iter().zip(&rendered).map(|(Chosen { tile, stands_for }, rendered)| {
             TileMeasurement::new(tile.id, *stands_for, rendered.counters, &rendered.traffic)
         });
@@ -211,25 +208,21 @@ impl Bench<'_> {
         tiles: &[Tile],
         caches: &CacheSettings,
     ) -> Result<Measurement, RenderError> {
-        let (scene, memory) = self.mapped.image.view();
-        let mut memory = Measured::new(caches.over(memory));
         let mut counters = Counters::ZERO;
         let mut stopped = (self.is_stopped)();
-        self.pool.install(|| {
-            let mut chip = chip.emulated().chip();
-            let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
-            render_tiles(&mut chip, job, tiles, |_, tile| {
-                counters.add(&tile.counters);
-                stopped = (self.is_stopped)();
-                !stopped
-            })
-            .map_err(RenderError::Image)
-        })?;
+        let mut take = |_: &Tile, tile: RenderedTile| {
+            counters.add(&tile.counters);
+            stopped = (self.is_stopped)();
+            !stopped
+        };
+        let image = &self.mapped.image;
+        let render = || render_tiles_in_flight(chip, image, frame, tiles, caches, &mut take);
+        let traffic = self.pool.install(render).map_err(RenderError::Image)?;
         if stopped {
             return Err(RenderError::Stopped);
         }
         Ok(Measurement {
-            tiles: vec![TileMeasurement::new(0, 1, counters, &MeasuredMemory::traffic(&memory))],
+            tiles: vec![TileMeasurement::new(0, 1, counters, &traffic)],
             rendered: tiles.len(),
             map: PhotonMapSize::of(&self.mapped.image),
         })

@@ -257,7 +257,7 @@ fn pixels(
     let chosen = choose(&tiles(settings.window(), TILE, settings.schedule.order), count);
     let chosen: Vec<Tile> = chosen.into_iter().map(|chosen| chosen.tile).collect();
     let format = SumFormat::new(&bench.mapped.image.view().0.header, &frame);
-    let rendered = bench.render(EmulatedKind::Reference, &frame, &chosen, &|memory| memory)?;
+    let rendered = bench.render(EmulatedKind::Reference, &frame, &chosen, None)?;
     let of_tile =
         |tile: &RenderedTile| tile.pixels(format).map(|pixel| light(&pixel).map(f64::from)).collect();
     Ok(rendered.iter().map(of_tile).collect())

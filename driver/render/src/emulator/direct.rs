@@ -4,7 +4,7 @@
 use photoncard_firmware::chip::{Chip, FinishedPixel, PixelView, Progress};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::kind::ChipKind;
-use photoncard_firmware::memory::{Lines, MemoryPort};
+use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::render::{GatherOutlet, RenderJob};
 use photoncard_firmware::scene::SceneImage;
 use photoncard_map::pack::CardImage;
@@ -15,7 +15,9 @@ use photoncard_shared::message::{Fault, FaultCode, FrameParameters, Tile};
 use rayon::ThreadPool;
 use rayon::prelude::*;
 
-use super::memory_model::{MeasuredMemory, MemoryTraffic};
+use super::dram::EmulatedDram;
+use super::measured::Measured;
+use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use super::{EmulatedChip, EmulatedKind};
 
 /// A rendered tile, with the work and memory traffic of rendering it.
@@ -65,29 +67,64 @@ impl From<Fault> for TileError {
     }
 }
 
-/// Renders tiles on chips of a kind, one per thread of `pool`. `model` creates a new memory for each tile, so
-/// that every tile begins with empty caches. `is_stopped` is polled before each tile.
+/// Renders tiles on chips of a kind, one per thread of `pool`. With `caches` the memory of each tile is
+/// modelled, and its caches are empty at first. `is_stopped` is polled before each tile.
 ///
 /// # Errors
 /// If the card image is malformed, or the work is stopped.
-pub fn render_tiles_apart<'a, M: MeasuredMemory>(
+pub fn render_tiles_apart(
     pool: &ThreadPool,
     kind: EmulatedKind,
-    image: &'a CardImage,
+    image: &CardImage,
     frame: &FrameParameters,
     tiles: &[Tile],
-    model: &(impl Fn(Lines<'a>) -> M + Sync),
+    caches: Option<&CacheSettings>,
     is_stopped: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<RenderedTile>, TileError> {
-    let (scene, memory) = image.view();
     let render_one = |chip: &mut EmulatedChip, &tile: &Tile| {
         if is_stopped() {
             return Err(TileError::Stopped);
         }
-        Ok(render_tile(chip, &scene, model(memory), frame, tile, None)?)
+        Ok(render_tile_of(chip, image, caches, frame, tile, None)?)
     };
     let new_chip = || kind.emulated().chip();
     pool.install(|| tiles.par_iter().with_max_len(1).map_init(new_chip, render_one).collect())
+}
+
+/// Renders tiles on one chip of a kind with modelled memory, with as many in flight as the frame and the chip
+/// allow. `take` is called with each finished tile, without its traffic, and returns whether to continue.
+///
+/// # Errors
+/// If the card image is malformed, or the chip has no room for a tile.
+pub fn render_tiles_in_flight(
+    kind: EmulatedKind,
+    image: &CardImage,
+    frame: &FrameParameters,
+    tiles: &[Tile],
+    caches: &CacheSettings,
+    take: &mut dyn FnMut(&Tile, RenderedTile) -> bool,
+) -> Result<MemoryTraffic, Fault> {
+    let (scene, lines) = image.view();
+    let mut memory = Measured::new(caches.over(lines));
+    let job = &mut RenderJob { scene: &scene, memory: &mut memory, frame, outlet: None };
+    render_tiles(&mut kind.emulated().chip(), job, tiles, take)?;
+    Ok(memory.traffic())
+}
+
+/// [`render_tile`] of an image, in memory that is modelled if there are `caches`.
+pub(super) fn render_tile_of(
+    chip: &mut EmulatedChip,
+    image: &CardImage,
+    caches: Option<&CacheSettings>,
+    frame: &FrameParameters,
+    tile: Tile,
+    outlet: Option<&mut (dyn GatherOutlet + 'static)>,
+) -> Result<RenderedTile, Fault> {
+    let (scene, lines) = image.view();
+    match caches {
+        None => render_tile(chip, &scene, EmulatedDram::lent(lines), frame, tile, outlet),
+        Some(caches) => render_tile(chip, &scene, Measured::new(caches.over(lines)), frame, tile, outlet),
+    }
 }
 
 /// Renders a tile on a chip with a memory of its own. With an `outlet`, the gathers of pixels are passed to

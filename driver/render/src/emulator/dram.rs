@@ -10,7 +10,7 @@
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
-use photoncard_firmware::memory::{CardMemory, MemoryPort, copy_lines};
+use photoncard_firmware::memory::{CardMemory, Lines, MemoryPort, copy_lines};
 use photoncard_map::pack::CardImage;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::{Fault, FaultCode};
@@ -37,8 +37,8 @@ impl SharedImage {
 }
 
 /// DRAM that takes host memory only for written lines, and none for lines that equal the shared image's.
-pub(super) struct EmulatedDram {
-    lines: Stored,
+pub(super) struct EmulatedDram<'a> {
+    lines: Stored<'a>,
     limit: u32,
     shared: SharedImage,
     /// Image that the memory contains if no line was written, once it is given.
@@ -46,8 +46,10 @@ pub(super) struct EmulatedDram {
 }
 
 /// Lines from the first to the last written one.
-enum Stored {
+enum Stored<'a> {
     Own(Vec<Line>),
+    /// Lines that the card has only read.
+    Lent(&'a [Line]),
     /// The first `written` lines of an image, by reference, and lines after the whole image.
     Shared {
         image: Arc<CardImage>,
@@ -56,7 +58,14 @@ enum Stored {
     },
 }
 
-impl EmulatedDram {
+impl<'a> EmulatedDram<'a> {
+    /// Memory that consists of `lines`, which it copies when it is written.
+    pub(super) fn lent(Lines(lines): Lines<'a>) -> Self {
+        let limit = u32::try_from(lines.len()).unwrap_or(u32::MAX);
+        let (shared, held) = (SharedImage::default(), SharedImage::default());
+        Self { lines: Stored::Lent(lines), limit, shared, held }
+    }
+
     pub(super) fn new(bytes: u32, shared: SharedImage, held: SharedImage) -> Self {
         Self { lines: Stored::Own(Vec::new()), limit: bytes / LINE_BYTES as u32, shared, held }
     }
@@ -79,6 +88,7 @@ impl EmulatedDram {
     #[inline(always)]
     fn get(&self, address: LineAddress) -> Option<&Line> {
         match &self.lines {
+            Stored::Lent(lines) => lines.get(address.0 as usize),
             Stored::Own(lines) => lines.get(address.0 as usize),
             Stored::Shared { image, written, beyond } => {
                 let line = image.lines().get(..*written)?.get(address.0 as usize);
@@ -93,6 +103,7 @@ impl EmulatedDram {
             return image.lines();
         }
         match &self.lines {
+            Stored::Lent(lines) => lines,
             Stored::Own(lines) => lines,
             Stored::Shared { image, written, .. } => &image.lines()[..*written],
         }
@@ -129,20 +140,29 @@ impl EmulatedDram {
             }
             self.lines = Stored::Own(own);
         }
+        if let Stored::Lent(lines) = &self.lines {
+            self.lines = Stored::Own(lines.to_vec());
+        }
         match &mut self.lines {
-            Stored::Own(own) => (own, first),
             Stored::Shared { image, beyond, .. } => (beyond, first - image.lines().len()),
+            Stored::Own(own) => (own, first),
+            Stored::Lent(_) => unreachable!("lent lines were copied"),
         }
     }
 }
 
-impl MemoryPort for EmulatedDram {
+impl MemoryPort for EmulatedDram<'_> {
     #[inline(always)]
     fn read(&mut self, _: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty()) {
             self.adopt();
         }
         self.get(address).ok_or(Fault { code: FaultCode::LineRange, detail: address.0 })
+    }
+
+    #[inline(always)]
+    fn near(&self, address: LineAddress) -> Option<&Line> {
+        self.get(address)
     }
 
     fn write(&mut self, first: LineAddress, lines: &[[u8; LINE_BYTES]]) -> Option<()> {
@@ -161,13 +181,13 @@ impl MemoryPort for EmulatedDram {
     }
 }
 
-impl MeasuredMemory for EmulatedDram {
+impl MeasuredMemory for EmulatedDram<'_> {
     fn traffic(&self) -> MemoryTraffic {
         MemoryTraffic::ZERO
     }
 }
 
-impl CardMemory for EmulatedDram {
+impl CardMemory for EmulatedDram<'_> {
     fn lines(&self) -> u32 {
         self.limit
     }

@@ -248,7 +248,7 @@ pub fn serve_card(kind: EmulatedKind, port: &mut (dyn Port + Send)) -> std::io::
 fn run(
     kind: EmulatedKind,
     model: Option<(MemoryModel, TileLines)>,
-    dram: EmulatedDram,
+    dram: EmulatedDram<'static>,
     port: &mut dyn Port,
 ) -> Option<MemoryRecord> {
     match model {

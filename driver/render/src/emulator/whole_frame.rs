@@ -12,7 +12,6 @@ use photoncard_firmware::chip::{Component, PixelView};
 use photoncard_firmware::fixed_point::ColourSum;
 use photoncard_firmware::gather::GatherRequest;
 use photoncard_firmware::kind::ReferenceCandidates;
-use photoncard_firmware::memory::Lines;
 use photoncard_firmware::render::final_gather::gathered;
 use photoncard_firmware::render::{Context, GatherOutlet};
 use photoncard_map::pack::CardImage;
@@ -23,7 +22,8 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{Fault, FaultCode, FrameParameters, PixelSums, Tile};
 use rayon::prelude::*;
 
-use super::direct::{RenderedTile, render_tile};
+use super::direct::{RenderedTile, render_tile_of};
+use super::dram::EmulatedDram;
 use super::measured::Measured;
 use super::memory_model::{CacheSettings, MeasuredMemory, MemoryTraffic};
 use super::{EmulatedChip, EmulatedKind};
@@ -136,23 +136,8 @@ pub fn render_along_curve(
     sinks: &[&dyn TileSink],
     progress: &(dyn Fn(u64, u64) -> bool + Sync),
 ) -> Result<CurveOutcome, FrameError> {
-    match caches {
-        None => render_with(job, GATHERS_PER_TASK, &|memory| memory, sinks, progress),
-        Some(caches) => {
-            let model = |memory| Measured::new(caches.over(memory));
-            render_with(job, GATHERS_PER_COUNTED_TASK, &model, sinks, progress)
-        }
-    }
-}
-
-fn render_with<'a, M: MeasuredMemory>(
-    job: CurveJob<'a>,
-    gathers_per_task: usize,
-    model: &(impl Fn(Lines<'a>) -> M + Sync),
-    sinks: &[&dyn TileSink],
-    progress: &(dyn Fn(u64, u64) -> bool + Sync),
-) -> Result<CurveOutcome, FrameError> {
     let CurveJob { frame, tiles, chips, .. } = job;
+    let gathers_per_task = if caches.is_some() { GATHERS_PER_COUNTED_TASK } else { GATHERS_PER_TASK };
     let mut all = Frame::with_room_for(frame, tiles)?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(chips).build()?;
     // The rays of a tile count as a tenth of its work, its gathers as the rest.
@@ -162,13 +147,17 @@ fn render_with<'a, M: MeasuredMemory>(
     let gathers_of_tile = rays_of_pixel(frame) * tiles.iter().map(Tile::pixels).max().unwrap_or(1);
     let tiles_per_round = (GATHERS_PER_CAST / gathers_of_tile.max(1)).max(2 * chips as u64) as usize;
     for tiles in tiles.chunks(tiles_per_round) {
-        all.add(frame, pool.install(|| cast_tiles(job, model, tiles, &go_on))?)?;
+        all.add(frame, pool.install(|| cast_tiles(job, caches, tiles, &go_on))?)?;
     }
     pool.install(|| all.waiting.par_sort_unstable_by_key(|waiting| waiting.request.position));
+    let (_, lines) = job.image.view();
     let mut done = 0;
     for waiting in all.waiting.chunks(GATHERS_PER_ROUND.max(chips * gathers_per_task)) {
         let parts: Result<Vec<_>, Fault> = pool.install(|| {
-            let task = |waiting: &[Waiting]| do_gathers(job, model, waiting);
+            let task = |waiting: &[Waiting]| match caches {
+                None => do_gathers(job, EmulatedDram::lent(lines), waiting),
+                Some(caches) => do_gathers(job, Measured::new(caches.over(lines)), waiting),
+            };
             waiting.par_chunks(gathers_per_task).map(task).collect()
         });
         for Gathered { brought, counters, traffic } in parts? {
@@ -241,9 +230,9 @@ impl Frame {
     }
 }
 
-fn cast_tiles<'a, M: MeasuredMemory>(
-    job: CurveJob<'a>,
-    model: &(impl Fn(Lines<'a>) -> M + Sync),
+fn cast_tiles(
+    job: CurveJob,
+    caches: Option<&CacheSettings>,
     tiles: &[Tile],
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<CastTile>, FrameError> {
@@ -252,8 +241,7 @@ fn cast_tiles<'a, M: MeasuredMemory>(
             return Err(FrameError::Stopped);
         }
         let mut outlet = Outlet(Vec::new());
-        let (scene, memory) = job.image.view();
-        let tile = render_tile(chip, &scene, model(memory), job.frame, tile, Some(&mut outlet))?;
+        let tile = render_tile_of(chip, job.image, caches, job.frame, tile, Some(&mut outlet))?;
         Ok(CastTile { tile, waiting: outlet.0 })
     };
     tiles.par_iter().map_init(|| EmulatedKind::Reference.emulated().chip(), cast_one).collect()
@@ -283,13 +271,12 @@ struct Gathered {
     traffic: MemoryTraffic,
 }
 
-fn do_gathers<'a, M: MeasuredMemory>(
-    job: CurveJob<'a>,
-    model: &impl Fn(Lines<'a>) -> M,
+fn do_gathers(
+    job: CurveJob,
+    mut memory: impl MeasuredMemory,
     waiting: &[Waiting],
 ) -> Result<Gathered, Fault> {
-    let (scene, memory) = job.image.view();
-    let mut memory = model(memory);
+    let (scene, _) = job.image.view();
     let mut counters = Counters::ZERO;
     let mut context =
         Context { scene: &scene, memory: &mut memory, frame: job.frame, counters: &mut counters };

@@ -288,7 +288,7 @@ impl<'a> Pilot<'a> {
         let is_stopped = || self.observer.is_stopped();
         let image = &self.mapped.image;
         let chip = EmulatedKind::Reference;
-        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, &|memory| memory, &is_stopped)?)
+        Ok(render_tiles_apart(self.pool, chip, image, frame, tiles, None, &is_stopped)?)
     }
 }
 
