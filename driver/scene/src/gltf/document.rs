@@ -12,7 +12,6 @@ use miette::SourceSpan;
 use photoncard_picture::allocation;
 use photoncard_picture::foreign;
 use photoncard_picture::printable::printable;
-use serde::Deserialize as _;
 
 use super::extensions::{QUANTIZATION, SUPPORTED_EXTENSIONS};
 use super::files::{Files, read_file};
@@ -334,7 +333,7 @@ fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, Shortened), Sce
         return Err(other_kinds::version_1(path));
     }
     let shortened = schema::amend(&mut document);
-    let root = json::Root::deserialize(&document).map_err(|_| {
+    let root = serde_json::from_str(&document.to_string()).map_err(|_| {
         let (item, reason) = schema::violation(&document);
         let remedy = "export the scene again, or correct this item of the file: it violates glTF's schema";
         SceneError::Invalid { location: Location::new(path, item), reason, remedy }

@@ -165,8 +165,12 @@ fn simplify(value: &mut Value) {
     }
 }
 
+/// Reason why `value` is no `T`. It is read as text, since the types of the `gltf` crate are compiled once for
+/// each form of their input, which takes a minute.
 fn fault<T: DeserializeOwned>(value: &Value) -> Option<String> {
-    T::deserialize(value).err().map(|error| error.to_string())
+    let error = serde_json::from_str::<T>(&value.to_string()).err()?.to_string();
+    let end = error.rfind(" at line ").unwrap_or(error.len());
+    Some(error[..end].to_owned())
 }
 
 /// Fault of a member of the root that is no list.
