@@ -2,7 +2,7 @@
 # Runs a test program within a limit of time, as a runner of `cargo test`. What hangs is a failure that names the tests which were
 # still running: the test harness says of each when it has run for a minute.
 set -uo pipefail
-limit=${PHOTONCARD_TEST_LIMIT:-900}
+limit=${PHOTONCARD_TEST_LIMIT:-2400}
 
 said=$(mktemp)
 trap 'rm -f "$said"' EXIT

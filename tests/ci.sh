@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The test command: prepares the machine, then checks format, lints, tests, docs and the firmware's builds.
-# A tool that is missing and cannot be installed is a failure or, where said so, a loud skip: never a silent pass.
+# The test command: prepares the machine, then checks format, lints, boards, tests, documentation and packages. Stages run alone by their
+# names: tests/ci.sh [lint|boards|test|docs|packages ...]. A tool that is missing and cannot be installed is a failure or, where said so, a loud skip: never a silent pass.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
@@ -35,7 +35,6 @@ command -v cc >/dev/null || {
     apt-get update -qq && apt-get install -y -qq build-essential
 }
 rustup component add rustfmt clippy llvm-tools
-rustup target add "${target_of[@]}"
 
 can_install() { [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; }
 # install NAME PACKAGE...: installs packages of the distribution, or says by which command.
@@ -50,6 +49,14 @@ install() {
     DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "$@" >/dev/null
 }
 
+# What cannot be had, for the end.
+skipped=()
+# skip WHAT WHY: says loudly that something is not tested.
+skip() {
+    echo "ci: SKIPPED: $1: $2" >&2
+    skipped+=("$1: $2")
+}
+
 # The machines that boards are tested on. Without them all else is tested, and the end says what is not.
 has_qemu() { command -v qemu-system-arm >/dev/null && command -v qemu-system-riscv32 >/dev/null; }
 install_qemu() {
@@ -57,11 +64,12 @@ install_qemu() {
     install QEMU qemu-system-arm qemu-system-misc ||
         { can_install && install QEMU qemu-system-arm qemu-system-misc qemu-utils-; }
 }
-unset PHOTONCARD_SKIP_QEMU
-if ! has_qemu && ! { install_qemu && has_qemu; }; then
+find_qemu() {
+    unset PHOTONCARD_SKIP_QEMU
+    has_qemu || { install_qemu && has_qemu; } && return
     export PHOTONCARD_SKIP_QEMU="QEMU is missing and could not be installed"
-    echo "ci: SKIPPED: the images are built, but not run: $PHOTONCARD_SKIP_QEMU" >&2
-fi
+    skip "images on QEMU" "$PHOTONCARD_SKIP_QEMU"
+}
 
 # The browser that shows the page of `photoncard view`. Without it all else is tested, and the end says what is not.
 has_browser() {
@@ -71,11 +79,12 @@ has_browser() {
     done
     return 1
 }
-unset PHOTONCARD_SKIP_BROWSER
-if ! has_browser && ! { install Chromium chromium && has_browser; }; then
+find_browser() {
+    unset PHOTONCARD_SKIP_BROWSER
+    has_browser || { install Chromium chromium && has_browser; } && return
     export PHOTONCARD_SKIP_BROWSER="Chromium is missing and could not be installed"
-    echo "ci: SKIPPED: the page of the live view is not tested: $PHOTONCARD_SKIP_BROWSER" >&2
-fi
+    skip "the page of the live view" "$PHOTONCARD_SKIP_BROWSER"
+}
 
 # The engines of farms that jobs are tested with: GNU parallel, in whose place a loop can stand, and the runner of Open Job Description.
 install_openjd() {
@@ -84,55 +93,55 @@ install_openjd() {
     PHOTONCARD_OPENJD=$(realpath "$folder/bin/openjd")
     export PHOTONCARD_OPENJD
 }
-farms_untested=()
-command -v parallel >/dev/null || install "GNU parallel" parallel || farms_untested+=("GNU parallel")
-unset PHOTONCARD_OPENJD
-command -v openjd >/dev/null || install_openjd || farms_untested+=("Open Job Description (pip install openjd-cli)")
-for engine in "${farms_untested[@]}"; do
-    echo "ci: SKIPPED: jobs of farms are printed, but not run by $engine: it cannot be installed" >&2
-done
+find_farms() {
+    local why="it cannot be installed; jobs are printed, but not run by it"
+    command -v parallel >/dev/null || install "GNU parallel" parallel || skip "jobs of farms by GNU parallel" "$why"
+    unset PHOTONCARD_OPENJD
+    command -v openjd >/dev/null || install_openjd || skip "jobs of farms by Open Job Description (pip install openjd-cli)" "$why"
+}
 
 # The firmware's operations are counted where it runs without floating-point instructions: tests/src/operations.
-uncounted=""
-if rustup target add x86_64-unknown-none; then
-    cargo fetch --locked --manifest-path tests/operations/Cargo.toml
-else
-    uncounted="rustup cannot add the target x86_64-unknown-none"
-    echo "ci: SKIPPED: the firmware's operations are not counted: $uncounted" >&2
-fi
-
-step "format"
-cargo fmt --all --check
-cargo fmt --check --manifest-path tests/operations/Cargo.toml
-# Comments end at column 110, as code does; tables and formats of bytes do not.
-long=$(find shared firmware driver host-cli scenes tests -name '*.rs' -not -path '*/target/*' -print0 |
-    xargs -0 grep -nE '^.{111,}$' | grep -E ':[0-9]+: *//' | grep -vE '//[/!]? .*(\||  )' || true)
-[ -z "$long" ] || fail "comments are longer than 110 columns: $long"
-
-step "lints"
-cargo clippy --workspace --all-targets --features photoncard/study --locked -- -D warnings
-cargo clippy -p photoncard --all-targets --locked -- -D warnings
-
-# A path takes more bytes on Windows, and so do errors that hold one.
-unchecked=()
-for system in "${systems[@]}"; do
-    step "check for $system"
-    if rustup target add "$system"; then
-        cargo clippy -p photoncard --target "$system" --locked -- -D warnings -A clippy::result_large_err
+find_operations() {
+    if rustup target add x86_64-unknown-none; then
+        cargo fetch --locked --manifest-path tests/operations/Cargo.toml
     else
-        unchecked+=("$system")
-        echo "ci: SKIPPED: the command is not checked for $system: rustup cannot add it" >&2
+        skip "the count of operations" "rustup cannot add the target x86_64-unknown-none"
     fi
-done
+}
 
-# Scenes, maps, pictures and sessions need no operating system: a browser has none.
-step "check for wasm32-unknown-unknown"
-if rustup target add wasm32-unknown-unknown; then
-    cargo clippy -p photoncard-map -p photoncard-cards --target wasm32-unknown-unknown --locked -- -D warnings
-else
-    unchecked+=(wasm32-unknown-unknown)
-    echo "ci: SKIPPED: what a browser runs is not checked: rustup cannot add wasm32-unknown-unknown" >&2
-fi
+check_lint() {
+    step "format"
+    cargo fmt --all --check
+    cargo fmt --check --manifest-path tests/operations/Cargo.toml
+    # Comments end at column 110, as code does; tables and formats of bytes do not.
+    local long
+    long=$(find shared firmware driver host-cli scenes tests -name '*.rs' -not -path '*/target/*' -print0 |
+        xargs -0 grep -nE '^.{111,}$' | grep -E ':[0-9]+: *//' | grep -vE '//[/!]? .*(\||  )' || true)
+    [ -z "$long" ] || fail "comments are longer than 110 columns: $long"
+
+    step "lints"
+    cargo clippy --workspace --all-targets --features photoncard/study --locked -- -D warnings
+    cargo clippy -p photoncard --all-targets --locked -- -D warnings
+
+    # A path takes more bytes on Windows, and so do errors that hold one.
+    local system
+    for system in "${systems[@]}"; do
+        step "check for $system"
+        if rustup target add "$system"; then
+            cargo clippy -p photoncard --target "$system" --locked -- -D warnings -A clippy::result_large_err
+        else
+            skip "the check for $system" "rustup cannot add it"
+        fi
+    done
+
+    # Scenes, maps, pictures and sessions need no operating system: a browser has none.
+    step "check for wasm32-unknown-unknown"
+    if rustup target add wasm32-unknown-unknown; then
+        cargo clippy -p photoncard-map -p photoncard-cards --target wasm32-unknown-unknown --locked -- -D warnings
+    else
+        skip "the check of what a browser runs" "rustup cannot add wasm32-unknown-unknown"
+    fi
+}
 
 # Fails if code that panics is linked into an image, unless it is allowed.
 refuse_panics() {
@@ -144,61 +153,75 @@ refuse_panics() {
     [ -z "$panics" ] || fail "$1 can panic, by: $panics"
 }
 
-for image in "${images[@]}"; do
-    step "image of $image"
-    arguments=(-p photoncard-firmware --bin "$image" --features "board-$image" --target "${target_of[$image]}")
-    cargo clippy "${arguments[@]}" --profile card --locked -- -D warnings
-    cargo build "${arguments[@]}" --profile card --locked
-    refuse_panics "${CARGO_TARGET_DIR:-target}/${target_of[$image]}/card/$image"
-done
+check_boards() {
+    rustup target add "${target_of[@]}"
+    local image arguments
+    for image in "${images[@]}"; do
+        step "image of $image"
+        arguments=(-p photoncard-firmware --bin "$image" --features "board-$image" --target "${target_of[$image]}")
+        cargo clippy "${arguments[@]}" --profile card --locked -- -D warnings
+        cargo build "${arguments[@]}" --profile card --locked
+        refuse_panics "${CARGO_TARGET_DIR:-target}/${target_of[$image]}/card/$image"
+    done
 
-step "figures of docs/bring-up.md"
-tests/bring_up_figures.sh check
-
-# A test that hangs is stopped and named: by nextest one by one, else with its test program.
-step "tests"
-if cargo nextest --version >/dev/null 2>&1; then
-    cargo nextest run --workspace --features photoncard/study --locked
-else
-    echo "ci: cargo-nextest is missing: a limit of time holds for each test program, not for each test" >&2
-    host=$(rustc -vV | sed -n 's/^host: //p')
-    export "CARGO_TARGET_$(tr 'a-z-' 'A-Z_' <<<"$host")_RUNNER=$PWD/tests/bounded.sh"
-    cargo test --workspace --features photoncard/study --locked --lib --bins --tests --examples
-fi
-timeout 900 cargo test --workspace --features photoncard/study --doc --locked
-
-step "documentation"
-RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features photoncard/study --no-deps --locked
-
-step "packages"
-unpublished=""
-tests/publishable.sh || {
-    [ $? = 75 ] || fail "the crates cannot be packed"
-    unpublished="the index of crates.io cannot be had"
-    echo "ci: SKIPPED: the rehearsal of 'cargo publish': $unpublished" >&2
+    step "figures of docs/bring-up.md"
+    tests/bring_up_figures.sh check
 }
 
-# Licences and sources are a test as well (tests/tests/dependencies.rs); advisories need the tool, and a database on GitHub.
-step "dependencies"
-skipped_advisories=""
-if ! cargo deny --version >/dev/null 2>&1; then
-    skipped_advisories="cargo-deny is missing; run: cargo install cargo-deny --locked (it takes ten minutes and more to build)"
-else
-    cargo deny --offline check licenses bans sources
-    if timeout 120 cargo deny fetch db; then
-        cargo deny --offline check advisories
+check_test() {
+    find_qemu
+    find_browser
+    find_farms
+    find_operations
+    rustup target add "${target_of[@]}"
+    # A test that hangs is stopped and named: by nextest one by one, else with its test program.
+    step "tests"
+    if cargo nextest --version >/dev/null 2>&1; then
+        cargo nextest run --workspace --features photoncard/study --locked
     else
-        skipped_advisories="the advisory database cannot be had (https://github.com/RustSec/advisory-db)"
+        echo "ci: cargo-nextest is missing: a limit of time holds for each test program, not for each test" >&2
+        local host
+        host=$(rustc -vV | sed -n 's/^host: //p')
+        export "CARGO_TARGET_$(tr 'a-z-' 'A-Z_' <<<"$host")_RUNNER=$PWD/tests/bounded.sh"
+        cargo test --workspace --features photoncard/study --locked --lib --bins --tests --examples
     fi
-fi
-[ -z "$skipped_advisories" ] || echo "ci: SKIPPED: advisories of dependencies: $skipped_advisories" >&2
+    timeout 900 cargo test --workspace --features photoncard/study --doc --locked
+}
 
-[ -z "$unpublished" ] || echo "ci: SKIPPED: the rehearsal of 'cargo publish': $unpublished" >&2
-[ -z "$uncounted" ] || echo "ci: SKIPPED: the count of operations: $uncounted" >&2
-[ ${#unchecked[@]} = 0 ] || echo "ci: SKIPPED: checks for ${unchecked[*]}: rustup cannot add them" >&2
-for engine in "${farms_untested[@]}"; do
-    echo "ci: SKIPPED: jobs of farms by $engine: it cannot be installed" >&2
+check_docs() {
+    step "documentation"
+    RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features photoncard/study --no-deps --locked
+}
+
+check_packages() {
+    step "packages"
+    tests/publishable.sh || {
+        [ $? = 75 ] || fail "the crates cannot be packed"
+        skip "the rehearsal of 'cargo publish'" "the index of crates.io cannot be had"
+    }
+
+    # Licences and sources are a test as well (tests/tests/it/dependencies.rs); advisories need the tool, and a database on GitHub.
+    step "dependencies"
+    if ! cargo deny --version >/dev/null 2>&1; then
+        skip "advisories of dependencies" "cargo-deny is missing; run: cargo install cargo-deny --locked (it takes ten minutes and more to build)"
+    else
+        cargo deny --offline check licenses bans sources
+        if timeout 120 cargo deny fetch db; then
+            cargo deny --offline check advisories
+        else
+            skip "advisories of dependencies" "the advisory database cannot be had (https://github.com/RustSec/advisory-db)"
+        fi
+    fi
+}
+
+[ $# != 0 ] || set -- lint boards test docs packages
+for stage in "$@"; do
+    declare -F "check_$stage" >/dev/null || fail "there is no stage $stage; the stages are lint, boards, test, docs, packages"
 done
-[ -z "${PHOTONCARD_SKIP_BROWSER:-}" ] || echo "ci: SKIPPED: the page of the live view: $PHOTONCARD_SKIP_BROWSER" >&2
-[ -z "${PHOTONCARD_SKIP_QEMU:-}" ] || echo "ci: SKIPPED: images on QEMU: $PHOTONCARD_SKIP_QEMU" >&2
+for stage in "$@"; do
+    "check_$stage"
+done
+for what in "${skipped[@]}"; do
+    echo "ci: SKIPPED: $what" >&2
+done
 step "done"

@@ -51,4 +51,4 @@ naive=(--order naive --photon-map jensen --sampling brdf)
     done
 } >"$scratch/figures.csv"
 cp "$scratch/figures.csv" "$csv"
-UPDATE_DOCS=1 cargo test -q -p photoncard-tests --locked --test measured_tables memory
+UPDATE_DOCS=1 cargo test -q -p photoncard-tests --locked --test it measured_tables::memory

@@ -4,7 +4,7 @@
 #   tests/operations.sh report     operations of each unit for a ray and for a gather of several scenes, counted and by the table
 #   tests/operations.sh table      writes the operations of a step, driver/render/src/cost_model/arithmetic/table.rs
 #
-# It takes about a minute on Linux and x86-64, and the target x86_64-unknown-none. tests/tests/operations.rs checks the table.
+# It takes about a minute on Linux and x86-64, and the target x86_64-unknown-none. tests/tests/it/operations.rs checks the table.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 table=driver/render/src/cost_model/arithmetic/table.rs

@@ -7,4 +7,4 @@ set -euo pipefail
     exit 2
 }
 cd "$(dirname "$0")/.."
-"${CARGO:-cargo}" test --quiet --locked --release -p photoncard --test view_browser -- --ignored --exact latency::latency --nocapture
+"${CARGO:-cargo}" test --quiet --locked --release -p photoncard --test it -- --ignored --exact view_browser::latency::latency --nocapture

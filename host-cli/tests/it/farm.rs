@@ -1,0 +1,323 @@
+//! Jobs of farms: they run, and their picture is that of one render, to the byte.
+#![cfg(unix)]
+
+use std::process::Command;
+
+use crate::support::{Outcome, Room, shipped};
+use serde_json::Value;
+
+/// Names that a shell or an engine reads otherwise, unless they are quoted.
+const FOLDER: &str = "it's a {{Param.x}} $HOME";
+const SCENE: &str = "a {1} \"b\" {}.gltf";
+const PICTURE: &str = "o{{}}ut `id`.exr";
+
+/// Options of a small picture.
+const OPTIONS: [&str; 15] = [
+    "--quality",
+    "draft",
+    "--size",
+    "40x24",
+    "--photons",
+    "900",
+    "--gather-rays",
+    "6",
+    "--spp",
+    "2",
+    "--card",
+    "emulated:1",
+    "--set",
+    "white.diffuse=0.3,0.4,0.5",
+    "--irradiance-cache=on",
+];
+
+/// Room with a scene in a folder, and its picture by one render.
+fn room() -> (Room, Vec<u8>) {
+    let room = Room::new();
+    std::fs::create_dir(room.path(FOLDER)).unwrap();
+    std::fs::copy(shipped("cornell.gltf"), room.path(FOLDER).join(SCENE)).unwrap();
+    let whole = run(&room, &[&["render", SCENE, "-o", "whole.exr"], &OPTIONS[..]].concat());
+    assert_eq!(whole.status, Some(0), "{}", whole.stderr);
+    let whole = room.path(FOLDER).join("whole.exr");
+    (room, std::fs::read(whole).unwrap())
+}
+
+/// Runs the command in the folder of the scene.
+fn run(room: &Room, arguments: &[&str]) -> Outcome {
+    Outcome::of(&room.command().current_dir(room.path(FOLDER)).args(arguments).output().unwrap())
+}
+
+/// The job of the scene for an engine.
+fn job(room: &Room, engine: &str) -> String {
+    let own =
+        ["farm", engine, SCENE, "--parts", "3", "-o", PICTURE, "-o", "out.png", "--sample-type", "half"];
+    let outcome = run(room, &[&own[..], &OPTIONS].concat());
+    assert_eq!((outcome.status, &*outcome.stderr), (Some(0), ""));
+    outcome.stdout
+}
+
+/// A command that finds the program in its path.
+fn in_path(program: &str) -> Command {
+    let own = std::path::Path::new(env!("CARGO_BIN_EXE_photoncard")).parent().unwrap();
+    let path = format!("{}:{}", own.display(), std::env::var("PATH").unwrap());
+    let mut command = Command::new(program);
+    command.env("PATH", path);
+    command
+}
+
+fn is_there(program: &str, test: &str) -> bool {
+    Command::new(program).arg(test).output().is_ok_and(|output| output.status.success())
+}
+
+/// Runs a script of a job in a folder with other names still.
+fn run_script(room: &Room, script: &str, arguments: &[&str]) {
+    let path = room.path("the {2} job's.sh");
+    std::fs::write(&path, script).unwrap();
+    let outcome = Outcome::of(&in_path("sh").arg(&path).args(arguments).output().unwrap());
+    assert_eq!(outcome.status, Some(0), "{script}\n{}\n{}", outcome.stdout, outcome.stderr);
+}
+
+/// Checks the pictures of a job that is done. One of halves has the pixels of the other, rounded.
+fn check_pictures(room: &Room) {
+    let own = ["render", SCENE, "-o", "half.exr", "-o", "whole.png", "--sample-type", "half"];
+    let outcome = run(room, &[&own[..], &OPTIONS].concat());
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    let read = |name: &str| std::fs::read(room.path(FOLDER).join(name)).unwrap();
+    assert!(read(PICTURE) == read("half.exr"));
+    assert!(read("out.png") == read("whole.png"));
+}
+
+/// The tasks of a script one after another, without an engine.
+fn by_hand(room: &Room, script: &str) {
+    let seq = script.lines().find(|line| line.contains("| parallel ")).unwrap();
+    let tasks = seq.split('|').next().unwrap().trim();
+    run_script(
+        room,
+        &script.replace(seq, &format!("for task in $({tasks}); do sh \"$job\" task \"$task\"; done")),
+        &[],
+    );
+}
+
+#[test]
+fn the_script_of_gnu_parallel_renders_the_picture() {
+    let (room, _) = room();
+    let script = job(&room, "parallel");
+    if is_there("parallel", "--version") {
+        run_script(&room, &script, &[]);
+    } else {
+        eprintln!("SKIPPED: GNU parallel is missing, and a loop does its work");
+        by_hand(&room, &script);
+    }
+    check_pictures(&room);
+}
+
+/// Tasks that were killed, or run twice, or whose scene has changed since.
+#[test]
+fn a_job_that_is_run_again_goes_on_or_begins_anew() {
+    let (room, whole) = room();
+    let folder = room.path(FOLDER);
+    let script = job(&room, "parallel").replace(" --sample-type half", "");
+    by_hand(&room, &script);
+    let picture = || std::fs::read(folder.join(PICTURE)).unwrap();
+    assert!(picture() == whole);
+    let farm = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+    let farm = farm.into_iter().find(|path| path.extension().is_some_and(|ending| ending == "farm")).unwrap();
+    // A part that is missing, and one that was begun.
+    std::fs::remove_file(farm.join("2of3.part")).unwrap();
+    std::fs::write(farm.join("2of3.part.partial"), b"photoncard partial ren").unwrap();
+    std::fs::remove_file(folder.join(PICTURE)).unwrap();
+    by_hand(&room, &script);
+    assert!(picture() == whole);
+    // Another scene under the same name: no part of the old one is merged.
+    std::fs::copy(shipped("cornell-uplight.gltf"), folder.join(SCENE)).unwrap();
+    by_hand(&room, &script);
+    let outcome = run(&room, &[&["render", SCENE, "-o", "other.exr"], &OPTIONS[..]].concat());
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    assert!(picture() == std::fs::read(folder.join("other.exr")).unwrap() && picture() != whole);
+}
+
+/// The steps in the order in which Slurm runs them, each by the command that it would run.
+#[test]
+fn the_script_of_slurm_submits_steps_that_render_the_picture() {
+    let (room, _) = room();
+    let script = job(&room, "slurm");
+    // A stand-in notes what is submitted.
+    let stand_in = "sbatch() { printf '%s\\n' \"$*\" >>submitted; wc -l <submitted | tr -d ' '; }\n";
+    run_script(
+        &room,
+        &script.replacen("set -eu\n", &format!("set -eu\n{stand_in}"), 1),
+        &["--partition=farm"],
+    );
+    let submitted = std::fs::read_to_string(room.path(FOLDER).join("submitted")).unwrap();
+    let lines: Vec<&str> = submitted.lines().collect();
+    assert_eq!(lines.len(), 3, "{submitted}");
+    for (line, words) in lines.iter().zip([
+        ["prepare", "--partition=farm"],
+        ["tasks", "--array=0-2 --dependency=afterok:1"],
+        ["merge", "--dependency=afterok:2"],
+    ]) {
+        assert!(words.iter().all(|word| line.contains(word)), "{line}");
+    }
+    run_script(&room, &script, &["prepare"]);
+    for task in ["0", "1", "2", "1"] {
+        run_script(&room, &format!("export SLURM_ARRAY_TASK_ID={task}\n{script}"), &["tasks"]);
+    }
+    run_script(&room, &script, &["merge"]);
+    check_pictures(&room);
+}
+
+/// Runs the template by the engine's own command: `tests/ci.sh` installs it.
+#[test]
+fn the_template_of_open_job_description_renders_the_picture() {
+    let (room, _) = room();
+    let template = job(&room, "openjd");
+    let parsed: Value = serde_json::from_str(&template).unwrap();
+    assert_eq!(parsed["specificationVersion"], "jobtemplate-2023-09");
+    assert_eq!(parsed["steps"][1]["dependencies"][0]["dependsOn"], "prepare");
+    let parameters = &parsed["steps"][1]["parameterSpace"]["taskParameterDefinitions"];
+    assert_eq!((&parameters[0]["type"], &parameters[0]["range"]), (&"CHUNK[INT]".into(), &"1-3".into()));
+    let openjd = std::env::var("PHOTONCARD_OPENJD").unwrap_or("openjd".to_owned());
+    if !is_there(&openjd, "--version") {
+        eprintln!("SKIPPED: openjd is missing (pip install openjd-cli), and the template is not run");
+        return;
+    }
+    let path = room.path(FOLDER).join("job.json");
+    std::fs::write(&path, template).unwrap();
+    let output = in_path(&openjd).arg("run").arg(&path).output().unwrap();
+    let said =
+        String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}");
+    assert!(said.contains("openjd_progress: 100"), "{said}");
+    check_pictures(&room);
+}
+
+/// Compiles the job type with a stand-in for Flamenco's manager, and runs the commands of the tasks in an
+/// order of their dependencies.
+#[test]
+fn the_job_type_of_flamenco_renders_the_picture() {
+    let (room, _) = room();
+    let script = job(&room, "flamenco");
+    if !is_there("node", "--version") {
+        eprintln!("SKIPPED: node is missing, and the job type is not run");
+        return;
+    }
+    let manager = r#"
+        const { execFileSync } = require("child_process");
+        const author = {
+            Task: (name, type) => ({ commands: [], before: [],
+                addCommand(command) { this.commands.push(command); },
+                addDependency(task) { this.before.push(task); } }),
+            Command: (name, settings) => ({ name, settings }),
+        };
+        const tasks = [];
+        compileJob({ settings: {}, addTask: (task) => tasks.push(task) });
+        const done = new Set();
+        const run = (task) => {
+            if (done.has(task)) return;
+            done.add(task);
+            task.before.forEach(run);
+            for (const { name, settings } of task.commands) {
+                if (name !== "exec") throw new Error(name);
+                execFileSync(settings.exe, settings.args);
+            }
+        };
+        if (tasks.length !== 5) throw new Error("tasks: " + tasks.length);
+        tasks.reverse().forEach(run);
+    "#;
+    room.write("job.js", script + manager);
+    let outcome = Outcome::of(&in_path("node").arg(room.path("job.js")).output().unwrap());
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    check_pictures(&room);
+}
+
+#[test]
+fn progress_and_failure_are_lines_of_open_job_description() {
+    let (room, _) = room();
+    let own = ["render", SCENE, "-o", "a.exr", "--progress", "openjd"];
+    let outcome = run(&room, &[&own[..], &OPTIONS].concat());
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    let percents: Vec<u32> = outcome
+        .stdout
+        .lines()
+        .map(|line| line.strip_prefix("openjd_progress: ").and_then(|number| number.parse().ok()).unwrap())
+        .collect();
+    assert!(percents.is_sorted() && percents.last() == Some(&100), "{percents:?}");
+    let outcome = run(&room, &["render", "absent\n.gltf", "-o", "a.exr", "--progress", "openjd"]);
+    assert_eq!(outcome.status, Some(2));
+    let (line, rest) = outcome.stdout.split_once('\n').unwrap();
+    assert!(line.starts_with("openjd_fail: cannot read absent\\n.gltf: ") && rest.is_empty(), "{line}");
+    let outcome = run(&room, &["merge", "absent.part", "-o", "a.exr", "--progress", "openjd"]);
+    assert!(outcome.stdout.starts_with("openjd_fail: cannot read absent.part"), "{}", outcome.stdout);
+}
+
+#[test]
+fn frames_of_a_job_are_those_of_one_render() {
+    let (room, _) = room();
+    std::fs::copy(shipped("cornell-moving.glb"), room.path(FOLDER).join(SCENE)).unwrap();
+    let frames = [&["--frames", "8-10", "--fps", "12"], &OPTIONS[..]].concat();
+    let whole = run(&room, &[&["render", SCENE, "-o", "whole.##.exr"], &frames[..]].concat());
+    assert_eq!(whole.status, Some(0), "{}", whole.stderr);
+    let own = ["farm", "parallel", SCENE, "--parts", "2", "-o", "it's out.##.exr"];
+    let script = run(&room, &[&own[..], &frames].concat()).stdout;
+    by_hand(&room, &script);
+    for frame in ["08", "09", "10"] {
+        let read = |name: &str| std::fs::read(room.path(FOLDER).join(format!("{name}.{frame}.exr"))).unwrap();
+        assert!(read("it's out") == read("whole"), "{frame}");
+    }
+}
+
+/// Tasks of frames name the frame, and its pictures are merged one by one.
+#[test]
+fn frames_are_tasks_of_their_own() {
+    let room = Room::new();
+    let own =
+        ["farm", "slurm", "a.gltf", "--frames", "9-11", "--parts", "4", "-o", "d/p##.##.exr", "--seed", "3"];
+    let script = room.run(&own).stdout;
+    let stand_in = "photoncard() { printf '%s\\n' \"$*\" >>said; }\n";
+    let script = script.replacen("set -eu\n", &format!("set -eu\n{stand_in}"), 1);
+    room.write("job.sh", &script);
+    let step = |step: &str, task: &str| {
+        let mut command = Command::new("sh");
+        command.arg(room.path("job.sh")).arg(step).env("SLURM_ARRAY_TASK_ID", task);
+        assert!(command.status().unwrap().success(), "{script}");
+    };
+    step("tasks", "6");
+    step("merge", "");
+    let prepare = script.replacen(
+        "set -eu\n",
+        "set -eu\ndiff() { false; }\nmv() { printf 'mv %s\\n' \"$*\" >>said; }\n",
+        1,
+    );
+    room.write("job.sh", &prepare);
+    step("prepare", "");
+    let said = String::from_utf8(room.read("said")).unwrap();
+    let lines: Vec<&str> = said.lines().collect();
+    assert!(lines[0].contains("/cards/######.card --frames 10 --resume --part 3/4 -o d/p."), "{said}");
+    assert!(lines[1].contains("/000009.") && lines[1].ends_with("of4.part -o d/p##.09.exr"), "{said}");
+    assert!(lines[4].starts_with("prepare a.gltf --seed 3 --frames 9-11 -o d/p."), "{said}");
+    assert!(lines[4].ends_with("/new/######.card"), "{said}");
+    assert_eq!(lines.len(), 6, "{said}");
+    assert!(script.contains("--array=0-11"), "{script}");
+}
+
+#[test]
+fn what_is_of_no_job_is_refused() {
+    let room = Room::new();
+    for (options, words) in [
+        (&["-o", "a.exr", "--stats", "-"][..], ["--stats is not for a farm's job", "help: leave it out"]),
+        (&["-o", "a.exr", "--counters"], ["--counters is not for a farm's job", "help: leave it out"]),
+        (&["-o", "a.exr", "--part", "1/2"], ["--part is not for a farm's job", "help: leave it out"]),
+        (&["-o", "a.part"], ["parts of its own", "help: give -o"]),
+        (&["-o", "a.exr", "--frames", "1-2"], ["no place for the number of a frame", "out.####.exr"]),
+        (&["-o", "a.####.exr", "--frames", "1,3"], ["follow each other", "--frames A-B"]),
+        (&["-o", "a.exr", "--parts", "0"], ["--parts", "65536"]),
+    ] {
+        let outcome = room.run(&[&["farm", "parallel", "a.gltf"], options].concat());
+        assert_eq!((outcome.status, &*outcome.stdout), (Some(2), ""), "{options:?}: {}", outcome.stderr);
+        let said = outcome.stderr.to_lowercase();
+        assert!(
+            words.iter().all(|word| said.contains(&word.to_lowercase())),
+            "{options:?}: {}",
+            outcome.stderr
+        );
+    }
+}

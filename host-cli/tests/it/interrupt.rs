@@ -1,0 +1,77 @@
+//! An interrupt ends a render or a self-test soon, with status 130 and no file left.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::support::{Emulator, Room, shipped, small_render};
+
+/// Time limit of a stopped process, generous for a loaded machine.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// Waits for the end of a process, and kills it after the time limit.
+fn wait(child: &mut Child) -> ExitStatus {
+    let start = Instant::now();
+    while start.elapsed() < PATIENCE {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    panic!("the process went on for {PATIENCE:?}");
+}
+
+/// Interrupts a render as soon as it has printed `phase`.
+fn interrupt(phase: &str, options: &[&str]) {
+    let room = Room::new();
+    room.write("out.exr", "old picture");
+    let cornell = shipped("cornell.gltf");
+    let options = [options, &["-o", "out.exr", "-o", "out.png"]].concat();
+    let mut command = room.command();
+    let mut child = command.args(small_render(&cornell, &options)).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let told = lines.find(|line| line.starts_with(&format!("photoncard: {phase} ")));
+    assert!(told.is_some(), "the render ended before its phase {phase}");
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    assert_eq!(wait(&mut child).code(), Some(130));
+    let last = lines.last();
+    assert_eq!(last.as_deref(), Some("photoncard: stopped; no picture was written"));
+    assert_eq!(room.names(), ["out.exr"]);
+    assert_eq!(room.read("out.exr"), b"old picture");
+}
+
+/// The card, which goes on with its test, serves the next host.
+#[test]
+fn while_a_card_tests_itself() {
+    let room = Room::new();
+    let card = Emulator::start(&room, "unix:card", &[]);
+    let mut command = room.command();
+    command.args(["card", "selftest", "--card", &card.address]);
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.next().is_some_and(|line| line.starts_with("photoncard: memory ")));
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    assert_eq!(wait(&mut child).code(), Some(130));
+    let last = lines.last();
+    assert_eq!(
+        last.as_deref(),
+        Some("photoncard: stopped; the card holds patterns of the test, and no scene")
+    );
+    assert_eq!(room.run(&["card", "info", "--card", &card.address]).status, Some(0));
+}
+
+#[test]
+fn while_photons_are_traced() {
+    interrupt("photons", &["--photons", "20000000"]);
+}
+
+#[test]
+fn while_a_picture_is_rendered() {
+    // The image is loaded, and a single tile would take minutes.
+    interrupt("load", &["--size", "256x256", "--spp", "4096", "--gather-rays", "64", "--tile", "32"]);
+}

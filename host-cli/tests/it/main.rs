@@ -1,0 +1,34 @@
+//! Tests of the command as it is run.
+
+mod bad_input;
+#[cfg(feature = "study")]
+mod commands_of_documents;
+mod costly_files;
+mod counters;
+mod display;
+mod documents;
+mod farm;
+mod first_minutes;
+mod foreign_text;
+mod frames;
+mod information;
+mod interrupt;
+mod links;
+mod notices;
+mod options;
+mod package;
+mod parts;
+mod passes;
+mod pictures;
+mod prepared;
+mod provenance;
+mod quality;
+mod resume;
+mod self_test;
+#[cfg(feature = "study")]
+mod study;
+mod support;
+mod tone_mapping;
+mod verify;
+mod view;
+mod view_browser;

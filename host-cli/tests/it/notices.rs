@@ -1,0 +1,120 @@
+//! Notices on scenes: what is ignored or missing is told, also to the quiet, and is an error of the strict.
+
+use crate::support::{Room, scene};
+use photoncard_driver::exr::read_rgb;
+use serde_json::{Value, json};
+
+/// Scene with a texture whose image is missing.
+fn without_texture() -> Value {
+    let mut scene = scene();
+    scene["images"] = json!([{"uri": "absent.png"}]);
+    scene["textures"] = json!([{"source": 0}]);
+    scene["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"] = json!({"index": 0});
+    scene["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = json!(3);
+    scene["bufferViews"][0]["byteLength"] = json!(84);
+    let coordinates = json!({"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC2"});
+    scene["accessors"].as_array_mut().unwrap().push(coordinates);
+    scene
+}
+
+#[test]
+fn a_missing_texture_is_told_to_the_quiet_and_refused_by_the_strict() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &without_texture());
+    let said = room.rendered("scene.gltf", &["-o", "a.exr", "--quiet"]).stderr;
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(
+        said.starts_with("photoncard: ignored or missing: textures are left out")
+            && said.contains("absent.png"),
+        "{said}"
+    );
+    let arguments = ["prepare", "scene.gltf", "-o", "a.card", "--photons", "100", "--quiet"];
+    let prepared = room.run(&arguments);
+    assert!(prepared.status == Some(0) && prepared.stderr == said, "{}", prepared.stderr);
+    let names = room.names();
+    for arguments in [
+        &["render", "scene.gltf", "-o", "b.exr", "--strict"][..],
+        &["prepare", "scene.gltf", "-o", "b.card", "--strict", "--quiet"],
+        &["render", "scene.gltf", "-o", "b.#.exr", "--strict", "--size", "8x8"],
+    ] {
+        let strict = room.run(arguments);
+        let is_named = strict.stderr.contains("absent.png") && strict.stderr.contains("--strict");
+        assert!(strict.status == Some(2) && is_named, "{arguments:?}: {}", strict.stderr);
+    }
+    assert_eq!(room.names(), names);
+    room.write_scene("whole.gltf", &scene());
+    assert_eq!(room.rendered("whole.gltf", &["-o", "a.exr", "--quiet", "--strict"]).stderr, "");
+}
+
+/// A light that no surface meets: the sky is seen, and a plane from behind is black.
+#[test]
+fn a_scene_without_photons_has_a_picture() {
+    let room = Room::new();
+    let mut scene = scene();
+    scene["meshes"][0]["primitives"].as_array_mut().unwrap().truncate(1);
+    let point = json!({"lights": [{"type": "directional", "intensity": 1}]});
+    scene["extensions"] = json!({"KHR_lights_punctual": point});
+    scene["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual"]);
+    // Light from below the floor, whose back is one-sided.
+    let below = json!({"rotation": [1, 0, 0, 1], "extensions": {"KHR_lights_punctual": {"light": 0}}});
+    scene["nodes"].as_array_mut().unwrap().push(below);
+    scene["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    room.write_scene("scene.gltf", &scene);
+    for quality in ["paper", "good"] {
+        let said = room.rendered("scene.gltf", &["-o", "a.exr", "--quality", quality]).stderr;
+        assert!(said.contains("only 0 photons were stored of 10"), "{said}");
+        assert!(said.contains("the picture is black: no light reaches what is seen"), "{said}");
+    }
+    // Direct light of a bright sky on what is seen stays.
+    let options = ["-o", "a.exr", "--set", "floor.diffuse=0,0,0", "--environment", "1,1,1"];
+    let said = room.rendered("scene.gltf", &options).stderr;
+    let picture = read_rgb(&room.path("a.exr")).unwrap();
+    assert!(picture.pixels.contains(&[1.0; 3]) && picture.pixels.contains(&[0.0; 3]), "{said}");
+}
+
+#[test]
+fn an_orthographic_camera_is_refused_and_another_view_is_not() {
+    let room = Room::new();
+    let mut scene = scene();
+    let orthographic = json!({"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9});
+    scene["cameras"][0] = json!({"name": "plan", "type": "orthographic", "orthographic": orthographic});
+    room.write_scene("scene.gltf", &scene);
+    for options in [&[][..], &["--camera", "plan"], &["--camera-at", "0,1,2"]] {
+        let refused = room.render("scene.gltf", &[&["-o", "a.exr"], options].concat());
+        let is_named =
+            refused.stderr.contains("'plan' is orthographic") && refused.stderr.contains("--look-at");
+        assert!(refused.status == Some(2) && is_named, "{options:?}: {}", refused.stderr);
+    }
+    room.rendered(
+        "scene.gltf",
+        &["-o", "a.exr", "--camera-at", "0,1,2", "--look-at", "0,0,0", "--fov", "40"],
+    );
+}
+
+/// A file without a camera, and one with an orthographic camera before another.
+#[test]
+fn what_the_command_line_states_in_place_of_the_file_is_no_fault_of_a_strict_render() {
+    let room = Room::new();
+    let mut bare = scene();
+    bare["nodes"][1].as_object_mut().unwrap().remove("camera");
+    room.write_scene("bare.gltf", &bare);
+    let mut plan = scene();
+    let orthographic = json!({"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9});
+    let camera = json!({"name": "plan", "type": "orthographic", "orthographic": orthographic});
+    plan["cameras"].as_array_mut().unwrap().insert(0, camera);
+    plan["nodes"][1]["camera"] = json!(1);
+    plan["nodes"].as_array_mut().unwrap().insert(0, json!({"camera": 0}));
+    plan["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    room.write_scene("plan.gltf", &plan);
+    let view = ["--camera-at", "0,1,2", "--look-at", "0,0,0"];
+    for (scene, chosen) in
+        [("bare.gltf", &view[..]), ("plan.gltf", &view), ("plan.gltf", &["--camera", "eye"])]
+    {
+        let options = [&["-o", "a.exr", "--strict", "--quiet"][..], chosen].concat();
+        assert_eq!(room.rendered(scene, &options).stderr, "", "{scene} {chosen:?}");
+    }
+    for (scene, part) in [("bare.gltf", "has no camera"), ("plan.gltf", "is orthographic")] {
+        let refused = room.render(scene, &["-o", "a.exr", "--strict", "--camera-at", "0,1,2"]);
+        assert!(refused.status == Some(2) && refused.stderr.contains(part), "{}", refused.stderr);
+    }
+}

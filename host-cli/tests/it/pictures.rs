@@ -1,0 +1,279 @@
+//! Outputs of a render; the picture depends on nothing but the scene and its settings.
+
+use crate::support::{Room, scene, scene_bytes, scene_of, shipped, small_render};
+use photoncard_driver::exr::{RgbImage, read_rgb};
+use serde_json::{Value, json};
+
+fn picture(room: &Room, name: &str) -> RgbImage {
+    read_rgb(&room.path(name)).unwrap()
+}
+
+#[test]
+fn layers_are_asked_for_by_name_and_leave_the_picture_as_it_is() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let of_options = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr"], options].concat());
+        (picture(&room, "a.exr"), room.read("a.exr"))
+    };
+    let (plain, bytes) = of_options(&[]);
+    assert_eq!(of_options(&["--aov=Z,N,albedo"]).1, bytes);
+    let mut sizes = vec![bytes.len()];
+    for list in ["all", "none", "direct,gathers"] {
+        for card in ["emulated:2", "emulated-micro:2"] {
+            let (same, other) = of_options(&["--aov", list, "--card", card]);
+            assert!(same == plain, "{list}");
+            sizes.push(other.len());
+        }
+    }
+    // The file has the requested channels, and no others.
+    let [default, all, again, none, _, some, _] = sizes[..] else { panic!("{sizes:?}") };
+    assert!(all == again && all > default && none < some && none < default, "{sizes:?}");
+
+    let outcome = room.render("scene.gltf", &["-o", "b.exr", "--aov=all", "--tile=33", "--card=emulated:1"]);
+    assert_eq!(outcome.status, Some(2));
+    assert!(outcome.stderr.contains("32 or less") && outcome.stderr.contains("--aov"), "{}", outcome.stderr);
+    let outcome = room.render("scene.gltf", &["-o", "b.exr", "--aov=depth"]);
+    assert_eq!(outcome.status, Some(2));
+    assert!(outcome.stderr.contains("direct,indirect,caustic,albedo,N,Z,gathers"), "{}", outcome.stderr);
+}
+
+#[test]
+fn a_render_writes_pictures_and_statistics() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    // One card: bytes in transit to another at the end count as payload, but not yet as sent.
+    let files = ["-o", "a.exr", "-o", "a.png", "--stats", "a.json", "--card", "emulated:1"];
+    let outcome = room.rendered(&cornell, &files);
+    assert_eq!(room.names(), ["a.exr", "a.json", "a.png"]);
+    assert!(room.read("a.png").starts_with(b"\x89PNG\r\n\x1a\n"));
+    assert!(outcome.stderr.lines().all(|line| line.starts_with("photoncard: ")), "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("tiles"), "{}", outcome.stderr);
+    assert!(!outcome.stderr.contains(['\r', '\x1b']), "{:?}", outcome.stderr);
+
+    let statistics: Value = serde_json::from_slice(&room.read("a.json")).unwrap();
+    for key in ["scene", "photons", "pack", "load", "render", "total"] {
+        assert!(statistics["time_s"][key].as_f64().is_some_and(|seconds| seconds >= 0.0), "{key}");
+    }
+    assert_eq!(statistics["rays"]["eye"], 2 * 64);
+    for pointer in ["/rays/shadow", "/rays/gather", "/gathers", "/image_bytes"] {
+        assert!(statistics.pointer(pointer).and_then(Value::as_u64).is_some_and(|n| n > 0), "{pointer}");
+    }
+    let link = |key: &str| statistics["link"][key].as_u64().unwrap();
+    assert!(link("wire_bytes") > link("payload_bytes") && link("payload_bytes") > 0);
+    assert_eq!(link("retransmitted_frames"), 0);
+
+    let outcome = room.run(&["diff", "a.exr", "a.exr"]);
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    let difference: Value = serde_json::from_str(&outcome.stdout).unwrap();
+    for pointer in ["/pixels/mse", "/pixels/rmse", "/pixels/relmse", "/blocks/mse"] {
+        assert_eq!(difference.pointer(pointer), Some(&json!(0.0)), "{pointer}");
+    }
+}
+
+/// The first line is what was loaded, the last what was written; with a remaining time in between.
+#[test]
+fn a_render_says_what_it_loads_and_what_it_has_done() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let options = ["-o", "a.png", "-o", "./a.exr", "--spp", "3", "--crop", "0,8,0,5", "--tile", "1"];
+    let said = room.rendered("scene.gltf", &options).stderr;
+    let lines: Vec<_> = said.lines().collect();
+    assert_eq!(
+        lines[0],
+        "photoncard: scene.gltf: 3 triangles, 2 materials, 0 images, light of 1 emissive triangle; seen by 'eye', 8 x 8 pixels"
+    );
+    let last = lines[lines.len() - 1];
+    assert!(last.starts_with("photoncard: a.png, ./a.exr: done in "), "{last}");
+    assert!(last.contains("; 3 samples a pixel, 120 in all"), "{last}");
+    let tiles: Vec<_> = lines.iter().filter(|line| line.starts_with("photoncard: tiles ")).collect();
+    assert!(tiles.len() > 1 && tiles.iter().all(|line| line.ends_with(" left")), "{said}");
+    assert!(
+        tiles[tiles.len() - 1].contains("40 of 40") && tiles[tiles.len() - 1].ends_with(", 0 s left"),
+        "{said}"
+    );
+}
+
+/// Data alone is on standard output, and the rest where it always is.
+#[test]
+fn statistics_go_to_standard_output_by_a_dash() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    for more in [&[][..], &["--quiet", "--counters"]] {
+        let outcome = room.render("scene.gltf", &[&["-o", "a.exr", "--stats", "-"], more].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        let statistics: Value = serde_json::from_str(&outcome.stdout).unwrap();
+        assert_eq!(statistics["width"], 8);
+        assert_eq!(outcome.stderr.is_empty(), !more.is_empty(), "{}", outcome.stderr);
+    }
+    room.rendered("scene.gltf", &["-o", "a.exr", "--stats", "./-"]);
+    assert_eq!(room.names(), ["-", "a.exr", "scene.gltf"]);
+}
+
+#[test]
+fn quiet_is_silent() {
+    let room = Room::new();
+    let outcome = room.rendered(&shipped("cornell-glossy.gltf"), &["-o", "a.exr", "--quiet"]);
+    assert_eq!(outcome.stderr, "");
+}
+
+#[test]
+fn the_same_bytes_however_they_are_rendered() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    room.rendered(&cornell, &["-o", "first.exr", "--size", "20x20"]);
+    for options in [
+        &[][..],
+        &["--order", "naive"],
+        &["--order", "tiled"],
+        &["--card", "emulated:1"],
+        &["--card", "emulated:2", "--threads", "1"],
+        &["--card", "emulated:3", "--threads", "2"],
+        &["--card", "emulated:1", "--card", "emulated-micro:2"],
+        &["--tile", "1"],
+        &["--tile", "7", "--order", "naive"],
+        &["--tile", "32"],
+    ] {
+        room.rendered(&cornell, &[&["-o", "other.exr", "--size", "20x20", "--quiet"], options].concat());
+        assert!(room.read("other.exr") == room.read("first.exr"), "{options:?}");
+    }
+    room.rendered(&cornell, &["-o", "other.exr", "--size", "20x20", "--seed", "1"]);
+    assert!(room.read("other.exr") != room.read("first.exr"));
+}
+
+#[test]
+fn a_crop_is_a_part_of_the_whole() {
+    let room = Room::new();
+    let cornell = shipped("cornell.gltf");
+    room.rendered(&cornell, &["-o", "whole.exr", "--size", "20x16"]);
+    room.rendered(&cornell, &["-o", "part.exr", "--size", "20x16", "--crop", "3,17,5,16"]);
+    let (whole, part) = (picture(&room, "whole.exr"), picture(&room, "part.exr"));
+    assert_eq!((part.width, part.height, part.data_window_origin), (14, 11, [3, 5]));
+    for (row, pixels) in part.pixels.chunks(14).enumerate() {
+        let first = (row + 5) * whole.width + 3;
+        assert_eq!(pixels, &whole.pixels[first..first + 14], "row {row}");
+    }
+}
+
+#[test]
+fn a_setting_of_a_material_changes_the_picture() {
+    let room = Room::new();
+    let glossy = shipped("cornell-glossy.gltf");
+    // The glossy lobe reflects the light of final gather rays: with few of them the difference is visible.
+    let common = ["--size", "16x16", "--gather-rays", "16", "--quiet"];
+    room.rendered(&glossy, &[&common[..], &["-o", "a.exr"]].concat());
+    room.rendered(&glossy, &[&common[..], &["-o", "b.exr", "--set", "floor.exponent=2"]].concat());
+    assert_ne!(picture(&room, "a.exr").pixels, picture(&room, "b.exr").pixels);
+}
+
+#[test]
+fn an_environment_lights_the_picture() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let pixels = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr"], options].concat());
+        picture(&room, "a.exr").pixels
+    };
+    let plain = pixels(&[]);
+    assert!(plain == pixels(&["--environment", "0,0,0"]));
+    assert!(plain != pixels(&["--environment", "1, 2, 3"]));
+    // A picture of the scene serves as the map.
+    room.rendered("scene.gltf", &["-o", "map.exr"]);
+    assert!(plain != pixels(&["--environment", "map.exr"]));
+}
+
+#[test]
+fn triangles_of_no_area_are_counted_and_left_out() {
+    let room = Room::new();
+    let mut bytes = scene_bytes();
+    // The floor's second triangle becomes a line.
+    bytes[92..94].copy_from_slice(&0u16.to_le_bytes());
+    room.write_scene("scene.gltf", &scene_of(&bytes));
+    let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
+    let told = outcome.stderr.lines().filter(|line| line.contains("zero area")).collect::<Vec<_>>();
+    let [told] = told[..] else { panic!("{told:?}") };
+    assert!(
+        told.starts_with("photoncard: scene.gltf: 2 triangles (and 1 of zero area, left out), "),
+        "{told}"
+    );
+    let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
+    assert!(
+        information.contains("  triangles   2, 1 of them emissive\n  left out    1 of zero area\n"),
+        "{information}"
+    );
+}
+
+#[test]
+fn what_is_ignored_is_said_once() {
+    let room = Room::new();
+    let mut scene = scene();
+    // An image of an unused texture is not read.
+    scene["images"] = json!([{"uri": "absent.png"}]);
+    scene["textures"] = json!([{"source": 0}]);
+    scene["materials"][0]["occlusionTexture"] = json!({"index": 0});
+    scene["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual", "EXT_unheard_of"]);
+    scene["extensions"] =
+        json!({"KHR_lights_punctual": {"lights": [{"type": "point", "name": "bulb", "range": 3.0}]}});
+    room.write_scene("scene.gltf", &scene);
+    let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
+    let information = room.run(&["scene", "info", "scene.gltf"]).stdout;
+    for sentence in ["occlusion textures", "range of lights", "EXT_unheard_of is ignored"] {
+        let lines: Vec<_> = outcome.stderr.lines().filter(|line| line.contains(sentence)).collect();
+        assert!(
+            lines.len() == 1 && lines[0].starts_with("photoncard: ignored or missing: "),
+            "{}",
+            outcome.stderr
+        );
+        assert_eq!(outcome.stderr.matches(sentence).count(), 1, "{sentence}: {}", outcome.stderr);
+        assert_eq!(information.matches(sentence).count(), 1, "{sentence}: {information}");
+    }
+}
+
+#[test]
+fn the_camera_gives_the_picture_its_aspect_ratio() {
+    let room = Room::new();
+    let mut scene = scene();
+    scene["cameras"][0]["perspective"]["aspectRatio"] = json!(64.0);
+    room.write_scene("scene.gltf", &scene);
+    let without_size: Vec<_> = small_render("scene.gltf", &["-o", "a.exr"]);
+    let place = without_size.iter().position(|argument| *argument == "--size").expect("a small size");
+    let arguments = [&without_size[..place], &without_size[place + 2..]].concat();
+    let outcome = room.run(&arguments);
+    assert_eq!((outcome.status, outcome.stderr.contains("aspect")), (Some(0), false), "{}", outcome.stderr);
+    let found = picture(&room, "a.exr");
+    assert_eq!((found.width, found.height), (512, 8));
+
+    // Another size is rendered as it is given, with the same field of view from top to bottom.
+    let said = room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x8"]).stderr;
+    assert!(said.contains("'eye' has an aspect ratio of 64") && said.contains("--size 128x2 "), "{said}");
+    let narrow = picture(&room, "a.exr");
+    assert_eq!((narrow.width, narrow.height), (128, 8));
+    assert!(!room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x2"]).stderr.contains("aspect"));
+}
+
+/// A view by options is the one that a file states.
+#[test]
+fn a_view_by_options_is_that_of_a_camera_there() {
+    let room = Room::new();
+    let mut stated = scene();
+    stated["nodes"][1]["translation"] = json!([0.25, 0.75, 2.5]);
+    stated["cameras"][0]["perspective"]["yfov"] = json!(45_f32.to_radians());
+    room.write_scene("stated.gltf", &stated);
+    room.write_scene("other.gltf", &scene());
+    stated["scenes"][0]["nodes"] = json!([0]);
+    room.write_scene("without.gltf", &stated);
+    let pixels = |name: &str, options: &[&str]| {
+        room.rendered(name, &[&["-o", "a.exr"], options].concat());
+        picture(&room, "a.exr").pixels
+    };
+    let expected = pixels("stated.gltf", &[]);
+    let place = ["--camera-at", "0.25,0.75,2.5"];
+    let view = [&place[..], &["--look-at", "0.25,0.75,-7", "--fov", "45"]].concat();
+    for name in ["other.gltf", "without.gltf"] {
+        assert!(pixels(name, &view) == expected, "{name}");
+    }
+    assert!(pixels("without.gltf", &[]) != expected);
+    // Options that are not given leave the camera's own values.
+    assert!(pixels("other.gltf", &[&place[..], &["--fov=45"]].concat()) == expected);
+    assert!(pixels("other.gltf", &place) != expected);
+}

@@ -1,0 +1,255 @@
+//! Provenance: everything that pixels depend on in pictures, and everything that the work depends on in
+//! statistics.
+
+use std::collections::BTreeSet;
+
+use crate::support::{Room, scene, shipped};
+use serde_json::{Value, json};
+
+/// Options that pixels depend on: a value of each that is not the default, its key in the provenance, and the
+/// value there.
+fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
+    vec![
+        (&["--size", "9x7"], "size", json!([9, 7])),
+        (&["--crop", "1,5,2,6"], "crop", json!([1, 5, 2, 6])),
+        (&["--camera", "camera"], "camera", json!("camera")),
+        (&["--camera-at", "0,1.25, 2"], "camera-at", json!([0.0, 1.25, 2.0])),
+        (&["--look-at", "-0.5,0.5,0"], "look-at", json!([-0.5, 0.5, 0.0])),
+        (&["--fov", "12.5"], "fov", json!(12.5)),
+        (&["--quality", "draft"], "spp", json!(8)),
+        (&["--filter", "gaussian"], "filter", json!("gaussian")),
+        (&["--aov", "direct,Z"], "aov", json!("direct,Z")),
+        (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),
+        (&["--light-units", "watts"], "light-units", json!("watts")),
+        (&["--energy-compensation"], "energy-compensation", json!(true)),
+        (&["--environment", "1,2,3"], "environment", json!("1,2,3")),
+        (&["--environment-rotation", "-9.5", "--environment", "1,2,3"], "environment-rotation", json!(-9.5)),
+        (&["--seed", "5"], "seed", json!(5)),
+        (&["--photons", "300"], "photons", json!(300)),
+        (&["--photons-for", "camera"], "photons-for", json!("camera")),
+        (&["--neighbors", "6"], "neighbors", json!(6)),
+        (&["--caustic-photons", "90"], "caustic-photons", json!(90)),
+        (&["--caustic-neighbors", "9"], "caustic-neighbors", json!(9)),
+        (&["--max-distance", "0.5"], "max-distance", json!(0.5)),
+        (&["--radiance", "precomputed"], "radiance", json!("precomputed")),
+        (&["--gather-rays", "5"], "gather-rays", json!(5)),
+        (&["--shadow-rays", "2"], "shadow-rays", json!(2)),
+        (&["--spp", "2"], "spp", json!(2)),
+        (&["--sampling", "mixture"], "sampling", json!("mixture")),
+        (&["--irradiance-cache", "on"], "ic-error", json!(0.025_f32)),
+        (&["--ic-error", "0.5", "--irradiance-cache", "on"], "ic-error", json!(0.5)),
+        (&["--adaptive", "0.5"], "adaptive", json!(0.5)),
+    ]
+}
+
+/// Options that no pixel depends on.
+const OTHERS: [&[&str]; 23] = [
+    &["--strict"],
+    &["--photon-map", "jensen"],
+    &["--tile", "3"],
+    &["--order", "naive"],
+    &["--bins", "5"],
+    &["--queue", "7"],
+    &["--in-flight", "1"],
+    &["--card", "emulated-micro:2"],
+    &["--verify", "0.5", "--card", "emulated:2"],
+    &["--faults", "flips=1e-6"],
+    &["--resume"],
+    &["--keep-samples"],
+    // Without the irradiance cache.
+    &["--planned-spp", "7"],
+    &["--counters"],
+    &["--cache", "unified=8K/128/2"],
+    &["--trace", "a.din.gz", "--card", "emulated:1"],
+    &["--trace-format", "ramulator", "--trace", "a.gz", "--card", "emulated:1"],
+    &["--trace-labels", "--trace", "a.din.gz", "--card", "emulated:1"],
+    &["--threads", "2"],
+    &["--exposure", "1", "-o", "a.png"],
+    &["--tonemap", "aces", "-o", "a.png"],
+    &["--display-server", "127.0.0.1:1"],
+    &["--stats", "a.json"],
+];
+
+/// Options on the storage of samples, which the file states itself, and on messages.
+const OF_THE_FILE: [&str; 5] = ["--output", "--sample-type", "--quiet", "--progress", "--help"];
+
+/// Option that pixels depend on, and that no shipped scene takes.
+const OF_SCENES_WITH_VARIANTS: &str = "--variant";
+
+/// Options of frames, which a test of their own has.
+const OF_FRAMES: [&str; 3] = ["--frames", "--animation", "--fps"];
+
+/// Options of prepared scenes and of parts, which tests of their own have.
+const OF_FARMS: [&str; 2] = ["--part", "--prepared"];
+
+/// Options that state the number of samples by an aim.
+const OF_SAMPLES: [&str; 2] = ["--noise", "--time"];
+
+/// Provenance in an EXR file: the text of the attribute `photoncard`.
+fn provenance(file: &[u8]) -> Value {
+    let head = b"photoncard\0string\0";
+    let start = file.windows(head.len()).position(|bytes| bytes == head).expect("the attribute") + head.len();
+    let (length, text) = file[start..].split_first_chunk().expect("a length");
+    serde_json::from_slice(&text[..u32::from_le_bytes(*length) as usize]).expect("JSON")
+}
+
+/// Provenance of a render of a scene with mirrors and glass.
+fn rendered(room: &Room, options: &[&str]) -> Value {
+    let small = if options.contains(&"--caustic-photons") { &[][..] } else { &["--caustic-photons", "99"] };
+    // Samples that an earlier render has kept are not written over.
+    let _ = std::fs::remove_file(room.path("a.exr.partial"));
+    room.rendered(&shipped("cornell-spheres.glb"), &[&["-o", "a.exr"], small, options].concat());
+    provenance(&room.read("a.exr"))
+}
+
+#[test]
+fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
+    let room = Room::new();
+    let plain = rendered(&room, &[]);
+    assert_eq!((&plain["scene"], &plain["aov"]), (&json!("cornell-spheres.glb"), &json!("albedo,N,Z")));
+    let mut keys = BTreeSet::from(["program", "layout", "scene", "scene-checksum", "variant", "view"]);
+    for (options, key, value) in options_of_pixels() {
+        let found = rendered(&room, options);
+        assert_eq!(found[key], value, "{options:?}");
+        assert_ne!(plain[key], value, "{options:?}");
+        keys.insert(key);
+    }
+    let found: BTreeSet<_> = plain.as_object().expect("an object").keys().map(String::as_str).collect();
+    assert_eq!(found, keys);
+    for options in OTHERS {
+        assert_eq!(rendered(&room, options), plain, "{options:?}");
+    }
+}
+
+/// JSON of a text chunk of a PNG file; `None` without one of the keyword.
+fn text_of_png(file: &[u8], keyword: &str) -> Option<Value> {
+    let reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().expect("a PNG");
+    let chunk = reader.info().uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == keyword);
+    chunk.map(|chunk| serde_json::from_str(&chunk.text).expect("JSON"))
+}
+
+fn statistics(room: &Room) -> Value {
+    serde_json::from_slice(&room.read("a.json")).expect("JSON")
+}
+
+#[test]
+fn all_pictures_and_the_statistics_of_a_render_have_one_provenance() {
+    let room = Room::new();
+    let mut scene = scene();
+    scene["materials"][0]["name"] = json!("Größe \u{202e}");
+    room.write_scene("scene.gltf", &scene);
+    let set = ["--set", "Größe \u{202e}.diffuse=0.25", "--camera-at", "0,0.5,2"];
+    room.rendered("scene.gltf", &[&["-o", "a.exr", "-o", "a.png", "--stats", "a.json"][..], &set].concat());
+    let of_pixels = &statistics(&room)["provenance"]["pixels"];
+    assert_eq!(of_pixels["set"], json!(["Größe \u{202e}.diffuse=0.25"]));
+    assert_eq!(of_pixels["view"]["camera"], "eye");
+    assert_eq!(of_pixels["view"]["at"], json!([0.0, 0.5, 2.0]));
+    assert_eq!(provenance(&room.read("a.exr")), *of_pixels);
+    assert_eq!(text_of_png(&room.read("a.png"), "photoncard").as_ref(), Some(of_pixels));
+    let mapping = json!({"exposure": null, "tonemap": "reinhard"});
+    assert_eq!(text_of_png(&room.read("a.png"), "photoncard-tonemap"), Some(mapping));
+    let outcome = room.run(&["tonemap", "a.exr", "-o", "b.png", "--exposure=-1", "--tonemap=aces"]);
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    assert_eq!(text_of_png(&room.read("b.png"), "photoncard").as_ref(), Some(of_pixels));
+    let mapping = json!({"exposure": -1.0, "tonemap": "aces"});
+    assert_eq!(text_of_png(&room.read("b.png"), "photoncard-tonemap"), Some(mapping));
+}
+
+#[test]
+fn statistics_name_what_the_work_depends_on_besides_pixels() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    let work = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr", "--stats", "a.json"], options].concat());
+        statistics(&room)["provenance"]["work"].clone()
+    };
+    let plain = work(&["--card", "emulated:1"]);
+    assert_eq!(plain["protocol"], photoncard_shared::message::PROTOCOL_VERSION);
+    let cases: [(&[&str], &str, Value); 14] = [
+        (&["--photon-map", "jensen"], "photon-map", json!("jensen")),
+        (&["--tile", "3"], "tile", json!(3)),
+        (&["--order", "naive"], "order", json!("naive")),
+        (&["--bins", "5", "--order", "dirbin"], "bins", json!(5)),
+        (&["--queue", "7"], "queue", json!(7)),
+        (&["--in-flight", "1"], "in-flight", json!(1)),
+        (&["--card", "emulated-micro:2"], "card", json!(["emulated-micro:2"])),
+        (
+            &["--card", "emulated-micro:2", "--card", "emulated:1"],
+            "chips",
+            json!({"micro": 2, "reference": 1}),
+        ),
+        (&["--verify", "0.5", "--card", "emulated:2"], "verify", json!(0.5)),
+        (
+            &["--faults", "flips=1e-9,seed=3"],
+            "faults",
+            json!("flips=0.000000001,drops=0,repeats=0,delays=0,seed=3"),
+        ),
+        (&["--counters"], "cache", json!("photon=128K/128/4,scene=75K/128/4")),
+        (&["--cache", "unified=8K/128/2"], "cache", json!("unified=8K/128/2")),
+        (&["--quality", "draft"], "quality", json!("draft")),
+        (&["--threads", "2"], "threads", json!(2)),
+    ];
+    for (options, key, value) in cases {
+        assert_ne!(plain[key], value, "{options:?}");
+        assert_eq!(work(options)[key], value, "{options:?}");
+    }
+}
+
+#[test]
+fn scenes_of_one_name_that_differ_have_another_provenance() {
+    let room = Room::new();
+    let [dark, light] = [0.2, 0.9].map(|red| {
+        let mut scene = scene();
+        scene["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([red, 0.5, 0.5, 1.0]);
+        room.write_scene("scene.gltf", &scene);
+        room.rendered("scene.gltf", &["-o", "a.exr", "--max-distance", "0.5"]);
+        provenance(&room.read("a.exr"))
+    });
+    assert_eq!(dark["scene"], light["scene"]);
+    assert_ne!(dark, light);
+}
+
+#[test]
+fn a_variant_is_in_the_provenance_and_changes_the_scene() {
+    let room = Room::new();
+    let mut scene = scene();
+    scene["extensions"] =
+        json!({"KHR_materials_variants": {"variants": [{"name": "day"}, {"name": "night"}]}});
+    scene["materials"].as_array_mut().expect("a list").push(json!({"name": "dark"}));
+    scene["meshes"][0]["primitives"][0]["extensions"] =
+        json!({"KHR_materials_variants": {"mappings": [{"material": 2, "variants": [1]}]}});
+    room.write_scene("scene.gltf", &scene);
+    let of = |options: &[&str]| {
+        room.rendered("scene.gltf", &[&["-o", "a.exr", "--max-distance", "0.5"], options].concat());
+        provenance(&room.read("a.exr"))
+    };
+    let [stated, day, night] = [of(&[]), of(&["--variant", "day"]), of(&["--variant", "night"])];
+    assert_eq!(
+        [&stated, &day, &night].map(|of| of["variant"].clone()),
+        [Value::Null, json!("day"), json!("night")]
+    );
+    assert_eq!(stated["scene-checksum"], day["scene-checksum"]);
+    assert_ne!(stated["scene-checksum"], night["scene-checksum"]);
+    let info = room.run(&["scene", "info", "scene.gltf"]).stdout;
+    assert!(info.contains("Variants (2)\n  day\n  night\n"), "{info}");
+}
+
+/// A new option must be in one of the lists above.
+#[test]
+fn every_option_is_known_to_change_pixels_or_not_to() {
+    let help = Room::new().run(&["render", "--help"]).stdout;
+    let lines =
+        help.lines().filter_map(|line| line.trim_start().strip_prefix("-").map(|_| line.trim_start()));
+    let options = lines.filter_map(|line| line.split([' ', ',']).find(|word| word.starts_with("--")));
+    let offered: BTreeSet<_> = options.collect();
+    let of_pixels = options_of_pixels();
+    let known = of_pixels.iter().map(|(options, ..)| options[0]).chain(OTHERS.map(|options| options[0]));
+    let known: BTreeSet<_> = known
+        .chain(OF_THE_FILE)
+        .chain(OF_SAMPLES)
+        .chain(OF_FRAMES)
+        .chain(OF_FARMS)
+        .chain([OF_SCENES_WITH_VARIANTS])
+        .collect();
+    assert_eq!(offered, known);
+}

@@ -1,0 +1,197 @@
+//! `photoncard study` from outside: wrong arguments, an interrupt, and sweeps.
+
+use crate::support::{Room, scene, shipped};
+
+fn refused(arguments: &[&str], words: &[&str]) {
+    let room = Room::new();
+    room.write("taken", "");
+    let outcome = room.run(&[&["study"], arguments].concat());
+    assert_eq!((outcome.status, outcome.stdout.as_str()), (Some(2), ""), "{arguments:?}: {}", outcome.stderr);
+    for word in words {
+        assert!(outcome.stderr.contains(word), "{arguments:?}: {word:?} is not in: {}", outcome.stderr);
+    }
+}
+
+#[test]
+fn wrong_arguments_are_told_with_a_remedy() {
+    refused(&["figure-6.18", "--out", "out"], &["figure-6.18", "figure-6.17", "all"]);
+    refused(&["reordering"], &["--out"]);
+    refused(&[], &["--out", "NAME"]);
+    for sample in ["0/5", "3/2", "1/0", "text", "-1/2"] {
+        refused(&["scaling", "--out", "out", "--sample", sample], &[sample, "1/17"]);
+    }
+    refused(&["scaling", "--out", "out", "--threads", "0"], &["threads"]);
+    for (option, value) in [("--bandwidth", "0"), ("--flops", "x"), ("--latency", "-1"), ("--tasks", "0")] {
+        refused(&["interactive", "--out", "out", option, value], &[option, value, "use a number from"]);
+    }
+    refused(&["scaling", "--out", "out"], &["cornell.gltf", "scenes", "--scenes"]);
+    refused(&["scaling", "--out", "out", "--scenes", "nowhere"], &["cornell.gltf", "nowhere", "--scenes"]);
+    refused(&["scaling", "--out", "taken"], &["taken", "--out"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupt_ends_a_study_and_keeps_its_points() {
+    use std::io::{BufRead, BufReader};
+    use std::process::{Command, Stdio};
+
+    let room = Room::new();
+    let folder = shipped("");
+    let arguments = ["study", "reordering", "--quick", "--out", "out", "--scenes", &folder, "--threads", "1"];
+    let mut child = room.command().args(arguments).stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
+    let finished = |line: &String| -> Option<usize> {
+        line.strip_prefix("photoncard: reordering ")?.split(' ').next()?.parse().ok()
+    };
+    // Progress is printed in tenths: several points may be finished at the first line.
+    let finished = lines.find_map(|line| finished(&line).filter(|&count| count > 0)).unwrap();
+    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(kill.success());
+    let last = lines.last().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{last}");
+    assert!(last.contains("stopped") && last.contains("points are kept"), "{last}");
+    assert!(std::fs::read_dir(room.path("out/points")).unwrap().count() >= finished);
+    assert!(!room.path("out/index.html").exists());
+}
+
+/// Options of a minimal sweep of the scene `my scene.gltf`.
+const SWEEP: [&str; 15] = [
+    "sweep",
+    "my scene.gltf",
+    "--out",
+    "out",
+    "--size",
+    "16x16",
+    "--photons",
+    "200",
+    "--neighbors",
+    "5",
+    "--gather-rays",
+    "8",
+    "--tile",
+    "4",
+    "--quiet",
+];
+
+fn room_with_a_scene() -> Room {
+    let room = Room::new();
+    room.write_scene("my scene.gltf", &scene());
+    room
+}
+
+#[test]
+fn a_sweep_measures_every_combination_of_a_scene_of_ones_own() {
+    let room = room_with_a_scene();
+    let arguments = [
+        "--vary",
+        "order=naive,sort",
+        "--vary",
+        "cache=1K",
+        "--vary",
+        "set=floor.diffuse=0.2,floor.diffuse=0.8",
+    ];
+    let outcome = room.run(&[&["study"], &SWEEP[..], &arguments].concat());
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    let points = String::from_utf8(room.read("out/points.csv")).unwrap();
+    let rows: Vec<_> = points.lines().skip(1).map(|row| row.split(',').take(3).collect::<Vec<_>>()).collect();
+    assert_eq!(rows.len(), 4);
+    assert_eq!(rows[1], ["naive", "1K", "floor.diffuse=0.8"]);
+    let page = String::from_utf8(room.read("out/index.html")).unwrap();
+    for text in ["Sweep of my scene.gltf", "by-order.svg", "scene-checksum", "unified"] {
+        assert_eq!(page.contains(text), text != "unified", "{text}");
+    }
+    let points = || std::fs::read_dir(room.path("out/points")).unwrap().count();
+    assert_eq!(points(), 4);
+    // Two orders and materials of four are finished.
+    let more = ["--cache", "photon=1K/128/4", "--cache", "unified=2K/128/4", "--vary", "order=sort"];
+    let set = ["--vary", "set=floor.diffuse=0.2"];
+    let machine = ["--bandwidth", "12.5", "--flops", "80"];
+    let outcome = room.run(&[&["study"], &SWEEP[..], &more, &set, &machine].concat());
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    assert_eq!(points(), 5);
+    let page = String::from_utf8(room.read("out/index.html")).unwrap();
+    assert!(page.contains("12.5 GB/s and 80 GFLOPS, reads of 100 ns, 128 tasks in flight"), "the provenance");
+}
+
+/// Requests of a sweep of all tiles are those of a render with counters.
+#[test]
+fn a_sweep_of_all_tiles_counts_what_a_render_counts() {
+    let room = room_with_a_scene();
+    let options =
+        ["--size", "16x16", "--photons", "200", "--neighbors", "5", "--gather-rays", "8", "--tile", "4"];
+    let render = [
+        "--quality",
+        "paper",
+        "--shadow-rays",
+        "8",
+        "-o",
+        "a.exr",
+        "--counters",
+        "--stats",
+        "a.json",
+        "--card",
+        "emulated-micro:1",
+    ];
+    room.rendered("my scene.gltf", &[&options[..], &render].concat());
+    let outcome =
+        room.run(&[&["study"], &SWEEP[..], &["--sample", "1", "--card", "emulated-micro"]].concat());
+    assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
+    let statistics: serde_json::Value = serde_json::from_slice(&room.read("a.json")).unwrap();
+    let structures = String::from_utf8(room.read("out/structures.csv")).unwrap();
+    let rows: Vec<Vec<_>> = structures.lines().skip(1).map(|row| row.split(',').collect()).collect();
+    assert!(rows.len() >= 4, "{structures}");
+    for row in rows {
+        let counted = statistics["memory"]["structures"][row[0]]["requests"].as_f64().unwrap();
+        assert_eq!((row[1].parse::<f64>().unwrap() * 1e6).round(), counted, "{row:?}");
+    }
+}
+
+#[test]
+fn sweeps_that_are_not_possible_are_refused_with_value_and_remedy() {
+    let many = format!("seed={}", (0..300).map(|seed| seed.to_string()).collect::<Vec<_>>().join(","));
+    for (arguments, words) in [
+        (&["--vary", "order=naive,best"][..], &["order=best", "naive", "hilbert"][..]),
+        (&["--vary", "oder=naive"], &["\"oder\"", "order, bins, queue"]),
+        (&["--vary", "order"], &["OPTION=VALUE"]),
+        (&["--vary", "tile=4,,8"], &["a value is empty"]),
+        (&["--vary", "tile=4,8,4"], &["--vary tile has the value 4 twice", "leave one"]),
+        (&["--vary", "tile=4", "--vary", "tile=8"], &["tile is varied twice", "in one --vary"]),
+        (
+            &["--vary", "cache=8K", "--cache", "unified=8K/128/4", "--cache", "unified=4K/128/4"],
+            &["cache is varied twice"],
+        ),
+        (&["--vary", "cache=8K,100"], &["cache=100", "whole number of sets", "correct the values"]),
+        (&["--vary", &many, "--vary", "tile=4,8"], &["300 x 2 values make more than 512 points", "fewer"]),
+        (&["--vary", "queue=16,100000000"], &["--queue 100000000", "choose"]),
+        (&["--vary", "tile=4,64", "--card", "emulated-micro"], &["--tile 64", "or less"]),
+        (&["--vary", "order=hilbert", "--card", "emulated-micro"], &["--order hilbert", "--card emulated"]),
+        (&["--vary", "set=flor.diffuse=1"], &["flor", "floor"]),
+        (&["--vary", "camera=eye,back"], &["back", "eye"]),
+        (&["--cache", "8K"], &["--cache", "photon=128K/128/4"]),
+        (&["--vary", "cache=photon=8K/128/4,scene=8K/128/4"], &["parts of one cache", "by semicolons"]),
+        (&["--latency", "50"], &["unexpected argument", "--latency"]),
+        (&["--tasks", "3"], &["unexpected argument", "--tasks"]),
+    ] {
+        let room = room_with_a_scene();
+        let outcome = room.run(&[&["study"], &SWEEP[..], arguments].concat());
+        assert_eq!(outcome.status, Some(2), "{arguments:?}: {}", outcome.stderr);
+        for word in words {
+            assert!(outcome.stderr.contains(word), "{arguments:?}: {word:?} is not in: {}", outcome.stderr);
+        }
+        assert_eq!(room.names(), ["my scene.gltf"], "{arguments:?}");
+    }
+    refused(&["sweep", "absent.gltf", "--out", "out"], &["absent.gltf"]);
+    refused(&["sweep", "--out", "out"], &["SCENE"]);
+}
+
+#[test]
+fn a_quick_study_says_that_it_is_a_trial() {
+    let room = Room::new();
+    let folder = shipped("");
+    let arguments = ["study", "figure-6.17", "--quick", "--out", "taken", "--scenes", &folder];
+    room.write("taken", "");
+    let outcome = room.run(&arguments);
+    assert_eq!(outcome.status, Some(2));
+    let first = outcome.stderr.lines().next().unwrap();
+    assert!(first.starts_with("photoncard: Trial, no result: 128x128 pixels"), "{first}");
+}

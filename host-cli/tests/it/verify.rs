@@ -1,0 +1,90 @@
+//! Verification: tiles that two cards render for comparison.
+
+use crate::support::{Room, scene, shipped};
+use serde_json::json;
+
+const PICTURE: [&str; 8] =
+    ["--size", "64x64", "--photons", "2000", "--gather-rays", "20", "--quiet", "--stats=a.json"];
+
+fn statistics(room: &Room) -> serde_json::Value {
+    serde_json::from_slice(&room.read("a.json")).unwrap()
+}
+
+#[test]
+fn honest_cards_of_any_kind_agree_and_the_picture_is_the_same() {
+    let cornell = shipped("cornell.gltf");
+    let rendered = |options: &[&str]| {
+        let room = Room::new();
+        let outcome = room.run(&[&["render", &cornell, "-o", "a.exr"][..], &PICTURE, options].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        (room.read("a.exr"), statistics(&room))
+    };
+    let (expected, alone) = rendered(&["--card", "emulated:1", "--tile", "16"]);
+    let cards = ["--card", "emulated:1", "--card", "emulated-micro:1"];
+    for (share, verified) in [("1", 16..=16), ("0.000001", 1..=1)] {
+        for technique in [&[][..], &["--irradiance-cache", "on"]] {
+            let (found, statistics) = rendered(&[&cards[..], technique, &["--verify", share]].concat());
+            assert!(!technique.is_empty() || found == expected, "--verify {share}");
+            let tiles = statistics["verified_tiles"].as_u64().unwrap();
+            assert!(verified.contains(&tiles), "{tiles} tiles are verified");
+            assert!(statistics["repeated_tiles"].as_u64().unwrap() >= tiles);
+            assert_eq!(statistics["cards_given_up"], 0);
+            if technique.is_empty() {
+                assert_eq!(
+                    [&statistics["rays"], &statistics["gathers"]],
+                    [&alone["rays"], &alone["gathers"]]
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_verified_is_refused_in_words() {
+    let cornell = shipped("cornell.gltf");
+    for (options, words) in [
+        (&["--verify", "0.5", "--card", "emulated:1"][..], "a second card"),
+        (&["--verify", "0", "--card", "emulated:2"], "above 0 and at most 1"),
+        (&["--verify", "nan", "--card", "emulated:2"], "above 0 and at most 1"),
+        (&["--verify", "1", "--card", "emulated:2", "--counters"], "leave --counters"),
+        (&["--verify", "1", "--card", "emulated:2", "--order", "hilbert"], "--order sort"),
+    ] {
+        let room = Room::new();
+        let outcome = room.run(&[&["render", &cornell, "-o", "a.exr"][..], &PICTURE, options].concat());
+        assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
+        assert!(outcome.stderr.contains("--verify") && outcome.stderr.contains(words), "{}", outcome.stderr);
+        assert!(room.names().is_empty());
+    }
+}
+
+/// A lamp a hundredth of a millimetre above the floor.
+#[test]
+fn dazzling_light_of_a_card_alone_is_told() {
+    let room = Room::new();
+    let mut dazzling = scene();
+    let lights = json!({"lights": [{"type": "point", "intensity": 1}]});
+    dazzling["extensions"] = json!({"KHR_lights_punctual": lights});
+    dazzling["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual"]);
+    let lamp = json!({"translation": [0.0, 1e-5, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}});
+    dazzling["nodes"].as_array_mut().unwrap().push(lamp);
+    dazzling["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    room.write_scene("scene.gltf", &dazzling);
+    let view = ["--camera-at", "0,0.001,0.001", "--look-at", "0,0,0", "--fov", "20", "--stats", "a.json"];
+    for (cards, is_told) in [("emulated:1", true), ("emulated:2", false)] {
+        let options = [&["-o", "a.exr", "--quiet", "--card", cards][..], &view].concat();
+        let said = room.rendered("scene.gltf", &options).stderr;
+        assert_eq!(
+            said.contains("card 0 with light far beyond") && said.contains("--card"),
+            is_told,
+            "{said}"
+        );
+        assert_eq!(statistics(&room)["dazzling_tiles"].as_u64().unwrap() > 0, is_told);
+    }
+    // Parts do not state which cards have rendered them.
+    for number in ["1", "2"] {
+        let part = [&format!("--part={number}/2"), "-o", &format!("{number}.part"), "--quiet"];
+        room.rendered("scene.gltf", &[&part[..], &view[..6]].concat());
+    }
+    let merged = room.run(&["merge", "1.part", "2.part", "-o", "b.exr"]);
+    assert!(merged.status == Some(0) && merged.stderr.contains("far beyond"), "{}", merged.stderr);
+}

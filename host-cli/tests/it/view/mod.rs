@@ -1,0 +1,372 @@
+//! `photoncard view`: what its page can see and do, and what others cannot.
+
+mod connections;
+mod page;
+
+use std::process::Command;
+use std::time::Duration;
+
+use crate::support::{Emulator, Room, scene, shipped};
+use page::{View, camera};
+use serde_json::{Value, json};
+
+/// Options of a small picture.
+const SMALL: [&str; 14] = [
+    "--quality",
+    "paper",
+    "--size",
+    "20x12",
+    "--photons",
+    "200",
+    "--gather-rays",
+    "4",
+    "--neighbors",
+    "5",
+    "--shadow-rays",
+    "1",
+    "--card",
+    "emulated:1",
+];
+
+fn small_view(room: &Room, more: &[&str]) -> View {
+    room.write_scene("scene.gltf", &scene());
+    View::start(room, "scene.gltf", &[&SMALL, more].concat())
+}
+
+/// Runs the command that a page shows, into `picture`.
+fn run_shown(room: &Room, state: &Value, picture: &str) {
+    let shown = state["command"].as_str().unwrap();
+    let line =
+        shown.replacen("photoncard", env!("CARGO_BIN_EXE_photoncard"), 1).replace("picture.exr", picture);
+    let output = Command::new("sh").arg("-c").arg(&line).current_dir(room.path(".")).output().unwrap();
+    assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
+}
+
+#[test]
+fn a_page_is_greeted_with_the_scene() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let hello = view.connect().wait_for("hello");
+    assert_eq!(
+        (&hello["scene"]["name"], &hello["steers"], &hello["out"]),
+        (&json!("scene.gltf"), &json!(true), &json!(null))
+    );
+    assert_eq!(hello["scene"]["cameras"][0]["name"], "eye");
+    assert_eq!(hello["scene"]["materials"][1]["properties"]["emission"], json!([1.0, 1.0, 1.0]));
+    assert_eq!(hello["scene"]["low"], json!([-1.0, 0.0, -1.0]));
+}
+
+#[test]
+#[cfg(unix)]
+fn the_settled_picture_is_that_of_the_command_shown() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    let view = small_view(&room, &["--out", "out"]);
+    let mut page = view.connect();
+    for number in 0..4 {
+        match number {
+            0 => {}
+            1 => (0..20).for_each(|step| page.send(&camera(0.01 * f64::from(step), step < 19))),
+            2 => page.send(&json!({"type": "set", "name": "floor.diffuse", "value": [0.7, 0.2, 0.1]})),
+            _ => {
+                page.send(&json!({"type": "size", "size": [33, 17]}));
+                page.send(&json!({"type": "setting", "name": "cache", "value": true}));
+                page.send(&json!({"type": "layer", "name": "direct"}));
+            }
+        }
+        // A picture of some of the messages may settle before all have arrived.
+        let state = page.wait("state", |state| {
+            let is_last = match number {
+                0 => true,
+                1 => state["camera"]["position"][0].as_f64().is_some_and(|x| x > 0.185),
+                2 => state["changes"] != json!([]),
+                _ => state["settings"]["layers"] != "albedo,N,Z",
+            };
+            is_last && state["settled"] == true
+        });
+        let [exr, png] = ["exr", "png"].map(|ending| format!("{number}.{ending}"));
+        for name in [&exr, &png] {
+            page.send(&json!({"type": "save", "name": name}));
+            let saved = page.wait_for("saved");
+            assert!(saved["path"].as_str().unwrap().ends_with(name), "{saved}");
+        }
+        run_shown(&room, &state, &exr);
+        run_shown(&room, &state, &png);
+        for name in [&exr, &png] {
+            assert!(room.read(&format!("out/{name}")) == room.read(name), "{name}: {}", state["command"]);
+        }
+    }
+}
+
+/// The tiles of a settled picture took together what its command takes; with samples in several passes as
+/// well.
+#[test]
+#[cfg(unix)]
+fn tiles_tell_what_they_took() {
+    const UNKNOWN: u32 = u32::MAX;
+    let room = Room::new();
+    for (counters, options) in [
+        (&["--counters"][..], ["--spp", "1", "--irradiance-cache", "on"]),
+        (&[], ["--spp", "3", "--irradiance-cache", "off"]),
+    ] {
+        let view = small_view(&room, &[counters, &options, &["--tile", "8"]].concat());
+        let mut page = view.connect();
+        let mut state = page.settle();
+        state["command"] =
+            format!("{} --card emulated:1 --counters --stats stats.json", state["command"].as_str().unwrap())
+                .into();
+        run_shown(&room, &state, "a.exr");
+        let stats: Value = serde_json::from_slice(&room.read("stats.json")).unwrap();
+        let sum = |part: usize| page.work.values().map(|work| u64::from(work[part])).sum::<u64>();
+        assert_eq!(page.work.len(), 6);
+        assert_eq!(json!([sum(0), sum(1)]), json!([stats["gathers"], stats["records"]]));
+        let bytes = |part: &str| stats["memory"][part]["dram_bytes"].as_u64().unwrap();
+        assert_eq!(sum(1) > 0, options[3] == "on");
+        if counters.is_empty() {
+            assert!(page.work.values().all(|work| work[2] == UNKNOWN));
+        } else {
+            assert_eq!(128 * sum(2), bytes("photon_map") + bytes("scene"));
+        }
+    }
+}
+
+/// The shown command of a view whose quality finds its settings by pilot renders states all that they have
+/// found.
+#[test]
+#[cfg(unix)]
+fn a_quality_finds_the_settings_of_the_settled_picture() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    let options = ["--size", "12x12", "--quality", "draft", "--out", "out", "--card", "emulated:2"];
+    let view = View::start(&room, &shipped("cornell.gltf"), &options);
+    let mut page = view.connect();
+    let state = page.settle();
+    page.send(&json!({"type": "save", "name": "a.exr"}));
+    page.wait_for("saved");
+    run_shown(&room, &state, "a.exr");
+    assert!(room.read("out/a.exr") == room.read("a.exr"), "{}", state["command"]);
+    let plain = ["render", &shipped("cornell.gltf"), "--size", "12x12", "--quality", "draft", "-o", "b.exr"];
+    assert_eq!(room.run(&plain).status, Some(0));
+    assert!(room.read("b.exr") == room.read("a.exr"), "{}", state["command"]);
+}
+
+#[test]
+fn pictures_are_refined_from_coarse_to_fine_and_follow_edits() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.settle();
+    let lit = page.mean([20, 12]);
+    page.steps.clear();
+    page.send(&json!({"type": "set", "name": "lamp.emission", "value": 0.25}));
+    let state = page.settle();
+    let dark = page.mean([20, 12]);
+    assert!((0.2..0.3).contains(&(dark / lit)), "{dark} of {lit}");
+    let mut steps: Vec<u32> = page
+        .steps
+        .iter()
+        .filter(|(version, _)| *version == state["version"])
+        .map(|(_, step)| *step)
+        .collect();
+    steps.dedup();
+    // A page that is behind misses coarse ones.
+    assert!(steps.is_sorted_by(|a, b| a > b) && steps.last() == Some(&1), "{steps:?}");
+    assert_eq!(state["changes"], json!([{"name": "lamp.emission", "value": 0.25}]));
+    page.send(&json!({"type": "pick", "at": [10, 8]}));
+    let picked = page.wait_for("picked");
+    assert!(
+        picked["point"][1].as_f64().unwrap().abs() < 0.1 && picked["depth"].as_f64().unwrap() > 1.0,
+        "{picked}"
+    );
+    page.send(&json!({"type": "reset"}));
+    assert_eq!(page.settle()["changes"], json!([]));
+    assert!((page.mean([20, 12]) - lit).abs() < 1e-6);
+}
+
+#[test]
+fn a_scene_stays_lit() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    let version = page.settle()["version"].clone();
+    page.send(&json!({"type": "set", "name": "lamp.emission", "value": 0, "id": 7}));
+    let error = page.wait_for("error");
+    assert!(error["text"].as_str().unwrap().contains("light") && error["id"] == 7, "{error}");
+    page.send(&camera(0.5, false));
+    assert_eq!(page.settle()["version"], version.as_u64().unwrap() + 1);
+}
+
+#[test]
+fn settings_that_no_card_can_hold_are_named_and_change_nothing() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut page = view.connect();
+    let before = page.settle();
+    for (name, value, option) in [
+        ("gather_rays", u32::MAX, "--gather-rays"),
+        ("spp", 0, "--spp"),
+        ("spp", 5000, "--spp"),
+        ("tile", 100, "--tile"),
+    ] {
+        page.send(&json!({"type": "setting", "name": name, "value": value}));
+        let error = page.wait_for("error");
+        assert!(error["text"].as_str().unwrap().contains(option), "{error}");
+    }
+    page.send(&camera(0.2, false));
+    let after = page.settle();
+    assert_eq!(after["settings"], before["settings"]);
+    assert_eq!(after["version"], before["version"].as_u64().unwrap() + 1);
+    page.send(&json!({"type": "setting", "name": "gather_rays", "value": 3}));
+    assert_eq!(page.settle()["settings"]["gather_rays"], 3);
+}
+
+#[test]
+fn of_two_pages_one_steers() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    let mut first = view.connect();
+    assert_eq!(first.wait_for("hello")["steers"], true);
+    let mut second = view.connect();
+    assert_eq!(second.wait_for("hello")["steers"], false);
+    first.settle();
+    second.settle();
+    second.send(&camera(0.3, false));
+    assert!(second.wait_for("error")["text"].as_str().unwrap().contains("take over"));
+    second.send(&json!({"type": "steer"}));
+    assert_eq!([&mut first, &mut second].map(|page| page.wait_for("steers")["value"].clone()), [false, true]);
+    second.send(&camera(0.3, false));
+    let states = [first.settle(), second.settle()];
+    assert_eq!(states[0], states[1]);
+    assert_eq!(first.pixels, second.pixels);
+    drop(second);
+    assert_eq!(first.wait_for("steers")["value"], true);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_card_that_dies_and_comes_back_is_shown_and_used() {
+    let room = Room::new();
+    let card = Emulator::start(&room, "unix:card", &[]);
+    room.write_scene("scene.gltf", &scene());
+    let options: Vec<&str> =
+        SMALL.iter().copied().filter(|word| !["--card", "emulated:1"].contains(word)).collect();
+    let view = View::start(&room, "scene.gltf", &[&options, &["--card", card.address.as_str()][..]].concat());
+    let mut page = view.connect();
+    page.settle();
+    let before = page.mean([20, 12]);
+    drop(card);
+    let is = |state: &'static str| move |message: &Value| message["cards"][0]["state"] == state;
+    page.send(&camera(0.4, false));
+    page.wait("cards", is("lost"));
+    assert!(page.wait_for("error")["text"].as_str().unwrap().contains("no card is left"));
+    page.send(&json!({"type": "reset"}));
+    let _ = std::fs::remove_file(room.path("card"));
+    let _card = Emulator::start(&room, "unix:card", &[]);
+    page.wait("cards", is("ready"));
+    page.settle();
+    assert!((page.mean([20, 12]) - before).abs() < 1e-6);
+}
+
+#[test]
+fn why_a_picture_is_not_saved_is_told_in_plain_text() {
+    let room = Room::new();
+    std::fs::create_dir(room.path("out")).unwrap();
+    let view = small_view(&room, &["--out", "out"]);
+    let mut page = view.connect();
+    page.settle();
+    std::fs::remove_dir(room.path("out")).unwrap();
+    for name in ["a.exr", "a.png"] {
+        page.send(&json!({"type": "save", "name": name}));
+        let error = page.wait_for("error");
+        let text = error["text"].as_str().unwrap();
+        assert!(text.starts_with("cannot write") && text.contains(name) && !text.contains('\n'), "{text}");
+    }
+}
+
+#[test]
+fn what_a_view_cannot_be_is_said_at_once() {
+    let room = Room::new();
+    let view = small_view(&room, &[]);
+    for (options, said) in [
+        (&["--listen", view.host.as_str()][..], "--listen 127.0.0.1:0"),
+        (&["--listen", "127.0.0.1"], "--listen"),
+        (&["--listen", "127.0.0.1:0", "--crop", "0,1,0,1"], "--crop"),
+        (&["--listen", "127.0.0.1:0", "--size", "5000x5000"], "4194304"),
+        (&["--listen", "127.0.0.1:0", "--size", "5000x1"], "4096"),
+        (&["--listen", "127.0.0.1:0", "--trace", "trace.gz"], "--trace"),
+        (&["--listen", "127.0.0.1:0", "--out", "absent"], "absent"),
+        (&["--listen", "127.0.0.1:0", "--set", "flor.alpha=1"], "'floor'"),
+        (&["--listen", "127.0.0.1:0", "--spp", "0"], "--spp"),
+        (&["--listen", "127.0.0.1:0", "--tile", "1000"], "--tile"),
+    ] {
+        let outcome = room.run(&[&["view", "scene.gltf"], options].concat());
+        assert!(
+            matches!(outcome.status, Some(1 | 2)) && outcome.stderr.contains(said),
+            "{options:?}: {}",
+            outcome.stderr
+        );
+    }
+}
+
+/// A script stands in for the program that opens addresses, and `sh` for whoever reads what the view prints.
+#[test]
+#[cfg(target_os = "linux")]
+fn open_opens_the_page_and_other_addresses_come_with_a_warning() {
+    let room = Room::new();
+    room.write_scene("scene.gltf", &scene());
+    std::fs::create_dir(room.path("bin")).unwrap();
+    room.write("bin/xdg-open", "#!/bin/sh\necho \"$@\" > opened.part && mv opened.part opened\n");
+    assert!(
+        Command::new("chmod")
+            .args(["+x", "bin/xdg-open"])
+            .current_dir(room.path("."))
+            .status()
+            .unwrap()
+            .success()
+    );
+    let path = std::env::join_paths(
+        std::iter::once(room.path("bin")).chain(std::env::split_paths(&std::env::var_os("PATH").unwrap())),
+    );
+    for (address, is_warned) in [("127.0.0.1:0", false), ("0.0.0.0:0", true)] {
+        let mut command = room.command();
+        command
+            .args(["view", "scene.gltf", "--open", "--listen", address])
+            .env("PATH", path.as_ref().unwrap());
+        let [out, err] = ["out", "err"].map(|name| std::fs::File::create(room.path(name)).unwrap());
+        let mut view = command.args(SMALL).stdout(out).stderr(err).spawn().unwrap();
+        let mut opened = None;
+        for _ in 0..1000 {
+            opened = std::fs::read_to_string(room.path("opened")).ok();
+            if opened.is_some() {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        view.kill().and_then(|()| view.wait()).unwrap();
+        let [said, warned] = ["out", "err"].map(|name| String::from_utf8(room.read(name)).unwrap());
+        assert_eq!(opened.as_ref(), Some(&said), "{warned}");
+        assert!(said.starts_with("http://") && said.contains("/?token="), "{said}");
+        assert_eq!(warned.contains("warning: other machines can reach 0.0.0.0:"), is_warned, "{warned}");
+        std::fs::remove_file(room.path("opened")).unwrap();
+    }
+}
+
+/// A signal ends the view soon, whatever it does.
+#[test]
+#[cfg(unix)]
+fn an_interrupt_ends_the_view() {
+    let room = Room::new();
+    let mut view = small_view(&room, &[]);
+    let mut page = view.connect();
+    page.wait_for("hello");
+    let id = view.process.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
+    for _ in 0..500 {
+        if let Some(status) = view.process.try_wait().unwrap() {
+            assert_eq!(status.code(), Some(130));
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    panic!("the view goes on");
+}

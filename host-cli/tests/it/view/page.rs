@@ -1,0 +1,220 @@
+//! A page without a browser: a client of the view's socket.
+
+use std::collections::HashMap;
+use std::io::{BufRead, BufReader, Read};
+use std::net::TcpStream;
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tungstenite::handshake::client::generate_key;
+use tungstenite::http::Request;
+use tungstenite::{Message, WebSocket};
+
+use crate::support::Room;
+
+/// Time in which everything happens that a test waits for, on a loaded machine.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A view in a process of its own, until it is dropped.
+pub(crate) struct View {
+    pub(crate) process: Child,
+    /// Address and port.
+    pub(crate) host: String,
+    pub(crate) token: String,
+}
+
+impl View {
+    pub(crate) fn start(room: &Room, scene: &str, options: &[&str]) -> Self {
+        let mut command = room.command();
+        command.args(["view", scene, "--listen", "127.0.0.1:0"]).args(options);
+        let mut process = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let mut line = String::new();
+        BufReader::new(process.stdout.as_mut().unwrap()).read_line(&mut line).unwrap();
+        let Some((host, token)) =
+            line.trim().strip_prefix("http://").and_then(|url| url.split_once("/?token="))
+        else {
+            let mut said = String::new();
+            process.stderr.take().unwrap().read_to_string(&mut said).unwrap();
+            panic!("{line:?}: {said}");
+        };
+        Self { host: host.to_owned(), token: token.to_owned(), process }
+    }
+
+    /// A connection to the socket, by these headers.
+    pub(crate) fn try_connect(&self, target: &str, host: &str, origin: Option<&str>) -> Result<Page, u16> {
+        let stream = TcpStream::connect(&self.host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let mut request = Request::builder()
+            .uri(format!("ws://{}{target}", self.host))
+            .header("Host", host)
+            .header("Connection", "Upgrade")
+            .header("Upgrade", "websocket")
+            .header("Sec-WebSocket-Version", "13")
+            .header("Sec-WebSocket-Key", generate_key());
+        if let Some(origin) = origin {
+            request = request.header("Origin", origin);
+        }
+        match tungstenite::client(request.body(()).unwrap(), stream) {
+            Ok((socket, _)) => Ok(Page::new(socket)),
+            Err(tungstenite::HandshakeError::Failure(tungstenite::Error::Http(response))) => {
+                Err(response.status().as_u16())
+            }
+            Err(error) => panic!("{error}"),
+        }
+    }
+
+    /// A page of the view's own.
+    pub(crate) fn connect(&self) -> Page {
+        let target = format!("/socket?token={}", self.token);
+        self.try_connect(&target, &self.host, Some(&format!("http://{}", self.host))).unwrap()
+    }
+
+    /// Answer to a request of a file: status and text.
+    pub(crate) fn get(&self, target: &str, host: &str) -> (u16, String) {
+        use std::io::Write;
+        let mut stream = TcpStream::connect(&self.host).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        write!(stream, "GET {target} HTTP/1.1\r\nHost: {host}\r\n\r\n").unwrap();
+        let mut text = String::new();
+        stream.read_to_string(&mut text).unwrap();
+        (text.split(' ').nth(1).unwrap().parse().unwrap(), text)
+    }
+}
+
+impl Drop for View {
+    fn drop(&mut self) {
+        // Both fail if the process has ended.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// A connected page.
+pub(crate) struct Page {
+    socket: WebSocket<TcpStream>,
+    received: usize,
+    /// Last message of each type.
+    pub(crate) last: HashMap<String, Value>,
+    /// Radiance of each pixel.
+    pub(crate) pixels: HashMap<(u32, u32), [f32; 3]>,
+    /// Side of a pixel's square in each tile, with its wish.
+    pub(crate) steps: Vec<(u32, u32)>,
+    /// Gathers, irradiance records and lines of DRAM of each tile of the newest wish whose pixels are the
+    /// picture's, by its corner.
+    pub(crate) work: HashMap<(u32, u32), [u32; 3]>,
+}
+
+impl Page {
+    fn new(socket: WebSocket<TcpStream>) -> Self {
+        Self {
+            socket,
+            received: 0,
+            last: HashMap::new(),
+            pixels: HashMap::new(),
+            steps: Vec::new(),
+            work: HashMap::new(),
+        }
+    }
+
+    pub(crate) fn send(&mut self, message: &Value) {
+        self.socket.send(Message::text(message.to_string())).unwrap();
+    }
+
+    pub(crate) fn send_raw(&mut self, message: Message) {
+        // The view may have closed the connection already.
+        let _ = self.socket.send(message);
+    }
+
+    /// Reads messages until one of a type is as it should be.
+    pub(crate) fn wait(&mut self, kind: &str, is_right: impl Fn(&Value) -> bool) -> Value {
+        let begin = Instant::now();
+        while begin.elapsed() < PATIENCE {
+            match self.socket.read().unwrap() {
+                Message::Text(text) => {
+                    let message: Value = serde_json::from_str(&text).unwrap();
+                    let found = message["type"].as_str().unwrap().to_owned();
+                    let is_it = found == kind && is_right(&message);
+                    self.last.insert(found, message.clone());
+                    if is_it {
+                        return message;
+                    }
+                }
+                Message::Binary(tile) => self.draw(&tile),
+                _ => {}
+            }
+        }
+        panic!("no {kind} after {:?}; last: {:?}", begin.elapsed(), self.last);
+    }
+
+    pub(crate) fn wait_for(&mut self, kind: &str) -> Value {
+        self.wait(kind, |_| true)
+    }
+
+    /// Waits for a settled picture of a wish that is newer than the last settled one.
+    pub(crate) fn settle(&mut self) -> Value {
+        let before = self
+            .last
+            .get("state")
+            .filter(|state| state["settled"] == true)
+            .map(|state| state["version"].clone());
+        self.wait("state", |state| state["settled"] == true && Some(&state["version"]) != before.as_ref())
+    }
+
+    /// Closes the connection.
+    pub(crate) fn leave(mut self) {
+        self.socket.close(None).unwrap();
+        self.wait_for_end();
+    }
+
+    /// Waits until the view closes the connection.
+    pub(crate) fn wait_for_end(&mut self) {
+        let begin = Instant::now();
+        while begin.elapsed() < PATIENCE {
+            match self.socket.read() {
+                Ok(Message::Close(_)) | Err(_) => return,
+                Ok(_) => {}
+            }
+        }
+        panic!("the connection stays");
+    }
+
+    fn draw(&mut self, tile: &[u8]) {
+        self.received += tile.len();
+        let words = tile.as_chunks::<4>().0;
+        let [version, step, x, y, columns, rows, _, _, work @ ..] =
+            &words[..11].iter().map(|word| u32::from_le_bytes(*word)).collect::<Vec<_>>()[..]
+        else {
+            panic!("no header")
+        };
+        let [version, step, x, y, columns, rows] = [version, step, x, y, columns, rows].map(|word| *word);
+        assert_eq!(words.len(), 11 + 3 * (columns * rows) as usize);
+        if step == 1 {
+            self.work.insert((x, y), work.try_into().unwrap());
+        } else {
+            self.work.clear();
+        }
+        self.steps.push((version, step));
+        for (index, pixel) in (0..columns * rows).zip(words[11..].as_chunks::<3>().0) {
+            let [left, top] = [x + index % columns * step, y + index / columns * step];
+            let pixel = pixel.map(f32::from_le_bytes);
+            for offset in 0..step * step {
+                self.pixels.insert((left + offset % step, top + offset / step), pixel);
+            }
+        }
+        self.send(&json!({"type": "shown", "version": version, "bytes": self.received}));
+    }
+
+    /// Mean radiance of a picture's pixels.
+    pub(crate) fn mean(&self, [width, height]: [u32; 2]) -> f32 {
+        let inside = self.pixels.iter().filter(|((x, y), _)| *x < width && *y < height);
+        let sums: Vec<f32> = inside.map(|(_, pixel)| pixel.iter().sum()).collect();
+        assert_eq!(sums.len(), (width * height) as usize, "pixels that were never shown");
+        sums.iter().sum::<f32>() / (3 * sums.len()) as f32
+    }
+}
+
+/// Message that places the camera.
+pub(crate) fn camera(x: f64, is_moving: bool) -> Value {
+    json!({"type": "camera", "position": [x, 0.5, 3], "look_at": [0, 0.3, 0], "fov": 40, "moving": is_moving})
+}

@@ -1,0 +1,106 @@
+//! Some thousands of mutated inputs of all readers of foreign bytes. The example `fuzz` runs any number.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use photoncard_tests::fuzz::{NAMES, Random, Settings, Target, fuzz, target};
+
+use crate::ALONE;
+
+fn settings(inputs: u64, patience: Duration) -> Settings {
+    Settings {
+        seed: 0,
+        first: 0,
+        inputs,
+        time: None,
+        patience,
+        folder: PathBuf::from(env!("CARGO_TARGET_TMPDIR")),
+    }
+}
+
+fn check(name: &str, inputs: u64) {
+    let _alone = ALONE.lock();
+    let report = fuzz(&target(name).expect("a target"), &settings(inputs, Duration::from_secs(60)));
+    println!("{report:?}");
+    assert!(report.failures.is_empty(), "{:#?}", report.failures);
+    assert_eq!(report.inputs, inputs);
+    // Inputs that are all rejected at once would test nothing.
+    assert!(report.sound * 20 > inputs && report.sound < inputs, "{report:?}");
+}
+
+/// A test for each target, of so many inputs: some seconds each, so that a busy machine has time for any of
+/// them.
+macro_rules! tests_of_targets {
+    ($($name:ident: $inputs:literal,)*) => {
+        $(#[test]
+        fn $name() {
+            super::check(stringify!($name), $inputs);
+        })*
+
+        #[test]
+        fn all_targets_are_tested() {
+            assert_eq!(super::NAMES, [$(stringify!($name)),*]);
+        }
+    };
+}
+
+mod no_input_panics_hangs_or_takes_much_memory {
+    tests_of_targets! {
+        frames: 100_000,
+        messages: 500_000,
+        session: 20_000,
+        image: 6_000,
+        gltf: 8_000,
+        meshopt: 8_000,
+        draco: 8_000,
+        textures: 6_000,
+        environments: 20_000,
+        exr: 8_000,
+        parts: 4_000,
+        prepared: 4_000,
+    }
+}
+
+/// Target that fails in every way, at the number in its input.
+struct Faulty;
+
+impl Target for Faulty {
+    fn name(&self) -> &'static str {
+        "faulty"
+    }
+
+    fn allocation_bound(&self, _input: usize) -> usize {
+        1 << 24
+    }
+
+    fn input(&self, random: &mut Random) -> Vec<u8> {
+        vec![random.next() as u8 % 16]
+    }
+
+    fn read(&self, input: &[u8]) -> bool {
+        match input {
+            [0] => panic!("a panic"),
+            [1] => drop(std::hint::black_box(vec![1_u8; 1 << 25])),
+            [2] => std::thread::sleep(Duration::from_secs(5)),
+            _ => {}
+        }
+        true
+    }
+}
+
+#[test]
+fn panics_hangs_and_allocations_are_found_and_replayed() {
+    let _alone = ALONE.lock();
+    let faulty: Arc<dyn Target> = Arc::new(Faulty);
+    let input = |number| faulty.input(&mut Random::new("faulty", 0, number))[0];
+    let alone = |number| Settings { first: number, ..settings(1, Duration::from_millis(300)) };
+    for (kind, word) in [(0, "a panic"), (1, "allocated"), (2, "hangs")] {
+        let number = (0..).find(|&number| input(number) == kind).expect("an input of the kind");
+        let failures = fuzz(&faulty, &alone(number)).failures;
+        let [failure] = &failures[..] else { panic!("{failures:?}") };
+        assert!(failure.number == number && failure.what.contains(word), "{failure:?}");
+        let path = settings(1, Duration::ZERO).folder.join(format!("faulty-0-{number}.hex"));
+        assert_eq!(std::fs::read_to_string(path).expect("a dump"), format!("{kind:02x}\n"));
+    }
+}

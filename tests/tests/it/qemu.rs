@@ -1,0 +1,264 @@
+//! The firmware's images on machines that QEMU emulates render the same bits as the emulated card.
+#![cfg(unix)]
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::time::{Duration, Instant};
+
+use photoncard_driver::link::LineFaults;
+use photoncard_driver::render::{
+    CardAddress, CardSet, Integrator, MemoryUse, PatternTest, PhotonMaps, Picture, RenderSettings, Renderer,
+    Unobserved, card_info, card_self_test,
+};
+use photoncard_driver::scene::{FixedScene, gltf};
+use photoncard_firmware::card::MicroCard;
+use photoncard_firmware::kind::MICRO;
+use photoncard_firmware::memory::Dram;
+use photoncard_tests::everything::everything;
+use photoncard_tests::render_or_panic;
+
+/// Time limit of building and starting a machine.
+const START: Duration = Duration::from_secs(600);
+/// Prints a line that is visible although the test passes.
+fn say(line: &str) {
+    // The test goes on if standard error is closed.
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Running machine with its image.
+struct Machine {
+    process: Child,
+    /// Output of QEMU and of the image.
+    lines: Receiver<String>,
+}
+
+/// Forwards the lines of a stream.
+fn forward(stream: impl Read + Send + 'static, sender: Sender<String>) {
+    std::thread::spawn(move || {
+        for line in BufReader::new(stream).lines().map_while(Result::ok) {
+            if sender.send(line).is_err() {
+                break;
+            }
+        }
+    });
+}
+
+impl Machine {
+    /// Starts a machine and waits until its image is ready. Returns it with the address of its UART.
+    fn start(name: &str) -> (Self, CardAddress) {
+        let mut process = Command::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("qemu.sh"))
+            .args([name, "pty"])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("tests/qemu.sh starts");
+        let (sender, lines) = channel();
+        forward(process.stdout.take().expect("it is piped"), sender.clone());
+        forward(process.stderr.take().expect("it is piped"), sender);
+        let mut machine = Self { process, lines };
+        let start = Instant::now();
+        let (mut address, mut is_ready) = (None, false);
+        while address.is_none() || !is_ready {
+            let line = machine.next_line(name, START.saturating_sub(start.elapsed()));
+            is_ready |= line == "ready";
+            if let Some(path) = line.split(' ').find(|word| word.starts_with("/dev/")) {
+                address = Some(format!("serial:{path}").parse().expect("an address"));
+            }
+        }
+        (machine, address.expect("the loop ends with one"))
+    }
+
+    fn next_line(&mut self, name: &str, wait: Duration) -> String {
+        match self.lines.recv_timeout(wait) {
+            Ok(line) => {
+                say(&format!("{name}: {line}"));
+                line
+            }
+            Err(RecvTimeoutError::Timeout) => panic!("{name} is not ready"),
+            Err(RecvTimeoutError::Disconnected) => panic!(
+                "{name} ended: {}; to leave these tests out, set PHOTONCARD_SKIP_QEMU to the reason",
+                self.process.wait().expect("it was started")
+            ),
+        }
+    }
+}
+
+impl Drop for Machine {
+    fn drop(&mut self) {
+        // The machine may have ended already.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
+    }
+}
+
+/// The Cornell box as a small frame, with `PHOTONCARD_QEMU_GATHER_RAYS` gather rays.
+fn settings() -> RenderSettings {
+    let gather_rays = std::env::var("PHOTONCARD_QEMU_GATHER_RAYS").map(|text| text.parse());
+    RenderSettings {
+        picture: Picture { width: 64, height: 64, ..Picture::default() },
+        photons: PhotonMaps { count: 20_000, ..PhotonMaps::default() },
+        integrator: Integrator {
+            gather_rays: gather_rays.unwrap_or(Ok(8)).expect("a number of gather rays"),
+            irradiance_error: None,
+            ..Integrator::default()
+        },
+        cards: CardSet { addresses: vec!["emulated-micro:1".parse().expect("a card")], ..CardSet::default() },
+        ..RenderSettings::default()
+    }
+}
+
+/// Bad lines to test: those in `PHOTONCARD_QEMU_FAULTS`, separated by blanks.
+fn faults() -> Vec<LineFaults> {
+    let asked = std::env::var("PHOTONCARD_QEMU_FAULTS");
+    let asked = asked.as_deref().unwrap_or("flips=1e-4,drops=1e-5,repeats=1e-5,delays=1e-4,seed=1");
+    asked.split_whitespace().map(|faults| faults.parse().expect("faults of a line")).collect()
+}
+
+fn renders_as_the_emulated_card(name: &str) {
+    if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_QEMU") {
+        say(&format!("SKIPPED: {name} is not tested, as PHOTONCARD_SKIP_QEMU is set: {reason}"));
+        return;
+    }
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell.gltf");
+    let scene = gltf::load(&path).expect("a shipped scene loads");
+    let (machine, address) = Machine::start(name);
+    let cached = settings().with(|s| s.integrator.irradiance_error = Some(0.1));
+    // Other photons give another image, of which the card has few lines.
+    let mut renders = vec![(settings(), None), (cached, None)];
+    for (seed, faults) in (1..).zip(faults()) {
+        renders.push((
+            settings().with(|s| {
+                s.photons.count = 5_000;
+                s.integrator.seed = seed;
+            }),
+            Some(faults),
+        ));
+    }
+    for (number, (settings, faults)) in renders.into_iter().enumerate() {
+        let expected = render_or_panic(&scene, &settings).film;
+        let remote = settings.with(|s| {
+            s.cards.addresses = vec![address.clone()];
+            s.cards.faults = faults;
+        });
+        let rendering = render_or_panic(&scene, &remote);
+        let (statistics, sums) = (&rendering.statistics, rendering.film.sums());
+        say(&format!(
+            "{name}: {}load {:.1} s, render {:.1} s, {} gathers, {:?}",
+            faults.map_or(String::new(), |faults| format!("{faults}: ")),
+            statistics.time_s.load,
+            statistics.time_s.render,
+            statistics.gathers,
+            statistics.link
+        ));
+        for (index, (sums, expected)) in sums.zip(expected.sums()).enumerate() {
+            assert_eq!(sums, expected, "pixel {index}");
+        }
+        if number == 0 {
+            check_page("card image, bytes", name, statistics.image_bytes as u32);
+        }
+        // An image that is loaded already is not sent again.
+        assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
+    }
+    passes_the_self_test(name, &address);
+    renders_everything(name, &address);
+    keeps_irradiance_records(name, &address);
+    stays_within_the_budget(name, &address);
+    drop(machine);
+}
+
+/// The machine computes as the host does, and has all of its memory. The scene after the test is loaded as a
+/// whole.
+fn passes_the_self_test(name: &str, address: &CardAddress) {
+    let test = card_self_test(address, &Unobserved).expect("the card answers");
+    for PatternTest { pattern, write, check, .. } in &test.patterns {
+        say(&format!("{name}: {} of {} lines: {write:?}, {check:?}", pattern.name(), test.lines));
+    }
+    assert!(test.is_passed(), "{test:?}");
+}
+
+/// Textures, cut-outs, mirrors, glass and lights of every kind.
+fn renders_everything(name: &str, address: &CardAddress) {
+    let scene = everything();
+    let settings = settings().with(|s| {
+        s.picture.width = 24;
+        s.picture.height = 20;
+        s.photons.count = 3000;
+        s.photons.caustic_photons = Some(1000);
+        s.integrator.gather_rays = 8;
+        s.integrator.shadow_rays = 3;
+        s.integrator.samples = 2;
+    });
+    let expected = render_or_panic(&scene, &settings).film;
+    let film = render_or_panic(&scene, &settings.with(|s| s.cards.addresses = vec![address.clone()])).film;
+    for (index, (sums, expected)) in film.sums().zip(expected.sums()).enumerate() {
+        assert_eq!(sums, expected, "{name}, pixel {index}");
+    }
+}
+
+/// Two passes, of which the first gathers all irradiance records.
+fn keeps_irradiance_records(name: &str, address: &CardAddress) {
+    let scene = everything();
+    let settings = settings().with(|s| {
+        (s.picture.width, s.picture.height) = (24, 20);
+        (s.photons.count, s.photons.caustic_photons) = (3000, Some(1000));
+        (s.integrator.gather_rays, s.integrator.shadow_rays, s.integrator.samples) = (8, 1, 2);
+        (s.integrator.irradiance_error, s.integrator.planned_samples) = (Some(0.1), Some(2));
+    });
+    let expected = render_or_panic(&scene, &settings);
+    let remote = settings.with(|s| {
+        s.cards.addresses = vec![address.clone()];
+        s.schedule.keep_records = true;
+    });
+    let mut renderer = Renderer::default();
+    let first = remote.clone().with(|s| s.integrator.samples = 1);
+    let first = renderer.render(&scene, &first, &Unobserved).unwrap_or_else(|error| panic!("{error}"));
+    let all = renderer.refine(&FixedScene::from(&scene), &remote, Arc::new(first.film), &Unobserved);
+    let all = all.unwrap_or_else(|error| panic!("{error}"));
+    assert!(all.film.sums().eq(expected.film.sums()), "{name}");
+    let records = expected.statistics.records;
+    assert_eq!((first.statistics.records, first.statistics.kept_records), (records, 0), "{name}");
+    assert_eq!((all.statistics.records, all.statistics.kept_records), (0, records), "{name}");
+}
+
+/// Checks the on-chip memory that the image reports over its link after all renders.
+fn stays_within_the_budget(name: &str, address: &CardAddress) {
+    let MemoryUse { static_bytes, stack_bytes, stack_used } =
+        card_info(address).expect("the card answers").memory_use.expect("a board measures its memory");
+    say(&format!("{name}: {static_bytes} bytes of static data, {stack_used} of {stack_bytes} of stack used"));
+    assert!(0 < stack_used && stack_used < stack_bytes && stack_bytes <= MICRO.stack_bytes);
+    check_page("stack used, bytes", name, stack_used);
+    assert!(static_bytes as usize >= size_of::<MicroCard<Dram<'static>>>() / 2, "32-bit pointers take half");
+    // The images have no caches: the memory that the budget has for caches must stay free.
+    let caches = MICRO.photon_cache_bytes + MICRO.scene_cache_bytes;
+    assert!(static_bytes + stack_bytes + caches <= MICRO.sram_bytes);
+}
+
+/// Checks a figure of `docs/bring-up.md` that the test measures, in a row of the table of machines: other
+/// compilers give others, within a tenth.
+fn check_page(row: &str, name: &str, measured: u32) {
+    let page = include_str!("../../../docs/bring-up.md");
+    let cells = |start: &str| {
+        let line = page.lines().find(|line| line.starts_with(start)).expect("the page has the row");
+        line.split('|').map(|cell| cell.trim().to_owned()).collect::<Vec<_>>()
+    };
+    let column = cells("| under QEMU |").iter().position(|cell| *cell == format!("`{name}`"));
+    let stated = cells(&format!("| {row} |"))[column.expect("the page has the machine")].replace(',', "");
+    let stated: u32 = stated.parse().expect("a number");
+    assert!(
+        stated.abs_diff(measured) <= measured / 10,
+        "docs/bring-up.md states {stated} for {row} of {name}; write {measured}"
+    );
+}
+
+#[test]
+fn an_arm_board_renders_the_same_picture() {
+    renders_as_the_emulated_card("mps2-an386");
+}
+
+#[test]
+fn a_risc_v_board_renders_the_same_picture() {
+    renders_as_the_emulated_card("virt");
+}
