@@ -4,7 +4,7 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use photoncard_cards::link::{host_name, tcp_address};
+use photoncard_cards::link::RemoteAddress;
 use photoncard_picture::choice::Choice;
 
 use super::RenderError;
@@ -24,39 +24,8 @@ pub enum CardAddress {
     Remote(RemoteAddress),
 }
 
-/// Address of a card that is not emulated in this process.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum RemoteAddress {
-    /// A serial port or pseudo terminal.
-    Serial {
-        /// Path of the device.
-        path: PathBuf,
-        /// Speed, bit/s.
-        baud: u32,
-    },
-    /// TCP port on which the card listens.
-    Tcp {
-        /// Name or IP address of the host.
-        host: String,
-        /// Port number.
-        port: u16,
-    },
-    /// Unix socket on which the card listens.
-    Unix {
-        /// Path of the socket.
-        path: PathBuf,
-    },
-}
-
 /// Maximum number of chips that one process emulates.
 const MAX_CHIPS: usize = 1024;
-/// Default speed of a serial port, bit/s.
-const DEFAULT_BAUD: u32 = 115_200;
-/// Minimum speed of a serial port, bit/s. A card is silent while it receives two whole frames and
-/// acknowledges them. Even if one acknowledgement is lost, the next must arrive within the 10 s after which a
-/// card counts as lost.
-const MIN_BAUD: u32 = 4800;
-
 impl Default for CardAddress {
     /// One emulated reference chip.
     fn default() -> Self {
@@ -73,14 +42,14 @@ impl CardAddress {
 
     /// Card on a serial port at the default speed.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
-        Self::Remote(RemoteAddress::Serial { path: path.into(), baud: DEFAULT_BAUD })
+        Self::Remote(RemoteAddress::serial(path))
     }
 
     /// Forms of an address, for a line of help.
     pub fn forms() -> String {
         let emulated: String =
             EmulatedKind::ALL.iter().map(|kind| format!("{}[:CHIPS], ", kind.name())).collect();
-        format!("{emulated}serial:PATH[@BAUD], tcp:HOST:PORT or unix:PATH")
+        format!("{emulated}{}", RemoteAddress::FORMS)
     }
 
     /// Number of chips at this address that this process emulates.
@@ -145,16 +114,6 @@ impl fmt::Display for CardAddress {
     }
 }
 
-impl fmt::Display for RemoteAddress {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        match self {
-            Self::Serial { path, baud } => write!(f, "serial:{}@{baud}", path.display()),
-            Self::Tcp { host, port } => f.write_str(&tcp_address(host, *port)),
-            Self::Unix { path } => write!(f, "unix:{}", path.display()),
-        }
-    }
-}
-
 impl FromStr for CardAddress {
     type Err = String;
 
@@ -163,15 +122,9 @@ impl FromStr for CardAddress {
         if let Ok(kind) = EmulatedKind::of_name(kind) {
             return emulated(kind, rest);
         }
-        match kind {
-            "serial" => serial(rest.unwrap_or_default()).map(Self::Remote),
-            "tcp" => tcp(rest.unwrap_or_default()).map(Self::Remote),
-            "unix" => match rest {
-                Some(path) if !path.is_empty() => Ok(Self::Remote(RemoteAddress::Unix { path: path.into() })),
-                _ => Err("a card on a Unix socket is unix:PATH".into()),
-            },
-            _ => Err(format!("{kind:?} is no kind of card; use {}", Self::forms())),
-        }
+        let remote = RemoteAddress::parse(kind, rest.unwrap_or_default());
+        let unknown = || format!("{kind:?} is no kind of card; use {}", Self::forms());
+        remote.ok_or_else(unknown)?.map(Self::Remote)
     }
 }
 
@@ -180,41 +133,6 @@ fn emulated(kind: EmulatedKind, chips: Option<&str>) -> Result<CardAddress, Stri
     let chips = text.parse().ok().filter(|count| (1..=MAX_CHIPS).contains(count));
     let chips = chips.ok_or_else(|| format!("{text:?} is no number of chips; use 1 to {MAX_CHIPS}"))?;
     Ok(CardAddress::Emulated { kind, chips })
-}
-
-fn serial(text: &str) -> Result<RemoteAddress, String> {
-    // The path itself may contain an @.
-    let (path, baud) = match text.rsplit_once('@') {
-        Some((path, baud)) if !baud.contains('/') => (path, Some(baud)),
-        _ => (text, None),
-    };
-    if path.is_empty() {
-        return Err(
-            "a card on a serial port is serial:PATH[@BAUD], such as serial:/dev/ttyUSB0@115200".into()
-        );
-    }
-    let baud = match baud {
-        None => DEFAULT_BAUD,
-        Some(baud) => speed(baud)?,
-    };
-    Ok(RemoteAddress::Serial { path: path.into(), baud })
-}
-
-fn speed(text: &str) -> Result<u32, String> {
-    match text.parse() {
-        Ok(baud) if baud >= MIN_BAUD => Ok(baud),
-        Ok(baud) if baud > 0 => Err(format!(
-            "{baud} bits a second are too slow: a card would be taken for silent; use {MIN_BAUD} or more, such as 115200"
-        )),
-        _ => Err(format!("{text:?} is no speed in bits a second; use one such as 115200")),
-    }
-}
-
-fn tcp(text: &str) -> Result<RemoteAddress, String> {
-    let usage = || format!("{text:?} is no TCP address; use tcp:HOST:PORT, such as tcp:localhost:7000");
-    let (host, port) = text.rsplit_once(':').ok_or_else(usage)?;
-    let port = port.parse().ok().filter(|&port| port > 0).ok_or_else(usage)?;
-    Ok(RemoteAddress::Tcp { host: host_name(host)?, port })
 }
 
 #[cfg(test)]

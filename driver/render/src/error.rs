@@ -10,8 +10,8 @@ use photoncard_picture::output::OutputError;
 use photoncard_scene::error::SceneError;
 use photoncard_shared::message::Fault;
 
-use crate::emulator::direct::TileError;
-use crate::emulator::whole_frame::FrameError;
+use crate::emulator::direct::DirectError;
+use crate::emulator::whole_frame::CurveError;
 use crate::partial::PartialError;
 
 /// Error of a card.
@@ -157,13 +157,13 @@ pub enum RenderError {
     Stopped,
 }
 
-impl From<FrameError> for RenderError {
-    fn from(error: FrameError) -> Self {
+impl From<CurveError> for RenderError {
+    fn from(error: CurveError) -> Self {
         match error {
-            FrameError::Stopped => Self::Stopped,
-            FrameError::Image(fault) => Self::Image(fault),
-            FrameError::Start(source) => Self::Chips(source),
-            FrameError::TooManyGathers { .. } => Self::Setting {
+            CurveError::Stopped => Self::Stopped,
+            CurveError::Image(fault) => Self::Image(fault),
+            CurveError::Start(source) => Self::Chips(source),
+            CurveError::TooManyGathers { .. } => Self::Setting {
                 option: "--order",
                 value: "hilbert".into(),
                 reason: error.to_string(),
@@ -173,11 +173,11 @@ impl From<FrameError> for RenderError {
     }
 }
 
-impl From<TileError> for RenderError {
-    fn from(error: TileError) -> Self {
+impl From<DirectError> for RenderError {
+    fn from(error: DirectError) -> Self {
         match error {
-            TileError::Fault(fault) => Self::Image(fault),
-            TileError::Stopped => Self::Stopped,
+            DirectError::Fault(fault) => Self::Image(fault),
+            DirectError::Stopped => Self::Stopped,
         }
     }
 }

@@ -37,7 +37,7 @@ mod times;
 mod verification;
 mod whole_frame;
 
-pub use address::{CardAddress, RemoteAddress};
+pub use address::CardAddress;
 pub use error::{CardError, RenderError};
 pub use greeting::{CardInfo, card_info, card_ping};
 pub use memory::{MemoryStatistics, ReadStatistics, StageReads, StructureReads};

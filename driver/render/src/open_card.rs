@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
-use photoncard_cards::link::{FaultInjector, LineFaults, LinkError, connect_tcp, connect_unix, open_serial};
+use photoncard_cards::link::{
+    FaultInjector, LineFaults, LinkError, RemoteAddress, connect_tcp, connect_unix, open_serial,
+};
 use photoncard_shared::link::{Port, PortError};
 
 use super::CardError;
-use super::address::{CardAddress, RemoteAddress};
+use super::address::CardAddress;
 use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, TileLines};
 
 /// Host's end of a link.

@@ -4,9 +4,9 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
 use super::RenderError;
-use super::address::RemoteAddress;
 use super::exchange::WAIT;
 use super::open_card::{BoxedPort, reach};
+use photoncard_cards::link::RemoteAddress;
 
 /// Pause before each attempt to reconnect.
 const RETRY: Duration = Duration::from_millis(500);

@@ -33,7 +33,7 @@ pub use self::host::{Change, Changed, HostBench, HostFrame, LIGHT_STEP};
 pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
 pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
 pub use self::point::{ImageKey, Point, Task};
-pub use self::quality::{Quality, Reference, TileError};
+pub use self::quality::{Quality, Reference, TileDeviation};
 use self::report::{Provenance, Report};
 pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;

@@ -27,7 +27,7 @@ use super::sample::choose;
 
 /// Error of indirect light in the pixels of one tile, as sums over pixels and channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct TileError {
+pub struct TileDeviation {
     /// Number of pixels that were compared.
     pub pixels: usize,
     /// Sum of squared differences from the reference.
@@ -44,14 +44,14 @@ pub struct TileError {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Errors by tile. All pixels have equal weight.
-    pub tiles: Vec<TileError>,
+    pub tiles: Vec<TileDeviation>,
 }
 
 impl Quality {
     /// Root mean square error over pixels and channels, relative to the reference's mean, without the
     /// reference's noise; 0 if that noise exceeds the difference.
     pub fn rmse(&self) -> f64 {
-        let TileError { squares, noise, .. } = self.total();
+        let TileDeviation { squares, noise, .. } = self.total();
         self.relative((squares - noise).max(0.0))
     }
 
@@ -62,7 +62,7 @@ impl Quality {
 
     /// Ratio of the means of the pixels and of the reference; 1 without bias.
     pub fn mean(&self) -> f64 {
-        let TileError { sum, reference, .. } = self.total();
+        let TileDeviation { sum, reference, .. } = self.total();
         sum / reference
     }
 
@@ -73,8 +73,8 @@ impl Quality {
         Self { tiles: others.map(|(_, error)| *error).collect() }
     }
 
-    fn total(&self) -> TileError {
-        self.tiles.iter().fold(TileError::default(), |sum, tile| TileError {
+    fn total(&self) -> TileDeviation {
+        self.tiles.iter().fold(TileDeviation::default(), |sum, tile| TileDeviation {
             pixels: sum.pixels + tile.pixels,
             squares: sum.squares + tile.squares,
             noise: sum.noise + tile.noise,
@@ -84,7 +84,7 @@ impl Quality {
     }
 
     fn relative(&self, squares: f64) -> f64 {
-        let TileError { pixels, reference, .. } = self.total();
+        let TileDeviation { pixels, reference, .. } = self.total();
         let channels = 3.0 * pixels as f64;
         (squares / channels).sqrt() / (reference / channels)
     }
@@ -190,8 +190,8 @@ impl ReferencePixel {
     }
 }
 
-fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileError {
-    let mut error = TileError::default();
+fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileDeviation {
+    let mut error = TileDeviation::default();
     for (reference, pixel) in reference.iter().zip(pixels) {
         let Some(ReferencePixel { light, noise }) = reference else { continue };
         error.pixels += 1;
@@ -339,7 +339,7 @@ mod tests {
 
     #[test]
     fn a_tile_can_be_omitted_from_a_quality() {
-        let tile = |squares| TileError { pixels: 1, squares, noise: 1.0, sum: 2.0, reference: 3.0 };
+        let tile = |squares| TileDeviation { pixels: 1, squares, noise: 1.0, sum: 2.0, reference: 3.0 };
         let quality = Quality { tiles: vec![tile(4.0), tile(13.0)] };
         assert_eq!(quality.without(1), Quality { tiles: vec![tile(4.0)] });
         assert!((quality.without(1).rmse() - 1.0).abs() < 1e-12);

@@ -52,7 +52,7 @@ impl RenderedTile {
 
 /// Error of [`render_tiles_apart`].
 #[derive(Debug, thiserror::Error)]
-pub enum TileError {
+pub enum DirectError {
     /// The image is malformed, or a tile is too large.
     #[error("{0}")]
     Fault(Fault),
@@ -61,7 +61,7 @@ pub enum TileError {
     Stopped,
 }
 
-impl From<Fault> for TileError {
+impl From<Fault> for DirectError {
     fn from(fault: Fault) -> Self {
         Self::Fault(fault)
     }
@@ -80,10 +80,10 @@ pub fn render_tiles_apart(
     tiles: &[Tile],
     caches: Option<&CacheSettings>,
     is_stopped: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<RenderedTile>, TileError> {
+) -> Result<Vec<RenderedTile>, DirectError> {
     let render_one = |chip: &mut EmulatedChip, &tile: &Tile| {
         if is_stopped() {
-            return Err(TileError::Stopped);
+            return Err(DirectError::Stopped);
         }
         Ok(render_tile_of(chip, image, caches, frame, tile, None)?)
     };

@@ -41,7 +41,7 @@ const GATHERS_PER_ROUND: usize = 256 * GATHERS_PER_TASK;
 
 /// Error of [`render_along_curve`].
 #[derive(Debug, thiserror::Error)]
-pub enum FrameError {
+pub enum CurveError {
     /// The frame may have more gathers than can be kept.
     #[error(
         "the frame may have {gathers} gathers, and at most {MAX_GATHERS} are kept at once, as memory allows"
@@ -61,7 +61,7 @@ pub enum FrameError {
     Stopped,
 }
 
-impl From<Fault> for FrameError {
+impl From<Fault> for CurveError {
     fn from(fault: Fault) -> Self {
         Self::Image(fault)
     }
@@ -135,7 +135,7 @@ pub fn render_along_curve(
     caches: Option<&CacheSettings>,
     sinks: &[&dyn TileSink],
     progress: &(dyn Fn(u64, u64) -> bool + Sync),
-) -> Result<CurveOutcome, FrameError> {
+) -> Result<CurveOutcome, CurveError> {
     let CurveJob { frame, tiles, chips, .. } = job;
     let gathers_per_task = if caches.is_some() { GATHERS_PER_COUNTED_TASK } else { GATHERS_PER_TASK };
     let mut all = Frame::with_room_for(frame, tiles)?;
@@ -169,7 +169,7 @@ pub fn render_along_curve(
         }
         done += waiting.len() as u64;
         if !progress(total / 10 + (total - total / 10) * done / all.waiting.len() as u64, total) {
-            return Err(FrameError::Stopped);
+            return Err(CurveError::Stopped);
         }
     }
     complete(job, &all, sinks)?;
@@ -186,10 +186,10 @@ fn rays_of_pixel(frame: &FrameParameters) -> u64 {
 }
 
 impl Frame {
-    fn with_room_for(frame: &FrameParameters, tiles: &[Tile]) -> Result<Self, FrameError> {
+    fn with_room_for(frame: &FrameParameters, tiles: &[Tile]) -> Result<Self, CurveError> {
         let pixels: u64 = tiles.iter().map(Tile::pixels).sum();
         let gathers = pixels * rays_of_pixel(frame);
-        let too_many = || FrameError::TooManyGathers { gathers };
+        let too_many = || CurveError::TooManyGathers { gathers };
         let sums = pixels * u64::from(sums_of_pixel(frame.layers));
         if gathers > MAX_GATHERS || sums > u32::MAX as u64 {
             return Err(too_many());
@@ -209,10 +209,10 @@ impl Frame {
 
     /// Adds the sums and gathers of tiles. Only gathers of glossy lobes beside an irradiance cache, and of
     /// several paths per sample, can exceed the reserved memory.
-    fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), FrameError> {
+    fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), CurveError> {
         for CastTile { tile, waiting } in tiles {
             let gathers = (self.waiting.len() + waiting.len()) as u64;
-            let too_many = || FrameError::TooManyGathers { gathers };
+            let too_many = || CurveError::TooManyGathers { gathers };
             if gathers > MAX_GATHERS {
                 return Err(too_many());
             }
@@ -235,10 +235,10 @@ fn cast_tiles(
     caches: Option<&CacheSettings>,
     tiles: &[Tile],
     go_on: &(dyn Fn() -> bool + Sync),
-) -> Result<Vec<CastTile>, FrameError> {
+) -> Result<Vec<CastTile>, CurveError> {
     let cast_one = |chip: &mut EmulatedChip, &tile: &Tile| {
         if !go_on() {
-            return Err(FrameError::Stopped);
+            return Err(CurveError::Stopped);
         }
         let mut outlet = Outlet(Vec::new());
         let tile = render_tile_of(chip, job.image, caches, job.frame, tile, Some(&mut outlet))?;
@@ -248,7 +248,7 @@ fn cast_tiles(
 }
 
 /// Stores the tiles in sinks.
-fn complete(job: CurveJob, all: &Frame, sinks: &[&dyn TileSink]) -> Result<(), FrameError> {
+fn complete(job: CurveJob, all: &Frame, sinks: &[&dyn TileSink]) -> Result<(), CurveError> {
     let (scene, _) = job.image.view();
     let format = SumFormat::new(&scene.header, job.frame);
     let sums_of_pixel = sums_of_pixel(job.frame.layers) as usize;

@@ -3,6 +3,7 @@
 mod error;
 mod host_port;
 mod listener;
+mod remote_address;
 mod serial;
 mod serial_list;
 mod socket;
@@ -16,6 +17,7 @@ mod unsupported;
 pub use error::LinkError;
 pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
+pub use remote_address::RemoteAddress;
 pub use serial::{SerialLink, open_serial};
 pub use serial_list::{ListedPort, list_serial_ports};
 pub use socket::connect_tcp;

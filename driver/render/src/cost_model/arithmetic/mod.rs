@@ -4,7 +4,7 @@
 //! The number of each [`Step`] follows from counters and the contents of the lines that a chip reads. The
 //! operations per step are constants of the firmware ([`OPERATIONS`]). They were counted on a target without
 //! floating-point instructions, where each operation is a function call (`tests/operations.sh`);
-//! `tests/tests/operations.rs` counts them again. A vector lane counts only if its result is used.
+//! `tests/tests/it/operations.rs` counts them again. A vector lane counts only if its result is used.
 
 mod operations;
 mod step;

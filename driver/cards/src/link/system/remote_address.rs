@@ -1,0 +1,107 @@
+//! Addresses of cards at the other end of a link.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use super::socket::{host_name, tcp_address};
+
+/// Address of a card that is not emulated in this process.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum RemoteAddress {
+    /// A serial port or pseudo terminal.
+    Serial {
+        /// Path of the device.
+        path: PathBuf,
+        /// Speed, bit/s.
+        baud: u32,
+    },
+    /// TCP port on which the card listens.
+    Tcp {
+        /// Name or IP address of the host.
+        host: String,
+        /// Port number.
+        port: u16,
+    },
+    /// Unix socket on which the card listens.
+    Unix {
+        /// Path of the socket.
+        path: PathBuf,
+    },
+}
+
+/// Default speed of a serial port, bit/s.
+const DEFAULT_BAUD: u32 = 115_200;
+/// Minimum speed of a serial port, bit/s. A card is silent while it receives two whole frames and
+/// acknowledges them. Even if one acknowledgement is lost, the next must arrive within the 10 s after which a
+/// card counts as lost.
+const MIN_BAUD: u32 = 4800;
+
+impl RemoteAddress {
+    /// Forms of an address, for a line of help.
+    pub const FORMS: &str = "serial:PATH[@BAUD], tcp:HOST:PORT or unix:PATH";
+
+    /// Card on a serial port at the default speed.
+    pub fn serial(path: impl Into<PathBuf>) -> Self {
+        Self::Serial { path: path.into(), baud: DEFAULT_BAUD }
+    }
+
+    /// Address of a kind of link: the text in front of the first colon, and what follows it. `None` if there
+    /// is no such kind.
+    ///
+    /// # Errors
+    /// A sentence that names the valid form.
+    pub fn parse(kind: &str, rest: &str) -> Option<Result<Self, String>> {
+        Some(match kind {
+            "serial" => serial(rest),
+            "tcp" => tcp(rest),
+            "unix" if rest.is_empty() => Err("a card on a Unix socket is unix:PATH".into()),
+            "unix" => Ok(Self::Unix { path: rest.into() }),
+            _ => return None,
+        })
+    }
+}
+
+impl fmt::Display for RemoteAddress {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Self::Serial { path, baud } => write!(f, "serial:{}@{baud}", path.display()),
+            Self::Tcp { host, port } => f.write_str(&tcp_address(host, *port)),
+            Self::Unix { path } => write!(f, "unix:{}", path.display()),
+        }
+    }
+}
+
+fn serial(text: &str) -> Result<RemoteAddress, String> {
+    // The path itself may contain an @.
+    let (path, baud) = match text.rsplit_once('@') {
+        Some((path, baud)) if !baud.contains('/') => (path, Some(baud)),
+        _ => (text, None),
+    };
+    if path.is_empty() {
+        return Err(
+            "a card on a serial port is serial:PATH[@BAUD], such as serial:/dev/ttyUSB0@115200".into()
+        );
+    }
+    let baud = match baud {
+        None => DEFAULT_BAUD,
+        Some(baud) => speed(baud)?,
+    };
+    Ok(RemoteAddress::Serial { path: path.into(), baud })
+}
+
+fn speed(text: &str) -> Result<u32, String> {
+    match text.parse() {
+        Ok(baud) if baud >= MIN_BAUD => Ok(baud),
+        Ok(baud) if baud > 0 => Err(format!(
+            "{baud} bits a second are too slow: a card would be taken for silent; use {MIN_BAUD} or more, such as 115200"
+        )),
+        _ => Err(format!("{text:?} is no speed in bits a second; use one such as 115200")),
+    }
+}
+
+fn tcp(text: &str) -> Result<RemoteAddress, String> {
+    let usage = || format!("{text:?} is no TCP address; use tcp:HOST:PORT, such as tcp:localhost:7000");
+    let (host, port) = text.rsplit_once(':').ok_or_else(usage)?;
+    let port = port.parse().ok().filter(|&port| port > 0).ok_or_else(usage)?;
+    Ok(RemoteAddress::Tcp { host: host_name(host)?, port })
+}
