@@ -1,12 +1,13 @@
-//! Blender's own exporter: its name and version in `asset.generator`, what it leaves out by default, and its
-//! lights.
+//! Files of Blender's glTF exporter: recognition by `asset.generator`, units and falloff of its lights, and
+//! what its default settings leave out.
 
 use super::light_units::LightUnits;
 
 /// Start of `asset.generator` in a file of Blender's exporter; `v` and the version follow.
 const NAME: &str = "Khronos glTF Blender I/O";
 
-/// First version that writes candela and lux; earlier ones write Blender's numbers.
+/// First version of Blender's exporter that writes intensities in candela and lux by default; earlier ones
+/// write watts.
 const PHOTOMETRIC_SINCE: (u32, u32) = (3, 4);
 
 /// Remedy of a file without light.
@@ -38,12 +39,13 @@ fn version(text: &str) -> Option<(u32, u32)> {
     Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
 }
 
-/// Cosine of the inner cone with which glTF's falloff has the flux of Blender's spot light, by the cosine of
-/// its outer cone and the exporter's angles of both.
+/// Cosine of the inner cone angle at which glTF's spot falloff has the flux of Blender's. Arguments are the
+/// angles of the inner and outer cone that the exporter wrote, radians, and the cosine of the outer one.
 ///
 /// The exporter writes `inner = outer (1 - blend)`. Blender's falloff is a smooth step of the cosine, from 0
-/// at `cos outer` to 1 over a width of `blend (1 - cos outer)`, and its integral over the width is 1/2; that
-/// of glTF's square is 1/3. Equal flux takes 3/4 of the width.
+/// at `cos outer` to 1 over a width of `blend (1 - cos outer)`; its integral over the width is 1/2. The
+/// integral of glTF's squared ramp is 1/3. The flux is equal if the inner cone takes up 3/4 of the remaining
+/// width.
 pub(super) fn inner_cosine(inner: f32, outer: f32, outer_cosine: f32) -> f32 {
     let blend = 1.0 - inner / outer;
     outer_cosine + 0.75 * blend * (1.0 - outer_cosine)
@@ -71,7 +73,7 @@ mod tests {
         }
     }
 
-    /// Integral of a falloff over the cosine, from 0 to 1.
+    /// Integral of `falloff` over the cosine, from 0 to 1.
     fn flux(falloff: impl Fn(f64) -> f64) -> f64 {
         let steps = 100_000;
         (0..steps).map(|step| falloff((f64::from(step) + 0.5) / f64::from(steps))).sum::<f64>()

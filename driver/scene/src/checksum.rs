@@ -13,12 +13,12 @@ impl Scene {
         self.checksum_after(self.bulk_checksum(), &self.cameras)
     }
 
-    /// [`Self::checksum`] of a scene without its cameras: everything that its card image depends on.
+    /// [`Self::checksum`] without the cameras. It covers everything that the card image depends on.
     pub fn checksum_without_cameras(&self) -> String {
         self.checksum_after(self.bulk_checksum(), &[])
     }
 
-    /// Sum of the triangles and texels.
+    /// Checksum of the triangles and texels.
     pub(super) fn bulk_checksum(&self) -> Checksum {
         let mut sum = Checksum::default();
         for triangle in &self.triangles {
@@ -43,14 +43,14 @@ impl Scene {
         sum
     }
 
-    /// Sum of all contents, with these cameras, after that of the triangles and texels.
+    /// Checksum of all contents. `sum` is [`Self::bulk_checksum`]; `cameras` replace those of the scene.
     pub(super) fn checksum_after(&self, mut sum: Checksum, cameras: &[Camera]) -> String {
         sum.update(self.description(cameras).as_bytes());
         format!("{:08x}", sum.value())
     }
 
-    /// Text of all contents except triangles, attributes and texels, with floating-point numbers that parse
-    /// back exactly.
+    /// Text of all contents except triangles, attributes and texels. Its floating-point numbers parse back
+    /// exactly.
     fn description(&self, cameras: &[Camera]) -> String {
         let mut text = String::new();
         let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, cameras, self.textures, self.lights);

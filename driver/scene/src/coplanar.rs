@@ -1,7 +1,7 @@
-//! Lamps in the plane of another surface, such as a panel that is modelled in the plane of the ceiling.
+//! Lifts lamps off surfaces in the same plane, such as a panel that is modelled in the plane of the ceiling.
 //!
-//! Of two surfaces in one plane a ray would meet either, by rounding. An emissive triangle is lifted off such
-//! a surface by a distance above the rounding error, so that it is seen whole, shadow rays reach it, and its
+//! Rounding decides which of two coplanar surfaces a ray meets. An emissive triangle is therefore lifted off
+//! the other surface by more than the rounding error, so that it is seen whole, shadow rays reach it, and its
 //! photons start in front.
 
 use glam::{DVec2, DVec3};
@@ -10,17 +10,18 @@ use rayon::prelude::*;
 
 use super::{Scene, Triangle};
 
-/// Distance within which surfaces share a plane, in units in the last place of their greatest coordinate.
+/// Distance within which two surfaces count as coplanar, in units in the last place of their greatest
+/// coordinate.
 const SHARED: f64 = 16.0;
-/// Distance that a lamp is lifted by, in units in the last place of its greatest coordinate and of the
-/// distance from which it is seen.
+/// Distance by which a lamp is lifted, in units in the last place of the larger of its greatest coordinate
+/// and its viewing distance.
 const LIFT: f64 = 64.0;
-/// Greatest distance from which a lamp is seen whole, in lengths of its longest edge.
+/// Greatest viewing distance at which a lifted lamp is seen whole, in lengths of its longest edge.
 const SEEN_FROM: f64 = 32.0;
 
 impl Scene {
-    /// Lifts emissive triangles off surfaces that are not, and overlap them in one plane: along their own
-    /// normal, or on both sides emissive ones towards the front of a one-sided surface.
+    /// Lifts emissive triangles off coplanar, overlapping triangles that do not emit. They move along their
+    /// own normal. Double-sided emissive ones move towards the front of a one-sided surface.
     ///
     /// # Errors
     /// If the process cannot have the memory.
@@ -51,7 +52,7 @@ impl Scene {
         self.triangles.iter().enumerate().filter(|(_, triangle)| self.emits(triangle))
     }
 
-    /// Displacement of a lamp off a surface.
+    /// Displacement that lifts `lamp` off `surface`, metres.
     fn lift(&self, lamp: usize, surface: &Triangle) -> DVec3 {
         let lamp = &self.triangles[lamp];
         let is_double_sided = |triangle: &Triangle| {
@@ -76,7 +77,6 @@ fn magnitude(triangle: &Triangle) -> f64 {
     triangle.vertices.iter().map(|vertex| f64::from(vertex.abs().max_element())).fold(0.0, f64::max)
 }
 
-/// An axis-aligned box.
 #[derive(Clone, Copy)]
 struct Box3 {
     low: DVec3,
@@ -84,7 +84,8 @@ struct Box3 {
 }
 
 impl Box3 {
-    /// Box of a triangle, with room for surfaces in its plane.
+    /// Bounding box of a triangle, enlarged by the tolerance of [`SHARED`] so that it meets those of coplanar
+    /// surfaces.
     fn of(triangle: &Triangle) -> Self {
         let [a, b, c] = triangle.vertices.map(DVec3::from);
         let room = SHARED * f64::from(f32::EPSILON) * magnitude(triangle);
@@ -100,9 +101,9 @@ impl Box3 {
     }
 }
 
-/// An emissive triangle.
+/// Emissive triangle that may be lifted.
 struct Lamp {
-    /// Index in the scene.
+    /// Index in [`Scene::triangles`].
     index: usize,
     triangle: Triangle,
     bounds: Box3,
@@ -113,7 +114,7 @@ impl Lamp {
         Self { index, triangle: *triangle, bounds: Box3::of(triangle) }
     }
 
-    /// Returns whether a triangle lies in the lamp's plane, and overlaps it by more than an edge.
+    /// Returns whether `surface` lies in the lamp's plane and overlaps it by more than an edge.
     fn is_covered_by(&self, surface: &Triangle) -> bool {
         let up = normal(&self.triangle);
         let [lamp, surface_corners] =
@@ -163,11 +164,11 @@ enum Content {
     Halves(Box<[Tree; 2]>),
 }
 
-/// Lamps of a leaf.
+/// Maximum number of lamps of a leaf.
 const LEAF: usize = 4;
 
 impl Tree {
-    /// Hierarchy of at least one lamp, halved by number along the longest side.
+    /// Builds the hierarchy of at least one lamp. Nodes are split at the median along their longest side.
     fn new(mut lamps: Vec<Lamp>) -> Self {
         let bounds = lamps.iter().map(|lamp| lamp.bounds).reduce(Box3::union);
         let bounds = bounds.unwrap_or(Box3 { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY });
@@ -181,7 +182,7 @@ impl Tree {
         Self { bounds, content: Content::Halves(Box::new([Self::new(lamps), Self::new(upper)])) }
     }
 
-    /// Indices of the lamps that a surface overlaps in their plane.
+    /// Indices of the lamps that `surface` overlaps in their plane.
     fn overlapping(&self, surface: &Triangle) -> impl Iterator<Item = usize> {
         let mut found = Vec::new();
         self.find(surface, &Box3::of(surface), &mut found);
@@ -209,7 +210,7 @@ mod tests {
     use super::*;
     use crate::{Material, Reflection};
 
-    /// A triangle at a height whose front faces down; `x` moves it.
+    /// One-sided triangle at `height` that faces down, shifted by `x`.
     fn panel(height: f32, x: f32, material: u32) -> Triangle {
         Triangle::new(
             [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|[a, b]| Vec3::new(a + x, height, b)),

@@ -1,4 +1,4 @@
-//! Environment light from infinitely far.
+//! Environment light: radiance from infinitely far.
 
 use std::fs;
 use std::io;
@@ -32,12 +32,12 @@ pub struct Environment {
     pub height: u32,
     /// Texels, rows from the top; finite, and 0 or more.
     pub texels: Vec<[f32; 3]>,
-    /// Factor of the texels, 0 or more; 1 shows them as they are.
+    /// Factor of the texels, 0 or more.
     pub strength: f32,
 }
 
 impl Environment {
-    /// Environment of equal radiance in all directions.
+    /// Creates an environment of equal radiance in all directions.
     pub fn constant(radiance: Vec3) -> Self {
         Self { width: 1, height: 1, texels: vec![radiance.to_array()], strength: 1.0 }
     }
@@ -45,8 +45,8 @@ impl Environment {
     /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that
     /// has the channels R, G and B. The first bytes of the file determine its format.
     ///
-    /// Channels that are no radiance are clamped: negative ones and those that are not a number to 0, others
-    /// to [`BRIGHTEST`], and infinite ones to the brightest channel of the map.
+    /// Invalid channels are clamped: negative and NaN ones to 0, those above [`BRIGHTEST`] to it, and
+    /// infinite ones to the brightest finite channel of the map.
     ///
     /// # Errors
     /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged,
@@ -56,7 +56,7 @@ impl Environment {
         Self::load_with_notice(path).map(|(environment, _)| environment)
     }
 
-    /// [`Self::load`], and a sentence on the texels that were clamped, if there are any.
+    /// [`Self::load`] that also returns a sentence about clamped texels, if there are any.
     ///
     /// # Errors
     /// As [`Self::load`].
@@ -98,8 +98,8 @@ impl Environment {
         Self { width, height, texels, strength: 1.0 }
     }
 
-    /// Clamps channels that are no radiance. Returns the number of texels that have any; `None` if channels
-    /// are infinite, and no finite one is above 0.
+    /// Clamps invalid channels. Returns the number of texels that have any; `None` if channels are infinite
+    /// and no finite one is above 0.
     fn clamp(&mut self) -> Option<usize> {
         let is_bad = |texel: &&mut [f32; 3]| !texel.iter().all(|value| (0.0..=BRIGHTEST).contains(value));
         let finite = self.texels.iter().flatten().filter(|value| value.is_finite());
@@ -116,8 +116,8 @@ impl Environment {
         Some(clamped)
     }
 
-    /// The environment turned about +y, counter-clockwise seen from above. By fractions of a column texels
-    /// are interpolated.
+    /// Returns the environment turned about +y, counter-clockwise seen from above. Texels are interpolated if
+    /// the angle is no whole number of columns.
     #[must_use]
     pub fn turned(mut self, degrees: f32) -> Self {
         let width = self.width as usize;
@@ -140,7 +140,7 @@ impl Environment {
         self
     }
 
-    /// Returns whether each row has one radiance, so that turning changes nothing.
+    /// Returns whether every row has one radiance, so that a turn about +y changes nothing.
     pub fn is_equal_around(&self) -> bool {
         let rows = self.texels.chunks_exact((self.width as usize).max(1));
         rows.into_iter().all(|row| row.iter().all(|texel| Some(texel) == row.first()))

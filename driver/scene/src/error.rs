@@ -9,14 +9,14 @@ use miette::{Diagnostic, MietteError, MietteSpanContents, SourceCode, SourceSpan
 use photoncard_picture::allocation::{self, OutOfMemory};
 use thiserror::Error;
 
-/// Part of a line of a file, which knows its place there.
+/// Part of a line of a file with its position in the file.
 #[derive(Debug)]
 pub struct Excerpt {
     /// Name of the file.
     pub name: String,
-    /// The part.
+    /// Text of the part.
     pub part: String,
-    /// Line of the file and bytes in it before the part, both from 0.
+    /// Line of the file, and offset of the part in that line, bytes; both from 0.
     pub place: [usize; 2],
 }
 
@@ -51,7 +51,7 @@ pub struct Location {
 }
 
 impl Location {
-    /// Location `item` in `file`.
+    /// Creates the location of `item` in `file`.
     pub fn new(file: &Path, item: impl Into<String>) -> Self {
         Self { file: file.to_owned(), item: item.into() }
     }
@@ -91,7 +91,7 @@ pub enum SceneError {
         reason: String,
     },
 
-    /// Error of a file of another format, a folder or an address.
+    /// Error of a path that is a folder, an address, or a file of another format.
     #[error("{} is {what}, not a glTF 2.0 scene", file.display())]
     #[diagnostic(code(scene::other_format), help("{remedy}"))]
     OtherFormat {
@@ -99,7 +99,7 @@ pub enum SceneError {
         file: PathBuf,
         /// Format of the file.
         what: &'static str,
-        /// Remedy, with the command that makes glTF of it where there is one.
+        /// Remedy. Where a program converts the format to glTF, it contains the command.
         remedy: String,
     },
 
@@ -113,7 +113,7 @@ pub enum SceneError {
         what: &'static str,
         /// Stated size of the part, bytes.
         needed: u64,
-        /// Available bytes.
+        /// Available size, bytes.
         available: u64,
     },
 

@@ -1,4 +1,4 @@
-//! A scene that stays as it is between pictures, with what renders derive from all of it.
+//! Scene that is rendered several times without changes of geometry or materials, with cached checksums.
 
 use std::borrow::Cow;
 use std::ops::Deref;
@@ -9,7 +9,7 @@ use photoncard_shared::checksum::Checksum;
 
 use super::{Camera, Scene};
 
-/// A scene that stays as it is between pictures. What a render derives from all triangles and texels is
+/// Scene whose geometry and materials stay fixed between renders. Checksums of all triangles and texels are
 /// computed once.
 #[derive(Debug)]
 pub struct FixedScene<'a> {
@@ -41,14 +41,13 @@ impl FixedScene<'_> {
         self.bulk.get_or_init(|| self.scene.bulk_checksum()).clone()
     }
 
-    /// Moves the cameras, or takes others: nothing that a render derives from triangles and texels is
-    /// computed again.
+    /// Replaces the cameras. Cached checksums of triangles and texels stay valid.
     pub fn set_cameras(&mut self, cameras: Vec<Camera>) {
         self.scene.to_mut().cameras = cameras;
         self.checksum = OnceLock::new();
     }
 
-    /// The scene.
+    /// Returns the scene.
     pub fn into_scene(self) -> Scene {
         self.scene.into_owned()
     }
@@ -63,8 +62,8 @@ impl Deref for FixedScene<'_> {
 }
 
 impl FixedScene<'static> {
-    /// The cameras of a scene of these checksums, with cameras and without. Of the rest nothing is there but
-    /// whether it is specular.
+    /// Creates a stand-in for a scene of which only the cameras, the offset, and the checksums with and
+    /// without cameras are known, and whether it is specular.
     pub fn of_cameras(
         cameras: Vec<Camera>,
         offset: DVec3,

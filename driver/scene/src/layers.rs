@@ -11,12 +11,12 @@ use super::out_of_range::{OutOfRange, Property, every, fault, is_share};
 pub struct Layers {
     /// Normal map of the base.
     pub normal: Option<NormalMap>,
-    /// F0 of the dielectric before its limit of 1, without the factor: F0 of the index of refraction times
-    /// the colour of `KHR_materials_specular`.
+    /// F0 of the dielectric before it is limited to 1, without `specularFactor`: F0 of the index of
+    /// refraction times `specularColorFactor` (`KHR_materials_specular`).
     pub specular: Vec3,
-    /// Texture of the factor of `KHR_materials_specular`, in alpha.
+    /// Texture of `specularFactor`, in alpha.
     pub specular_texture: Option<u32>,
-    /// Texture of the colour of `KHR_materials_specular` (sRGB).
+    /// Texture of `specularColorFactor` (sRGB).
     pub specular_colour_texture: Option<u32>,
     /// Coat over everything else.
     pub coat: Option<Coat>,
@@ -37,7 +37,7 @@ pub struct NormalMap {
     pub scale: f32,
 }
 
-/// A layer of clear dielectric of the index 1.5 (`KHR_materials_clearcoat`).
+/// Layer of clear dielectric with the index of refraction 1.5 (`KHR_materials_clearcoat`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coat {
     /// Share of the surface that has the coat, 0 to 1.
@@ -48,7 +48,7 @@ pub struct Coat {
     pub factor_texture: Option<u32>,
     /// Texture of the roughness, in green.
     pub roughness_texture: Option<u32>,
-    /// Normal map; the coat has the corners' normals without one.
+    /// Normal map of the coat; without one, the coat has the interpolated vertex normals.
     pub normal: Option<NormalMap>,
 }
 
@@ -68,9 +68,9 @@ pub struct Sheen {
 /// Diffuse transmission (`KHR_materials_diffuse_transmission`).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DiffuseTransmission {
-    /// Share of the diffuse light that leaves at the other side, 0 to 1.
+    /// Share of the diffuse light that is transmitted to the other side, 0 to 1.
     pub factor: f32,
-    /// Colour of that light, 0 to 1.
+    /// Colour of the transmitted light, 0 to 1.
     pub colour: Vec3,
     /// Texture of the share, in alpha.
     pub factor_texture: Option<u32>,
@@ -79,7 +79,8 @@ pub struct DiffuseTransmission {
 }
 
 impl Layers {
-    /// No layer: for a dielectric of an F0.
+    /// Creates layers without any texture, coat, sheen or transmission. `specular` is the F0 of the
+    /// dielectric.
     pub const fn none(specular: Vec3) -> Self {
         Self {
             normal: None,
@@ -93,13 +94,13 @@ impl Layers {
         }
     }
 
-    /// The normal texture whose coordinates define tangents: the base's, or the coat's if the base has none.
+    /// Normal texture whose coordinates define tangents: that of the base or, without one, that of the coat.
     pub(super) fn tangent_texture(&self) -> Option<u32> {
         let coat_normal = self.coat.and_then(|coat| coat.normal);
         self.normal.or(coat_normal).map(|map| map.texture)
     }
 
-    /// Textures in use.
+    /// Indices of the textures in use.
     pub(super) fn textures(&self) -> impl Iterator<Item = u32> {
         let Self { normal, specular_texture, specular_colour_texture, transmission_texture, .. } = *self;
         let map = |map: Option<NormalMap>| map.map(|map| map.texture);
@@ -114,8 +115,8 @@ impl Layers {
             .flatten()
     }
 
-    /// Replaces every texture by `renumbered` of it, or takes it off. No field is left out here: a new one
-    /// may be a texture.
+    /// Replaces every texture index by its `renumbered` value; `None` removes the texture. It destructures
+    /// all fields, so that a new one cannot be forgotten.
     pub(super) fn renumber(&mut self, renumbered: impl Fn(u32) -> Option<u32>) {
         let Self {
             normal,

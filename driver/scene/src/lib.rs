@@ -1,8 +1,8 @@
 //! Loaded scenes: triangles, materials, textures, lights and cameras in world space.
 //!
-//! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel. They are
-//! about the scene's own origin, which lies at [`Scene::offset`] in the file: single precision resolves
-//! little far from an origin.
+//! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel.
+//! Coordinates are relative to the scene's own origin, which lies at [`Scene::offset`] in the file, because
+//! single precision is coarse far from an origin.
 #![forbid(unsafe_code)]
 
 mod blender;
@@ -45,7 +45,7 @@ pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
 pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
 use crate::error::SceneError;
 
-/// Name of the camera in a scene whose file has none.
+/// Name of the default camera.
 const FRAMED: &str = "framed";
 
 /// Remedy of a scene without light.
@@ -53,11 +53,11 @@ const NO_LIGHT: &str = "give a material of at least one triangle an emissiveFact
                         for its radiance), place a light of KHR_lights_punctual, or add an environment: --environment 1,1,1 \
                         is a white sky";
 
-/// A scene in world space, every instance resolved. [`gltf::load`] reads one from a file.
+/// Scene in world space, with all instances expanded. [`gltf::load`] reads one from a file.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Place of the scene's origin in the coordinates of its file, metres: 0 unless the scene lies far from
-    /// the file's origin.
+    /// Position of the scene's origin in the coordinates of its file, metres. It is 0 unless the scene lies
+    /// far from the file's origin.
     pub offset: DVec3,
     /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
     pub triangles: Vec<Triangle>,
@@ -69,9 +69,9 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.
     pub textures: Vec<Texture>,
-    /// Images, one for each encoding that is in use.
+    /// Images. One that textures use in two encodings is listed twice.
     pub images: Vec<Image>,
-    /// Lights without extent.
+    /// Point, spot and directional lights (`KHR_lights_punctual`).
     pub lights: Vec<PunctualLight>,
     /// Environment light from infinitely far; `None` in a scene from a glTF file.
     pub environment: Option<Environment>,
@@ -81,35 +81,35 @@ pub struct Scene {
     pub generator: Option<String>,
     /// Names of the file's variants of materials.
     pub variants: Vec<String>,
-    /// Orthographic cameras of the file, which are not rendered: the number of other cameras before each, and
-    /// its name.
+    /// Orthographic cameras of the file, which are not rendered: the number of perspective cameras before
+    /// each, and its name.
     pub orthographic: Vec<(usize, String)>,
-    /// Sentences on contents of the file that the renderer does not use or that are missing, each once.
+    /// Sentences about missing contents of the file and about contents that the renderer ignores, each once.
     pub notices: Vec<String>,
-    /// Notices that do not concern every picture: the index in [`Self::notices`], and what they are about.
+    /// Notices that matter only to some pictures: index in [`Self::notices`], and the subject.
     pub concerns: Vec<(usize, Concern)>,
-    /// Sentences on contents of the file that the renderer takes in another way than they are stated, each
-    /// once.
+    /// Sentences about contents of the file that the renderer interprets in another way than they are stated,
+    /// each once.
     pub remarks: Vec<String>,
-    /// Number of triangles of zero area that were left out.
+    /// Number of triangles of zero area, which were left out.
     pub skipped_triangles: usize,
 }
 
-/// Contents of a file that a picture may do without: what is ignored or missing of them does not show in it.
+/// Subject of a notice that matters only to pictures that use it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Concern {
-    /// The view, which a picture may state.
+    /// Default view. A picture that states its view does not use it.
     View,
-    /// Cameras that nothing can be seen by, as others can.
+    /// Cameras that cannot be used, in a file that has others.
     OtherCameras,
-    /// Animations, which do not play in a picture of the scene as it stands.
+    /// Animations. A picture of the scene at rest does not use them.
     Animations,
-    /// Light from infinitely far, which a picture may have from another file.
+    /// Environment light of the file. A picture may replace it by that of another file.
     Environment,
 }
 
 impl Scene {
-    /// The notices that concern a picture, by what it uses of the file.
+    /// Notices that matter to a picture; `uses` returns whether the picture uses a subject.
     pub fn notices_on(&self, uses: impl Fn(Concern) -> bool) -> Vec<&str> {
         let is_idle =
             |index: usize| self.concerns.iter().any(|&(notice, concern)| notice == index && !uses(concern));
@@ -117,8 +117,8 @@ impl Scene {
         notices.filter(|(index, _)| !is_idle(*index)).map(|(_, notice)| &**notice).collect()
     }
 
-    /// Coordinates in the file of a place in the scene. Where the scene has no offset they read as the
-    /// place's own do.
+    /// Converts a position from the scene's coordinates to the file's, metres. Without an offset the result
+    /// prints as the argument does.
     pub fn in_file(&self, place: Vec3) -> DVec3 {
         // Of all double-precision numbers that round to a coordinate the one with its shortest decimal form
         // is meant.
@@ -126,19 +126,19 @@ impl Scene {
         DVec3::from_array(place.to_array().map(decimal)) + self.offset
     }
 
-    /// Place in the scene of coordinates in the file.
+    /// Converts a position from the file's coordinates to the scene's, metres.
     pub fn in_scene(&self, place: DVec3) -> Vec3 {
         (place - self.offset).as_vec3()
     }
 
-    /// Lower and upper corner of the scene's bounding box; both zero for a scene without triangles.
+    /// Lower and upper corner of the scene's bounding box, metres; both zero for a scene without triangles.
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let mut vertices = self.triangles.iter().flat_map(|triangle| triangle.vertices);
         let first = vertices.next().unwrap_or(Vec3::ZERO);
         vertices.fold((first, first), |(low, high), vertex| (low.min(vertex), high.max(vertex)))
     }
 
-    /// The camera of a name, or the first one for `None`.
+    /// Returns the camera of this name, or the first one for `None`.
     ///
     /// # Errors
     /// If no camera has the name, or the camera is orthographic; the error lists the cameras' names.
@@ -162,7 +162,8 @@ impl Scene {
         })
     }
 
-    /// The orthographic camera of a name, or the first camera of the file for `None`, if it is one.
+    /// Name of the orthographic camera that was requested: the one of this name or, for `None`, the file's
+    /// first camera if it is orthographic.
     fn orthographic_camera(&self, name: Option<&str>) -> Option<&str> {
         let is_meant = |(before, camera): &&(usize, String)| match name {
             None => *before == 0,
@@ -200,7 +201,7 @@ impl Scene {
         self.materials.get(triangle.material as usize).is_some_and(Material::is_emissive)
     }
 
-    /// Returns whether any light comes from a triangle, a light without extent, or the environment.
+    /// Returns whether the scene has an emissive triangle, a punctual light or a lit environment.
     pub fn has_light(&self) -> bool {
         self.lights.iter().any(|light| light.intensity.max_element() > 0.0)
             || self.environment.as_ref().is_some_and(Environment::is_lit)
@@ -212,32 +213,32 @@ impl Scene {
         blender::is_exporter(self.generator.as_deref())
     }
 
-    /// Angle by which an environment map is turned about +y in scenes of the program that wrote the file,
-    /// counter-clockwise seen from above, degrees: the middle of a map is +x in Blender, and -z in glTF's
+    /// Rotation about +y, degrees, counter-clockwise seen from above, that aligns an environment map with the
+    /// conventions of the program that wrote the file. The middle of a map is +x in Blender and -z in glTF
     /// viewers.
     pub fn environment_turn(&self) -> f32 {
         if self.is_of_blender() { -90.0 } else { 0.0 }
     }
 
-    /// Returns whether any triangle focuses light: [`Self::specular_materials`].
+    /// Returns whether any triangle has one of the [`Self::specular_materials`].
     pub fn is_specular(&self) -> bool {
         let is_specular = self.specular_materials();
         self.triangles.iter().any(|triangle| is_specular.get(triangle.material as usize) == Some(&true))
     }
 
-    /// For each material, whether it focuses light: it reflects or transmits perfectly specularly, or by a
-    /// lobe that rays follow.
+    /// Flags of the materials that focus light. They reflect or transmit perfectly specularly, or have a lobe
+    /// that rays follow.
     pub fn specular_materials(&self) -> Vec<bool> {
         self.materials.iter().map(|material| material.is_specular(self.minimum_roughness(material))).collect()
     }
 
-    /// Returns whether a material has a lobe that is narrow somewhere, and that rays follow.
+    /// Returns whether a material has a narrow lobe that rays follow, at some texel at least.
     pub fn has_narrow_lobe(&self, material: &Material) -> bool {
         material.has_narrow_lobe(self.minimum_roughness(material))
     }
 
-    /// For each material, whether parts of its surfaces may not be there: it has cut-outs, or an alpha below
-    /// 1 that counts.
+    /// Flags of the materials with partial coverage: they have cut-outs, or an alpha below 1 with `alphaMode`
+    /// `BLEND`.
     pub fn uncovered_materials(&self) -> Vec<bool> {
         let mut uncovered: Vec<bool> =
             self.materials.iter().map(|material| self.is_uncovered(material)).collect();
@@ -262,20 +263,20 @@ impl Scene {
         material.alpha_cutoff.is_some() || material.blends && (material.alpha < 1.0 || has_alpha())
     }
 
-    /// Minimum of a material's roughness texture, 0 to 1; 1 without one.
+    /// Minimum of a material's roughness texture, 0 to 1; 1 without a texture.
     fn minimum_roughness(&self, material: &Material) -> f32 {
         let texture = material.metallic_roughness_texture.and_then(|index| self.textures.get(index as usize));
         let image = texture.and_then(|texture| self.images.get(texture.image as usize));
         image.map_or(1.0, Image::minimum_green)
     }
 
-    /// Adds the light that rough microsurfaces reflect several times to the reflection of all
-    /// metallic-roughness materials.
+    /// Enables the compensation of multiple scattering between microfacets for all metallic-roughness
+    /// materials.
     pub fn compensate_energy(&mut self) {
         self.materials.iter_mut().for_each(|material| material.energy_compensation = true);
     }
 
-    /// Checks that the scene has a light, once settings were applied and an environment was added.
+    /// Checks that the scene has a light. Call it once settings are applied and an environment is added.
     ///
     /// # Errors
     /// [`SceneError::NoLight`].

@@ -1,8 +1,8 @@
-//! Lights without extent (`KHR_lights_punctual`).
+//! Punctual lights: point, spot and directional (`KHR_lights_punctual`).
 
 use glam::Vec3;
 
-/// A light without extent, in radiometric units: a file's are converted by its
+/// Point, spot or directional light in radiometric units. Those of a file are converted by its
 /// [`LightUnits`](super::LightUnits).
 #[derive(Clone, Debug, PartialEq)]
 pub struct PunctualLight {
@@ -15,7 +15,7 @@ pub struct PunctualLight {
     pub intensity: Vec3,
 }
 
-/// Kind of a light without extent, with its position and direction.
+/// Kind of a punctual light, with its position and direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PunctualKind {
     /// Light in all directions from a point.
@@ -26,18 +26,18 @@ pub enum PunctualKind {
     /// Light from a point into a cone. Between the inner and the outer cone the intensity falls off as
     /// `KHR_lights_punctual` recommends: `((cos - outer_cosine) / (inner_cosine - outer_cosine))^2`.
     Spot {
-        /// Position, metres.
+        /// Position of the apex, metres.
         position: Vec3,
-        /// Unit vector of the cone's axis, in which light travels.
+        /// Unit vector of the cone's axis, in the direction of the light.
         direction: Vec3,
-        /// Cosine of the angle of the inner cone, within which the intensity is full; above `outer_cosine`.
+        /// Cosine of the inner cone angle, within which the intensity is full; above `outer_cosine`.
         inner_cosine: f32,
-        /// Cosine of the angle of the outer cone, beyond which there is no light.
+        /// Cosine of the outer cone angle, beyond which the intensity is 0.
         outer_cosine: f32,
     },
     /// Parallel light from infinitely far.
     Directional {
-        /// Unit vector in which light travels.
+        /// Unit vector of the direction in which light travels.
         direction: Vec3,
     },
 }

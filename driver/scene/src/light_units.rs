@@ -1,26 +1,28 @@
-//! Units of lights without extent.
+//! Units of punctual lights.
 
 use photoncard_picture::choice::choices;
 
 /// Luminous efficacy by which Blender's exporter converts watts to lumens, lm/W.
 const EFFICACY: f32 = 683.0;
 
-/// Units in which a file states lights without extent (`KHR_lights_punctual`).
+/// Units in which a file states punctual lights (`KHR_lights_punctual`).
 ///
-/// Emission of surfaces is always radiance in W/(sr m^2), and the constant radiance of an environment too. A
-/// file is consistent if its lights are in W/sr and W/m^2, or in cd and lx beside emission in cd/m^2, which
-/// is the same but for a factor of all light: both are [`Radiometric`](Self::Radiometric).
+/// Emission of surfaces is always radiance in W/(sr m^2), and so is the constant radiance of an environment.
+/// [`Radiometric`](Self::Radiometric) fits two kinds of consistent files: those with lights in W/sr and
+/// W/m^2, and those with lights in cd and lx beside emission in cd/m^2, which differ by one factor of all
+/// light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LightUnits {
-    /// Units of the exporter that the file names: [`Photometric`](Self::Photometric) for Blender's own,
+    /// Chosen by the exporter in `asset.generator`: [`Photometric`](Self::Photometric) for Blender's,
     /// [`Watts`](Self::Watts) for Blender's before 3.4, [`Radiometric`](Self::Radiometric) for others.
     #[default]
     Auto,
-    /// Points and spots in W/sr, directional lights in W/m^2: numbers of candela and lux as they stand.
+    /// Point and spot lights in W/sr, directional lights in W/m^2. Numbers in candela and lux are taken
+    /// unchanged.
     Radiometric,
-    /// Points and spots in cd, directional lights in lx, both of 683 lm/W.
+    /// Point and spot lights in cd, directional lights in lx; 683 lm are 1 W.
     Photometric,
-    /// Points and spots by the flux of a point that radiates in all directions, W; directional lights in
+    /// Point and spot lights by their flux in W, as if they radiated in all directions; directional lights in
     /// W/m^2.
     Watts,
 }
@@ -34,7 +36,7 @@ choices!(LightUnits {
 });
 
 impl LightUnits {
-    /// Number by which intensities of points and spots are divided to be in W/sr.
+    /// Divisor that converts the intensity of a point or spot light to W/sr.
     pub(super) fn points(self) -> f32 {
         match self {
             Self::Auto | Self::Radiometric => 1.0,
@@ -43,7 +45,7 @@ impl LightUnits {
         }
     }
 
-    /// Number by which irradiances of directional lights are divided to be in W/m^2.
+    /// Divisor that converts the irradiance of a directional light to W/m^2.
     pub(super) fn directional(self) -> f32 {
         match self {
             Self::Auto | Self::Radiometric | Self::Watts => 1.0,

@@ -1,8 +1,8 @@
 //! Limits of emission.
 
-/// Maximum emission in each channel: of surfaces and the environment in W/(sr m^2), of lights without extent
-/// in their unit of intensity. Its products and squares are finite in single precision.
+/// Maximum emission in each channel: W/(sr m^2) of surfaces and the environment, the unit of intensity of
+/// punctual lights. Products and squares of it are finite in single precision.
 pub const BRIGHTEST: f32 = 1e20;
 
-/// Range of non-zero emission, whose products and squares neither overflow nor underflow in single precision.
+/// Range of non-zero emission. Its products and squares neither overflow nor underflow in single precision.
 pub(super) const EMISSION: std::ops::RangeInclusive<f32> = 1e-20..=BRIGHTEST;

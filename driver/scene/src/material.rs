@@ -8,7 +8,7 @@ use super::layers::Layers;
 use super::limits::EMISSION;
 use super::out_of_range::{OutOfRange, Property, every, fault, is_share};
 
-/// Tolerance of the sum of the two albedos above 1: they are often written in three digits.
+/// Tolerance of the sum of the diffuse and specular albedo above 1, because files often state three digits.
 const SUM_TOLERANCE: f32 = 1e-4;
 
 /// Material of a surface: reflection, transmission, emission, textures and cut-outs.
@@ -20,13 +20,13 @@ pub struct Material {
     pub reflection: Reflection,
     /// Radiance emitted from the front, W/(sr m^2). The emissive texture multiplies it.
     pub emission: Vec3,
-    /// True if the back reflects and emits as the front does. A one-sided back is black.
+    /// True if the back reflects and emits as the front does. The back of a one-sided surface is black.
     pub double_sided: bool,
-    /// Alpha below which the surface is cut out (`alphaMode` `MASK`), of `alpha` times the alphas of the base
-    /// texture and of the corners' colours.
+    /// Threshold of `alphaMode` `MASK`: the surface is cut out where the product of `alpha`, the base
+    /// texture's alpha and the vertex colour's alpha is below it.
     pub alpha_cutoff: Option<f32>,
-    /// True for partial coverage (`alphaMode` `BLEND`): the share of the surface that is there is `alpha`
-    /// times the alphas of the base texture and of the corners' colours.
+    /// True for `alphaMode` `BLEND`: the coverage of the surface is the product of `alpha`, the base
+    /// texture's alpha and the vertex colour's alpha.
     pub blends: bool,
     /// Alpha of the base colour factor, 0 to 1.
     pub alpha: f32,
@@ -39,7 +39,8 @@ pub struct Material {
     /// Emissive texture (sRGB), an index into [`Scene::textures`](super::Scene::textures), which multiplies
     /// the emission.
     pub emissive_texture: Option<u32>,
-    /// True to add the light that a rough microsurface reflects several times, which glTF's model leaves out.
+    /// True to add the light that is scattered several times between microfacets, which glTF's model leaves
+    /// out.
     pub energy_compensation: bool,
     /// Layers beyond the base; `None` for most materials.
     pub layers: Option<Box<Layers>>,
@@ -48,10 +49,10 @@ pub struct Material {
 /// Reflection and transmission model of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflection {
-    /// A Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2
-    /// pi) max(0, cos alpha)^exponent`, alpha measured from the mirror direction. Stated by `extras`; without
-    /// the lobe also by `KHR_materials_specular` with the factor 0 on a material that is neither metallic nor
-    /// transmissive.
+    /// Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi)
+    /// max(0, cos alpha)^exponent`; alpha is the angle to the mirror direction. A file states it in `extras`.
+    /// A material that is neither metallic nor transmissive and has a `specularFactor` of 0 is one without a
+    /// lobe.
     Phong {
         /// Lambertian albedo, 0 to 1.
         diffuse: Vec3,
@@ -62,17 +63,16 @@ pub enum Reflection {
     },
     /// The metallic-roughness reflection of glTF 2.0 (appendix B).
     MetallicRoughness {
-        /// Base colour, 0 to 1: the albedo of the dielectric part, and the reflectance at normal incidence of
-        /// metal.
+        /// Base colour, 0 to 1: the albedo of the dielectric part, and F0 of the metallic part.
         base_colour: Vec3,
         /// Metalness, 0 to 1.
         metallic: f32,
         /// Perceptual roughness, 0 to 1: `sqrt(alpha)` of the microfacet distribution.
         roughness: f32,
-        /// F0 of the dielectric part: `((ior - 1) / (ior + 1))^2` times the colour (the product at most 1)
-        /// and the factor of `KHR_materials_specular`.
+        /// F0 of the dielectric part, `min(1, ((ior - 1) / (ior + 1))^2 specularColorFactor) specularFactor`
+        /// (`KHR_materials_specular`).
         dielectric: Vec3,
-        /// F90 of the dielectric part, 0 to 1: the factor of `KHR_materials_specular`.
+        /// F90 of the dielectric part, 0 to 1: `specularFactor` of `KHR_materials_specular`.
         grazing: f32,
         /// Transmission; `None` for opaque surfaces.
         transmission: Option<Transmission>,
@@ -82,10 +82,10 @@ pub enum Reflection {
 /// Transmission of light through a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transmission {
-    /// Share of the dielectric part's light that is transmitted instead of scattered, 0 to 1
+    /// Share of the light entering the dielectric part that is transmitted instead of scattered, 0 to 1
     /// (`KHR_materials_transmission`).
     pub factor: f32,
-    /// Index of refraction, at least 1 (`KHR_materials_ior`; 1.5 without).
+    /// Index of refraction, at least 1 (`KHR_materials_ior`; 1.5 by default).
     pub ior: f32,
     /// True if the surface bounds a volume (`KHR_materials_volume` with a thickness above 0), at which light
     /// is refracted. Otherwise the surface is thin-walled: light passes straight on.
@@ -96,7 +96,7 @@ pub struct Transmission {
 }
 
 impl Material {
-    /// A one-sided material that does not emit, without textures.
+    /// Creates a one-sided material that does not emit and has no textures.
     pub fn new(name: impl Into<String>, reflection: Reflection) -> Self {
         Self {
             name: name.into(),
@@ -114,12 +114,12 @@ impl Material {
         }
     }
 
-    /// A one-sided Lambertian material that does not emit.
+    /// Creates a one-sided Lambertian material that does not emit.
     pub fn lambertian(name: impl Into<String>, albedo: Vec3) -> Self {
         Self::phong(name, albedo, Vec3::ZERO, 0.0)
     }
 
-    /// A one-sided material with a Lambertian albedo and a Phong lobe that does not emit.
+    /// Creates a one-sided material with a Lambertian albedo and a Phong lobe that does not emit.
     pub fn phong(name: impl Into<String>, diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
         Self::new(name, Reflection::Phong { diffuse, specular, exponent })
     }
@@ -129,9 +129,9 @@ impl Material {
         self.emission.max_element() > 0.0
     }
 
-    /// Returns whether the material focuses light: it reflects or transmits perfectly specularly (mirrors,
-    /// smooth coats, glass), or by a lobe that rays follow: a narrow one, a coat, a sheen. `texel` is the
-    /// minimum roughness of its texture, 1 without one.
+    /// Returns whether the material focuses light. It reflects or transmits perfectly specularly (mirrors,
+    /// smooth coats, glass), or has a lobe that rays follow: a narrow one, a coat, a sheen. `texel` is the
+    /// minimum of its roughness texture, 1 without one.
     pub(super) fn is_specular(&self, texel: f32) -> bool {
         if self.layers.as_ref().is_some_and(|layers| layers.coat.is_some() || layers.sheen.is_some()) {
             return true;
@@ -155,8 +155,8 @@ impl Material {
         }
     }
 
-    /// Returns whether the material has a lobe that is narrow somewhere. `texel` is the minimum roughness of
-    /// its texture, 1 without one.
+    /// Returns whether the material has a narrow lobe at some texel. `texel` is the minimum of its roughness
+    /// texture, 1 without one.
     pub(super) fn has_narrow_lobe(&self, texel: f32) -> bool {
         matches!(self.reflection, Reflection::MetallicRoughness { roughness, .. } if is_narrow(roughness * texel))
     }
@@ -166,14 +166,14 @@ impl Material {
         metallic < 1.0 || self.metallic_roughness_texture.is_some()
     }
 
-    /// Textures in use, as indices into [`Scene::textures`](super::Scene::textures).
+    /// Indices of the textures in use, in [`Scene::textures`](super::Scene::textures).
     pub fn textures(&self) -> impl Iterator<Item = u32> {
         let own = [self.base_texture, self.metallic_roughness_texture, self.emissive_texture];
         own.into_iter().flatten().chain(self.layers.iter().flat_map(|layers| layers.textures()))
     }
 
-    /// The normal texture whose coordinates define tangents, an index into
-    /// [`Scene::textures`](super::Scene::textures); `None` without a normal map.
+    /// Index in [`Scene::textures`](super::Scene::textures) of the normal texture whose coordinates define
+    /// tangents; `None` without a normal map.
     pub fn tangent_texture(&self) -> Option<u32> {
         self.layers.as_ref().and_then(|layers| layers.tangent_texture())
     }
@@ -199,7 +199,7 @@ impl Material {
     }
 }
 
-/// Returns whether a GGX lobe of a roughness is narrow.
+/// Returns whether a GGX lobe of this perceptual roughness is narrow.
 fn is_narrow(roughness: f32) -> bool {
     roughness * roughness < NARROW_ALPHA
 }

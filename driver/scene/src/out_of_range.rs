@@ -5,11 +5,11 @@ use glam::Vec3;
 /// A value of a material that is out of its range.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct OutOfRange {
-    /// The property that is out of range.
+    /// Property that is out of range.
     pub(super) property: Property,
-    /// Description of the fault, a clause.
+    /// Description of the fault, as a clause.
     pub(super) reason: String,
-    /// Valid range or another remedy, a clause.
+    /// Valid range or another remedy, as a clause.
     pub(super) remedy: &'static str,
 }
 

@@ -2,35 +2,35 @@
 
 use glam::Vec3;
 
-/// Steps of the angle of a triangle around an edge, per radian: triangles in one plane are at one step.
+/// Resolution of a triangle's angle around an edge, steps per radian. Coplanar triangles have the same step.
 const ANGLE_STEPS: f32 = 1e4;
 
 /// A connected part of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Part {
-    /// Indices of its triangles, ascending.
+    /// Indices of the part's triangles, ascending.
     pub triangles: Vec<u32>,
-    /// True if each edge is passed as often in one direction as in the other: the part bounds a solid.
+    /// True if every edge is traversed equally often in both directions, so that the part bounds a solid.
     pub(crate) is_closed: bool,
 }
 
-/// An edge of a triangle: the bits of its ends, of which the lower comes first.
+/// Edge of a triangle: the bits of the coordinates of its two ends, the lower first.
 type Ends = [[u32; 3]; 2];
 
-/// A triangle at an edge.
+/// One triangle at an edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Side {
     ends: Ends,
     triangle: u32,
-    /// Corner where the edge begins in the triangle's order.
+    /// Corner of the triangle at which the edge begins.
     corner: usize,
-    /// True if the triangle passes the edge from the lower end to the upper.
+    /// True if the triangle traverses the edge from the lower end to the upper.
     is_forward: bool,
 }
 
-/// The connected parts of triangles, by their first triangles. Triangles are connected by an edge that no
-/// third one has. Where more meet, as at solids that touch, those are connected that have the inside of a
-/// solid between them.
+/// Splits triangles into connected parts, in the order of their first triangles. An edge of two triangles
+/// connects them. At an edge of more, as where solids touch, it connects each pair with the inside of a solid
+/// between them.
 pub fn parts(triangles: &[[Vec3; 3]]) -> Vec<Part> {
     let mut sides: Vec<Side> =
         triangles.iter().zip(0..).flat_map(|(corners, index)| sides(corners, index)).collect();
@@ -67,7 +67,6 @@ pub fn parts(triangles: &[[Vec3; 3]]) -> Vec<Part> {
     found
 }
 
-/// The three edges of a triangle.
 fn sides(corners: &[Vec3; 3], triangle: u32) -> [Side; 3] {
     // Negative zero equals zero.
     let bits = corners.map(|corner| corner.to_array().map(|axis| (axis + 0.0).to_bits()));
@@ -77,7 +76,7 @@ fn sides(corners: &[Vec3; 3], triangle: u32) -> [Side; 3] {
     })
 }
 
-/// Pairs of triangles around an edge with the inside of a solid, behind both, between them.
+/// Pairs of neighbouring triangles around an edge between which the inside of a solid lies, behind both.
 fn partners(triangles: &[[Vec3; 3]], around: &[Side]) -> impl Iterator<Item = [u32; 2]> {
     let Some(first) = around.first() else { unreachable!("an edge is a triangle's") };
     let [from, to] = first.ends.map(|end| Vec3::from_array(end.map(f32::from_bits)));
@@ -134,7 +133,7 @@ impl Forest {
 mod tests {
     use super::*;
 
-    /// A box that faces outwards.
+    /// Triangles of an axis-aligned box that faces outwards.
     fn block(lower: Vec3, upper: Vec3) -> Vec<[Vec3; 3]> {
         let corner = |bits: usize| {
             Vec3::from([0, 1, 2].map(|axis| if bits >> axis & 1 == 1 { upper[axis] } else { lower[axis] }))

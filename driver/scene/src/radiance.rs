@@ -1,4 +1,4 @@
-//! Pictures of the Radiance system: `.hdr`, `.pic` (Ward, "Real Pixels", Graphics Gems II, 1991; "Radiance
+//! Reader of Radiance pictures, `.hdr` and `.pic` (Ward, "Real Pixels", Graphics Gems II, 1991; "Radiance
 //! Picture File Format", <https://radsite.lbl.gov/radiance/refer/filefmts.pdf>).
 
 use photoncard_picture::allocation;
@@ -6,16 +6,16 @@ use photoncard_picture::allocation;
 use super::map_size::check_map_size;
 use super::raster::Fault;
 
-/// First bytes of a file, followed by a program's name.
+/// First bytes of a file; the name of a program follows.
 pub(super) const MAGIC: &[u8] = b"#?";
 
 /// Maximum size of a header, bytes.
 const MAX_HEADER: usize = 1 << 16;
 
-/// Maximum number of texels per byte: two bytes encode up to 127 values of one of four channels.
+/// Maximum number of texels per byte. Two bytes encode a run of up to 127 values of one of four channels.
 const TEXELS_OF_A_BYTE: u64 = 16;
 
-/// Widths of rows that may be run-length encoded by channel.
+/// Widths of rows whose channels may be run-length encoded.
 const ENCODED_WIDTHS: std::ops::Range<usize> = 8..32_768;
 
 const EXPORT_AGAIN: &str =
@@ -29,16 +29,15 @@ fn ends_early() -> Fault {
     damaged("the picture ends before its last row")
 }
 
-/// Contents of the header.
 struct Header {
     size: [u32; 2],
-    /// True if the first column is the rightmost, and if the first row is the lowest.
+    /// Whether the first column is the rightmost, and whether the first row is the lowest.
     flipped: [bool; 2],
-    /// Factor by which the radiance was multiplied.
+    /// Factor by which the stored radiance was multiplied.
     exposure: f32,
 }
 
-/// Width and height, and radiance in rows from the top.
+/// Decodes a file. Returns its width and height, and radiance in rows from the top.
 pub(super) fn read(bytes: &[u8]) -> Result<([u32; 2], Vec<[f32; 3]>), Fault> {
     let (header, mut rest) = read_header(bytes)?;
     check_map_size(header.size)?;
@@ -64,7 +63,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<([u32; 2], Vec<[f32; 3]>), Fault> {
 }
 
 /// Decodes `m 2^(e - 136) / exposure` for three mantissas with a common exponent `e`; `e = 0` is black. A
-/// mantissa of 0 gives 0, unlike in readers that add a half.
+/// mantissa of 0 is 0, whereas some readers add 1/2 to it.
 fn radiance([red, green, blue, exponent]: [u8; 4], exposure: f32) -> [f32; 3] {
     if exponent == 0 {
         return [0.0; 3];
@@ -73,7 +72,7 @@ fn radiance([red, green, blue, exponent]: [u8; 4], exposure: f32) -> [f32; 3] {
     [red, green, blue].map(|mantissa| (f64::from(mantissa) * scale) as f32)
 }
 
-/// Header, and the bytes after it.
+/// Parses the header. Returns it and the bytes after it.
 fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
     let (mut exposure, mut rest) = (1.0_f32, bytes);
     loop {
@@ -109,7 +108,7 @@ fn read_header(bytes: &[u8]) -> Result<(Header, &[u8]), Fault> {
     Ok((Header { size, flipped, exposure }, rest))
 }
 
-/// Removes and returns a line of the header.
+/// Removes the next line of the header from `rest` and returns it.
 fn next_line(rest: &mut &[u8]) -> Result<String, Fault> {
     let header = rest.get(..MAX_HEADER.min(rest.len())).unwrap_or_default();
     let end =
@@ -119,7 +118,7 @@ fn next_line(rest: &mut &[u8]) -> Result<String, Fault> {
     Ok(line)
 }
 
-/// Parses `-Y HEIGHT +X WIDTH` with any signs: the size, and whether columns and rows are reversed.
+/// Parses `-Y HEIGHT +X WIDTH` with any signs. Returns the size, and whether columns and rows are reversed.
 fn parse_resolution(line: &str) -> Option<([u32; 2], [bool; 2])> {
     let words: Vec<_> = line.split_whitespace().collect();
     let &[y, height, x, width] = &words[..] else { return None };

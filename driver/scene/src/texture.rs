@@ -19,15 +19,15 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// True for the nearest texel (`magFilter` `NEAREST`), false for bilinear interpolation.
     pub nearest: bool,
-    /// Rows of the matrix M of `KHR_texture_transform`: coordinates are M (u, v) + offset. The identity
-    /// without it.
+    /// Rows of the matrix M of `KHR_texture_transform`; the image is sampled at `M (u, v) + offset`. The
+    /// identity without the extension.
     pub matrix: [[f32; 2]; 2],
     /// Offset of `KHR_texture_transform`, in widths and heights of the image.
     pub offset: [f32; 2],
 }
 
 impl Texture {
-    /// A texture of an image by the first set of coordinates, untransformed, repeated and bilinear.
+    /// Creates a bilinear, repeated, untransformed texture with the first set of coordinates.
     pub fn new(image: u32) -> Self {
         Self {
             image,
@@ -40,7 +40,7 @@ impl Texture {
     }
 }
 
-/// Wrap mode of texture coordinates beyond the image's border.
+/// Wrap mode: the image beyond texture coordinates 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {
     /// The image repeated (`REPEAT`).
@@ -51,10 +51,10 @@ pub enum Wrap {
     Clamp,
 }
 
-/// The texels of an image.
+/// Image as decoded texels.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    /// Name in the scene's file, or of the image's file, or `image N`.
+    /// Name in the scene's file, name of the image's file, or `image N`.
     pub name: String,
     /// Width, texels.
     pub width: u32,
@@ -72,7 +72,7 @@ impl Image {
         size_of_val(&self.texels[..]) as u64
     }
 
-    /// Minimum of green, as it is encoded, 0 to 1; 1 without texels.
+    /// Minimum of the encoded green channel, 0 to 1; 1 without texels.
     pub(crate) fn minimum_green(&self) -> f32 {
         let codes = self.texels.iter();
         match self.encoding {
@@ -85,21 +85,21 @@ impl Image {
     }
 }
 
-/// Encoding of red, green and blue of a texel. Alpha is always linear.
+/// Encoding of the red, green and blue channel of texels. Alpha is always linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Encoding {
     /// sRGB transfer function (IEC 61966-2-1), for colours.
     Srgb,
     /// Linear, for roughness and metalness.
     Linear,
-    /// Linear, of nine bits a channel with a shared exponent (OpenGL's `RGB9_E5`), without alpha: for
+    /// Linear, nine bits per channel with a shared exponent (OpenGL's `RGB9_E5`), without alpha. It keeps
     /// emission of more than 8 bits.
     SharedExponent,
-    /// Two linear channels of 16 bits, little-endian: the first is red and blue, the second green. Without
-    /// alpha.
+    /// Two linear 16-bit channels, little-endian: the first in the bytes of red and blue, the second in those
+    /// of green and alpha.
     LinearPair,
-    /// Red and green of a normal map, linear, 16 bits each, little-endian; blue is that of a unit normal.
-    /// Without alpha.
+    /// x and y of a normal map, linear, 16 bits each, little-endian; z follows from the unit length. Without
+    /// alpha.
     NormalPair,
 }
 
@@ -115,7 +115,7 @@ impl From<Encoding> for TexelFormat {
     }
 }
 
-/// The nearest `RGB9_E5` texel: nine bits a channel with a shared exponent (OpenGL's
+/// Encodes the nearest `RGB9_E5` texel: nine bits per channel with a shared exponent (OpenGL's
 /// `EXT_texture_shared_exponent`).
 pub fn shared_exponent(texel: [f32; 3]) -> [u8; 4] {
     const GREATEST: f32 = 65408.0;

@@ -2,10 +2,10 @@
 
 use glam::{Vec2, Vec3, Vec4};
 
-/// [`Triangle::attributes`] of a triangle whose corners have nothing but their positions.
+/// Value of [`Triangle::attributes`] for a triangle that has positions only.
 pub const NO_ATTRIBUTES: u32 = u32::MAX;
 
-/// [`VertexAttributes::tangents`] of a triangle without tangents.
+/// Value of [`VertexAttributes::tangents`] for a triangle without tangents.
 pub const NO_TANGENTS: u32 = u32::MAX;
 
 /// A triangle in world space.
@@ -20,13 +20,13 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// A triangle without attributes.
+    /// Creates a triangle without attributes.
     pub fn new(vertices: [Vec3; 3], material: u32) -> Self {
         Self { vertices, material, attributes: NO_ATTRIBUTES }
     }
 
-    /// Cross product of two edges: the direction of the geometric normal, with twice the area in m^2 for its
-    /// length.
+    /// Cross product of two edges: the direction of the geometric normal, with a length of twice the area in
+    /// m^2.
     pub fn scaled_normal(&self) -> Vec3 {
         let [a, b, c] = self.vertices;
         (b - a).cross(c - a)
@@ -41,26 +41,26 @@ impl Triangle {
 /// Vertex attributes of a triangle's corners beyond their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexAttributes {
-    /// Unit shading normals of the corners in world space, on the front's side. `None` for a flat triangle,
-    /// also where all three normals equal the geometric normal.
+    /// Unit shading normals of the corners in world space, on the side of the front. `None` for a flat
+    /// triangle, and where all three equal the geometric normal.
     pub normals: Option<[Vec3; 3]>,
     /// Texture coordinates of the corners, sets 0 and 1 (`TEXCOORD_0` and `TEXCOORD_1`), untransformed; v
     /// counts from the image's top.
     pub coordinates: [[Vec2; 3]; 2],
-    /// Linear RGBA of the corners, white without `COLOR_0`. It multiplies the base colour (or the diffuse
-    /// albedo) and alpha.
+    /// Linear RGBA of the corners; white without `COLOR_0`. It multiplies the base colour or diffuse albedo,
+    /// and alpha.
     pub colours: [[f32; 4]; 3],
     /// Index into [`Scene::tangents`](super::Scene::tangents), or [`NO_TANGENTS`].
     pub tangents: u32,
 }
 
-/// Tangents of a triangle's corners: x, y and z of the unit vector in world space along which u increases,
-/// perpendicular to the corner's normal, or zero at a corner without one; w is 1 or -1, and the bitangent `w
-/// (normal x tangent)`.
+/// Tangents of a triangle's corners. (x, y, z) is a unit vector in world space along which u increases,
+/// perpendicular to the corner's normal, or zero at a corner without a tangent. w is 1 or -1; the bitangent
+/// is `w (normal x tangent)`.
 pub type CornerTangents = [Vec4; 3];
 
 impl VertexAttributes {
-    /// Attributes of a triangle that states none: flat, at the origin of every texture, white.
+    /// Attributes of a triangle that states none: flat, white, with zero texture coordinates.
     pub const NONE: Self = Self {
         normals: None,
         coordinates: [[Vec2::ZERO; 3]; 2],
@@ -68,7 +68,7 @@ impl VertexAttributes {
         tangents: NO_TANGENTS,
     };
 
-    /// Unit normals of the corners, of a flat triangle its own.
+    /// Unit normals of the corners; the geometric normal of a flat triangle.
     pub fn normals_of(&self, triangle: &Triangle) -> [Vec3; 3] {
         self.normals.unwrap_or_else(|| [triangle.scaled_normal().normalize_or_zero(); 3])
     }

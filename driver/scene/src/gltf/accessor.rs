@@ -1,6 +1,7 @@
 //! Elements of accessors, read in place after every bound is checked.
 //!
-//! Nothing is allocated for an accessor's count: it need not be backed by bytes (glTF fills with zeros).
+//! Nothing is allocated in proportion to an accessor's count, because it need not be backed by bytes (glTF
+//! fills with zeros).
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
@@ -16,25 +17,25 @@ use crate::error::SceneError;
 
 const REMEDY: &str = "export the scene again; the accessor, its buffer view and its buffer do not fit";
 
-/// Buffers of a document with their bytes.
+/// Document with the bytes of its buffers.
 pub(super) struct Source<'a> {
     pub(super) document: &'a Document,
     buffers: &'a Buffers<'a>,
-    /// Cache of accessors whose sparse indices were found to be increasing: many primitives may share one.
+    /// Accessors whose sparse indices are known to increase, because many primitives may share one.
     increasing: RefCell<BTreeSet<usize>>,
-    /// Sums over all primitives that were decompressed.
+    /// Totals of all decompressed primitives.
     pub(super) decompressed: Decompressed,
 }
 
-/// Sums over decompressed primitives.
+/// Totals of decompressed primitives.
 #[derive(Default)]
 pub(super) struct Decompressed {
     pub(super) triangles: Cell<u64>,
-    /// Size of their attributes and indices, bytes.
+    /// Size of the attributes and indices, bytes.
     pub(super) bytes: Cell<u64>,
 }
 
-/// Valid formats of an accessor, depending on its use.
+/// Component types and element types that a use of an accessor allows.
 pub(super) struct Format {
     pub(super) types: &'static [Type],
     pub(super) components: &'static [ComponentType],
@@ -48,11 +49,11 @@ pub(super) enum Integers {
     Whole,
     /// The range 0 to 1, or -1 to 1 if signed.
     Normalized,
-    /// Either of them, by the accessor's `normalized`.
+    /// Normalised or not, according to the accessor's `normalized`.
     AsStated,
 }
 
-/// Statements of an accessor on its elements.
+/// Element type and count that an accessor states.
 #[derive(Clone, Copy)]
 pub(super) struct Header {
     pub(super) count: u64,
@@ -84,7 +85,7 @@ impl Strided<'_> {
     }
 }
 
-/// Elements that replace elements of the base, sorted by index.
+/// Sparse elements, which replace elements of the base, sorted by index.
 struct Sparse<'a> {
     count: usize,
     indices: Strided<'a>,
@@ -129,7 +130,7 @@ fn unsigned(bytes: &[u8]) -> u64 {
 }
 
 impl Header {
-    /// Header of the accessor `index`, which `item` refers to and which must have a valid format.
+    /// Header of accessor `index`, which must have a valid format. `item` is the JSON path that refers to it.
     fn of(
         document: &Document,
         index: usize,
@@ -167,7 +168,8 @@ impl Header {
 }
 
 impl<'a> Elements<'a> {
-    /// Elements of the accessor `index`, which `item` refers to and which must have a valid format.
+    /// Elements of accessor `index`, which must have a valid format. `item` is the JSON path that refers to
+    /// it.
     pub(super) fn new(
         source: &Source<'a>,
         index: usize,
@@ -177,8 +179,7 @@ impl<'a> Elements<'a> {
         Self::decompressed(source, index, item, format, |_| Ok(None))
     }
 
-    /// Elements as [`new`](Self::new), over the bytes that `decompress` has for the accessor instead of those
-    /// of its buffer view.
+    /// [`new`](Self::new) for an accessor whose bytes `decompress` may supply in place of its buffer view.
     pub(super) fn decompressed(
         source: &Source<'a>,
         index: usize,
@@ -209,7 +210,7 @@ impl<'a> Elements<'a> {
         Ok(Self { count, component, components: kind.multiplicity(), is_normalized, base, sparse })
     }
 
-    /// Indices that were decompressed, without an accessor of them.
+    /// Elements of decompressed indices, which need no accessor.
     pub(super) fn indices(indices: impl Iterator<Item = u32>) -> Self {
         let bytes: Vec<u8> = indices.flat_map(u32::to_le_bytes).collect();
         let size = size_of::<u32>();
@@ -223,13 +224,14 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// Bytes of an element; `None` if glTF defines it as zero.
+    /// Bytes of an element; `None` if glTF defines the element as zero.
     fn bytes(&self, index: u64) -> Option<&[u8]> {
         let replaced = self.sparse.as_ref().and_then(|sparse| sparse.get(index));
         replaced.or_else(|| self.base.as_ref()?.get(usize::try_from(index).ok()?))
     }
 
-    /// An element as numbers; components that the accessor lacks are taken from `absent`.
+    /// Returns an element as floating-point numbers. Components that the accessor lacks are taken from
+    /// `absent`.
     pub(super) fn floats<const N: usize>(&self, index: u64, absent: [f32; N]) -> [f32; N] {
         let mut vector = absent;
         let present = vector.iter_mut().take(self.components);
@@ -244,12 +246,10 @@ impl<'a> Elements<'a> {
         vector
     }
 
-    /// An element of three numbers.
     pub(super) fn vec3(&self, index: u64) -> [f32; 3] {
         self.floats(index, [0.0; 3])
     }
 
-    /// An element of four unsigned integers.
     pub(super) fn unsigned4(&self, index: u64) -> [u64; 4] {
         let mut vector = [0; 4];
         if let Some(bytes) = self.bytes(index) {
@@ -260,7 +260,6 @@ impl<'a> Elements<'a> {
         vector
     }
 
-    /// An element of one unsigned integer.
     pub(super) fn unsigned(&self, index: u64) -> u64 {
         self.bytes(index).map_or(0, unsigned)
     }
@@ -271,13 +270,13 @@ impl<'a> Source<'a> {
         Self { document, buffers, increasing: RefCell::default(), decompressed: Decompressed::default() }
     }
 
-    /// The accessor `index`, which `item` refers to.
+    /// Accessor `index`; `item` is the JSON path that refers to it.
     fn accessor(&self, index: usize, item: &str) -> Result<&'a json::Accessor, SceneError> {
         let found = self.document.root.accessors.get(index);
         found.ok_or_else(|| self.document.invalid(item, format!("accessor {index} does not exist"), REMEDY))
     }
 
-    /// Bytes of the buffer view `view`, which `item` refers to.
+    /// Bytes of buffer view `view`; `item` is the JSON path that refers to it.
     pub(super) fn bytes(&self, view: usize, item: &str) -> Result<&'a [u8], SceneError> {
         let (bytes, _) = self.view(view, item)?;
         bytes.ok_or_else(|| {
@@ -286,7 +285,7 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// `count` elements of `size` bytes, starting `offset` bytes into a buffer view.
+    /// `count` elements of `size` bytes that start `offset` bytes into a buffer view.
     fn strided(
         &self,
         view: usize,
@@ -321,7 +320,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// Bytes of a buffer view, `None` if they exceed the buffer, and its stride.
+    /// Bytes and stride of a buffer view. The bytes are `None` if they exceed the buffer.
     fn view(&self, index: usize, item: &str) -> Result<(Option<&'a [u8]>, Option<usize>), SceneError> {
         let view = self.document.root.buffer_views.get(index).ok_or_else(|| {
             self.document.invalid(item, format!("buffer view {index} does not exist"), REMEDY)

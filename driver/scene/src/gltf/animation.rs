@@ -1,4 +1,4 @@
-//! Animations: poses of nodes at a moment (glTF 2.0, 3.11 and appendix C).
+//! Animations: poses of nodes at a time (glTF 2.0, 3.11 and appendix C).
 
 use std::collections::BTreeMap;
 
@@ -25,27 +25,27 @@ const WEIGHTS: Format =
 
 const REMEDY: &str = "export the animation again; its channels and samplers do not fit";
 
-/// A moment of a scene's animations.
+/// Animations that play, and the time at which they are evaluated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// Names of the animations that play; all of the file if none is stated.
+    /// Names of the animations that play. All of the file play if the list is empty.
     pub animations: Vec<String>,
-    /// Time since the begin of the animations, seconds.
+    /// Time since the start of the animations, seconds.
     pub seconds: f64,
 }
 
 /// An animation of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Animation {
-    /// Name; `animation N` without one.
+    /// Name in the file, or `animation N`.
     pub name: String,
-    /// Times of its first and last keyframe, seconds.
+    /// Times of the first and the last keyframe, seconds.
     pub seconds: [f64; 2],
-    /// True if it moves cameras alone: neither meshes nor lights.
+    /// True if the animation moves cameras alone, and neither meshes nor lights.
     pub moves_only_cameras: bool,
 }
 
-/// Part of a node's transform, or of its mesh's shape, that an animation states in place of the node.
+/// Translation, rotation, scale and weights that animations give a node; each replaces that of the node.
 #[derive(Clone, Debug, Default)]
 pub(super) struct NodePose {
     pub(super) translation: Option<DVec3>,
@@ -55,18 +55,17 @@ pub(super) struct NodePose {
     pub(super) weights: Option<Vec<f32>>,
 }
 
-/// Poses of the nodes that are animated.
+/// Poses of the animated nodes, by node index.
 pub(super) type Poses = BTreeMap<usize, NodePose>;
 
-/// Name of an animation.
 pub(super) fn name(index: usize, animation: &json::Animation) -> String {
     animation.name.clone().unwrap_or_else(|| format!("animation {index}"))
 }
 
-/// Indices of the animations of these names, or of all for none.
+/// Indices of the animations with these names; of all if `names` is empty.
 ///
 /// # Errors
-/// If there is no animation of a name; the error lists the names.
+/// If no animation has a name; the error lists the names.
 pub(super) fn playing(document: &Document, names: &[String]) -> Result<Vec<usize>, SceneError> {
     let all: Vec<_> = document.root.animations.iter().enumerate().map(|(i, clip)| name(i, clip)).collect();
     if let Some(unknown) = names.iter().find(|name| !all.contains(name)) {
@@ -76,10 +75,10 @@ pub(super) fn playing(document: &Document, names: &[String]) -> Result<Vec<usize
     Ok((0..all.len()).filter(plays).collect())
 }
 
-/// Poses of the nodes at a moment.
+/// Evaluates the poses of all animated nodes at a moment.
 ///
 /// # Errors
-/// If an animation is not sound, or two that play move the same part of a node.
+/// If an animation is invalid, or two that play move the same property of a node.
 pub(super) fn poses(source: &Source<'_>, moment: &Moment) -> Result<Poses, SceneError> {
     let mut poses = Poses::new();
     for index in playing(source.document, &moment.animations)? {
@@ -91,7 +90,7 @@ pub(super) fn poses(source: &Source<'_>, moment: &Moment) -> Result<Poses, Scene
     Ok(poses)
 }
 
-/// Times of the first and the last keyframe of an animation, seconds; both zero without channels.
+/// Times of an animation's first and last keyframe, seconds; both zero without channels.
 pub(super) fn extent(source: &Source<'_>, index: usize) -> Result<[f64; 2], SceneError> {
     let mut extent: Option<[f64; 2]> = None;
     for channel in 0..source.document.root.animations[index].channels.len() {
@@ -107,16 +106,16 @@ pub(super) fn targets(animation: &json::Animation) -> impl Iterator<Item = usize
     animation.channels.iter().map(|channel| channel.target.node.value())
 }
 
-/// A channel whose sampler is sound.
+/// Channel whose sampler was checked.
 struct Channel<'a> {
     source: &'a Source<'a>,
-    /// Place in the file.
+    /// JSON path of the channel.
     item: String,
     node: usize,
     property: Property,
     keyframes: Keyframes<'a>,
     values: Elements<'a>,
-    /// Number of elements of a keyframe's value: that of morph targets, or one.
+    /// Number of elements of a keyframe's value: the number of morph targets for weights, else 1.
     elements: u64,
 }
 
@@ -159,7 +158,7 @@ impl<'a> Channel<'a> {
         Ok(Self { source, item, node, property, keyframes, values, elements })
     }
 
-    /// Adds the channel's value at a time to the pose of its node.
+    /// Evaluates the channel at a time and adds the value to the pose of its node.
     fn apply(&self, seconds: f64, poses: &mut Poses) -> Result<(), SceneError> {
         let pose = poses.entry(self.node).or_default();
         let place = self.keyframes.at(seconds);
@@ -192,7 +191,7 @@ impl<'a> Channel<'a> {
         self.source.document.invalid(&self.item, reason, remedy)
     }
 
-    /// Value `kind` (in-tangent, value, out-tangent of a cubic spline) of a keyframe's element.
+    /// Element of a keyframe. `kind` selects the in-tangent, the value or the out-tangent of a cubic spline.
     fn key(&self, keyframe: u64, kind: u64, element: u64) -> DVec4 {
         let of_each = self.keyframes.values_of_each();
         let index = (keyframe * of_each + kind) * self.elements + element;
@@ -221,7 +220,7 @@ impl<'a> Channel<'a> {
         }
     }
 
-    /// Rotation, of unit length unless it is zero; linear along the shorter arc.
+    /// Evaluates a rotation: linear interpolation along the shorter arc. Its length is 1 unless it is zero.
     fn rotation(&self, place: Place) -> DQuat {
         let unit = |value: DVec4| DQuat::from_vec4(value.normalize_or_zero());
         let Place { keyframe, share, .. } = place;

@@ -12,9 +12,9 @@ use crate::error::SceneError;
 
 const EXPORT_AGAIN: &str = "export the scene again; the buffer and its description do not fit";
 
-/// Bytes of every buffer, and of the compressed buffer views that were read.
+/// Bytes of every buffer, and of the compressed buffer views decoded so far.
 pub(super) struct Buffers<'a> {
-    /// At least as long as `byteLength`, or empty for the placeholders of compressed views.
+    /// Bytes of each buffer, at least `byteLength` long. Placeholders of compressed views are empty.
     bytes: Vec<Bytes<'a>>,
     decoded: DecodedViews,
 }
@@ -43,7 +43,7 @@ impl<'a> Buffers<'a> {
         Ok(self.part(view.buffer.value(), (offset, view.byte_length.0)))
     }
 
-    /// Bytes of a buffer from an offset on; `None` if they exceed it.
+    /// Bytes of a buffer at an offset; `None` if they exceed the buffer.
     fn part(&self, buffer: usize, (offset, length): (u64, u64)) -> Option<&[u8]> {
         let start = usize::try_from(offset).ok()?;
         let end = usize::try_from(offset.checked_add(length)?).ok()?;

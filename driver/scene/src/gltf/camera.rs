@@ -12,16 +12,16 @@ use super::notices::Notices;
 use crate::error::SceneError;
 use crate::{Camera, FRAMED, Scene};
 
-/// Width of the default camera's view over the scene's width.
+/// Width of the default camera's view, in widths of the scene.
 const MARGIN: f32 = 1.05;
 
-/// Tangent of half the default camera's field of view, 45 degrees.
+/// Tangent of half the default camera's field of view of 45 degrees.
 const HALF_VIEW_TANGENT: f32 = std::f32::consts::SQRT_2 - 1.0;
 
-/// Vertical field of view in a room, 65 degrees, radians.
+/// Vertical field of view of a default camera inside a room: 65 degrees, in radians.
 const WIDE_VIEW: f32 = 65.0 / 180.0 * std::f32::consts::PI;
 
-/// Conversion of glTF's cameras to the scene's.
+/// Converts the file's cameras to the scene's.
 pub(super) struct CameraPlacer<'a> {
     document: &'a Document,
     names: BTreeSet<String>,
@@ -70,7 +70,7 @@ impl<'a> CameraPlacer<'a> {
         Ok(())
     }
 
-    /// Name of the camera; that of its node if another camera has the name already; or `camera N`.
+    /// Unique name of the camera: its own, else that of its node, else `camera N`.
     fn name(&mut self, index: usize, node: usize) -> String {
         let root = &self.document.root;
         let stated = [root.cameras[index].name.as_ref(), root.nodes[node].name.as_ref()];
@@ -81,7 +81,7 @@ impl<'a> CameraPlacer<'a> {
     }
 }
 
-/// Position and right-handed unit axes of the camera; `None` for a degenerate transform.
+/// Position and right-handed unit axes of a camera; `None` for a degenerate transform.
 fn axes(world: &DMat4) -> Option<(Vec3, Vec3, Vec3, Vec3)> {
     let determinant = world.determinant();
     if determinant == 0.0 || !determinant.is_finite() {
@@ -96,7 +96,7 @@ fn axes(world: &DMat4) -> Option<(Vec3, Vec3, Vec3, Vec3)> {
     placed.0.is_finite().then_some(placed)
 }
 
-/// Default camera: in a closed room that lamps light from inside, or before the scene's bounding box.
+/// Default camera: inside a closed room that is lit from inside, else in front of the scene's bounding box.
 pub(super) fn frame(scene: &Scene) -> (Camera, Framed) {
     match inside::view(scene) {
         Some((origin, forward)) => {
@@ -108,7 +108,8 @@ pub(super) fn frame(scene: &Scene) -> (Camera, Framed) {
     }
 }
 
-/// Camera in front of the scene's bounding box, which sees the whole scene in a square or wider picture.
+/// Default camera in front of the scene's bounding box, which sees the whole scene in a square or wider
+/// picture.
 fn from_front(scene: &Scene) -> Camera {
     let (low, high) = scene.bounds();
     let centre = low + (high - low) * 0.5;

@@ -1,5 +1,4 @@
-//! Compressed buffer views (`EXT_meshopt_compression`, `KHR_meshopt_compression`), decoded when they are
-//! first read.
+//! Compressed buffer views (`EXT_meshopt_compression`, `KHR_meshopt_compression`), decoded on first use.
 
 use std::cell::{Cell, OnceCell};
 
@@ -11,13 +10,12 @@ use super::extensions::MESHOPT;
 use crate::error::SceneError;
 use crate::meshopt::{self, Fault, Filter, Layout, Mode};
 
-/// Maximum size of all decoded buffer views together, and of all decoded primitives, bytes: more than any
-/// scene's vertices take.
+/// Maximum total size of decoded buffer views, and of decoded primitives, bytes. The vertices of the largest
+/// scene take less.
 pub(super) const MAX_DECODED: u64 = 1 << 32;
 
 const REMEDY: &str = "compress the file again, or export it without the extension";
 
-/// The extension of a buffer view.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Extension {
@@ -32,7 +30,6 @@ struct Extension {
     filter: Filter,
 }
 
-/// A compressed buffer view.
 pub(super) struct Compressed {
     index: usize,
     item: String,
@@ -72,10 +69,10 @@ impl Compressed {
     }
 }
 
-/// Contents of compressed buffer views that were read.
+/// Cache of decoded buffer views.
 pub(super) struct DecodedViews {
     views: Vec<OnceCell<Vec<u8>>>,
-    /// Size of all of them, bytes.
+    /// Total size of the decoded views, bytes.
     bytes: Cell<u64>,
 }
 
@@ -84,7 +81,7 @@ impl DecodedViews {
         Self { views: vec![OnceCell::new(); views], bytes: Cell::new(0) }
     }
 
-    /// Contents of a compressed buffer view; `stream` is `None` if it exceeds its buffer.
+    /// Decoded contents of a compressed buffer view. `stream` is `None` if it exceeds its buffer.
     pub(super) fn get(
         &self,
         document: &Document,
@@ -122,7 +119,7 @@ impl DecodedViews {
     }
 }
 
-/// Returns whether a buffer only stands for the contents of compressed views: it is marked so, or has no
+/// Returns whether a buffer is only a placeholder for compressed views: it is marked as a fallback, or has no
 /// bytes in a file that uses the extension.
 pub(super) fn is_placeholder(document: &Document, index: usize, buffer: &json::Buffer) -> bool {
     let marked = buffer.extensions.as_ref().is_some_and(|extensions| {

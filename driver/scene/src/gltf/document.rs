@@ -1,4 +1,4 @@
-//! A glTF file: the chunks of a GLB, the parsed JSON, and its validation.
+//! Chunks of a GLB, parsed JSON, and its validation.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -30,21 +30,21 @@ const CHUNK_BIN: u32 = u32::from_le_bytes(*b"BIN\0");
 
 const INCONSISTENT: &str = "export the scene again; the file is inconsistent";
 
-/// Parsed file whose indices are all valid.
+/// Parsed glTF file whose indices are all valid.
 pub(super) struct Document {
     pub(super) path: PathBuf,
     pub(super) root: json::Root,
-    /// Bytes of the file; ranges of them are the JSON and the BIN chunk of a GLB.
+    /// Bytes of the file. The JSON and the BIN chunk of a GLB are ranges of them.
     bytes: Vec<u8>,
     text: Range<usize>,
     blob: Option<Range<usize>>,
-    /// Materials and images that were converted from another model.
+    /// Materials and images that were converted from specular-glossiness.
     pub(super) conversions: Conversions,
-    /// Animations with channels that move no node, which were removed.
+    /// Animations from which channels without a target node were removed.
     pub(super) shortened: Shortened,
-    /// Channels that were removed because nothing defines their path.
+    /// Channels that were removed because neither glTF nor an extension defines their path.
     pub(super) unknown_paths: Vec<UnknownPath>,
-    /// Files in its folder that were read.
+    /// Files in the scene's folder that were read.
     pub(super) files: Files,
 }
 
@@ -85,7 +85,7 @@ impl Document {
         Ok(document)
     }
 
-    /// The file's JSON, whose encoding was checked.
+    /// Text of the JSON; its encoding was checked.
     pub(super) fn text(&self) -> &str {
         self.bytes.get(self.text.clone()).map_or("", json_text)
     }
@@ -145,7 +145,8 @@ impl Document {
         Err(self.invalid("asset.version", reason, "export the scene as glTF 2.0"))
     }
 
-    /// Checks the POSITION of primitives, which the `gltf` crate's validation uses as an index unchecked.
+    /// Checks `POSITION` of all primitives, because the `gltf` crate's validation uses it as an index
+    /// unchecked.
     fn check_positions(&self) -> Result<(), SceneError> {
         let accessors = self.root.accessors.len();
         for (m, mesh) in self.root.meshes.iter().enumerate() {
@@ -161,7 +162,7 @@ impl Document {
         Ok(())
     }
 
-    /// Checks the nodes that animations move, which the `gltf` crate does not validate.
+    /// Checks the target nodes of animations, which the `gltf` crate does not validate.
     fn check_targets(&self) -> Result<(), SceneError> {
         let nodes = self.root.nodes.len();
         for (a, animation) in self.root.animations.iter().enumerate() {
@@ -189,7 +190,7 @@ impl Document {
         Err(self.invalid(item, reason, "export the scene again, or correct this item of the file"))
     }
 
-    /// First violation of glTF that matters to the loader, with its JSON path.
+    /// First violation of glTF that the loader cannot accept, with its JSON path.
     fn first_fault(&self) -> Result<Option<(json::Path, Fault)>, SceneError> {
         let mut first = None;
         let mut report = |path: &dyn Fn() -> json::Path, fault| {
@@ -222,14 +223,14 @@ impl Document {
     }
 }
 
-/// Returns whether a JSON path, as the `gltf` crate writes it, ends in this vertex attribute.
+/// Returns whether a JSON path, in the notation of the `gltf` crate, ends in vertex attribute `name`.
 fn ends_in_attribute(path: &str, name: &str) -> bool {
     path.strip_suffix("\"]")
         .and_then(|path| path.strip_suffix(name))
         .is_some_and(|path| path.ends_with(".attributes[\""))
 }
 
-/// Returns whether a JSON path names the buffer view of an accessor, not of its sparse elements.
+/// Returns whether a JSON path is that of an accessor's own buffer view, not of its sparse elements.
 fn is_accessors_view(path: &str) -> bool {
     path.strip_prefix("accessors[")
         .and_then(|rest| rest.split_once(']'))
@@ -241,7 +242,8 @@ fn u32_at(bytes: &[u8], offset: usize) -> Option<u32> {
     Some(u32::from_le_bytes(*word))
 }
 
-/// Ranges of the JSON and the BIN chunk in a GLB. Chunks of other types are skipped, as the format requires.
+/// Splits a GLB into the ranges of its JSON and its BIN chunk. Chunks of other types are skipped, as the
+/// format requires.
 fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<usize>>), SceneError> {
     let truncated = |what, needed: u64, available: usize| SceneError::Truncated {
         file: path.to_owned(),
@@ -286,7 +288,7 @@ fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<us
     text.map(|text| (text, blob)).ok_or_else(|| not_gltf("the GLB has no JSON chunk"))
 }
 
-/// The parsed JSON, and the animations from which channels were removed.
+/// Parses the JSON. Returns it with the animations from which channels were removed.
 fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneError> {
     let not_gltf = |reason: &str| SceneError::NotGltf { file: path.to_owned(), reason: reason.to_owned() };
     let text = str::from_utf8(bytes).map_err(|_| not_gltf("it is neither a GLB nor UTF-8 text"))?;
@@ -326,7 +328,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
     }
 }
 
-/// [`parse`] of a text that is JSON and not in the form of the `gltf` crate.
+/// [`parse`] of a text that is valid JSON but that the types of the `gltf` crate reject.
 fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, Shortened), SceneError> {
     let mut document = serde_json::from_str(text).map_err(|error| json_error(path, text, &error))?;
     if schema::is_of_version_1(&document) {
@@ -343,17 +345,17 @@ fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, Shortened), Sce
 
 const CONTRADICTION: &str = "its structure contradicts itself";
 
-/// JSON of bytes in UTF-8; empty for others.
+/// Text of bytes in UTF-8; empty for invalid ones.
 fn json_text(bytes: &[u8]) -> &str {
     str::from_utf8(bytes).map_or("", without_padding)
 }
 
-/// JSON without a byte order mark, and without the zeros to which some exporters pad a chunk.
+/// Removes a byte order mark, and the zeros with which some exporters pad a chunk.
 fn without_padding(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text).trim_end_matches('\0')
 }
 
-/// Syntax error with an excerpt of the text: a line of glTF may contain a whole buffer in base64.
+/// Syntax error with an excerpt, because a line of glTF may contain a whole buffer in base64.
 fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError {
     const CONTEXT: usize = 100;
     let above = error.line().saturating_sub(1);

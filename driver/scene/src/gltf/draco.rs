@@ -1,8 +1,8 @@
 //! Compressed primitives (`KHR_draco_mesh_compression`), decoded by the crate `draco-core`.
 //!
-//! A stream's length bounds nothing: values that are all equal take no bytes in it. Its counts are held
-//! against those of the primitive's accessors instead, by the decoder before it allocates for them, and again
-//! when it is done.
+//! The length of a stream does not bound its contents: equal values may take no bytes. The decoder therefore
+//! checks its counts against those of the primitive's accessors before it allocates, and they are checked
+//! again after decoding.
 
 use std::collections::BTreeMap;
 
@@ -22,33 +22,33 @@ use super::limits::MAX_TRIANGLES;
 use super::topology::Topology;
 use crate::error::SceneError;
 
-/// Memory of the decoder for each triangle, bytes: 110 without seams of attributes, more with them.
+/// Memory of the decoder per triangle, bytes. It takes 110 without seams of attributes, and more with them.
 const TRIANGLE_BYTES: u64 = 256;
 
 /// Size of a triangle's indices, bytes.
 const INDICES_BYTES: u64 = 3 * size_of::<u32>() as u64;
 
-/// Size of a vertex's attributes that a stream may hold and the extension does not name, bytes.
+/// Maximum size per vertex of attributes that are in the stream but not named by the extension, bytes.
 const UNNAMED_BYTES: u64 = 64;
 
 const REMEDY: &str =
     "compress the file again, or decompress it, for example by `npx @gltf-transform/cli copy IN.glb OUT.glb`";
 
-/// The extension of a primitive.
+/// JSON of the extension in a primitive.
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct Extension {
     buffer_view: usize,
-    /// Unique ids in the stream of the attributes by their names in the primitive.
+    /// Unique ids of attributes in the stream, by their names in the primitive.
     attributes: BTreeMap<String, u32>,
 }
 
-/// Counts that a stream must have, by the accessors of its primitive.
+/// Counts that a stream must have, according to the accessors of its primitive.
 struct Counts {
     vertices: u64,
-    /// Number of triangles; of a strip, the maximum.
+    /// Number of triangles; the maximum number for a strip.
     triangles: u64,
-    /// Size of a vertex's attributes, bytes.
+    /// Size of the attributes of one vertex, bytes.
     vertex_bytes: u64,
 }
 
@@ -85,7 +85,8 @@ impl<'s> Decoded<'s> {
         Ok(Some(Self { document, item, attributes: extension.attributes, mesh }))
     }
 
-    /// Packed elements of an attribute for an accessor; `None` if it is not compressed.
+    /// Packed elements of an attribute in the format of `accessor`; `None` if the attribute is not
+    /// compressed.
     pub(super) fn attribute(&self, name: &str, accessor: Header) -> Result<Option<Vec<u8>>, SceneError> {
         let Some(&id) = self.attributes.get(name) else { return Ok(None) };
         let invalid = |reason: String| {
@@ -114,7 +115,7 @@ impl<'s> Decoded<'s> {
         Ok(Some(bytes))
     }
 
-    /// Indices of its triangles.
+    /// Indices of the primitive's triangles.
     pub(super) fn indices<'a>(&self) -> Elements<'a> {
         Elements::indices(self.mesh.faces().iter().flatten().map(|point| point.0))
     }
@@ -157,14 +158,14 @@ impl Counts {
         self.vertices.saturating_mul(self.vertex_bytes + UNNAMED_BYTES)
     }
 
-    /// Size of the attributes and indices that are kept, bytes.
+    /// Size of the attributes and indices that stay in memory, bytes.
     fn kept_bytes(&self) -> u64 {
         let attributes = self.vertices.saturating_mul(self.vertex_bytes);
         attributes.saturating_add(self.triangles.saturating_mul(INDICES_BYTES))
     }
 
-    /// Checks that all decompressed primitives together are within bounds, and that the process has the
-    /// memory for this one.
+    /// Checks that the total of decompressed primitives stays within bounds, and that the process can have
+    /// the memory for this one.
     fn check_memory(&self, source: &Source<'_>, item: &str) -> Result<(), SceneError> {
         let (document, sums) = (source.document, &source.decompressed);
         let triangles = sums.triangles.get().saturating_add(self.triangles);
@@ -213,7 +214,7 @@ fn decode(stream: &[u8], counts: &Counts) -> Result<Mesh, String> {
     )
 }
 
-/// Component type of an accessor for a type of the stream.
+/// Component type of glTF for a data type of Draco.
 fn component(kind: DataType) -> Option<ComponentType> {
     match kind {
         DataType::Int8 => Some(ComponentType::I8),
@@ -226,7 +227,7 @@ fn component(kind: DataType) -> Option<ComponentType> {
     }
 }
 
-/// Bytes of an attribute's value at a vertex.
+/// Bytes of an attribute's value at a point.
 fn value(attribute: &PointAttribute, point: usize, size: usize) -> Option<&[u8]> {
     let index = attribute.mapped_index(PointIndex(point as u32)).0 as usize;
     let stride = usize::try_from(attribute.byte_stride()).ok()?;

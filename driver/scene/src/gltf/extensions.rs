@@ -25,20 +25,20 @@ pub(super) const SUPPORTED_EXTENSIONS: [&str; 20] = [
     "KHR_texture_transform",
 ];
 
-/// Vertex attributes as integers.
+/// Extension for integer vertex attributes.
 pub(super) const QUANTIZATION: &str = "KHR_mesh_quantization";
 
-/// Instances of a node's mesh.
+/// Extension for instances of a node's mesh.
 pub(super) const INSTANCING: &str = "EXT_mesh_gpu_instancing";
 
-/// Compressed buffer views: one format under two names.
+/// Extensions for compressed buffer views: one format under two names.
 pub(super) const MESHOPT: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// Compressed primitives.
+/// Extension for compressed primitives.
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// Image of a texture, in WebP.
+/// Extension for images in WebP.
 pub(super) const WEBP: &str = "EXT_texture_webp";
 
-/// Image of a texture, in KTX2.
+/// Extension for images in KTX2.
 pub(super) const BASISU: &str = "KHR_texture_basisu";

@@ -1,4 +1,4 @@
-//! Place of a scene in its file: the offset of its origin from the file's, by the scene at rest.
+//! Computes the offset of the scene's origin from the file's, from the bounds of the scene at rest.
 
 use std::collections::BTreeMap;
 
@@ -15,16 +15,16 @@ use super::stated_places;
 use crate::Scene;
 use crate::error::SceneError;
 
-/// Offset of a scene's origin, and what its nodes state.
+/// Offset of the scene's origin, with the stated translations of nodes that it is subtracted from.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Anchor {
     pub(super) offset: DVec3,
-    /// Translations of all nodes in double precision; empty without an offset.
+    /// Translation of every node in double precision; empty if the offset is zero.
     stated: Vec<Option<DVec3>>,
 }
 
 impl Anchor {
-    /// Anchor of a scene whose nodes have these world transforms at rest.
+    /// Computes the offset of a scene from the world transforms of its nodes at rest.
     pub(super) fn of(
         source: &Source<'_>,
         meshes: &mut MeshPlacer<'_>,
@@ -46,7 +46,7 @@ impl Anchor {
         Ok(Self { offset, stated })
     }
 
-    /// Local transform of a node about the scene's origin, from that about the file's. `is_posed` if an
+    /// Converts a node's local transform from the file's origin to the scene's. `is_posed` is true if an
     /// animation states its translation.
     pub(super) fn placed(&self, node: usize, mut local: DMat4, is_posed: bool, is_root: bool) -> DMat4 {
         if self.offset != DVec3::ZERO {
@@ -58,7 +58,7 @@ impl Anchor {
     }
 }
 
-/// Bounds of the triangles of a scene at rest.
+/// Computes the bounds of the triangles of a scene at rest.
 struct Extent<'e, 's, 'a> {
     source: &'e Source<'s>,
     meshes: &'e mut MeshPlacer<'a>,
@@ -66,7 +66,7 @@ struct Extent<'e, 's, 'a> {
     locals: BTreeMap<usize, Local>,
 }
 
-/// Bounds of the primitives of a mesh that have triangles, in its own space, and the number of these.
+/// Bounds of those primitives of a mesh that have triangles, in the mesh's space, and their number.
 #[derive(Clone, Default)]
 struct Local {
     bounds: Vec<Bounds>,
@@ -110,7 +110,6 @@ impl Extent<'_, '_, '_> {
         Ok(bounds)
     }
 
-    /// Bounds of the primitives of a mesh.
     fn locals(&mut self, mesh: usize, scene: &mut Scene) -> Result<Local, SceneError> {
         if let Some(locals) = self.locals.get(&mesh) {
             return Ok(locals.clone());
@@ -124,7 +123,7 @@ impl Extent<'_, '_, '_> {
     }
 }
 
-/// Bounds of the vertices that a primitive's triangles have.
+/// Bounds of the vertices that a primitive's triangles use.
 fn local(primitive: &Primitive<'_>) -> Bounds {
     let mut bounds = Bounds::EMPTY;
     for corner in (0..primitive.triangles).flat_map(|triangle| primitive.corners(triangle)) {

@@ -1,4 +1,4 @@
-//! Bytes of buffers and images, and a cache of the files in the scene's folder, so that each is read once.
+//! Bytes of buffers and images, and a cache by which each file in the scene's folder is read once.
 
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -44,7 +44,7 @@ impl Files {
     }
 }
 
-/// Reads a regular file; a pipe or a device might never end.
+/// Reads a regular file. Pipes and devices are refused, because they might never end.
 pub(super) fn read_file(path: &Path) -> io::Result<Vec<u8>> {
     if !fs::metadata(path)?.is_file() {
         return Err(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file"));

@@ -1,4 +1,4 @@
-//! Images that textures refer to, decoded in parallel.
+//! Images of textures, decoded in parallel.
 
 use std::sync::Arc;
 
@@ -17,20 +17,20 @@ use crate::{Encoding, Image, MAX_TEXELS};
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
 const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
 
-/// Maximum size of all image files together, bytes: in every format a texel takes at most eight.
+/// Maximum total size of all image files, bytes. In every format a texel takes at most eight.
 const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
 
-/// Image that textures take.
+/// Image that a texture requests, with its encoding.
 #[derive(Clone, Copy)]
 pub(super) struct Wanted {
     pub(super) origin: Origin,
-    /// Encoding of an image of 8 bits a channel.
+    /// Encoding of an image of 8 bits per channel.
     pub(super) encoding: Encoding,
-    /// Form of an image of more than 8 bits, if it keeps them.
+    /// Encoding of an image of 16 bits per channel that keeps more than 8; `None` to reduce it to 8 bits.
     pub(super) deep: Option<Deep>,
 }
 
-/// An image file whose header is read.
+/// Image file whose header was read.
 struct File<'a> {
     origin: Origin,
     kind: Kind,
@@ -38,14 +38,14 @@ struct File<'a> {
     bytes: Bytes<'a>,
 }
 
-/// An image before it is decoded.
+/// Image whose file was found, before it is decoded.
 enum Found<'a> {
     File(File<'a>),
-    /// Image that is made from two others, as far as these can be read.
+    /// Image that is computed from up to two others. Sources that cannot be read are `None`.
     Converted(&'a Conversion, [Option<File<'a>>; 2]),
 }
 
-/// Texels of an image, `None` if it cannot be read, and the faults of all files that it takes.
+/// Texels of an image, `None` if it cannot be read, and the faults of all its files.
 struct Decoded {
     size: [u32; 2],
     texels: Option<Vec<[u8; 4]>>,
@@ -55,9 +55,9 @@ struct Decoded {
 
 /// Failure to read an image.
 enum Failure {
-    /// Fault of the image.
+    /// Fault of the image alone.
     Image(Fault),
-    /// Fault of the buffers, which other parts of the scene need.
+    /// Fault of a buffer, which other parts of the scene need as well.
     Scene(SceneError),
 }
 
@@ -67,10 +67,11 @@ impl From<Fault> for Failure {
     }
 }
 
-/// Decodes images. Those that cannot be read are `None`, and described in `unreadable`. All indices exist.
+/// Decodes images, whose indices must exist. Those that cannot be read are `None` in the result, and are
+/// described in `unreadable`.
 ///
 /// # Errors
-/// If the images exceed a limit, or the memory of process or card.
+/// If the images exceed a limit, or the memory of the process or card.
 pub(super) fn load(
     source: &Source<'_>,
     wanted: &[Wanted],
@@ -135,7 +136,7 @@ impl Found<'_> {
         }
     }
 
-    /// Texels, in the form `deep` if the image has more than 8 bits a channel.
+    /// Decodes the texels. An image of more than 8 bits per channel is stored as `deep`.
     fn decode(&self, deep: Option<Deep>) -> Decoded {
         let size = self.size();
         let deep = match self {
@@ -173,7 +174,10 @@ fn error(source: &Source<'_>, origin: Origin, reason: String, remedy: &'static s
     SceneError::Image { location: source.document.location(item), reason, remedy }
 }
 
-/// Description of an image that cannot be read; an error for one beyond a limit.
+/// Describes an image that cannot be read.
+///
+/// # Errors
+/// If the image exceeds a limit.
 fn description(source: &Source<'_>, origin: Origin, fault: Fault) -> Result<String, SceneError> {
     let Fault { reason, remedy, is_limit } = fault;
     if is_limit {
@@ -222,7 +226,6 @@ fn find_file<'a>(source: &Source<'a>, origin: Origin) -> Result<File<'a>, Failur
     let size = kind.size(&bytes)?;
     Ok(File { origin, kind, size, bytes })
 }
-/// Bytes of an image.
 fn bytes<'a>(source: &Source<'a>, index: usize) -> Result<Bytes<'a>, Failure> {
     let document = source.document;
     let image = &document.root.images[index];

@@ -1,40 +1,40 @@
-//! Views from inside a closed room, for files of rooms without a camera.
+//! Default views inside closed rooms, for files without a camera.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
 use crate::{PunctualKind, Scene, Triangle};
 
-/// Number of directions in which a place is looked around from.
+/// Number of rays in which visibility is tested from a point.
 const DIRECTIONS: u32 = 96;
 
-/// Maximum number of directions in which a closed room may be open: cracks between its walls.
+/// Maximum number of rays that may leave a closed room, through cracks between its walls.
 const MAX_OPEN: usize = 3;
 
-/// Maximum number of triangles of which rays are cast without a hierarchy.
+/// Maximum number of triangles for which rays are cast without an acceleration structure.
 const MAX_TRIANGLES: usize = 4_000_000;
 
-/// Number of lamps that are looked at, from the brightest on.
+/// Number of lamps that are tested, the brightest first.
 const LAMPS: usize = 4;
 
-/// Share of the way to the wall behind at which the camera stands.
+/// Position of the camera, as a fraction of the distance to the wall behind it.
 const BEFORE_WALL: f32 = 0.92;
 
-/// Distance of a lamp's rays from its surface, over the scene's diagonal.
+/// Offset of the test rays' origin from the lamp's surface, as a fraction of the scene's diagonal.
 const CLEARANCE: f32 = 1e-4;
 
-/// Steps from the middle of the scene's bounding box to other places, in its sides.
+/// Offsets of tested points from the middle of the scene's bounding box, as fractions of its sides.
 const STEPS: [f32; 3] = [0.0, 0.2, -0.2];
 
-/// View of a scene without cameras.
+/// Kind of the default view of a scene without cameras.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Framed {
     FromFront,
     FromInside,
 }
 
-/// Place and level direction of a view along the greatest free length of a closed room; `None` for a scene
-/// that is none, or that no lamp of its own lights from inside.
+/// Returns the position and horizontal direction of a view along the longest free distance in a closed room.
+/// `None` if the scene is no closed room, or has no lamp inside.
 pub(super) fn view(scene: &Scene) -> Option<(Vec3, Vec3)> {
     if scene.triangles.len() > MAX_TRIANGLES || !lamps(scene).into_iter().any(|lamp| is_enclosed(scene, lamp))
     {
@@ -52,10 +52,10 @@ pub(super) fn view(scene: &Scene) -> Option<(Vec3, Vec3)> {
     Some((place + back * (BEFORE_WALL * length), -back))
 }
 
-/// A place, and the side of the surface that it is on.
+/// Position of a lamp, and the normal of its emitting side; `None` for a lamp without a surface.
 type Lamp = (Vec3, Option<Vec3>);
 
-/// Places of the brightest lamps.
+/// Positions of the brightest lamps.
 fn lamps(scene: &Scene) -> Vec<Lamp> {
     let mut lamps = Vec::new();
     for light in &scene.lights {
@@ -81,7 +81,8 @@ fn lamps(scene: &Scene) -> Vec<Lamp> {
     lamps.into_iter().take(LAMPS).map(|(_, lamp)| lamp).collect()
 }
 
-/// Returns whether surfaces are seen all around, and not mainly the backs of one-sided ones.
+/// Returns whether rays from a lamp meet surfaces in nearly all directions, and mostly not the backs of
+/// one-sided ones.
 fn is_enclosed(scene: &Scene, (place, side): Lamp) -> bool {
     let directions = (0..DIRECTIONS).map(direction);
     let directions: Vec<Vec3> =
@@ -103,7 +104,7 @@ fn is_enclosed(scene: &Scene, (place, side): Lamp) -> bool {
     2 * backs < directions.len()
 }
 
-/// Directions of a spiral over the sphere, evenly spread.
+/// Unit vector `index` of a spiral that covers the sphere evenly.
 fn direction(index: u32) -> Vec3 {
     let y = 1.0 - (2.0 * index as f32 + 1.0) / DIRECTIONS as f32;
     let golden = std::f32::consts::PI * (3.0 - libm::sqrtf(5.0));
@@ -116,7 +117,7 @@ fn distance(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<f32> {
     nearest(scene, origin, direction).map(|(distance, _)| distance)
 }
 
-/// The nearest triangle of a ray, and its distance.
+/// Nearest triangle along a ray, with its distance.
 fn nearest(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<(f32, &Triangle)> {
     let hits = scene.triangles.par_iter().with_min_len(4096).enumerate();
     let hits = hits.filter_map(|(index, triangle)| Some((hit(triangle, origin, direction)?, index)));
@@ -124,7 +125,7 @@ fn nearest(scene: &Scene, origin: Vec3, direction: Vec3) -> Option<(f32, &Triang
     Some((distance, scene.triangles.get(index)?))
 }
 
-/// Distance of a triangle along a ray (Möller and Trumbore 1997).
+/// Distance to a triangle along a ray (Möller and Trumbore 1997).
 fn hit(triangle: &Triangle, origin: Vec3, direction: Vec3) -> Option<f32> {
     let [a, b, c] = triangle.vertices;
     let (ab, ac) = (b - a, c - a);

@@ -26,7 +26,7 @@ struct Extension {
     attributes: InstanceAttributes,
 }
 
-/// Accessors of the transforms; attributes with other names are application-specific.
+/// Accessors of the instances' transforms. Attributes of other names are application-specific.
 #[derive(Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 struct InstanceAttributes {
@@ -45,7 +45,7 @@ pub(super) struct Instances<'a> {
 }
 
 impl<'a> Instances<'a> {
-    /// Instances of a node, if it has the extension.
+    /// Reads the instances of a node; `None` without the extension.
     pub(super) fn of(
         source: &Source<'a>,
         index: usize,

@@ -1,9 +1,9 @@
-//! One pass over a JSON text before it is parsed, which stores no value.
+//! Scans a JSON text in one pass before it is parsed, without storing values.
 //!
-//! It bounds the memory of the parsed text: two characters may become a material of hundreds of bytes. Each
-//! value counts as the largest value of its kind, in the types of the `gltf` crate and in the loader's, times
-//! two, as lists grow by doubling. It also finds keys that stand twice in an object, which glTF forbids and of
-//! which parsers take either value.
+//! The scan bounds the memory of the parsed text, because two characters may become a material of hundreds of
+//! bytes. Each value counts as the largest value of its kind, in the types of the `gltf` crate and of the
+//! loader, times two because lists grow by doubling. The scan also finds repeated keys of an object. glTF
+//! forbids them, and parsers differ in which value they take.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -19,21 +19,23 @@ use crate::{Camera, Material};
 /// Maximum number of bytes of memory per byte of JSON.
 pub(super) const BYTES_OF_A_BYTE: u64 = 32;
 
-/// Number of bytes of memory that any JSON may take.
+/// Memory that the parsed form of any JSON may take, however short, bytes.
 pub(super) const BYTES_OF_ANY: u64 = 256 << 20;
 
-/// Bytes of a value in a list that is not a list of the root: twice the maximum, `serde_json::Value`.
+/// Estimated memory of a value outside the root's lists, bytes: twice the size of the largest,
+/// `serde_json::Value`.
 const VALUE: u64 = 64;
 
-/// Bytes of an object that is not in a list of the root: a node of a `BTreeMap` with one key, or a primitive.
+/// Estimated memory of an object outside the root's lists, bytes: a node of a `BTreeMap` with one key, or a
+/// primitive.
 const OBJECT: u64 = 640;
 
-/// Result of a scan. If the text is no JSON, it covers the part before the first error.
+/// Result of a scan. It covers the text before the first syntax error.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Scanned {
     /// Estimated memory of the parsed text, bytes.
     pub(super) bytes: u64,
-    /// JSON path of a key that stands twice in its object. Contents of `extras` are free.
+    /// JSON path of the first repeated key of an object. Keys in `extras` may repeat.
     pub(super) repeated_key: Option<String>,
 }
 
@@ -42,7 +44,7 @@ pub(super) fn limit(text: &str) -> u64 {
     BYTES_OF_ANY + BYTES_OF_A_BYTE * text.len() as u64
 }
 
-/// Scans a text; `None` if its memory exceeds [`limit`].
+/// Scans a text; `None` if its estimated memory exceeds [`limit`].
 pub(super) fn scan(text: &str) -> Option<Scanned> {
     let limit = limit(text);
     let mut scan = Scan { bytes: 0, limit, keys: Vec::new(), path: Vec::new(), repeated_key: None };
@@ -52,7 +54,8 @@ pub(super) fn scan(text: &str) -> Option<Scanned> {
     (bytes <= limit).then_some(Scanned { bytes, repeated_key })
 }
 
-/// Bytes of an element of a list of the root, including the loader's data, times two.
+/// Estimated memory of an element of a list of the root, bytes: twice that of the `gltf` crate's and the
+/// loader's data.
 fn element(list: &str) -> u64 {
     let placed =
         size_of::<(usize, DMat4)>() + size_of::<Option<DMat4>>() + size_of::<(usize, DMat4, usize)>();
@@ -84,24 +87,23 @@ fn element(list: &str) -> u64 {
 #[derive(Clone, Copy)]
 enum Kind {
     Root,
-    /// A value of the root. If it is a list, each of its elements counts this number of bytes.
+    /// Member of the root. If it is a list, each element counts this number of bytes.
     List(u64),
     /// An element of a list of the root, which is counted by its list.
     Element,
     Other,
 }
 
-/// Step from a value to one in it.
+/// Step of a JSON path.
 enum Step<'t> {
     Key(Cow<'t, str>),
     Index(usize),
 }
 
-/// State of a scan.
 struct Scan<'t> {
     bytes: u64,
     limit: u64,
-    /// Keys of the objects around the present place, from the outermost.
+    /// Keys of the objects that enclose the current position, the outermost first.
     keys: Vec<Cow<'t, str>>,
     path: Vec<Step<'t>>,
     repeated_key: Option<String>,
@@ -113,7 +115,7 @@ impl Scan<'_> {
         if self.bytes <= self.limit { Ok(()) } else { Err(E::custom("more than the limit")) }
     }
 
-    /// Removes the keys of the present object, from index `first`, and notes one that stands twice.
+    /// Removes the keys of the current object, which start at index `first`, and records a repeated one.
     fn end_object(&mut self, first: usize, is_free: bool) {
         let keys = &mut self.keys[first..];
         if !is_free && self.repeated_key.is_none() {

@@ -11,26 +11,26 @@ const TIMES: Format =
 
 const REMEDY: &str = "export the animation again, with increasing times of 0 or more";
 
-/// Times of keyframes, seconds, increasing.
+/// Increasing times of keyframes, seconds.
 pub(super) struct Keyframes<'a> {
     times: Elements<'a>,
     pub(super) interpolation: Interpolation,
 }
 
-/// A time between keyframes.
+/// Position of a time between two keyframes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
-    /// The last keyframe at or before the time, or the first.
+    /// Last keyframe at or before the time, or the first keyframe.
     pub(super) keyframe: u64,
-    /// Part of the interval to the next one that has passed, 0 to 1; 0 before the first keyframe and after
-    /// the last.
+    /// Fraction of the interval to the next keyframe that has passed, 0 to 1. It is 0 before the first
+    /// keyframe and after the last.
     pub(super) share: f64,
-    /// Time from that keyframe to the next, seconds.
+    /// Time between the two keyframes, seconds.
     pub(super) interval: f64,
 }
 
 impl<'a> Keyframes<'a> {
-    /// Keyframes at the times in the accessor `index`, which `item` refers to.
+    /// Reads keyframe times from accessor `index`. `item` is the JSON path that refers to it.
     pub(super) fn new(
         source: &Source<'a>,
         index: usize,
@@ -59,7 +59,7 @@ impl<'a> Keyframes<'a> {
         self.times.count
     }
 
-    /// Number of values of each keyframe: a cubic spline has tangents as well.
+    /// Number of elements per keyframe: 3 for a cubic spline, which has tangents, else 1.
     pub(super) fn values_of_each(&self) -> u64 {
         if self.interpolation == Interpolation::CubicSpline { 3 } else { 1 }
     }
@@ -74,7 +74,7 @@ impl<'a> Keyframes<'a> {
         [0, self.count().saturating_sub(1)].map(|keyframe| self.time(keyframe))
     }
 
-    /// Place of a time.
+    /// Finds the keyframes around a time.
     pub(super) fn at(&self, seconds: f64) -> Place {
         let last = self.count().saturating_sub(1);
         let (mut low, mut high) = (0, last);

@@ -1,5 +1,6 @@
-//! Layers of materials: normal maps, textures of `KHR_materials_specular` and `KHR_materials_transmission`,
-//! `KHR_materials_clearcoat`, `KHR_materials_sheen`, `KHR_materials_diffuse_transmission`.
+//! Reads layers of materials: normal maps, textures of `KHR_materials_specular` and
+//! `KHR_materials_transmission`, `KHR_materials_clearcoat`, `KHR_materials_sheen`,
+//! `KHR_materials_diffuse_transmission`.
 
 use glam::Vec3;
 use gltf::json;
@@ -88,8 +89,9 @@ struct Reader<'a, 'd> {
     index: usize,
 }
 
-/// Layers of a material whose base has the F0 `specular` before its limit and without its factor; `None`
-/// without layers. `is_gltf` is false for a Phong reflection, to which the normal map alone applies.
+/// Reads the layers of a material; `None` if it has none. `specular` is the F0 of its base before the limit
+/// of 1, without `specularFactor`. `is_gltf` is false for a Phong reflection, which may have a normal map
+/// only.
 pub(super) fn load(
     document: &Document,
     index: usize,
@@ -109,14 +111,14 @@ pub(super) fn load(
     Ok((layers != Layers::none(specular)).then(|| Box::new(layers)))
 }
 
-/// Returns whether a material has a layer that reflects or transmits besides its base.
+/// Returns whether a material has a coat, sheen or diffuse transmission.
 pub(super) fn has_other_layer(source: &json::Material) -> bool {
     let Some(extensions) = &source.extensions else { return false };
     [CLEARCOAT, SHEEN, DIFFUSE_TRANSMISSION].iter().any(|name| extensions.others.contains_key(*name))
 }
 
 impl Reader<'_, '_> {
-    /// An extension that the glTF library does not read; `None` if the material has none.
+    /// Parses an extension that the `gltf` crate does not know; `None` if the material does not have it.
     fn extension<T: DeserializeOwned>(&self, name: &str) -> Result<Option<T>, SceneError> {
         let extensions = self.source.extensions.as_ref();
         let Some(value) = extensions.and_then(|extensions| extensions.others.get(name)) else {

@@ -10,18 +10,19 @@ use crate::error::SceneError;
 use crate::limits::EMISSION;
 use crate::{LightUnits, PunctualKind, PunctualLight, Scene, blender};
 
-/// Minimum difference of the cosines of a spot light's cones, as `KHR_lights_punctual` recommends. Exporters
-/// write equal angles for a sharp edge.
+/// Minimum difference between the cosines of a spot light's cones, as `KHR_lights_punctual` recommends.
+/// Exporters write equal angles for a sharp edge.
 const MIN_PENUMBRA: f32 = 0.001;
 
-/// Tolerance by which a rounded outer cone angle may exceed a right angle.
+/// Angle by which an outer cone may exceed a right angle, as a rounding error, radians.
 const ANGLE_TOLERANCE: f32 = 1e-4;
 
-/// Conversion of glTF's lights to the scene's.
+/// Converts the file's punctual lights to the scene's.
 pub(super) struct LightPlacer<'a> {
     document: &'a Document,
     units: LightUnits,
-    /// Units that the exporter's name has chosen.
+    /// Units that follow from Blender's name in `asset.generator`; `None` for other exporters, or if the
+    /// settings state them.
     found: Option<LightUnits>,
 }
 
@@ -123,13 +124,13 @@ fn spot(light: &Light) -> Option<&Spot> {
     light.spot.as_ref().filter(|_| matches!(light.type_, Checked::Valid(Type::Spot)))
 }
 
-/// Half angles of a spot light's cones, radians: `0 <= inner <= outer <= pi / 2`. No `outer` is a light that
-/// reaches nothing.
+/// Half angles of a spot light's cones, radians: `0 <= inner <= outer <= pi / 2`. A light without `outer`
+/// illuminates nothing.
 #[derive(Default)]
 struct Cone {
     inner: f32,
     outer: f32,
-    /// True if the file states other angles, rounding aside.
+    /// True if the file's angles differ from these by more than rounding.
     is_clamped: bool,
 }
 
@@ -143,7 +144,7 @@ impl Cone {
     }
 }
 
-/// Place of a light in the file.
+/// JSON path of a light.
 fn place(index: usize) -> String {
     format!("extensions.KHR_lights_punctual.lights[{index}]")
 }

@@ -13,7 +13,7 @@ use crate::error::SceneError;
 use crate::out_of_range::{OutOfRange, Property};
 use crate::{Material, Reflection, Transmission};
 
-/// Contents of `extras` for this renderer; other keys belong to other programs.
+/// Keys of `extras` that this renderer reads. Others belong to other programs.
 #[derive(Deserialize)]
 struct Extras {
     photoncard: Option<Photoncard>,
@@ -32,7 +32,7 @@ struct Phong {
     exponent: f32,
 }
 
-/// Default material of glTF for primitives that state none: a rough white metal.
+/// glTF's default material for primitives without one: a rough white metal.
 pub(super) fn default_material() -> Material {
     Material::new("default", metallic_roughness(&json::Material::default(), Vec3::ONE))
 }
@@ -130,7 +130,7 @@ fn add_textures(
     Ok(())
 }
 
-/// Checks values of extensions that [`Reflection`] does not keep.
+/// Checks values of extensions that [`Reflection`] does not store.
 fn check_extensions(extensions: Option<&json::extensions::material::Material>) -> Result<(), OutOfRange> {
     let Some(extensions) = extensions else { return Ok(()) };
     if let Some(specular) = &extensions.specular {
@@ -154,7 +154,7 @@ fn check_extensions(extensions: Option<&json::extensions::material::Material>) -
 /// Default index of refraction (`KHR_materials_ior`).
 const IOR: f32 = 1.5;
 
-/// Maximum absorption coefficient, 1/m: with it a layer of atomic thickness is opaque.
+/// Maximum absorption coefficient, 1/m. At this value a layer of one atom is opaque.
 const MAX_ABSORPTION: f32 = 1e12;
 
 /// Metallic-roughness reflection, with the extensions for dielectrics.
@@ -175,7 +175,7 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
     }
 }
 
-/// F0 of the dielectric, before its limit of 1 and without `specularFactor`: that of the index of refraction
+/// F0 of the dielectric before its limit of 1 and without `specularFactor`: F0 of the index of refraction
 /// times `specularColorFactor`.
 fn unlimited_f0(source: &json::Material) -> Vec3 {
     let extensions = source.extensions.as_ref();
@@ -193,13 +193,13 @@ fn emission(material: &json::Material) -> Vec3 {
     Vec3::from(material.emissive_factor.0) * strength.map_or(1.0, |strength| strength.emissive_strength.0)
 }
 
-/// Returns whether the material has an emissive texture that is multiplied by zero.
+/// Returns whether the material has an emissive texture whose factor is zero.
 pub(super) fn has_dark_texture(material: &json::Material) -> bool {
     material.emissive_texture.is_some() && emission(material) == Vec3::ZERO
 }
 
-/// Returns whether the material is purely diffuse: `KHR_materials_specular` with factor 0 removes the
-/// reflection of the dielectric part. A metal, which is the default metalness of glTF, keeps its reflection.
+/// Returns whether the material is purely diffuse: it is no metal, and `specularFactor` 0 removes the
+/// reflection of its dielectric part. The default metalness of glTF is 1.
 fn is_lambertian(material: &json::Material) -> bool {
     let specular = material.extensions.as_ref().and_then(|extensions| extensions.specular.as_ref());
     specular.is_some_and(|specular| specular.specular_factor.0 == 0.0)
@@ -208,7 +208,6 @@ fn is_lambertian(material: &json::Material) -> bool {
         && !has_other_layer(material)
 }
 
-/// Returns whether the material transmits light.
 fn is_transmissive(material: &json::Material) -> bool {
     let transmission = material.extensions.as_ref().and_then(|extensions| extensions.transmission.as_ref());
     transmission.is_some_and(|transmission| transmission.transmission_factor.0 > 0.0)

@@ -1,4 +1,4 @@
-//! Meshes: triangles in world space for each node and instance.
+//! Converts meshes to triangles in world space, for every node and instance.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
@@ -21,13 +21,13 @@ use crate::{Scene, Triangle};
 pub(super) struct MeshPlacer<'a> {
     source: &'a Source<'a>,
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,
-    /// Number of instances of each mesh.
+    /// Number of counted instances of each mesh.
     placed: BTreeMap<usize, u64>,
-    /// Number of triangles and primitives to convert, including zero area.
+    /// Number of triangles and primitives to convert, including triangles of zero area.
     work: u64,
-    /// Meshes with normals or colours that are not finite.
+    /// Meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
-    /// Meshes with vertices that make no whole triangle.
+    /// Meshes whose last vertices form no whole triangle.
     pub(super) incomplete: BTreeSet<usize>,
 }
 
@@ -81,7 +81,7 @@ impl<'a> MeshPlacer<'a> {
         room.triangles(triangles, bytes)
     }
 
-    /// Counted primitives, with the number of instances of each.
+    /// Counted primitives, each with its number of instances.
     fn placed(&self) -> impl Iterator<Item = (&Primitive<'a>, u64)> {
         self.placed.iter().flat_map(|(mesh, &times)| {
             let primitives = self.prepared.get(mesh).into_iter().flat_map(|primitives| primitives.iter());

@@ -1,9 +1,9 @@
 //! Tangents by `MikkTSpace` (Mikkelsen 2008, *Simulation of wrinkled surfaces revisited*), as bakers of
 //! normal maps compute them.
 //!
-//! Time is quadratic, and the stack linear, in the number of triangles that share a vertex. The triangles at
-//! a vertex of more than [`FAN`] are therefore left out, and have their own tangents: those of a flat fan are
-//! the same.
+//! Time is quadratic, and the stack depth linear, in the number of triangles that share a vertex. Triangles
+//! at a vertex with more than [`FAN`] are therefore treated as if they had no neighbours, which in a flat fan
+//! gives equal tangents.
 
 use std::collections::HashMap;
 
@@ -13,7 +13,7 @@ use glam::{Vec2, Vec3, Vec4};
 /// Maximum number of triangles that share a vertex.
 const FAN: u32 = 128;
 
-/// Bytes of memory of [`tangents`] per triangle, its result and its argument included.
+/// Memory that [`tangents`] takes per triangle, including argument and result, bytes.
 pub(super) const BYTES_OF_A_TRIANGLE: u64 = 1600;
 
 /// Corner of a triangle.
@@ -27,15 +27,15 @@ pub(super) struct Corner {
 }
 
 impl Corner {
-    /// Equal for corners at one vertex: zeros have no sign.
+    /// Key that is equal for corners at one vertex. Negative zeros are replaced by zeros.
     fn vertex(&self) -> [u32; 8] {
         let Self { position: p, normal: n, coordinates: c } = self;
         [p.x, p.y, p.z, n.x, n.y, n.z, c.x, c.y].map(|value| (value + 0.0).to_bits())
     }
 }
 
-/// The tangents of triangles' corners: unit vectors along which u increases, with glTF's sign of the
-/// bitangent in w; zero where the coordinates do not vary.
+/// Computes the tangents of triangles' corners: unit vectors along which u increases, with glTF's sign of the
+/// bitangent in w. They are zero where the coordinates do not vary.
 pub(super) fn tangents(triangles: &[[Corner; 3]]) -> Vec<[Vec4; 3]> {
     let mut fans: HashMap<[u32; 8], u32> = HashMap::with_capacity(triangles.len());
     for corner in triangles.as_flattened() {
@@ -55,7 +55,7 @@ pub(super) fn tangents(triangles: &[[Corner; 3]]) -> Vec<[Vec4; 3]> {
     mesh.tangents
 }
 
-/// The tangents of a triangle without neighbours.
+/// Tangents of a triangle, computed without its neighbours.
 fn own_tangents(corners: &[Corner; 3]) -> [Vec4; 3] {
     let [a, b, c] = corners;
     let [[s, t], [q, r]] = [b, c].map(|corner| (corner.coordinates - a.coordinates).to_array());
@@ -69,10 +69,10 @@ fn own_tangents(corners: &[Corner; 3]) -> [Vec4; 3] {
     })
 }
 
-/// Triangles as the crate reads them, and their tangents as it writes them.
+/// Input and output of the `MikkTSpace` crate.
 struct Mesh<'t> {
     triangles: &'t [[Corner; 3]],
-    /// Indices of the triangles that it reads.
+    /// Indices of the triangles that the crate reads.
     faces: Vec<usize>,
     tangents: Vec<[Vec4; 3]>,
 }
@@ -83,7 +83,7 @@ impl Mesh<'_> {
     }
 }
 
-/// Adding zero removes the sign of a zero, by which the crate would distinguish vertices.
+/// Adds zero to remove the sign of zeros, by which the crate would distinguish vertices.
 impl Geometry<Libm> for Mesh<'_> {
     fn num_faces(&self) -> usize {
         self.faces.len()
@@ -101,7 +101,7 @@ impl Geometry<Libm> for Mesh<'_> {
         (self.corner(face, corner).normal + 0.0).to_array()
     }
 
-    /// The algorithm's v counts upwards.
+    /// Returns coordinates with 1 - v, because v increases upwards in the algorithm.
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
         let Vec2 { x, y } = self.corner(face, corner).coordinates;
         [x + 0.0, 0.0 - y]
@@ -114,7 +114,7 @@ impl Geometry<Libm> for Mesh<'_> {
     }
 }
 
-/// Functions with equal bits on every processor.
+/// Mathematical functions whose results are equal on every processor.
 struct Libm;
 
 impl Ops for Libm {
@@ -135,7 +135,7 @@ mod tests {
         Corner { position: position.into(), normal: Vec3::Z, coordinates: coordinates.into() }
     }
 
-    /// A disc of triangles around the origin, with coordinates of a plane.
+    /// Disc of `count` triangles around the origin, with planar texture coordinates.
     fn fan(count: u32, height: f32) -> Vec<[Corner; 3]> {
         let rim = |step: u32| {
             let (y, x) = (std::f32::consts::TAU * (step % count) as f32 / count as f32).sin_cos();
@@ -181,7 +181,8 @@ mod tests {
         assert_eq!(tangents(&[triangle])[0].map(Vec4::truncate), [Vec3::ZERO; 3]);
     }
 
-    /// Neither the stack nor the time of a test would suffice for the whole fan, nor for its copies.
+    /// Compares triangles without neighbours, because the whole fan would exceed the stack and the time of a
+    /// test.
     #[test]
     fn wide_fans_have_their_own_tangents() {
         let mut wide = fan(200_000, 0.0);

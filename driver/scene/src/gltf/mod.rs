@@ -61,8 +61,8 @@ pub use self::settings::LoadSettings;
 use crate::Scene;
 use crate::error::SceneError;
 
-/// Loads the default scene of a glTF file, or its first, with the default settings: within the memory of the
-/// reference chip.
+/// Loads the default scene of a glTF file, or its first, with the default settings. The scene must fit the
+/// memory of the reference chip.
 ///
 /// ```
 /// # use std::path::Path;

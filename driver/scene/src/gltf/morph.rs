@@ -19,11 +19,10 @@ const DISPLACEMENTS: Format = Format {
     integers: Integers::AsStated,
 };
 
-/// Maximum number of morph targets of a primitive: each displaces all vertices, and takes a few bytes of the
-/// file.
+/// Maximum number of morph targets of a primitive. A target of a few bytes displaces all vertices.
 const MAX_TARGETS: usize = 1024;
 
-/// Displacements of one morph target, of as many vertices as the primitive has.
+/// Accessors of one morph target's displacements, each with as many elements as the primitive has vertices.
 pub(super) struct MorphTarget<'a> {
     positions: Option<Elements<'a>>,
     normals: Option<Elements<'a>>,
@@ -48,7 +47,7 @@ impl MorphTarget<'_> {
     }
 }
 
-/// The morph targets of a primitive of `count` vertices, which is `item` in the file.
+/// Reads the morph targets of a primitive of `count` vertices. `item` is the JSON path of the primitive.
 pub(super) fn targets<'a>(
     source: &Source<'a>,
     item: &str,
@@ -83,7 +82,7 @@ pub(super) fn targets<'a>(
     targets.collect()
 }
 
-/// Attribute of a vertex, displaced by morph targets with these weights.
+/// Attribute of a vertex plus the weighted displacements of the morph targets.
 pub(super) fn displaced(
     base: Vec3,
     targets: &[MorphTarget<'_>],

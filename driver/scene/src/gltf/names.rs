@@ -7,13 +7,13 @@ pub(super) fn mesh_name(root: &json::Root, mesh: usize) -> String {
     root.meshes[mesh].name.clone().unwrap_or_else(|| format!("mesh {mesh}"))
 }
 
-/// Name of a node in a message: `node 'NAME'`, or `node N`, which need not exist.
+/// Name of a node in a message: `node 'NAME'` or `node N`. The node need not exist.
 pub(super) fn node_name(root: &json::Root, node: usize) -> String {
     let name = root.nodes.get(node).and_then(|node| node.name.as_ref());
     name.map_or_else(|| format!("node {node}"), |name| format!("node '{name}'"))
 }
 
-/// Names for a choice, in quotation marks.
+/// List of names in quotation marks, for an error that offers them.
 pub(super) fn listed(names: &[String]) -> String {
     if names.is_empty() {
         return "none: leave the option out".to_owned();

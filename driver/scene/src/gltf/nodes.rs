@@ -24,8 +24,8 @@ use crate::{Camera, LightUnits, Scene};
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Adds the meshes, lights and cameras of the scene's nodes in their poses; the lights are stated in `units`.
-/// The anchor of the scene at rest is found once.
+/// Adds the meshes, lights and cameras of the scene's nodes in their poses. Lights are in `units`. `anchor`
+/// caches the origin's offset, which follows from the scene at rest.
 ///
 /// All triangles are counted before the first is added.
 pub(super) fn place(
@@ -82,7 +82,7 @@ struct Placer<'a> {
     cameras: CameraPlacer<'a>,
     lights: LightPlacer<'a>,
     skins: BTreeMap<usize, Skin>,
-    /// World transforms; `None` for nodes that are not in the scene.
+    /// World transform of every node; `None` for nodes outside the scene.
     worlds: Vec<Option<DMat4>>,
 }
 
@@ -102,7 +102,7 @@ impl<'a> Placer<'a> {
         self.meshes.count(mesh, instances.map_or(1, |instances| instances.count), scene)
     }
 
-    /// Anchor of the scene at rest.
+    /// Offset of the origin, computed on first use from the scene at rest.
     fn anchor<'o>(
         &mut self,
         found: &'o OnceLock<Anchor>,
@@ -185,8 +185,8 @@ impl<'a> Placer<'a> {
     }
 }
 
-/// Nodes of the default scene, or of the first, with their world transforms about the anchor or, for none,
-/// the file's origin; each parent precedes its children.
+/// Nodes of the default scene, or of the first one, parents before children, with their world transforms.
+/// These are relative to the anchor's origin, or to the file's without an anchor.
 fn walk(
     document: &Document,
     poses: &Poses,

@@ -1,12 +1,9 @@
-//! Record of attributes that are not usable numbers, of files that are loaded nevertheless.
+//! Attributes with unusable values in files that are loaded nevertheless.
 
-/// One value for each attribute that may be NaN or infinite, or zero if it is a tangent.
+/// One value for each kind of attribute that may hold NaN, infinity or, for tangents, zero.
 #[derive(Default)]
 pub(super) struct NotFinite<T> {
-    /// Value of normals.
     pub(super) normals: T,
-    /// Value of colours.
     pub(super) colours: T,
-    /// Value of tangents.
     pub(super) tangents: T,
 }

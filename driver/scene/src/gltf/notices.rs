@@ -1,5 +1,5 @@
-//! Notices: contents of a file that the renderer does not use, or takes in another way, one sentence for each
-//! feature, with the names of the objects.
+//! Notices on contents of the file that the renderer ignores or interprets in another way: one sentence for
+//! each feature, with the names of the objects.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,33 +18,33 @@ use super::solid_glass::Resolved;
 use super::topology::{Topology, has_positions};
 use crate::{Concern, LightUnits, blender};
 
-/// Maximum number of names in a notice; further ones are counted.
+/// Maximum number of names in a notice. Further ones are counted.
 const LISTED: usize = 8;
 
-/// Facts that loading collects; other notices follow from the JSON.
+/// Facts that are collected during loading. Other notices follow from the JSON.
 #[derive(Default)]
 pub(super) struct Notices {
     /// Names of orthographic cameras.
     pub(super) orthographic: Vec<String>,
-    /// Names of materials of glass whose surfaces bound a solid or none against what is stated.
+    /// Names of glass materials that were made solid or thin-walled against what they state.
     pub(super) glass: Resolved,
-    /// Names of materials of solid glass of which faces are in one place.
+    /// Names of solid glass materials with coinciding faces.
     pub(super) touching_glass: Vec<String>,
-    /// Units other than radiometric ones in which the lights were read because Blender's exporter wrote them.
+    /// Units of lights that were chosen because of Blender's exporter, unless radiometric.
     pub(super) blender_units: Option<LightUnits>,
     /// Names of Blender's spot lights with a penumbra.
     pub(super) blender_spots: Vec<String>,
     /// Names of spot lights whose angles were clamped.
     pub(super) clamped_spots: Vec<String>,
-    /// Names of spot lights that light nothing.
+    /// Names of spot lights that illuminate nothing.
     pub(super) closed_spots: Vec<String>,
     /// Images that cannot be read, each with its reason.
     pub(super) unreadable: Vec<String>,
-    /// The default camera of a scene that has none.
+    /// Kind of the default camera, in a file without cameras.
     pub(super) framed: Option<Framed>,
-    /// Meshes with normals or colours that are not finite.
+    /// Meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
-    /// Meshes with vertices that make no whole triangle.
+    /// Meshes whose last vertices form no whole triangle.
     pub(super) incomplete: BTreeSet<usize>,
 }
 
@@ -54,7 +54,7 @@ fn list(kind: &str, names: &[String]) -> String {
     format!("{kind} {}", several(&quoted))
 }
 
-/// Formats `a, b and 3 more`; equal ones count once.
+/// Formats `a, b and 3 more`. Equal items are listed once.
 fn several(items: &[String]) -> String {
     let mut seen = BTreeSet::new();
     let unique: Vec<_> = items.iter().filter(|item| seen.insert(*item)).map(String::as_str).collect();
@@ -82,14 +82,14 @@ fn meshes(root: &json::Root, holds: impl Fn(&json::mesh::Primitive) -> bool) -> 
     names("mesh", &root.meshes, |mesh| mesh.name.as_ref(), |mesh| mesh.primitives.iter().any(&holds))
 }
 
-/// Sentences of two kinds, each in a fixed order.
+/// Notices and remarks, each in a fixed order.
 #[derive(Default)]
 pub(super) struct Sentences {
-    /// Contents that are not used, or that are missing.
+    /// Notices on contents that are ignored or missing.
     pub(super) ignored: Vec<String>,
-    /// Ignored contents that do not concern every picture, by index.
+    /// Indices in `ignored` of notices that matter only to some pictures, with their subjects.
     pub(super) concerns: Vec<(usize, Concern)>,
-    /// Contents that are used in another way than they are stated.
+    /// Remarks on contents that are interpreted in another way than they are stated.
     pub(super) remarks: Vec<String>,
 }
 
@@ -101,7 +101,7 @@ fn note(sentences: &mut Vec<String>, sentence: &str, kind: &str, names: &[String
 }
 
 impl Notices {
-    /// All sentences on a document.
+    /// Returns all sentences about a document.
     pub(super) fn finish(&self, document: &Document) -> Sentences {
         let mut ignored = self.ignored(document);
         let mut concerns = Vec::new();
@@ -164,7 +164,7 @@ impl Notices {
         sentences
     }
 
-    /// Sentences that do not concern every picture, and those on extensions.
+    /// Notices that matter only to some pictures, with their subjects, and notices on extensions.
     fn of_some_pictures(&self, document: &Document) -> Vec<(Option<Concern>, String)> {
         let root = &document.root;
         let Shortened { by_extensions, without_target } = &document.shortened;
@@ -249,7 +249,7 @@ impl Notices {
     }
 }
 
-/// Concern of an unsupported extension; `None` if every picture has need of it.
+/// Subject of a notice on an unsupported extension; `None` if it matters to every picture.
 fn concern_of(extension: &str) -> Option<Concern> {
     match extension {
         "KHR_animation_pointer" => Some(Concern::Animations),
@@ -258,14 +258,14 @@ fn concern_of(extension: &str) -> Option<Concern> {
     }
 }
 
-/// Notice on animations, of which only the scene at rest is had.
+/// Remark on animations of a file that is loaded at rest.
 pub(super) fn of_animations(root: &json::Root) -> Option<String> {
     let moving = names("animation", &root.animations, |animation| animation.name.as_ref(), |_| true);
     let sentence = "the scene is rendered as it stands, its animations by --frames";
     (!moving.is_empty()).then(|| format!("{sentence}: {}", list("animation", &moving)))
 }
 
-/// Notice on units of lights that the exporter's name has chosen.
+/// Remark on the units of lights, if the exporter's name determined them.
 fn of_units(units: LightUnits) -> Option<&'static str> {
     match units {
         LightUnits::Auto | LightUnits::Radiometric => None,

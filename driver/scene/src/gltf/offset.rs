@@ -1,24 +1,25 @@
-//! Offset of a scene far from the file's origin, so that single precision resolves it.
+//! Offset of the origin for a scene far from the file's origin, so that single precision suffices.
 //!
-//! Places in a file of a building or a map may be thousands of kilometres from its origin, where single
-//! precision resolves half a metre. The scene's own origin is then a place near it, of few digits: what an
-//! exporter has added is taken off exactly, and the scene equals one that is modelled at the origin.
+//! Positions in a file of a building or a map may be thousands of kilometres from its origin, where single
+//! precision resolves half a metre. The scene's origin is then a point near the scene whose coordinates have
+//! few digits. If an exporter has added such an offset, the subtraction is exact, and the scene equals one
+//! that is modelled at the origin.
 
 use glam::{DMat4, DVec3};
 
 use super::vertex::MAX_COORDINATE;
 
-/// Distance from the origin, in sizes of the scene, up to which it stays where it is.
+/// Distance from the origin up to which a scene is not moved, in sizes of the scene.
 const NEAR: f64 = 16.0;
 
-/// Distance, metres, beyond which a scene stays where it is only if it reaches to the origin: single
-/// precision is coarser than 60 um.
+/// Distance beyond which a scene is moved unless it extends to the origin, metres. Single precision is
+/// coarser than 60 um there.
 const FAR: f64 = 1000.0;
 
-/// Least power of two that a coordinate is rounded to, 2^-10 m.
+/// Least exponent of a power of two to which the offset is rounded: 2^-10 m.
 const FINEST: i32 = -10;
 
-/// Bounding box in double precision; empty at first.
+/// Bounding box in double precision, empty by default.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
     pub(super) low: DVec3,
@@ -28,14 +29,14 @@ pub(super) struct Bounds {
 impl Bounds {
     pub(super) const EMPTY: Self = Self { low: DVec3::INFINITY, high: DVec3::NEG_INFINITY };
 
-    /// Adds a place; one that is not finite is left out.
+    /// Extends the box by a point. Points that are not finite are ignored.
     pub(super) fn add(&mut self, place: DVec3) {
         if place.is_finite() {
             (self.low, self.high) = (self.low.min(place), self.high.max(place));
         }
     }
 
-    /// Adds a box that is placed by a transform.
+    /// Extends the box by the transformed box `local`.
     pub(super) fn add_placed(&mut self, transform: &DMat4, local: &Self) {
         if !local.low.is_finite() {
             return;
@@ -47,8 +48,8 @@ impl Bounds {
         }
     }
 
-    /// Offset of a scene with these bounds; along an axis where it is near the origin, 0. `stated` are the
-    /// whole coordinates that nodes above the whole scene state.
+    /// Offset of a scene with these bounds, metres. It is 0 along axes on which the scene is near the origin.
+    /// `stated` are integral translations of nodes that contain the whole scene; they are preferred.
     pub(super) fn offset(&self, stated: &[DVec3]) -> DVec3 {
         let size = (self.high - self.low).max_element();
         let furthest = self.low.abs().max(self.high.abs()).max_element();
@@ -69,8 +70,8 @@ impl Bounds {
     }
 }
 
-/// Number of the fewest digits from `low` to `high`, which are of one sign: decimal ones or, at about half
-/// the price, binary ones. It is the nearest to the middle among such numbers.
+/// Number with the fewest digits from `low` to `high`, which have one sign, nearest to the middle. A binary
+/// digit costs about half a decimal one.
 fn roundest(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let magnitude = |base: f64| libm::floor(libm::log2(low.abs().max(high.abs())) / libm::log2(base)) as i32;
@@ -87,8 +88,8 @@ fn roundest(low: f64, high: f64) -> f64 {
     found.min_by(is_better).map_or(0.0, |(_, number)| number)
 }
 
-/// Multiple of the first of the powers of a base of which there is one in a range, nearest to the middle,
-/// with the power.
+/// Multiple of a power of `base` in `range` that is nearest to `middle`, with the power. It takes the first
+/// of `powers` that has a multiple in the range.
 fn multiple(
     base: f64,
     mut powers: impl Iterator<Item = i32>,
@@ -102,8 +103,9 @@ fn multiple(
     })
 }
 
-/// Translation of a node, `stated` in double precision and in a scene with an offset: small ones have single
-/// precision, as in a scene at the origin. The offset is taken off at nodes without a parent.
+/// Translation of a node relative to the scene's origin. `stated` is in double precision; small values are
+/// rounded to single precision, as in a scene without an offset. The offset is subtracted from nodes without
+/// a parent.
 pub(super) fn translation(stated: DVec3, offset: DVec3, is_root: bool) -> DVec3 {
     let moved = if is_root { stated - offset } else { stated };
     let limit = 0.5 * offset.abs().max_element();

@@ -4,17 +4,18 @@ use gltf::json;
 
 use super::extensions::{BASISU, WEBP};
 
-/// Image that a texture refers to.
+/// Source of a texture's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Origin {
-    /// Image of the index.
+    /// Index of an image in the file.
     Image(usize),
-    /// None in a format that is read, for the texture of the index.
+    /// Index of a texture that has no image in a supported format.
     Absent(usize),
 }
 
 impl Origin {
-    /// Image of a texture: its own one, of which those of extensions are copies, or that of an extension.
+    /// Finds the image of a texture: its own `source`, of which the images of extensions are copies, else
+    /// that of an extension.
     pub(super) fn of(root: &json::Root, texture: usize) -> Self {
         let stated = &root.textures[texture];
         let extensions = stated.extensions.as_ref();

@@ -1,4 +1,4 @@
-//! Files that are no glTF, recognised by their content or name, each with the command that makes glTF of it.
+//! Recognises files that are not glTF by content or name, and proposes the command that converts them.
 
 use std::path::{Path, PathBuf};
 
@@ -6,14 +6,14 @@ use photoncard_picture::printable::shell_word;
 
 use crate::error::SceneError;
 
-/// Remedy of kinds that no program converts whole.
+/// Remedy for formats that no program converts completely.
 const BY_HAND: &str =
     "open it in the program that wrote it, or import it into Blender, and export glTF 2.0 (.glb)";
 
-/// First bytes of files, and endings of their names.
+/// First bytes of files, and suffixes of their names.
 type Signs = (&'static [&'static [u8]], &'static [&'static str]);
 
-/// Kinds of other files, by their signs.
+/// Formats other than glTF with their signs.
 const KINDS: [(Signs, Kind); 15] = [
     ((&[b"photoncard partial render "], &[]), Kind::Partial),
     ((&[b"photoncard part "], &[]), Kind::Part),
@@ -47,7 +47,7 @@ const KINDS: [(Signs, Kind); 15] = [
 #[derive(Clone, Copy)]
 enum Kind {
     Blender,
-    /// Name, and the operator by which Blender imports it.
+    /// Format that Blender imports: its name, and Blender's import operator.
     Imported(&'static str, &'static str),
     Zip,
     ByHand(&'static str),
@@ -80,7 +80,7 @@ pub(super) fn refused_path(path: &Path) -> Option<SceneError> {
     Some(other(path, "a folder", remedy))
 }
 
-/// Error of a file that is recognised as none of glTF.
+/// Error of a file that is recognised as another format.
 pub(super) fn refused_file(path: &Path, bytes: &[u8]) -> Option<SceneError> {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     let is_of = |((starts, endings), _): &&(Signs, Kind)| {
@@ -151,7 +151,7 @@ fn other(path: &Path, what: &'static str, remedy: String) -> SceneError {
     SceneError::OtherFormat { file: path.to_owned(), what, remedy }
 }
 
-/// Command of Blender that exports a file, or what a line of Python imports.
+/// Shell command by which Blender opens `file`, or runs the Python line `import`, and exports glTF.
 fn export(file: &str, import: &str, made: &str) -> String {
     let made = python(made);
     let code = format!(
@@ -161,12 +161,12 @@ fn export(file: &str, import: &str, made: &str) -> String {
     format!("convert it by Blender: blender -b {file}--python-expr {}", shell_word(&code))
 }
 
-/// Text of Python in double quotation marks.
+/// Python string literal.
 fn python(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }
 
-/// The scene in a folder: the only one, or the first by its name.
+/// Scene file in a folder: the only one, or the first by name.
 fn scene_within(folder: &Path) -> Option<PathBuf> {
     let is_scene = |path: &PathBuf| {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());

@@ -9,16 +9,16 @@ use super::primitive::Primitive;
 use super::skin::Skin;
 use super::transform::Transform;
 
-/// World transforms of a mesh's vertices.
+/// World transforms of a mesh's vertices, and weights of its morph targets.
 pub(super) struct Pose<'s> {
     transform: Transform,
     skin: Option<&'s Skin>,
-    /// Weights of the mesh's morph targets; 0 for those beyond.
+    /// Weights of the morph targets; those beyond the list are 0.
     pub(super) weights: &'s [f32],
 }
 
 impl<'s> Pose<'s> {
-    /// Pose with the node's world transform, which primitives with joints ignore if there is a skin.
+    /// Creates a pose. Primitives with joints ignore the node's world transform if there is a skin.
     pub(super) fn new(world: DMat4, skin: Option<&'s Skin>, weights: &'s [f32]) -> Self {
         Self { transform: Transform::new(world), skin, weights }
     }
@@ -26,7 +26,7 @@ impl<'s> Pose<'s> {
     /// World transform of a vertex.
     ///
     /// # Errors
-    /// If the joints or weights of the vertex are not valid: the reason.
+    /// The reason, if the joints or weights of the vertex are invalid.
     pub(super) fn of(&self, primitive: &Primitive<'_>, vertex: u64) -> Result<Cow<'_, Transform>, String> {
         match self.skin {
             Some(skin) if !primitive.influences.is_empty() => {

@@ -19,7 +19,7 @@ use crate::error::SceneError;
 
 const FLOATS: &[ComponentType] = &[ComponentType::F32];
 const FRACTIONS: &[ComponentType] = &[ComponentType::F32, ComponentType::U8, ComponentType::U16];
-/// Component types of `KHR_mesh_quantization`.
+/// Component types that `KHR_mesh_quantization` allows.
 const QUANTIZED: &[ComponentType] =
     &[ComponentType::F32, ComponentType::I8, ComponentType::U8, ComponentType::I16, ComponentType::U16];
 
@@ -74,7 +74,7 @@ pub(super) struct Primitive<'a> {
     pub(super) index: usize,
     /// Number of triangles.
     pub(super) triangles: u64,
-    /// True if its last vertices make no whole triangle.
+    /// True if its last vertices form no whole triangle.
     pub(super) has_incomplete: bool,
     topology: Topology,
     pub(super) positions: Elements<'a>,
@@ -84,12 +84,12 @@ pub(super) struct Primitive<'a> {
     pub(super) tangents: Option<Elements<'a>>,
     /// Set of texture coordinates along which tangents point, if the material has a normal map.
     pub(super) tangent_set: Option<usize>,
-    /// Tangents once the first instance is placed.
+    /// Checked or computed tangents, once the first instance is placed.
     pub(super) known_tangents: OnceCell<Tangents>,
-    /// Sets of texture coordinates that the material uses.
+    /// Texture coordinates of the sets that the material uses.
     pub(super) coordinates: [Option<Elements<'a>>; 2],
     pub(super) colours: Option<Elements<'a>>,
-    /// Joints with their weights, four in each pair.
+    /// Pairs of accessors of joints and weights; each pair has four of each.
     pub(super) influences: Vec<(Elements<'a>, Elements<'a>)>,
     /// Morph targets, in the mesh's order.
     pub(super) targets: Vec<MorphTarget<'a>>,
@@ -102,7 +102,7 @@ struct AttributeReader<'s, 'a> {
     source: &'s Source<'a>,
     item: String,
     primitive: &'s json::mesh::Primitive,
-    /// Its compressed attributes.
+    /// Decoded attributes, if the primitive is compressed.
     decoded: Option<Decoded<'s>>,
 }
 
@@ -129,7 +129,7 @@ impl<'a> AttributeReader<'_, 'a> {
         accessor.map(|accessor| Elements::new(self.source, accessor.value(), &item, &INDICES)).transpose()
     }
 
-    /// Rejects an attribute whose count differs from the positions'.
+    /// Reads an attribute. Its count must be that of the positions.
     fn of_count(
         &self,
         count: u64,
@@ -150,8 +150,8 @@ impl<'a> AttributeReader<'_, 'a> {
 }
 
 impl<'a> Primitive<'a> {
-    /// Primitive `index` of a mesh, with the sets of texture coordinates that its material uses, and the one
-    /// of its tangents.
+    /// Reads primitive `index` of a mesh, with the sets of texture coordinates that its material uses and the
+    /// set that defines its tangents.
     pub(super) fn new(
         source: &Source<'a>,
         mesh: usize,
@@ -211,7 +211,7 @@ impl<'a> Primitive<'a> {
         })
     }
 
-    /// Returns whether its triangles may have attributes beyond positions, by the accessors present.
+    /// Returns whether the triangles may have attributes beyond positions, according to the accessors.
     pub(super) fn may_have_attributes(&self) -> bool {
         self.is_mapped() || self.normals.is_some() || self.colours.is_some()
     }
@@ -220,7 +220,7 @@ impl<'a> Primitive<'a> {
         self.coordinates.iter().any(Option::is_some)
     }
 
-    /// Lower bound of a card's memory that each instance takes, bytes.
+    /// Lower bound of the card memory that each instance takes, bytes.
     ///
     /// # Errors
     /// If the process cannot have the memory for a set of its vertices.
@@ -233,8 +233,8 @@ impl<'a> Primitive<'a> {
         Ok(Room::geometry(self.triangles, self.corners_in_different_places()?) + attributes)
     }
 
-    /// Number of distinct vertex positions. The memory of the set is bounded by the file's bytes, not by a
-    /// count in it.
+    /// Number of distinct vertex positions. The memory of the set is bounded by the size of the file, not by
+    /// a count in it.
     fn corners_in_different_places(&self) -> Result<u64, OutOfMemory> {
         let mut places = HashSet::new();
         for corner in (0..self.triangles).flat_map(|triangle| self.corners(triangle)) {
@@ -245,13 +245,12 @@ impl<'a> Primitive<'a> {
         Ok(places.len() as u64)
     }
 
-    /// Positions of a triangle's corners in the list of indices or, without one, of vertices.
+    /// Elements of the index list that form a triangle; vertex numbers without such a list.
     pub(super) fn corners(&self, triangle: u64) -> [u64; 3] {
         self.topology.vertices(triangle)
     }
 }
 
-/// All pairs of joints and weights.
 fn influences<'a>(
     attributes: &AttributeReader<'_, 'a>,
     count: u64,

@@ -1,9 +1,8 @@
-//! Lower bound of the card memory that a scene takes, from accessors, instances and image headers, before
-//! anything is expanded.
+//! Lower bound of a scene's card memory, from accessors, instances and image headers, before anything is
+//! expanded.
 //!
-//! A scene that is rejected here fits no card of the size; others are measured once they are packed
-//! (`pack::budget`). Triangles of a primitive are counted as in full leaves; sharing of vertices between
-//! primitives is ignored.
+//! A scene that is rejected here cannot fit a card. Others are measured once they are packed
+//! (`pack::budget`). The bound assumes full leaves, and ignores vertices that primitives share.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +14,7 @@ use photoncard_shared::layout::{
 
 use crate::error::SceneError;
 
-/// Memory of a card, and the part that is taken.
+/// Memory of a card, and the part that is in use.
 #[derive(Clone)]
 pub(super) struct Room {
     file: PathBuf,
@@ -32,20 +31,20 @@ impl Room {
         self.take((count * Material::BYTES) as u64, || format!("{count} materials"))
     }
 
-    /// Counts the texels of one more image.
+    /// Adds the texels of an image.
     pub(super) fn texels(&mut self, [width, height]: [u32; 2]) -> Result<(), SceneError> {
         let tiles = u64::from(width.div_ceil(TILE_WIDTH)) * u64::from(height.div_ceil(TILE_HEIGHT));
         self.take(tiles * LINE_BYTES as u64, || "images and materials".to_owned())
     }
 
-    /// Returns whether `triangles` triangles fit even without shared vertices.
+    /// Returns whether `triangles` triangles fit even if they share no vertices.
     pub(super) fn fits_any(&self, triangles: u64) -> bool {
         let corners = triangles.saturating_mul(3);
         self.available - self.taken
             >= Self::geometry(triangles, corners).saturating_add(attributes(triangles, 2, true))
     }
 
-    /// Counts all triangles of a scene; `bytes` is the size of their leaves, nodes and attributes.
+    /// Adds all triangles of a scene. `bytes` is the size of their leaves, nodes and attributes.
     pub(super) fn triangles(&mut self, triangles: u64, bytes: u64) -> Result<(), SceneError> {
         self.take(bytes, || format!("{triangles} triangles, images and materials"))
     }

@@ -1,4 +1,4 @@
-//! An open glTF file, whose scene can be had at several moments of its animations.
+//! Open glTF file whose scene can be evaluated at several times of its animations.
 
 use std::path::Path;
 use std::sync::OnceLock;
@@ -20,7 +20,7 @@ use super::{camera, material, nodes, solid_glass, touching_glass, variants};
 use crate::error::SceneError;
 use crate::{Camera, LightUnits, Scene};
 
-/// An open glTF file: materials and images are read once, geometry for each moment.
+/// Open glTF file. Materials and images are read once, geometry for each moment.
 ///
 /// ```
 /// # use std::path::Path;
@@ -42,14 +42,14 @@ use crate::{Camera, LightUnits, Scene};
 pub struct SceneFile {
     document: Document,
     light_units: LightUnits,
-    /// The scene without what its nodes place.
+    /// Scene without nodes' meshes, lights and cameras.
     bare: Scene,
     room: Room,
     /// Images that cannot be read, each with its reason.
     unreadable: Vec<String>,
-    /// Camera that shows the scene as it stands, if the file has none; known once it is needed.
+    /// Default camera of a file without cameras. It shows the scene at rest, and is computed on first use.
     framed: OnceLock<(Camera, Framed)>,
-    /// Place of the scene in the file, by the scene at rest; known once any moment is.
+    /// Offset of the scene's origin, which follows from the scene at rest and is computed on first use.
     anchor: OnceLock<Anchor>,
 }
 
@@ -71,17 +71,17 @@ impl SceneFile {
         Ok(Self { document, light_units: *light_units, bare, room, unreadable, framed, anchor })
     }
 
-    /// The default scene of the file, or its first, as it stands.
+    /// Evaluates the default scene of the file, or its first, without animations.
     ///
     /// [`Scene::notices`] names the features of the file that are not rendered.
     ///
     /// # Errors
-    /// If a node is not sound, the scene exceeds the cards' memory, or it has no triangle with an area.
+    /// If a node is invalid, the scene exceeds the cards' memory, or it has no triangle with an area.
     pub fn at_rest(&self) -> Result<Scene, SceneError> {
         self.placed(self.bare.clone(), None)
     }
 
-    /// [`Self::at_rest`] of a file that is not needed any more; animations are among the remarks.
+    /// [`Self::at_rest`] that consumes the file. A remark names the animations, which do not play.
     ///
     /// # Errors
     /// As [`Self::at_rest`].
@@ -92,17 +92,19 @@ impl SceneFile {
         Ok(scene)
     }
 
-    /// The scene at a moment of its animations. Before the first keyframe of a channel, and after its last,
-    /// its value stays. Without cameras in the file the scene is seen as at rest.
+    /// Evaluates the scene at a moment of its animations. A channel keeps its first value before the first
+    /// keyframe, and its last value after the last one. The default camera of a file without cameras does not
+    /// move.
     ///
     /// # Errors
-    /// As [`Self::at_rest`]; if an animation is not sound or unknown, or two that play move the same part of
-    /// a node.
+    /// As [`Self::at_rest`]; if an animation is invalid or unknown, or two that play move the same property
+    /// of a node.
     pub fn at(&self, moment: &Moment) -> Result<Scene, SceneError> {
         self.placed(self.bare.clone(), Some(moment))
     }
 
-    /// The cameras of the scene at a moment, without its geometry; none if the file has none.
+    /// Evaluates the cameras at a moment without the geometry. The result is empty if the file has no
+    /// cameras.
     ///
     /// # Errors
     /// As [`Self::at`].
@@ -120,10 +122,10 @@ impl SceneFile {
         !self.document.root.animations.is_empty()
     }
 
-    /// The animations of the file.
+    /// Lists the animations of the file.
     ///
     /// # Errors
-    /// If one is not sound.
+    /// If an animation is invalid.
     pub fn animations(&self) -> Result<Vec<Animation>, SceneError> {
         let buffers = Buffers::load(&self.document)?;
         let source = Source::new(&self.document, &buffers);
@@ -138,11 +140,11 @@ impl SceneFile {
         described.collect()
     }
 
-    /// Returns whether animations of these names, or all for none, move cameras alone: neither meshes nor
-    /// lights.
+    /// Returns whether the animations of these names move cameras alone, and neither meshes nor lights. An
+    /// empty list stands for all animations.
     ///
     /// # Errors
-    /// If there is no animation of a name.
+    /// If no animation has a name.
     pub fn only_cameras_move(&self, names: &[String]) -> Result<bool, SceneError> {
         let playing = animation::playing(&self.document, names)?;
         Ok(playing.into_iter().all(|index| self.moves_only_cameras(index)))
@@ -169,7 +171,7 @@ impl SceneFile {
         true
     }
 
-    /// The scene, from what it has without its nodes.
+    /// Completes a scene, which has all but its nodes' contents, at a moment or at rest.
     fn placed(&self, mut scene: Scene, moment: Option<&Moment>) -> Result<Scene, SceneError> {
         let Self { document, light_units, bare: _, room, unreadable, framed: _, anchor } = self;
         let buffers = Buffers::load(document)?;
@@ -199,7 +201,7 @@ impl SceneFile {
         Ok(scene)
     }
 
-    /// Camera of a file without cameras, which stays where it is at rest.
+    /// Default camera of a file without cameras. It is placed by the scene at rest.
     fn framed(&self, scene: &Scene, moment: Option<&Moment>) -> Result<(Camera, Framed), SceneError> {
         if moment.is_some() && self.framed.get().is_none() {
             self.at_rest()?;
@@ -208,7 +210,8 @@ impl SceneFile {
     }
 }
 
-/// The scene without what its nodes place, and the images that cannot be read.
+/// Reads the scene without its nodes' meshes, lights and cameras. Returns it with descriptions of unreadable
+/// images.
 fn bare_scene(document: &Document, room: &mut Room) -> Result<(Scene, Vec<String>), SceneError> {
     let buffers = Buffers::load(document)?;
     let source = Source::new(document, &buffers);

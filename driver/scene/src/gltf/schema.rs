@@ -1,7 +1,7 @@
-//! JSON in the form that the types of the `gltf` crate take, which are stricter than glTF 2.0.
+//! Amends JSON for the types of the `gltf` crate, which are stricter than glTF 2.0.
 //!
-//! glTF lets a scene have no `nodes` and an animation's target have no `node` (an extension may state another
-//! target), and its schema takes `1.0` as an integer. Members that are `null` count as absent.
+//! glTF allows a scene without `nodes`, an animation target without `node` (an extension may state another
+//! target), and `1.0` as an integer. Members that are `null` count as absent.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,13 +11,13 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
-/// Exclusive upper bound of numbers whose floating-point form is an integer without doubt.
+/// Exclusive upper bound, 2^53, of the floating-point numbers that represent an integer exactly.
 const MAX_INTEGER: f64 = 9_007_199_254_740_992.0;
 
-/// Paths of the targets of animations.
+/// Values of `path` of an animation target.
 const PATHS: [&str; 4] = ["translation", "rotation", "scale", "weights"];
 
-/// Lists of the root.
+/// Names of the root's lists.
 const LISTS: [&str; 15] = [
     "accessors",
     "animations",
@@ -36,21 +36,21 @@ const LISTS: [&str; 15] = [
     "textures",
 ];
 
-/// Returns whether a document is of glTF 1.0, whose objects are named instead of numbered.
+/// Returns whether a document is glTF 1.0, whose objects have names instead of indices.
 pub(super) fn is_of_version_1(document: &Value) -> bool {
     ["accessors", "meshes", "nodes", "scenes"].iter().any(|list| document[list].is_object())
 }
 
-/// Animations from which channels were removed that move no node.
+/// Animations from which channels without a target node were removed.
 #[derive(Default)]
 pub(super) struct Shortened {
     /// Animations with channels whose target an extension defines.
     pub(super) by_extensions: BTreeSet<usize>,
-    /// Animations with channels whose target nothing defines.
+    /// Animations with channels that have no target at all.
     pub(super) without_target: BTreeSet<usize>,
 }
 
-/// Brings a document into the crate's form. Returns the animations from which channels were removed.
+/// Amends a document for the crate's types. Returns the animations from which channels were removed.
 pub(super) fn amend(document: &mut Value) -> Shortened {
     simplify(document);
     let mut shortened = Shortened::default();
@@ -75,8 +75,8 @@ pub(super) fn amend(document: &mut Value) -> Shortened {
     shortened
 }
 
-/// Removes channels whose path glTF does not know. Returns their animations, each with the number of
-/// channels.
+/// Removes channels whose `path` is unknown to glTF. Returns the affected animations with the number of their
+/// removed channels.
 pub(super) fn remove_unknown_paths(root: &mut json::Root) -> BTreeMap<usize, usize> {
     let mut shortened = BTreeMap::new();
     for (index, animation) in root.animations.iter_mut().enumerate() {
@@ -96,8 +96,8 @@ pub(super) struct UnknownPath {
     pub(super) path: String,
 }
 
-/// Channels of a document's text whose path neither glTF nor an extension defines. The crate does not keep
-/// what their path is.
+/// Finds channels in a document's text whose `path` neither glTF nor an extension defines. The `gltf` crate
+/// does not keep an unknown path.
 pub(super) fn unknown_paths(text: &str) -> Vec<UnknownPath> {
     #[derive(Deserialize)]
     struct Animations {
@@ -140,12 +140,13 @@ fn list<'a>(root: &'a mut Map<String, Value>, name: &str) -> impl Iterator<Item 
     root.get_mut(name).and_then(Value::as_array_mut).into_iter().flatten()
 }
 
-/// Target of an animation's channel, if it is no node.
+/// Target of a channel that has no `node`.
 fn target_without_node(channel: &Value) -> Option<&Map<String, Value>> {
     channel.get("target").and_then(Value::as_object).filter(|target| !target.contains_key("node"))
 }
 
-/// Removes members that are `null`, and writes whole numbers as integers, except in `extras`.
+/// Removes members that are `null`, and converts integral floating-point numbers to integers, except in
+/// `extras`.
 fn simplify(value: &mut Value) {
     match value {
         Value::Object(members) => {
@@ -165,15 +166,15 @@ fn simplify(value: &mut Value) {
     }
 }
 
-/// Reason why `value` is no `T`. It is read as text, since the types of the `gltf` crate are compiled once for
-/// each form of their input, which takes a minute.
+/// Reason why `value` cannot be parsed as `T`. It is parsed as text, because the types of the `gltf` crate
+/// are compiled once per input format, which takes a minute.
 fn fault<T: DeserializeOwned>(value: &Value) -> Option<String> {
     let error = serde_json::from_str::<T>(&value.to_string()).err()?.to_string();
     let end = error.rfind(" at line ").unwrap_or(error.len());
     Some(error[..end].to_owned())
 }
 
-/// Fault of a member of the root that is no list.
+/// Fault of a member of the root that should be a list.
 fn fault_of_member(name: &str, value: &Value) -> Option<String> {
     match name {
         "asset" => fault::<json::Asset>(value),

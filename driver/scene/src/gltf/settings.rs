@@ -1,22 +1,22 @@
-//! Settings of loading.
+//! Settings of the loader.
 
 use photoncard_shared::budget::REFERENCE_DRAM_BYTES;
 
 use crate::LightUnits;
 
-/// Settings with which a scene is loaded. All that changes the scene is in
-/// [`Scene::checksum`](crate::Scene::checksum).
+/// Settings of the loader. [`Scene::checksum`](crate::Scene::checksum) covers all that they change in the
+/// scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadSettings {
-    /// Memory of the cards that the scene must fit, bytes.
+    /// Memory of the cards into which the scene must fit, bytes.
     pub dram_bytes: u32,
     /// Variant of the materials (`KHR_materials_variants`); `None` for the materials that the meshes state.
     pub variant: Option<String>,
-    /// Units of the file's lights without extent.
+    /// Units of the file's punctual lights.
     pub light_units: LightUnits,
 }
 
-/// The memory of the reference chip, no variant, and units by the exporter.
+/// Memory of the reference chip, no variant, and units chosen by the exporter.
 impl Default for LoadSettings {
     fn default() -> Self {
         Self { dram_bytes: REFERENCE_DRAM_BYTES, variant: None, light_units: LightUnits::default() }

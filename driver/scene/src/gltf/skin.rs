@@ -55,13 +55,12 @@ impl Skin {
         Ok(Self { index, joints })
     }
 
-    /// Joint matrices.
     pub(super) fn joints(&self) -> &[DMat4] {
         &self.joints
     }
 
-    /// Joint matrix of a vertex: the weighted mean of its joints. A vertex without weights follows its first
-    /// joint.
+    /// Joint matrix of a vertex: the weighted mean of its joints' matrices. A vertex without weights follows
+    /// its first joint.
     pub(super) fn matrix(&self, primitive: &Primitive<'_>, vertex: u64) -> Result<DMat4, String> {
         let mut first = None;
         let (mut sum, mut total) = (DMat4::ZERO, 0.0);

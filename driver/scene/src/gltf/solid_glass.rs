@@ -1,8 +1,8 @@
-//! Glass that is a solid or a thin wall by the form of its mesh, whatever its material says.
+//! Decides by the shape of a mesh whether its glass is solid or thin-walled, whatever the material states.
 //!
-//! Blender writes no thickness, and its users mean solids: closed parts of meshes bound volumes. A flat sheet
-//! bounds none, and is a thin wall of the thickness that its material states. Where one material is both,
-//! each has a copy of its own.
+//! Blender writes no thickness although its users mean solids: closed parts of its meshes therefore bound
+//! volumes. A flat sheet bounds none: it becomes a thin wall with the thickness of its material. A material
+//! that occurs in several forms is copied for each.
 
 use std::collections::BTreeMap;
 
@@ -14,42 +14,44 @@ use super::document::Document;
 use crate::error::SceneError;
 use crate::{Material, Reflection, Scene, Transmission, Triangle, parts};
 
-/// Memory of an edge of a triangle while it is matched, bytes.
+/// Memory per edge of a triangle while edges are matched, bytes.
 const BYTES_OF_AN_EDGE: u64 = 64;
-/// Maximum thickness of a sheet over its extent: a water surface states the depth of the water.
+/// Maximum ratio of stated thickness to extent of a sheet. A water surface exceeds it, because its thickness
+/// is the depth of the water.
 const THIN: f32 = 0.1;
-/// Distance from the plane of a flat sheet, over its extent and over the greatest coordinate.
+/// Tolerances of flatness: maximum distance from the plane as a fraction of the extent, and of the greatest
+/// coordinate.
 const UNEVEN: [f32; 2] = [1e-4, 1e-6];
 
-/// Names of materials, by what became of surfaces of theirs.
+/// Names of materials, by the change of their surfaces.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Resolved {
-    /// Closed parts became solid.
+    /// Materials whose closed parts became solid.
     pub(super) solid: Vec<String>,
-    /// Flat sheets became thin walls.
+    /// Materials whose flat sheets became thin walls.
     pub(super) walls: Vec<String>,
-    /// Open parts that are not flat have a thickness.
+    /// Materials with a thickness on open parts that are not flat.
     pub(super) open: Vec<String>,
 }
 
-/// Triangles of each form of each material.
+/// Triangles by material and by form.
 type Surfaces = BTreeMap<u32, BTreeMap<Form, Vec<u32>>>;
 
-/// Form that a part of a glass surface takes.
+/// Form of a part of a glass surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Form {
     AsStated,
     Solid,
     Wall,
-    /// As stated, though it bounds no solid.
+    /// Unchanged, although it bounds no solid.
     Open,
 }
 
-/// Makes closed parts of glass without a thickness solid in a file of Blender, and flat sheets of glass with
-/// one thin walls in any file.
+/// Makes closed parts of glass without a thickness solid, in files of Blender. Makes flat sheets of glass
+/// with a thickness thin walls, in all files.
 ///
 /// # Errors
-/// If the memory for the edges is not to be had.
+/// If the process cannot have the memory for the edges.
 pub(super) fn resolve(document: &Document, scene: &mut Scene) -> Result<Resolved, SceneError> {
     let is_considered: Vec<bool> = scene
         .materials
@@ -98,8 +100,8 @@ pub(super) fn resolve(document: &Document, scene: &mut Scene) -> Result<Resolved
     Ok(Resolved { solid, walls, open })
 }
 
-/// Gives triangles of other forms than stated the materials of these: a copy, if the material has surfaces of
-/// several forms.
+/// Replaces the material of triangles whose form differs from the stated one. The material is copied if its
+/// surfaces have several forms.
 fn change(scene: &mut Scene, surfaces: &Surfaces, thicknesses: &[f32]) {
     for (&material, of_forms) in surfaces {
         let original = scene.materials[material as usize].clone();
@@ -117,7 +119,7 @@ fn change(scene: &mut Scene, surfaces: &Surfaces, thicknesses: &[f32]) {
     }
 }
 
-/// A material of glass in another form.
+/// Copy of a glass material in another form.
 fn of_form(material: &Material, form: Form, thickness: f32) -> Material {
     let mut material = material.clone();
     if let Reflection::MetallicRoughness { base_colour, transmission: Some(transmission), .. } =
@@ -133,7 +135,7 @@ fn of_form(material: &Material, form: Form, thickness: f32) -> Material {
     material
 }
 
-/// Transmission of a material that transmits light.
+/// Transmission of a material; `None` if it transmits no light.
 pub(super) fn transmission(material: &Material) -> Option<Transmission> {
     let Reflection::MetallicRoughness { transmission, .. } = material.reflection else { return None };
     transmission.filter(|transmission| transmission.factor > 0.0)

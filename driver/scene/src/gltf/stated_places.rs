@@ -1,5 +1,5 @@
-//! Translations of nodes in double precision: the `gltf` crate keeps single precision, which far from the
-//! origin is too coarse.
+//! Translations of nodes in double precision. The `gltf` crate keeps single precision, which is too coarse
+//! far from the origin.
 
 use glam::DVec3;
 use photoncard_picture::foreign;
@@ -19,7 +19,7 @@ struct Node {
     matrix: Option<[f64; 16]>,
 }
 
-/// Translation of each node as the file states it; `None` for nodes that state none.
+/// Reads the translation of each node from the JSON; `None` for nodes without one.
 pub(super) fn read(document: &Document) -> Vec<Option<DVec3>> {
     let parsed = foreign::decode(|| Ok(serde_json::from_str(document.text()).ok()), || ());
     let File { nodes } = parsed.ok().flatten().unwrap_or(File { nodes: Vec::new() });

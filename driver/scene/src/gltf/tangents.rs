@@ -26,7 +26,7 @@ impl VertexReader<'_, '_> {
         Ok(Some(known.get_or_init(|| tangents)))
     }
 
-    /// Returns whether the stated tangents of all triangles are directions, with signs.
+    /// Returns whether the stated tangents of all triangles are non-zero vectors with a sign.
     fn are_stated_sound(&self) -> Result<bool, SceneError> {
         for triangle in 0..self.primitive.triangles {
             let corners = self.indices(triangle)?;
@@ -44,7 +44,7 @@ impl VertexReader<'_, '_> {
         self.primitive.tangents.as_ref().map_or(Vec4::ZERO, |found| found.floats(vertex, [0.0; 4]).into())
     }
 
-    /// Tangents by the coordinates of a set.
+    /// Computes tangents along the texture coordinates of a set.
     fn computed(&self, set: usize) -> Result<Vec<[Vec4; 3]>, SceneError> {
         let document = self.source.document;
         let count = self.primitive.triangles;
@@ -73,7 +73,7 @@ impl VertexReader<'_, '_> {
         )
     }
 
-    /// World tangents of a triangle whose corners have these normals.
+    /// World-space tangents of a triangle's corners with these normals.
     pub(super) fn placed_tangents(
         &self,
         tangents: &Tangents,
@@ -96,8 +96,8 @@ impl VertexReader<'_, '_> {
     }
 }
 
-/// A tangent in world space, perpendicular to the corner's normal. A mirror turns the cross product of the
-/// two round.
+/// Transforms a tangent to world space, perpendicular to the corner's normal. A mirroring transform inverts
+/// the cross product of the two.
 fn world(local: Vec4, transform: &Transform, normal: DVec3) -> Vec4 {
     let along = transform.tangent(local.truncate());
     let tangent = (along - normal * normal.dot(along)).normalize_or_zero();

@@ -1,4 +1,4 @@
-//! Textures of materials, each once, with their samplers and transforms.
+//! Textures of materials with their samplers and transforms. Equal ones are stored once.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ use crate::{Encoding, Material, Scene, Texture, Wrap};
 /// Maximum absolute value in a texture transform: beyond it single precision cannot resolve texels.
 const MAX_TRANSFORM: f32 = 1e6;
 
-/// Channels that a material takes from a texture.
+/// Channels of a texture that a material uses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Use {
     /// Colour, alpha or both.
@@ -41,7 +41,7 @@ impl Use {
     }
 }
 
-/// Image and what is taken from it.
+/// Image with the channels that are used.
 struct Taken {
     origin: Origin,
     encoding: Encoding,
@@ -62,11 +62,11 @@ impl Taken {
     }
 }
 
-/// Textures in the order in which materials refer to them.
+/// Textures, in the order in which materials refer to them.
 pub(super) struct Textures<'a> {
     document: &'a Document,
     textures: Vec<Texture>,
-    /// Index of each texture, by the bits of its fields.
+    /// Index of each known texture, by the bits of its fields.
     known: BTreeMap<[u32; 11], u32>,
     images: Vec<Taken>,
     image_indices: BTreeMap<(Origin, Encoding), u32>,
@@ -83,7 +83,7 @@ impl<'a> Textures<'a> {
         }
     }
 
-    /// Index of the texture that the `textureInfo` at `item` describes.
+    /// Adds the texture that the `textureInfo` at `item` describes, and returns its index.
     pub(super) fn add(
         &mut self,
         item: &str,
@@ -140,7 +140,7 @@ impl<'a> Textures<'a> {
         })
     }
 
-    /// Loads the images, and leaves textures out whose image cannot be read and is described in `unreadable`.
+    /// Loads the images. Textures whose image cannot be read are removed, and described in `unreadable`.
     pub(super) fn finish(
         self,
         source: &Source<'_>,
@@ -163,14 +163,14 @@ impl<'a> Textures<'a> {
     }
 }
 
-/// For each element of a list, its index once those that are not kept have been removed.
+/// New index of each element once those that are not kept are removed; `None` for a removed one.
 fn renumbered(is_kept: &[bool]) -> Vec<Option<u32>> {
     let mut next = 0..;
     is_kept.iter().map(|kept| kept.then(|| next.next()).flatten()).collect()
 }
 
-/// Renumbers the textures of a material, or takes them off it. No field is left out here: a new one may be a
-/// texture.
+/// Renumbers the textures of a material, or removes them. It destructures all fields, so that a new one
+/// cannot be forgotten.
 fn renumber(material: &mut Material, indices: &[Option<u32>]) {
     let Material {
         name: _,
@@ -194,14 +194,14 @@ fn renumber(material: &mut Material, indices: &[Option<u32>]) {
     }
 }
 
-/// Matrix and offset.
+/// Matrix and offset of a texture transform.
 type Affine = ([[f32; 2]; 2], [f32; 2]);
 
 const IDENTITY: Affine = ([[1.0, 0.0], [0.0, 1.0]], [0.0; 2]);
 
-/// Transform of `KHR_texture_transform`: scale, then counter-clockwise rotation, then offset. As v points
-/// down, the matrix is that of a clockwise rotation. The equations in the extension's text have the opposite
-/// sign, against its words, its example and its implementations (KhronosGroup/glTF issue 1563).
+/// Affine form of `KHR_texture_transform`: scale, then counter-clockwise rotation, then offset. The matrix is
+/// that of a clockwise rotation, because v points down. The equations in the extension's text have the
+/// opposite sign, against its words, its example and its implementations (KhronosGroup/glTF issue 1563).
 fn affine(transform: &TextureTransform) -> Option<Affine> {
     let (offset, [width, height]) = (transform.offset.0, transform.scale.0);
     let angle = transform.rotation.0;
@@ -216,7 +216,7 @@ fn affine(transform: &TextureTransform) -> Option<Affine> {
     Some((matrix, offset))
 }
 
-/// Wrap modes of the sampler, and whether it selects the nearest texel.
+/// Wrap modes of a sampler, and whether its filter is `NEAREST`.
 fn sampler(document: &Document, texture: &json::Texture) -> ([Wrap; 2], bool) {
     let Some(sampler) = texture.sampler.and_then(|index| document.root.samplers.get(index.value())) else {
         return ([Wrap::Repeat; 2], false);

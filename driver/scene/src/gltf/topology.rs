@@ -23,12 +23,12 @@ impl Topology {
         }
     }
 
-    /// Topology of a primitive that is rendered: one of triangles, with positions.
+    /// Topology of a primitive that is rendered. It consists of triangles and has positions.
     pub(super) fn of_rendered(primitive: &json::mesh::Primitive) -> Option<Self> {
         Self::of(primitive).filter(|_| has_positions(primitive))
     }
 
-    /// Number of whole triangles of `vertices` vertices, and whether vertices are left over.
+    /// Number of whole triangles that `vertices` vertices form, and whether vertices are left over.
     pub(super) fn triangles(self, vertices: u64) -> (u64, bool) {
         match self {
             Self::List => (vertices / 3, !vertices.is_multiple_of(3)),
@@ -47,7 +47,7 @@ impl Topology {
     }
 }
 
-/// Returns whether a primitive has positions, which glTF leaves to extensions otherwise.
+/// Returns whether a primitive has positions. Without them, its meaning is up to extensions.
 pub(super) fn has_positions(primitive: &json::mesh::Primitive) -> bool {
     primitive.attributes.contains_key(&Checked::Valid(Semantic::Positions))
 }
@@ -56,7 +56,7 @@ pub(super) fn has_positions(primitive: &json::mesh::Primitive) -> bool {
 mod tests {
     use super::*;
 
-    /// The triangles of a quadrilateral have equal orientation in a strip and in a fan.
+    /// Compares orientation: the two triangles of a quadrilateral face one way in a strip and in a fan.
     #[test]
     fn strips_and_fans_keep_their_side() {
         assert_eq!([0, 1].map(|triangle| Topology::List.vertices(triangle)), [[0, 1, 2], [3, 4, 5]]);

@@ -1,5 +1,5 @@
-//! Solids of glass that touch, such as a drink and its tumbler: where faces of both are in one place, a ray
-//! would meet one of them and miss the other. They become one face, from medium to medium.
+//! Joins coinciding faces of glass solids that touch, such as a drink and its tumbler, into one interface
+//! between two media. Otherwise a ray would meet one of the faces and miss the other.
 
 use std::collections::BTreeMap;
 
@@ -8,17 +8,17 @@ use glam::Vec3;
 use super::solid_glass::transmission;
 use crate::{Material, Reflection, Scene, Transmission};
 
-/// Outcome of joining two coinciding faces.
+/// Result of joining two coinciding faces.
 #[derive(Clone, Debug, PartialEq)]
 enum Touch {
-    /// Both are within one medium, and are left out.
+    /// Both are removed, because the medium is the same on both sides.
     None,
-    /// The first is the interface of the media; its material.
+    /// The first becomes the interface of the two media, with this material.
     Interface(Box<Material>),
 }
 
-/// Joins faces of solids of glass in one place that face each other. Returns the names of materials of which
-/// faces are in one place and cannot be joined.
+/// Joins coinciding glass faces that face each other. Returns the names of materials with coinciding faces
+/// that cannot be joined.
 pub(super) fn join(scene: &mut Scene) -> Vec<String> {
     let mut places: BTreeMap<[[u32; 3]; 3], Vec<usize>> = BTreeMap::new();
     for (index, triangle) in scene.triangles.iter().enumerate() {
@@ -50,8 +50,8 @@ pub(super) fn join(scene: &mut Scene) -> Vec<String> {
     apart
 }
 
-/// Corners of a triangle in ascending order, and whether the triangle passes them in this order or a rotation
-/// of it.
+/// Corners of a triangle in ascending order, and whether the triangle traverses them in this order or a
+/// rotation of it.
 fn place(corners: [Vec3; 3]) -> ([[u32; 3]; 3], bool) {
     // Negative zero equals zero.
     let [a, b, c] = corners.map(|corner| corner.to_array().map(|axis| (axis + 0.0).to_bits()));
@@ -61,8 +61,8 @@ fn place(corners: [Vec3; 3]) -> ([[u32; 3]; 3], bool) {
     (sorted, !is_descending)
 }
 
-/// Which of two faces that face each other is kept, and as what; `None` for other faces, and for two media
-/// that absorb or faces with textures.
+/// Decides which of two opposite faces is kept, and with which material. `None` for other pairs, for two
+/// absorbing media, and for textured faces.
 fn touch_of(scene: &Scene, faces: &[usize]) -> Option<(usize, Touch)> {
     let &[one, other] = faces else { return None };
     let triangles = [one, other].map(|face| &scene.triangles[face]);
@@ -91,7 +91,7 @@ fn touch_of(scene: &Scene, faces: &[usize]) -> Option<(usize, Touch)> {
     }
 }
 
-/// The face of a material, behind which is its medium and in front another.
+/// Material of the interface between the media behind and in front of a face.
 fn interface([material, before]: [&Material; 2], [inside, outside]: [Transmission; 2]) -> Option<Touch> {
     let mut face = material.clone();
     let Reflection::MetallicRoughness { base_colour: base_before, .. } = before.reflection else {
@@ -130,7 +130,7 @@ mod tests {
         Material::new(name, reflection)
     }
 
-    /// Two tetrahedra of media, with a face of each in one place.
+    /// Two tetrahedra of different media that share the place of a face.
     fn tetrahedra(media: [Material; 2]) -> Scene {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3], [3, 2, 1], [4, 1, 2], [4, 2, 3], [4, 3, 1]];
@@ -167,7 +167,7 @@ mod tests {
         assert_eq!(apart.triangles, two.triangles);
     }
 
-    /// One solid twice in one place does not face itself.
+    /// Places one solid twice: its coinciding faces do not face each other.
     #[test]
     fn faces_that_look_the_same_way_are_named() {
         let mut twice = tetrahedra([medium("one", 1.5, 0.0), medium("other", 1.3, 0.0)]);

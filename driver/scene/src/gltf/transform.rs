@@ -5,12 +5,12 @@ use gltf::json;
 
 use super::animation::NodePose;
 
-/// Affine transform with its matrix for normals.
+/// Affine transform, and its matrix for normals.
 #[derive(Clone)]
 pub(super) struct Transform {
     matrix: DMat4,
     normals: DMat3,
-    /// True if the transform mirrors: it swaps front and back of triangles.
+    /// True if the transform mirrors, which swaps the front and the back of triangles.
     pub(super) is_mirror: bool,
 }
 
@@ -40,7 +40,7 @@ impl Transform {
     }
 }
 
-/// Local transform of a node in a pose, which has no part in a matrix; `None` if it is not affine.
+/// Local transform of a node in a pose; `None` if it is not affine. A node with a matrix ignores the pose.
 pub(super) fn local(node: &json::Node, pose: Option<&NodePose>) -> Option<DMat4> {
     let transform = if let Some(columns) = node.matrix {
         DMat4::from_cols_array(&columns.map(f64::from))

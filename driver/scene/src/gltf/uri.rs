@@ -1,4 +1,4 @@
-//! URIs of a scene: data URIs, and files in the scene's folder. All files besides the scene file are located
+//! Resolves URIs: data URIs, and files in the scene's folder. All files besides the scene file are located
 //! here.
 
 use std::fs;
@@ -8,7 +8,8 @@ use base64::Engine;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
-/// Padding is optional, as writers disagree on it; missing bytes are detected by the buffer's stated length.
+/// Base64 engine that accepts missing padding, on which writers disagree. Missing bytes are detected by the
+/// buffer's stated length.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new()
@@ -20,7 +21,6 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 pub(super) const INSIDE_FOLDER: &str =
     "put the file beside the scene and refer to it by its name, or export the scene as .glb";
 
-/// Returns whether the URI is a data URI.
 pub(super) fn is_data(uri: &str) -> bool {
     uri.starts_with("data:")
 }
@@ -54,7 +54,7 @@ fn percent_decode(text: &str) -> Result<Vec<u8>, String> {
     Ok(decoded)
 }
 
-/// Path of the file that a URI names. It must be in the scene's folder, so that a downloaded scene cannot
+/// Path of the file that a URI names. It must lie in the scene's folder, so that a downloaded scene cannot
 /// read other files.
 pub(super) fn locate(scene: &Path, uri: &str) -> Result<PathBuf, String> {
     let refused = |why: &str| format!("the uri {uri:?} {why}");

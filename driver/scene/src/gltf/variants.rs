@@ -13,7 +13,7 @@ pub(super) fn names(document: &Document) -> Vec<String> {
     stated.iter().flat_map(|stated| &stated.variants).map(|variant| variant.name.clone()).collect()
 }
 
-/// Gives the primitives that have another material in a variant that material.
+/// Replaces the material of every primitive that has another one in variant `name`.
 pub(super) fn select(document: &mut Document, name: &str) -> Result<(), SceneError> {
     let names = names(document);
     let Some(variant) = names.iter().position(|known| known == name) else {
@@ -38,7 +38,7 @@ pub(super) fn select(document: &mut Document, name: &str) -> Result<(), SceneErr
     Err(document.invalid(item, reason, "export the scene again; the file is inconsistent"))
 }
 
-/// Material of a primitive in a variant, if it is another than its own.
+/// Material of a primitive in a variant; `None` if the variant does not map it.
 fn material_in(primitive: &json::mesh::Primitive, variant: usize) -> Option<u32> {
     let stated = primitive.extensions.as_ref()?.khr_materials_variants.as_ref()?;
     let of_variant = |index: &u32| *index as usize == variant;

@@ -15,20 +15,20 @@ use super::transform::Transform;
 use crate::error::SceneError;
 use crate::{Triangle, VertexAttributes};
 
-/// Maximum coordinate, metres: products of three are far below the maximum of single precision.
+/// Maximum coordinate, metres. The product of three is far below the maximum of single precision.
 pub(super) const MAX_COORDINATE: f32 = 1e8;
 
-/// Maximum texture coordinate: beyond it single precision cannot resolve texels.
+/// Maximum texture coordinate. Beyond it single precision cannot resolve texels.
 const MAX_TEXTURE_COORDINATE: f32 = 1e6;
 
-/// Maximum distance of a vertex normal from the triangle's, both unit vectors, at which they count as equal:
+/// Maximum distance between a unit vertex normal and the triangle's unit normal at which they count as equal:
 /// 0.1 degrees.
 const FLAT_DISTANCE: f64 = 0.001_745;
 
-/// Corners of a triangle as it is placed.
+/// Corners of a triangle with their transforms.
 pub(super) struct Corners<'p> {
     pub(super) vertices: [u64; 3],
-    /// Places in the file's triangle.
+    /// Order of the corners, as indices into the file's triangle. It is reversed by a mirroring transform.
     pub(super) order: [usize; 3],
     pub(super) transforms: [Cow<'p, Transform>; 3],
     /// Weights of morph targets.
@@ -40,7 +40,7 @@ pub(super) struct VertexReader<'r, 'a> {
     pub(super) source: &'r Source<'a>,
     pub(super) mesh: usize,
     pub(super) primitive: &'r Primitive<'a>,
-    /// True for attributes of which a value was not finite.
+    /// True for each kind of attribute of which a value was not finite.
     pub(super) not_finite: NotFinite<Cell<bool>>,
 }
 
@@ -57,7 +57,6 @@ impl VertexReader<'_, '_> {
         }
     }
 
-    /// Indices of a triangle's vertices.
     pub(super) fn indices(&self, triangle: u64) -> Result<[u64; 3], SceneError> {
         let primitive = self.primitive;
         let places = primitive.corners(triangle);
@@ -95,7 +94,6 @@ impl VertexReader<'_, '_> {
         Ok(corners)
     }
 
-    /// World positions of a triangle's corners.
     pub(super) fn places(&self, corners: &Corners<'_>) -> Result<[Vec3; 3], SceneError> {
         let mut places = [Vec3::ZERO; 3];
         for ((place, vertex), transform) in places.iter_mut().zip(corners.vertices).zip(&corners.transforms) {
@@ -104,12 +102,10 @@ impl VertexReader<'_, '_> {
         Ok(places)
     }
 
-    /// World transform of a vertex.
     fn transform<'p>(&self, pose: &'p Pose<'_>, vertex: u64) -> Result<Cow<'p, Transform>, SceneError> {
         pose.of(self.primitive, vertex).map_err(|reason| self.fault("JOINTS_0", vertex, reason))
     }
 
-    /// World position of a vertex.
     fn place(&self, vertex: u64, transform: &Transform, weights: &[f32]) -> Result<Vec3, SceneError> {
         let stated = Vec3::from(self.primitive.positions.vec3(vertex));
         let local = self.displaced(stated, weights, Displaced::Position, vertex);
@@ -131,7 +127,7 @@ impl VertexReader<'_, '_> {
         displaced(base, &self.primitive.targets, weights, attribute, vertex)
     }
 
-    /// Attributes of a triangle's corners beyond positions; `None` if they are the default ones.
+    /// Attributes of a triangle's corners beyond positions; `None` if all have their default value.
     pub(super) fn attributes(
         &self,
         corners: &Corners<'_>,
@@ -167,7 +163,7 @@ impl VertexReader<'_, '_> {
         Err(self.fault(&format!("TEXCOORD_{set}"), vertex, reason))
     }
 
-    /// Colour of a vertex, clamped to 0 to 1 (glTF 2.0, 3.7.2.1); white if it has none.
+    /// Colour of a vertex, clamped to 0 to 1 (glTF 2.0, 3.7.2.1); white without `COLOR_0`.
     fn colour(&self, vertex: u64) -> [f32; 4] {
         let colours = self.primitive.colours.as_ref();
         let colour = colours.map_or([1.0; 4], |colours| colours.floats(vertex, [1.0; 4]));

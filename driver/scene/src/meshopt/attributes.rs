@@ -1,7 +1,7 @@
-//! Streams of attributes, versions 0 and 1: blocks of elements, in which each byte of an element is a lane of
-//! differences.
+//! Streams of attributes, versions 0 and 1. Elements are coded in blocks; byte i of all elements of a block
+//! is lane i, stored as differences.
 
-/// Number of elements whose differences are coded together.
+/// Number of elements whose differences share a bit width.
 const GROUP: usize = 16;
 
 /// Maximum number of elements of a block.
@@ -10,17 +10,17 @@ const MAX_BLOCK: usize = 256;
 /// Maximum size of a block, bytes.
 const BLOCK_BYTES: usize = 8192;
 
-/// Header bytes of versions 0 and 1.
+/// First bytes of streams of versions 0 and 1.
 const HEADERS: [u8; 2] = [0xa0, 0xa1];
 
 /// Minimum size of the tail in each version, bytes.
 const TAILS: [usize; 2] = [32, 24];
 
-/// Bits of a difference for each code of a group: in version 0, and in version 1 for each of the first two
-/// controls of a lane.
+/// Bit widths of a group of differences, by its two-bit code: of version 0, and of the first two lane modes
+/// of version 1.
 const WIDTHS: [[u32; 4]; 3] = [[0, 2, 4, 8], [0, 1, 2, 4], [1, 2, 4, 8]];
 
-/// Control of a lane in version 1.
+/// Lane mode of version 1 whose differences are all zero.
 const CONTROL_ZERO: u8 = 2;
 const CONTROL_LITERAL: u8 = 3;
 
@@ -68,7 +68,7 @@ fn read_lanes(
     Some(())
 }
 
-/// Reads a lane whose groups are of different widths.
+/// Reads a lane whose groups have different bit widths.
 fn read_groups(stream: &mut &[u8], widths: [u32; 4], lane: &mut [u8]) -> Option<()> {
     let codes = stream.split_off(..(lane.len() / GROUP).div_ceil(4))?;
     for (index, group) in lane.chunks_exact_mut(GROUP).enumerate() {
@@ -82,8 +82,8 @@ fn read_groups(stream: &mut &[u8], widths: [u32; 4], lane: &mut [u8]) -> Option<
     Some(())
 }
 
-/// Reads a group of differences of 1, 2 or 4 bits. One with all bits set stands for a byte that follows the
-/// group.
+/// Reads a group of differences of 1, 2 or 4 bits. A difference with all bits set stands for a byte that
+/// follows the group.
 fn read_narrow(stream: &mut &[u8], width: u32, group: &mut [u8]) -> Option<()> {
     let each = 8 / width;
     let packed = stream.split_off(..GROUP / each as usize)?;
@@ -99,8 +99,8 @@ fn read_narrow(stream: &mut &[u8], width: u32, group: &mut [u8]) -> Option<()> {
     Some(())
 }
 
-/// Turns the last element into the next one by differences at `index` of each lane. `channels` is empty in
-/// version 0.
+/// Adds the differences at `index` of each lane to the last element, which becomes the next one. `channels`
+/// is empty in version 0.
 fn add(lanes: &[u8], lane_bytes: usize, index: usize, channels: &[u8], last: &mut [u8]) -> Option<()> {
     for (channel, word) in last.as_chunks_mut::<4>().0.iter_mut().enumerate() {
         let difference = [0, 1, 2, 3].map(|byte| lanes[(4 * channel + byte) * lane_bytes + index]);
@@ -125,7 +125,7 @@ fn add(lanes: &[u8], lane_bytes: usize, index: usize, channels: &[u8], last: &mu
     Some(())
 }
 
-/// Difference from its zigzag code.
+/// Decodes the zigzag code of a difference.
 fn signed_byte(code: u8) -> u8 {
     (code >> 1) ^ (code & 1).wrapping_neg()
 }

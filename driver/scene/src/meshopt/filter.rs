@@ -1,5 +1,4 @@
-//! Filters of decoded attributes. Values that the extension leaves undefined become any number, never a
-//! panic.
+//! Filters of decoded attributes. Values that the extension leaves undefined give any number, never a panic.
 
 use serde::Deserialize;
 
@@ -7,16 +6,16 @@ use serde::Deserialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(crate) enum Filter {
-    /// Attributes as they are.
+    /// No transform.
     #[default]
     None,
-    /// Unit vectors as points of an octahedron.
+    /// Unit vectors in octahedral encoding.
     Octahedral,
-    /// Unit quaternions without their largest component.
+    /// Unit quaternions whose largest component is left out.
     Quaternion,
-    /// Floats as mantissas with exponents.
+    /// Floating-point numbers as mantissa and exponent.
     Exponential,
-    /// Colours as luma and two differences, with alpha.
+    /// Colours as luma and two chroma differences, with alpha.
     Color,
 }
 
@@ -49,7 +48,7 @@ pub(super) fn apply(filter: Filter, stride: usize, decoded: &mut [u8]) {
     }
 }
 
-/// Replaces elements of four bytes.
+/// Replaces elements of four bytes each.
 fn bytes<R: IntoIterator<Item = u8>>(decoded: &mut [u8], filter: impl Fn([u8; 4]) -> R) {
     for element in decoded.as_chunks_mut::<4>().0 {
         let filtered = filter(*element);
@@ -57,7 +56,7 @@ fn bytes<R: IntoIterator<Item = u8>>(decoded: &mut [u8], filter: impl Fn([u8; 4]
     }
 }
 
-/// Replaces elements of four 16-bit integers.
+/// Replaces elements of four 16-bit integers each.
 fn halves<R: IntoIterator<Item = u16>>(decoded: &mut [u8], filter: impl Fn([u16; 4]) -> R) {
     for element in decoded.as_chunks_mut::<8>().0 {
         let halves = element.as_chunks_mut::<2>().0;
@@ -66,12 +65,12 @@ fn halves<R: IntoIterator<Item = u16>>(decoded: &mut [u8], filter: impl Fn([u16;
     }
 }
 
-/// Nearest integer, halves away from zero.
+/// Rounds to the nearest integer; halves away from zero.
 fn rounded(value: f32) -> f32 {
     libm::roundf(value)
 }
 
-/// Unit vector, scaled by `whole`, of a point of the octahedron whose third component stands for 1.
+/// Decodes an octahedral unit vector and scales it by `whole`. `one` is the code of 1.
 fn octahedral([x, y, one]: [f32; 3], whole: f32) -> [f32; 3] {
     let (x, y) = (x / one, y / one);
     let z = 1.0 - x.abs() - y.abs();
@@ -83,8 +82,8 @@ fn octahedral([x, y, one]: [f32; 3], whole: f32) -> [f32; 3] {
     [x, y, z].map(|value| rounded(value * scale))
 }
 
-/// Quaternion of three of its components; the fourth value has the place of the largest one in its two lowest
-/// bits, and the scale of the others in the rest.
+/// Decodes a quaternion from three of its components. The two lowest bits of the fourth value are the index
+/// of the largest component; the other bits are the scale of the three.
 fn quaternion(code: [u16; 4]) -> [u16; 4] {
     let [x, y, z, w] = code.map(|value| value as i16);
     let scale = std::f32::consts::FRAC_1_SQRT_2 / f32::from(w | 3);
@@ -97,15 +96,15 @@ fn quaternion(code: [u16; 4]) -> [u16; 4] {
     components
 }
 
-/// Float of a mantissa of 24 bits and an exponent of 8 bits, both signed.
+/// Decodes a floating-point number from a signed 24-bit mantissa and a signed 8-bit exponent.
 fn float(word: [u8; 4]) -> [u8; 4] {
     let word = i32::from_le_bytes(word);
     let mantissa = (word << 8) >> 8;
     libm::ldexpf(mantissa as f32, word >> 24).to_le_bytes()
 }
 
-/// Colour, scaled by `whole`, of luma, its differences to orange and green, and alpha below a bit that states
-/// their scale.
+/// Decodes a colour from luma, its differences to orange and green, and alpha, and scales it by `whole`. The
+/// highest set bit of alpha states the scale of the code.
 fn colour([luma, orange, green, alpha]: [i32; 4], whole: f32) -> [f32; 4] {
     let bit = alpha.checked_ilog2().unwrap_or(0);
     let one = (2 << bit) - 1;

@@ -12,7 +12,7 @@ const PADDING: usize = 4;
 /// Maximum size of an integer of variable length, bytes.
 const MAX_VARIABLE: u32 = 5;
 
-/// The last sixteen values; the initial ones are no index of any vertex.
+/// Ring of the last sixteen values. The initial ones are no index of a vertex.
 struct Recent<T>([T; 16], usize);
 
 impl<T: Copy> Recent<T> {
@@ -21,7 +21,7 @@ impl<T: Copy> Recent<T> {
         self.1 += 1;
     }
 
-    /// Value `back` pushes before the last one.
+    /// Value that was pushed `back` pushes before the last one.
     fn get(&self, back: u8) -> T {
         self.0[(self.1 + 15 - usize::from(back % 16)) % 16]
     }
@@ -29,13 +29,13 @@ impl<T: Copy> Recent<T> {
 
 /// State of the decoder of triangles.
 struct Triangles<'a> {
-    /// Bytes of codes that do not fit into one byte.
+    /// Bytes of codes that need more than one byte.
     data: &'a [u8],
     edges: Recent<[u32; 2]>,
     vertices: Recent<u32>,
-    /// Next index that did not occur yet.
+    /// Next index that has not occurred yet.
     next: u32,
-    /// Last index that was stated as a difference.
+    /// Last index that was coded as a difference.
     last: u32,
 }
 
@@ -67,7 +67,7 @@ pub(super) fn decode_triangles(mut stream: &[u8], stride: usize, decoded: &mut [
 }
 
 impl Triangles<'_> {
-    /// Triangle at a recent edge.
+    /// Decodes a triangle that shares a recent edge.
     fn beside(&mut self, edge: u8, third: u8) -> Option<[u32; 3]> {
         let [a, b] = self.edges.get(edge);
         let c = match third {
@@ -85,13 +85,13 @@ impl Triangles<'_> {
         Some([a, b, c])
     }
 
-    /// Triangle whose first index is the next one; `code` has two digits for the others.
+    /// Decodes a triangle whose first index is a new one. `code` holds two digits for the others.
     fn fresh(&mut self, code: u8) -> Option<[u32; 3]> {
         let a = self.fresh_index();
         self.complete(a, code)
     }
 
-    /// Triangle whose code is in the data.
+    /// Decodes a triangle whose code is in the data.
     fn stated(&mut self, is_stated: bool) -> Option<[u32; 3]> {
         let code = *self.data.split_off_first()?;
         if code == 0 {
@@ -157,7 +157,7 @@ pub(super) fn decode_sequence(mut stream: &[u8], stride: usize, decoded: &mut [u
     stream.is_empty().then_some(())
 }
 
-/// Integer of seven bits a byte, the least significant ones first.
+/// Reads an integer of seven bits per byte, the least significant ones first.
 fn variable(data: &mut &[u8]) -> Option<u32> {
     let mut value = 0;
     for place in 0..MAX_VARIABLE {
@@ -170,7 +170,7 @@ fn variable(data: &mut &[u8]) -> Option<u32> {
     None
 }
 
-/// Difference from its zigzag code.
+/// Decodes the zigzag code of a difference.
 fn signed(code: u32) -> u32 {
     (code >> 1) ^ (code & 1).wrapping_neg()
 }

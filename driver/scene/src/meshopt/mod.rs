@@ -1,8 +1,7 @@
-//! Decoding of buffer views compressed by meshopt (`EXT_meshopt_compression`, `KHR_meshopt_compression`).
+//! Decoder of buffer views compressed by meshopt (`EXT_meshopt_compression`, `KHR_meshopt_compression`).
 //!
-//! Sizes are checked against the maximum that a stream of its length can hold, before anything is allocated
-//! for them. A damaged stream ends in an error or in wrong bytes, which the accessors' readers check as they
-//! check all others.
+//! Sizes are checked against the maximum that a stream of its length can hold before memory is allocated. A
+//! damaged stream gives an error or wrong bytes; readers of accessors check the bytes as those of any buffer.
 
 mod attributes;
 mod filter;
@@ -13,7 +12,7 @@ use serde::Deserialize;
 pub(super) use self::filter::Filter;
 use photoncard_picture::allocation::{self, OutOfMemory};
 
-/// Maximum number of decoded bytes per byte of a stream: a byte of control bits stands for four lanes of 256
+/// Maximum number of decoded bytes per byte of a stream. A byte of control bits codes four lanes of 256
 /// elements.
 const EXPANSION: u64 = 4 * 256;
 
@@ -24,15 +23,15 @@ const MAX_STRIDE: usize = 256;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(super) enum Mode {
-    /// Elements of any content, as differences of their bytes.
+    /// Elements of any content, as differences between their bytes.
     Attributes,
-    /// Indices of a list of triangles, by edges and vertices of earlier ones.
+    /// Indices of a list of triangles, relative to recent edges and vertices.
     Triangles,
-    /// Other indices, as differences.
+    /// Other lists of indices, as differences.
     Indices,
 }
 
-/// Layout of decoded bytes, and the form of their stream.
+/// Size of the decoded elements, and the format of their stream.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Layout {
     /// Number of elements.
@@ -46,15 +45,18 @@ pub(super) struct Layout {
 /// Error of a stream.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// Combination of sizes, mode and filter that the extension does not allow, or a damaged stream: a
-    /// clause.
+    /// Clause on a damaged stream, or on a combination of sizes, mode and filter that the extension does not
+    /// allow.
     Invalid(String),
     /// Memory that the process cannot have.
     Memory(OutOfMemory),
 }
 
 impl Layout {
-    /// Number of decoded bytes; an error if the extension does not allow the layout.
+    /// Number of decoded bytes.
+    ///
+    /// # Errors
+    /// If the extension does not allow the layout.
     pub(super) fn bytes(&self) -> Result<u64, Fault> {
         let Self { count, stride, mode, filter } = *self;
         let is_element = match mode {

@@ -7,8 +7,8 @@ fn layout(mode: Mode, filter: Filter, count: usize, stride: usize) -> Layout {
     Layout { count, stride, mode, filter }
 }
 
-/// The extension's own example of a group of 4-bit differences, in the first lane of sixteen elements of four
-/// bytes.
+/// Decodes the example in the extension's text: a group of 4-bit differences in the first lane of sixteen
+/// elements of four bytes.
 #[test]
 fn the_example_of_the_specification_is_decoded() {
     let group = [0x17, 0x5f, 0xf0, 0xbc, 0x77, 0xa9, 0x21, 0x00, 0x34, 0xb5];
@@ -65,7 +65,7 @@ fn sizes_that_no_stream_of_the_length_has_are_refused() {
     }
 }
 
-/// The maximum expansion: each control byte says that 256 elements are equal.
+/// Decodes a stream whose control bytes each say that 256 elements are equal.
 #[test]
 fn the_stream_of_maximum_expansion_is_decoded() {
     const BLOCKS: usize = 100;

@@ -1,8 +1,8 @@
-//! Texels of images with 16 bits a channel, in the four bytes of a texel.
+//! Encodes texels of images with 16 bits per channel in four bytes.
 
 use crate::texture::{Encoding, shared_exponent};
 
-/// Channels that keep more than 8 bits of an image of 16 bits a channel, and their texel.
+/// Encoding of 16-bit images in four bytes that keeps more than 8 bits of some channels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Deep {
     /// Colour in sRGB, as [`Encoding::SharedExponent`].
@@ -39,15 +39,15 @@ fn pair(channels: [u16; 2]) -> [u8; 4] {
     [a, b, c, d]
 }
 
-/// Value of a code in the sRGB transfer function (IEC 61966-2-1).
+/// Decodes a 16-bit code of the sRGB transfer function (IEC 61966-2-1).
 fn linear(code: u16) -> f32 {
     let value = f64::from(code) / f64::from(u16::MAX);
     let linear = if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) };
     linear as f32
 }
 
-/// Red and green of a normal once it has unit length. A normal with z < 0 is moved into the surface (z = 0),
-/// as z is not stored; images of 8 bits a channel keep it.
+/// Encodes x and y of a normal after normalisation. A normal with z < 0 is moved into the surface (z = 0),
+/// because z is not stored; images of 8 bits per channel keep it.
 fn normal(codes: [u16; 3]) -> [u8; 4] {
     const HALF: f64 = u16::MAX as f64 / 2.0;
     let [x, y, z] = codes.map(|code| f64::from(code) - HALF);

@@ -9,8 +9,7 @@ pub(crate) struct Fault {
     pub(crate) reason: String,
     /// Remedy.
     pub(crate) remedy: &'static str,
-    /// True for an image that is beyond a limit, or takes memory that the process cannot have; false for one
-    /// that cannot be read.
+    /// True if the image exceeds a limit or the memory of the process; false if it cannot be read.
     pub(crate) is_limit: bool,
 }
 
@@ -26,7 +25,7 @@ impl Fault {
         }
     }
 
-    /// Error of an image that cannot be read, in whatever process.
+    /// Error of an image that no process can read.
     pub(crate) fn unreadable(reason: impl Into<String>, remedy: &'static str) -> Self {
         Self { reason: reason.into(), remedy, is_limit: false }
     }

@@ -10,8 +10,8 @@ use crate::texture::MAX_SIDE;
 
 pub(super) const MAGIC: &[u8] = b"\xff\xd8\xff";
 
-/// Maximum number of texels per byte: a block of samples takes at least one bit, and there is a block for
-/// each 128 texels, however coarsely components are sampled.
+/// Maximum number of texels per byte. A block of samples takes at least one bit, and there is a block for
+/// each 128 texels at the coarsest subsampling.
 const TEXELS_OF_A_BYTE: u64 = 8 * 128;
 
 type Decoder<'a> = JpegDecoder<ZCursor<&'a [u8]>>;
@@ -23,13 +23,13 @@ fn decoder(bytes: &[u8]) -> Decoder<'_> {
     JpegDecoder::new_with_options(ZCursor::new(bytes), options)
 }
 
-/// Width and height, and the maximum number of texels of a file of this length.
+/// Width and height, and the maximum number of texels in a file of this length.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let frame = frame_header(bytes).ok_or_else(|| Fault::damaged("it has no frame header"))?;
     Ok((frame, TEXELS_OF_A_BYTE * bytes.len() as u64))
 }
 
-/// Width and height in the frame header (ITU-T T.81, B.2.2), which the decoder reports only within its own
+/// Width and height in the frame header (ITU-T T.81, B.2.2). The decoder reports them only within its own
 /// limits.
 fn frame_header(bytes: &[u8]) -> Option<[u32; 2]> {
     let mut rest = bytes.get(2..)?;

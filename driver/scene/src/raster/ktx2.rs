@@ -1,8 +1,9 @@
-//! Decoding of KTX2 with Basis Universal, as `KHR_texture_basisu` has it: ETC1S with `BasisLZ`, or UASTC with
-//! or without Zstandard.
+//! Decoding of KTX2 with Basis Universal, as `KHR_texture_basisu` defines it: ETC1S with `BasisLZ`, or UASTC
+//! with or without Zstandard.
 //!
-//! The transcoder allocates by a file's header, and decodes more formats than glTF has. So the header is read
-//! here first, and Zstandard is decoded here, to the length that follows from the size.
+//! The transcoder allocates what a file's header states, and decodes more formats than glTF allows. The
+//! header is therefore checked here first. Zstandard is decoded here as well, to the length that follows from
+//! the size.
 
 use std::array;
 use std::borrow::Cow;
@@ -14,29 +15,29 @@ use super::fault::Fault;
 
 pub(super) const MAGIC: &[u8] = b"\xabKTX 20\xbb\r\n\x1a\n";
 
-/// Size of the header and of the level index's first entry, words of 32 bits.
+/// Length of the header with the first entry of the level index, 32-bit words.
 const HEADER_WORDS: usize = 26;
 
-/// Positions of the supercompression scheme, and of offset and length of level 0, in the header, bytes.
+/// Positions in the file's header, bytes: supercompression scheme, offset of level 0, length of level 0.
 const SCHEME: usize = 44;
 const LEVEL_OFFSET: usize = 80;
 const LEVEL_LENGTH: usize = 88;
 
-/// Size of the descriptor of a sample at the end of the data format descriptor, and the position of the
-/// channel in it, bytes.
+/// Size of a sample's description at the end of the data format descriptor, and position of the channel in
+/// it, bytes.
 const SAMPLE: usize = 16;
 const CHANNEL: usize = 3;
 
-/// Side of a block, texels, and size of one in UASTC, bytes.
+/// Side of a block, texels, and size of a UASTC block, bytes.
 const BLOCK_SIDE: u32 = 4;
 const UASTC_BLOCK: u64 = 16;
 
-/// Maximum number of texels of a byte in Zstandard: four bytes repeat a byte 2^17 times, and UASTC has a byte
-/// for a texel.
+/// Maximum number of texels per byte of Zstandard. Four bytes repeat a byte 2^17 times, and UASTC takes one
+/// byte per texel.
 const ZSTANDARD_TEXELS_OF_A_BYTE: u64 = 1 << 15;
 
-/// Window that decoders of Zstandard should have (RFC 8878, 3.1.1.1.2), bytes. An encoder that knows the
-/// length takes no larger one than that.
+/// Window size that decoders of Zstandard should support (RFC 8878, 3.1.1.1.2), bytes. An encoder that knows
+/// the length of its data takes no larger window than that.
 const ZSTANDARD_WINDOW: u64 = 8 << 20;
 
 const ENCODE_AGAIN: &str = "encode the image again for glTF, or convert it to PNG, JPEG or WebP";
@@ -53,9 +54,9 @@ enum Codec {
 struct Header<'a> {
     size: [u32; 2],
     codec: Codec,
-    /// Level 0 as the file has it.
+    /// Bytes of level 0, possibly compressed by Zstandard.
     level: &'a [u8],
-    /// Stated length of level 0 without Zstandard, bytes.
+    /// Stated length of level 0 after Zstandard is removed, bytes.
     plain_length: u64,
 }
 
@@ -81,7 +82,7 @@ impl<'a> Header<'a> {
 }
 
 impl Codec {
-    /// Codec by the header's format, the data format descriptor and the supercompression scheme.
+    /// Determines the codec from `vkFormat`, the data format descriptor and the supercompression scheme.
     fn of(vk_format: u32, descriptor: &[u8], scheme: u32) -> Result<Self, Fault> {
         const ETC1S: u8 = 163;
         const UASTC: u8 = 166;
@@ -118,20 +119,20 @@ fn unreadable(reason: &str) -> Fault {
     Fault::unreadable(reason, ENCODE_AGAIN)
 }
 
-/// Little-endian words at the start.
+/// First `N` little-endian words of a file.
 fn words<const N: usize>(bytes: &[u8]) -> Option<[u32; N]> {
     let bytes = bytes.get(..4 * N)?;
     Some(array::from_fn(|word| u32::from_le_bytes(array::from_fn(|byte| bytes[4 * word + byte]))))
 }
 
-/// Part of a file.
+/// Bytes of a file at `offset`; an error if they exceed the file.
 fn part(bytes: &[u8], offset: u64, length: u64) -> Result<&[u8], Fault> {
     let part = || bytes.get(usize::try_from(offset).ok()?..)?.get(..usize::try_from(length).ok()?);
     part().ok_or_else(|| Fault::damaged("its header refers to bytes beyond its end"))
 }
 
-/// Checks the lengths in the supercompression global data of ETC1S: a header, a description of each level,
-/// codebooks and tables.
+/// Checks the lengths in the supercompression global data of ETC1S: header, image descriptions, codebooks and
+/// tables.
 fn check_global(global: &[u8], levels: u32) -> Result<(), Fault> {
     let Some([_, endpoints, selectors, tables, extended, _, _, colour_length, ..]) = words::<10>(global)
     else {
@@ -147,8 +148,8 @@ fn check_global(global: &[u8], levels: u32) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Checks that the first texel is the upper left one, that channels are in order, and that there is no
-/// sequence of pictures.
+/// Checks that the first texel is the upper left one, that channels are not swizzled, and that the file is no
+/// video.
 fn check_metadata(metadata: &[u8]) -> Result<(), Fault> {
     for (key, required) in [("KTXorientation", "rd"), ("KTXswizzle", "rgba")] {
         if value(metadata, key).is_some_and(|value| value != required.as_bytes()) {
@@ -161,7 +162,7 @@ fn check_metadata(metadata: &[u8]) -> Result<(), Fault> {
     }
 }
 
-/// Value of a key in the key/value data, without the NUL that ends text.
+/// Value of a key in the key/value data, without the terminating NUL.
 fn value<'a>(mut metadata: &'a [u8], key: &str) -> Option<&'a [u8]> {
     loop {
         let (length, rest) = metadata.split_first_chunk()?;
@@ -174,8 +175,8 @@ fn value<'a>(mut metadata: &'a [u8], key: &str) -> Option<&'a [u8]> {
     }
 }
 
-/// Width and height, and the maximum number of texels of a file of this length: without a limit for ETC1S,
-/// whose blocks may take no bits.
+/// Width and height, and the maximum number of texels in a file of this length. There is no such maximum for
+/// ETC1S, whose blocks may take no bits.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let header = Header::read(bytes)?;
     let level = header.level.len() as u64;
@@ -205,7 +206,7 @@ pub(super) fn decode(bytes: &[u8], size: [u32; 2]) -> Result<Vec<[u8; 4]>, Fault
     Ok(texels.as_chunks().0.to_vec())
 }
 
-/// Copy of a file with level 0 appended without Zstandard, and a header that says so.
+/// Copy of a file with an uncompressed level 0 appended, and the header changed accordingly.
 fn without_zstandard(bytes: &[u8], level: &[u8], length: usize) -> Result<Vec<u8>, Fault> {
     let offset = bytes.len();
     let mut file = vec![0; offset + length];

@@ -1,8 +1,8 @@
-//! Decoding of PNG, JPEG, WebP and KTX2 files to 8-bit RGBA texels.
+//! Decoders of PNG, JPEG, WebP and KTX2 to RGBA texels of 32 bits.
 //!
-//! Sizes are checked in the header, before anything is allocated for them: against limits, and against the
-//! maximum that a file of its length can hold at the best compression, where its format has one. A file's
-//! colour space is ignored, as glTF requires.
+//! Sizes in the header are checked before memory is allocated for them: against limits and, where the format
+//! bounds compression, against the maximum that a file of this length can hold. The colour space of a file is
+//! ignored, as glTF requires.
 
 mod deep;
 mod fault;
@@ -17,11 +17,11 @@ use super::texture::{MAX_SIDE, MAX_TEXELS};
 use photoncard_picture::allocation;
 use photoncard_picture::foreign;
 
-/// Bytes of memory per texel while decoding: the texel itself, and interlaced rows of 16-bit PNG or
-/// coefficients of progressive JPEG.
+/// Memory per texel while decoding, bytes: the texel itself, and interlaced rows of a 16-bit PNG or
+/// coefficients of a progressive JPEG.
 const DECODING_BYTES: u64 = 16;
 
-/// Runs a decoder; a panic is reported as a damaged file.
+/// Runs a decoder and reports its panic as a damaged file.
 pub(super) fn walled<T>(decoder: impl FnOnce() -> Result<T, Fault>) -> Result<T, Fault> {
     foreign::decode(decoder, || Fault::damaged("its structure contradicts itself"))
 }
@@ -36,7 +36,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    /// Format by the first bytes of a file.
+    /// Recognises the format by the first bytes of a file.
     pub(super) fn of(bytes: &[u8]) -> Result<Self, Fault> {
         const REMEDY: &str = "convert the image to PNG, JPEG or WebP";
         const OTHERS: [(&[u8], &str); 6] = [
@@ -70,7 +70,7 @@ impl Kind {
         Err(Fault::unreadable(reason, REMEDY))
     }
 
-    /// Width and height from the header, checked against the limits and the file's length.
+    /// Width and height from the header, checked against the limits and the length of the file.
     pub(super) fn size(self, bytes: &[u8]) -> Result<[u32; 2], Fault> {
         let (size, most_texels) = walled(|| match self {
             Self::Png => png::size(bytes),
@@ -87,13 +87,13 @@ impl Kind {
         Ok(size)
     }
 
-    /// Returns whether an image has more than 8 bits a channel.
+    /// Returns whether an image has more than 8 bits per channel.
     pub(super) fn is_deep(self, bytes: &[u8]) -> bool {
         self == Self::Png && walled(|| Ok(png::is_deep(bytes))) == Ok(true)
     }
 
-    /// Texels of an image, rows from the top: of 8 bits a channel or, of an image that [is
-    /// deep](Self::is_deep), in the form that `deep` names. `size` is the result of [`Kind::size`].
+    /// Decodes an image to texels in rows from the top. An image that [is deep](Self::is_deep) is stored as
+    /// `deep` states, others with 8 bits per channel. `size` is the result of [`Kind::size`].
     pub(super) fn decode(
         self,
         bytes: &[u8],

@@ -10,7 +10,7 @@ use super::fault::Fault;
 const FILE_HEADER: usize = 12;
 const CHUNK_HEADER: usize = 8;
 
-/// Mask of a side in the headers of both codecs.
+/// Mask of the bits of a width or height in the headers of both codecs.
 const SIDE: u32 = 0x3fff;
 
 /// Returns whether a file is WebP.
@@ -26,8 +26,8 @@ fn decoder(bytes: &[u8]) -> Result<WebPDecoder<Cursor<&[u8]>>, Fault> {
     Ok(decoder)
 }
 
-/// Width and height, and the maximum number of texels of a file of this length: without a limit, as texels of
-/// one colour take no bits.
+/// Width and height, and the maximum number of texels in a file of this length. There is none, because texels
+/// of one colour may take no bits.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let size = decoder(bytes)?.dimensions().into();
     // The decoder allocates by the header of the codec before it compares that with the file's.
@@ -37,7 +37,7 @@ pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     Ok((size, u64::MAX))
 }
 
-/// Width and height in the header of the first picture's codec.
+/// Width and height in the codec's header of the first picture.
 fn frame_size(bytes: &[u8]) -> Option<[u32; 2]> {
     let mut rest = bytes.get(FILE_HEADER..)?;
     loop {

@@ -1,4 +1,4 @@
-//! Assignments to lights without extent and to the environment.
+//! Assignments to punctual lights and to the environment.
 
 use std::ops::RangeInclusive;
 
@@ -8,10 +8,10 @@ use crate::limits::{BRIGHTEST, EMISSION};
 use crate::out_of_range::every;
 use crate::{Environment, PunctualKind, PunctualLight};
 
-/// Reason and remedy of a value that is not possible.
+/// Reason and remedy of an impossible value.
 pub(super) type Refusal = (&'static str, &'static str);
 
-/// A property of a light that can be set.
+/// Property of a light that can be assigned.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum LightProperty {
     Colour,
@@ -19,7 +19,7 @@ pub(super) enum LightProperty {
     Position,
 }
 
-/// Places, metres: those that a scene's file may state.
+/// Range of a light's coordinates, metres: that of positions in a scene's file.
 const PLACES: RangeInclusive<f32> = -1e15..=1e15;
 
 impl LightProperty {
@@ -28,7 +28,7 @@ impl LightProperty {
 }
 
 impl PunctualLight {
-    /// Colour, its greatest channel 1, and intensity of that channel; white for a dark light.
+    /// Colour whose greatest channel is 1, and the intensity of that channel. A dark light is white.
     pub fn colour(&self) -> (Vec3, f32) {
         let greatest = self.intensity.max_element();
         if greatest > 0.0 { (self.intensity / greatest, greatest) } else { (Vec3::ONE, 0.0) }
@@ -37,7 +37,7 @@ impl PunctualLight {
     /// Sets a property.
     ///
     /// # Errors
-    /// If the light lacks the property, or the value is not possible: the reason and the remedy.
+    /// Reason and remedy, if the light lacks the property or the value is impossible.
     pub(super) fn assign(&mut self, property: LightProperty, values: &[f32]) -> Result<(), Refusal> {
         let (colour, intensity) = self.colour();
         match (property, values) {
@@ -85,7 +85,7 @@ impl PunctualLight {
     }
 }
 
-/// A colour whose greatest channel is 1.
+/// Scales a colour so that its greatest channel is 1.
 fn hue(values: &[f32]) -> Result<Vec3, Refusal> {
     let colour = match *values {
         [red, green, blue] => Vec3::new(red, green, blue),
@@ -106,7 +106,7 @@ impl Environment {
     /// Sets the factor of the texels.
     ///
     /// # Errors
-    /// If the environment would be brighter than any may be: the reason and the remedy.
+    /// Reason and remedy, if the environment would exceed the maximum radiance.
     pub(super) fn set_strength(&mut self, values: &[f32]) -> Result<(), Refusal> {
         let &[strength] = values else {
             return Err(("the strength is one number", "write environment.strength=2 for twice the map"));

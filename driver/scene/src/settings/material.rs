@@ -4,7 +4,7 @@ use glam::Vec3;
 
 use crate::{Material, Reflection, Transmission};
 
-/// A property of a material that can be set.
+/// Property of a material that can be assigned.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum MaterialProperty {
     Diffuse,
@@ -52,7 +52,7 @@ impl Material {
     /// Sets a property.
     ///
     /// # Errors
-    /// If the material lacks the property: the reason and the remedy.
+    /// Reason and remedy, if the material lacks the property.
     pub(super) fn assign(
         &mut self,
         property: MaterialProperty,
@@ -151,7 +151,7 @@ impl Material {
 }
 
 impl Reflection {
-    /// Index of refraction, stated or that of the reflectance; `None` without a dielectric part.
+    /// Index of refraction: the stated one, or that of the reflectance. `None` without a dielectric part.
     pub fn ior(&self) -> Option<f32> {
         match *self {
             Self::Phong { .. } => None,
@@ -169,7 +169,7 @@ fn f0(ior: f32) -> f32 {
     amplitude * amplitude
 }
 
-/// Index of refraction of a dielectric's F0 and F90; 1.5 for one without reflectance.
+/// Index of refraction of a dielectric with this F0 and F90; 1.5 for one without reflectance.
 fn index_of_refraction(f0: Vec3, f90: f32) -> f32 {
     if f90 <= 0.0 {
         return 1.5;

@@ -20,10 +20,10 @@ const FORM: &str = "write NAME.PROPERTY=VALUE, for example floor.exponent=32 or 
                     material are diffuse, specular, exponent, metallic, roughness, transmission, ior, thickness, alpha and \
                     emission; those of a light are colour, intensity and position; and there is environment.strength";
 
-/// Name by which the environment is set.
+/// Name of the environment in an assignment.
 const ENVIRONMENT: &str = "environment";
 
-/// A property that can be set, of anything that has any.
+/// Property of a material, a light or the environment that can be assigned.
 #[derive(Clone, Copy)]
 enum Property {
     Material(MaterialProperty),
@@ -42,13 +42,13 @@ impl Property {
     }
 }
 
-/// Assignment in its parts.
+/// Parsed assignment.
 struct Assignment<'a> {
     text: &'a str,
     name: &'a str,
     property: Property,
     values: Vec<f32>,
-    /// The values in double precision.
+    /// Values in double precision.
     precise: Vec<f64>,
 }
 
@@ -78,22 +78,23 @@ impl Scene {
     /// Applies `MATERIAL.PROPERTY=VALUE` to every material of the name, `LIGHT.PROPERTY=VALUE` to every light
     /// without extent of the name, or `environment.strength=VALUE`.
     ///
-    /// The property is `diffuse` (the diffuse albedo, or the base colour of a metallic-roughness material),
-    /// `alpha` (the coverage of a material without cut-outs) or `emission` of any material, `specular` or
-    /// `exponent` of one that states a Phong lobe or is Lambertian, or `metallic`, `roughness`, `ior` (index
-    /// of refraction, in place of the colour of the reflectance too), `transmission` or `thickness` (above 0:
-    /// the surface bounds a solid) of a metallic-roughness one. Colours are `r,g,b` or one number for all
-    /// three, the others one number. Textures keep multiplying the values; the emissive texture of a material
-    /// that did not emit was not loaded, as a notice says.
+    /// The property of a material is `diffuse` (the diffuse albedo, or the base colour of a
+    /// metallic-roughness material), `alpha` (the coverage of a material without cut-outs) or `emission` of
+    /// any material, `specular` or `exponent` of one that states a Phong lobe or is Lambertian, or
+    /// `metallic`, `roughness`, `ior` (index of refraction, which also replaces the colour of the
+    /// reflectance), `transmission` or `thickness` (above 0: the surface bounds a solid) of a
+    /// metallic-roughness one. Colours are `r,g,b` or one number for all three, the others one number.
+    /// Textures still multiply the values. The emissive texture of a material that did not emit was not
+    /// loaded; a notice says so.
     ///
-    /// Of a light it is `colour` (of which the proportions of the channels count alone), `intensity` (of the
-    /// greatest channel, W/sr, or W/m^2 of a directional light; the colour stays, and is white for a light
-    /// that was dark) or `position` (`x,y,z` in the file's coordinates, metres, of a point or spot light that
-    /// shares its name with no other). The strength of the environment is a factor of its map.
+    /// The property of a light is `colour` (only the ratios of its channels count), `intensity` (of the
+    /// greatest channel, W/sr, or W/m^2 of a directional light; the colour stays, and is white for a dark
+    /// light) or `position` (`x,y,z` in the file's coordinates, metres, of a point or spot light with a
+    /// unique name). The strength of the environment is a factor of its map.
     ///
-    /// No property is one of both materials and lights, so that a name may be that of both. A name may itself
-    /// contain dots. [`Scene::check_light`] checks that the scene still has a light once all assignments are
-    /// applied.
+    /// Materials and lights have no property in common, so that a material and a light may have the same
+    /// name. A name may itself contain dots. [`Scene::check_light`] checks that the scene still has a light
+    /// once all assignments are applied.
     ///
     /// # Errors
     /// If the text is not of this form, nothing with the property has the name, a material or light lacks the

@@ -1,9 +1,9 @@
-//! Proposals for a name that nothing has.
+//! Proposals for an unknown name.
 
 /// Maximum number of names that an error proposes.
 const PROPOSED: usize = 5;
 
-/// Names that are most similar to an unknown name, as a list in text.
+/// Lists the known names that are most similar to an unknown one.
 pub(super) fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> String {
     let mut names: Vec<_> = known.collect();
     names.sort_by_cached_key(|candidate| edit_distance(name, candidate));

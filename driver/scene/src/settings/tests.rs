@@ -1,4 +1,4 @@
-//! Assignments to every kind of thing that has properties.
+//! Assignments to materials, lights and the environment.
 
 use glam::Vec3;
 
@@ -139,7 +139,7 @@ fn bad_settings_change_nothing() {
     }
 }
 
-/// Either all materials of a name are changed, or none.
+/// An assignment changes either all materials of a name, or none.
 #[test]
 fn materials_of_one_name_change_together() {
     let mut scene = scene();

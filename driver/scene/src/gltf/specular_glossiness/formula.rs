@@ -1,13 +1,13 @@
-//! Conversion of specular-glossiness to metallic-roughness: that of the extension's own examples.
+//! Converts specular-glossiness to metallic-roughness by the formula of the extension's examples.
 
 use glam::Vec3;
 
-/// F0 of a dielectric.
+/// F0 of a dielectric with the index of refraction 1.5.
 const DIELECTRIC: f32 = 0.04;
 
 const EPSILON: f32 = 1e-6;
 
-/// Weights of red, green and blue in the perceived brightness, a quadratic mean.
+/// Weights of red, green and blue in the perceived brightness, `sqrt(sum of weight * channel^2)`.
 const WEIGHTS: Vec3 = Vec3::new(0.299, 0.587, 0.114);
 
 /// Linear values of the specular-glossiness model.
@@ -58,7 +58,7 @@ impl Appearance {
 mod tests {
     use super::*;
 
-    /// Specular-glossiness of a metallic-roughness material, by the same examples.
+    /// Converts metallic-roughness to specular-glossiness, by the examples of the extension.
     fn backwards(base: Vec3, metallic: f32, roughness: f32) -> Appearance {
         let specular = Vec3::splat(DIELECTRIC).lerp(base, metallic);
         let strength = 1.0 - specular.max_element();
@@ -66,7 +66,7 @@ mod tests {
         Appearance { diffuse, specular, glossiness: 1.0 - roughness }
     }
 
-    /// Metals and dielectrics come back as they were. Between them the formula itself is approximate.
+    /// Tests metals and dielectrics alone, because the formula is approximate between them.
     #[test]
     fn what_was_converted_there_is_converted_back() {
         for base in [Vec3::new(0.9, 0.6, 0.2), Vec3::splat(0.5), Vec3::new(0.1, 0.3, 0.8)] {
@@ -84,7 +84,7 @@ mod tests {
         );
     }
 
-    /// White reflection at all angles: the formula's extreme.
+    /// Tests white reflection at all angles, the extreme of the formula.
     #[test]
     fn extremes_stay_in_range() {
         for diffuse in [0.0, 1.0] {

@@ -1,5 +1,5 @@
-//! Specular-glossiness materials (`KHR_materials_pbrSpecularGlossiness`), which become metallic-roughness
-//! ones before anything else reads them: their factors, and their textures as new images.
+//! Converts specular-glossiness materials (`KHR_materials_pbrSpecularGlossiness`) to metallic-roughness ones,
+//! before anything else reads them: factors, and textures as new images.
 
 mod formula;
 mod texels;
@@ -17,23 +17,23 @@ use self::formula::Appearance;
 pub(super) use self::texels::Grid;
 use super::origin::Origin;
 
-/// Images that are made from others, by index, and materials that are not converted as they are.
+/// Images that are computed from others, by index, and materials whose conversion is incomplete.
 #[derive(Default)]
 pub(super) struct Conversions {
     pub(super) images: BTreeMap<usize, Conversion>,
-    /// Indices of materials whose two textures are mapped differently.
+    /// Indices of materials whose two textures have different samplers or coordinates.
     pub(super) mismatched: Vec<usize>,
 }
 
-/// An image that is made from a diffuse and a specular-glossiness texture, or one of them.
+/// Image that is computed from a diffuse texture, a specular-glossiness texture, or both.
 pub(super) struct Conversion {
-    /// Images of the diffuse and of the specular-glossiness texture.
+    /// Images of the diffuse and the specular-glossiness texture.
     pub(super) sources: [Option<Origin>; 2],
     factors: Appearance,
     part: Part,
 }
 
-/// Texture that an image is made for.
+/// Texture for which an image is computed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Part {
     BaseColour,
@@ -56,7 +56,7 @@ pub(super) fn convert(root: &mut json::Root) -> Conversions {
     conversions
 }
 
-/// Converts a material. Returns whether its specular-glossiness texture had to be left out.
+/// Converts a material. Returns whether its specular-glossiness texture was left out.
 fn convert_one(
     root: &mut json::Root,
     stated: &PbrSpecularGlossiness,
@@ -97,7 +97,8 @@ fn convert_one(
     (converted, is_mismatched)
 }
 
-/// Appends an image and a texture of it, which is mapped as another is.
+/// Appends an image and a texture of it with the sampler and coordinates of `mapping`. Returns the texture's
+/// info.
 fn added(root: &mut json::Root, mapping: &Info, image: usize, part: Part) -> Info {
     let sampler = root.textures[mapping.index.value()].sampler;
     let name = match part {
@@ -119,7 +120,7 @@ fn added(root: &mut json::Root, mapping: &Info, image: usize, part: Part) -> Inf
     Info { index, ..mapping.clone() }
 }
 
-/// Returns whether two textures take the same place of their images at each place of a surface.
+/// Returns whether two textures sample their images at the same coordinates, so that texels correspond.
 fn is_alike(root: &json::Root, one: &Info, other: &Info) -> bool {
     let transform = |info: &Info| {
         let plain = TextureTransform::default();

@@ -1,14 +1,14 @@
-//! Texels of converted images.
+//! Texels of images that are converted to metallic-roughness.
 
 use glam::{Vec3, Vec4};
 
 use super::formula::Appearance;
 use super::{Conversion, Part};
 
-/// Values of 8-bit codes: linear light of the sRGB transfer function (IEC 61966-2-1).
+/// Tables of the sRGB transfer function (IEC 61966-2-1) for 8-bit codes.
 struct Srgb {
     values: [f32; 256],
-    /// Least values that are nearer to the next code.
+    /// Least linear value that rounds to the next code, for each code.
     borders: [f32; 255],
 }
 
@@ -24,7 +24,7 @@ impl Srgb {
         }
     }
 
-    /// Linear colour, with alpha from 0 to 1.
+    /// Decodes a texel to linear colour, and alpha from 0 to 1.
     fn decode(&self, [red, green, blue, alpha]: [u8; 4]) -> Vec4 {
         let [red, green, blue] = [red, green, blue].map(|code| self.values[usize::from(code)]);
         Vec4::new(red, green, blue, f32::from(alpha) / 255.0)
@@ -48,7 +48,7 @@ pub(in crate::gltf) struct Grid<'t> {
 }
 
 impl Grid<'_> {
-    /// Linear value at the centre of texel (`x`, `y`) of a grid of another size, bilinear.
+    /// Linear value at the centre of texel (`x`, `y`) of a grid of size `size`, by bilinear interpolation.
     fn sample(&self, srgb: &Srgb, [x, y]: [u32; 2], size: [u32; 2]) -> Vec4 {
         let at = |x: u32, y: u32| srgb.decode(self.texels[(y * self.size[0] + x) as usize]);
         if self.size == size {
@@ -68,12 +68,12 @@ impl Grid<'_> {
 }
 
 impl Conversion {
-    /// Size of the image, from those of its sources that can be read: the maximum of each side.
+    /// Size of the converted image: the larger width and the larger height of its readable sources.
     pub(in crate::gltf) fn size(sources: [Option<[u32; 2]>; 2]) -> [u32; 2] {
         sources.into_iter().flatten().fold([1, 1], |[width, height], [w, h]| [width.max(w), height.max(h)])
     }
 
-    /// Texels of the image. A source that cannot be read is left out: the factors alone count.
+    /// Computes the texels of the converted image. The factors alone stand for a source that cannot be read.
     pub(in crate::gltf) fn texels(&self, size: [u32; 2], sources: [Option<Grid<'_>>; 2]) -> Vec<[u8; 4]> {
         let srgb = Srgb::new();
         let places = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));

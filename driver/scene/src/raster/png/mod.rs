@@ -9,11 +9,11 @@ use super::fault::Fault;
 
 pub(super) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Maximum number of texels per byte: Deflate expands a byte to at most 1032, and a byte holds at most 8
+/// Maximum number of texels per byte. Deflate expands a byte to at most 1032, and a byte holds at most 8
 /// texels of one bit.
 const TEXELS_OF_A_BYTE: u64 = 1032 * 8;
 
-/// Maximum memory of the decoder besides rows, bytes: chunks of text or colour profiles.
+/// Maximum memory of the decoder besides rows, bytes, such as for chunks of text and colour profiles.
 const ANCILLARY_BYTES: usize = 16 << 20;
 
 /// Maximum size of a palette, bytes: 256 entries.
@@ -31,7 +31,7 @@ fn decoder(bytes: &[u8]) -> Decoder<Cursor<&[u8]>> {
     decoder
 }
 
-/// Width and height, and the maximum number of texels of a file of this length.
+/// Width and height, and the maximum number of texels in a file of this length.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let mut decoder = decoder(bytes);
     let info = decoder.read_header_info().map_err(Fault::damaged)?;
@@ -68,7 +68,7 @@ fn chunks(bytes: &[u8]) -> impl Iterator<Item = ([u8; 4], usize)> {
     })
 }
 
-/// Texel of 16 bits a channel, as it is stored.
+/// Encoder of a texel of 16 bits per channel.
 type Store<'a> = &'a dyn Fn([u16; 4]) -> [u8; 4];
 
 /// Returns whether an image has 16 bits a channel.
@@ -76,7 +76,7 @@ pub(super) fn is_deep(bytes: &[u8]) -> bool {
     decoder(bytes).read_header_info().is_ok_and(|info| info.bit_depth == BitDepth::Sixteen)
 }
 
-/// Texels; those of 16 bits a channel in the form that `deep` names, or of 8 bits.
+/// Decodes texels. Those of 16 bits per channel are encoded as `deep` or, if it is `None`, reduced to 8 bits.
 pub(super) fn decode(
     bytes: &[u8],
     [width, height]: [u32; 2],
@@ -105,7 +105,7 @@ pub(super) fn decode(
     Ok(texels)
 }
 
-/// Appends rows in the decoder's output format; `store` stores those of 16 bits.
+/// Appends rows in the decoder's output format. `store` encodes texels of 16 bits per channel.
 fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, BitDepth), store: Store<'_>) {
     let samples = colour.samples();
     match depth {
@@ -128,7 +128,7 @@ fn append(texels: &mut Vec<[u8; 4]>, rows: &[u8], (colour, depth): (ColorType, B
     }
 }
 
-/// Nearest 8-bit value.
+/// Rounds a 16-bit value to the nearest 8-bit one.
 fn to_8_bits(value: u16) -> u8 {
     ((u32::from(value) * 255 + 32_767) / 65_535) as u8
 }
