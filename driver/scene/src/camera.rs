@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn other_sizes_are_told_apart() {
+    fn a_size_of_another_aspect_ratio_is_cropped() {
         let wide = camera(Some(1.5));
         assert!(wide.is_cropped(512, 512) && wide.is_cropped(512, 384));
         assert!(!wide.is_cropped(512, 341) && !wide.is_cropped(3, 2));

@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn other_lamps_stay() {
+    fn lamps_that_are_not_covered_stay() {
         let ceiling = panel(3.0, 0.0, 0);
         let beside =
             Triangle::new([Vec3::new(0.0, 3.0, 0.0), Vec3::new(0.0, 3.0, 1.0), Vec3::new(-1.0, 3.0, 0.0)], 1);

@@ -184,7 +184,7 @@ mod tests {
     const FORMAT: &str = "FORMAT=32-bit_rle_rgbe\n\n";
 
     #[test]
-    fn flat_rows_and_their_orders() {
+    fn flat_rows_of_any_order_are_read_from_the_top() {
         let data = [128, 64, 0, 129, 255, 255, 255, 0, 1, 0, 0, 136, 0, 0, 2, 137];
         let texels = [[1.0, 0.5, 0.0], [0.0; 3], [1.0, 0.0, 0.0], [0.0, 0.0, 4.0]];
         let cases = [
@@ -214,13 +214,13 @@ mod tests {
     }
 
     #[test]
-    fn exposures_are_taken_back() {
+    fn the_radiance_is_divided_by_the_exposure() {
         let bytes = picture(&format!("EXPOSURE=2\nEXPOSURE= 4\n{FORMAT}-Y 1 +X 1\n"), &[128, 0, 0, 129]);
         assert_eq!(read(&bytes).unwrap().1, [[0.125, 0.0, 0.0]]);
     }
 
     #[test]
-    fn what_is_none_is_refused() {
+    fn invalid_headers_and_rows_are_refused() {
         let cases = [
             ("FORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n", "xyze"),
             ("EXPOSURE=0\n\n-Y 1 +X 1\n", "exposure"),

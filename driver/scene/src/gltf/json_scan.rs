@@ -270,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn lists_of_next_to_nothing_are_refused() {
+    fn lists_of_short_elements_are_refused() {
         for (name, element) in
             [("materials", "{}"), ("nodes", "{}"), ("accessors", "{}"), ("extras", "{\"\":{\"\":0}}")]
         {
@@ -291,13 +291,13 @@ mod tests {
     }
 
     #[test]
-    fn a_text_that_is_no_json_counts_up_to_its_fault() {
+    fn invalid_json_counts_up_to_its_first_error() {
         let bytes = |text: &str| scan(text).unwrap().bytes;
         assert_eq!((bytes("{\"a\": [1, 2, nonsense"), bytes("")), (3 * VALUE, 0));
     }
 
     #[test]
-    fn the_place_of_a_key_that_stands_twice_is_found() {
+    fn the_path_of_a_repeated_key_is_found() {
         for (text, expected) in [
             (r#"{"a": [1, {"b": null}, {"b": -1.5, "c": {"d": "", "d": true}}]}"#, Some("a[2].c.d")),
             (r#"{"a": {"b": 1}, "b": [{"b": 1}, {"b": 2}]}"#, None),

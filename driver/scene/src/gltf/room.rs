@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_told_with_what_came_before() {
+    fn the_error_of_a_scene_too_large_counts_all_contents() {
         let mut room = Room::new(Path::new("scene.gltf"), 128 * 10);
         assert!(room.materials(2).is_ok() && room.texels([9, 4]).is_ok());
         assert!(room.fits_any(1) && !room.fits_any(1000));

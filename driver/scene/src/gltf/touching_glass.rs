@@ -169,7 +169,7 @@ mod tests {
 
     /// Places one solid twice: its coinciding faces do not face each other.
     #[test]
-    fn faces_that_look_the_same_way_are_named() {
+    fn coinciding_faces_with_one_orientation_are_named() {
         let mut twice = tetrahedra([medium("one", 1.5, 0.0), medium("other", 1.3, 0.0)]);
         twice.triangles[4].vertices.swap(0, 1);
         assert_eq!(join(&mut twice), ["one", "other"]);

@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn emission_is_nearer_than_by_8_bits() {
+    fn emission_has_less_error_than_with_8_bits() {
         let [grey, dark, white] = [0x8000, 100, u16::MAX].map(|code| decoded(Deep::Emission, [code; 3])[1]);
         assert!((grey / 0.214_05 - 1.0).abs() < 1e-3, "{grey}");
         let exact = 100.0 / 65_535.0 / 12.92;
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn data_keeps_all_bits() {
+    fn linear_channels_keep_all_bits() {
         let codes = [40_001, 40_002, 40_003];
         let exact = codes.map(|code| f32::from(code) * (1.0 / 65_535.0));
         assert_eq!(decoded(Deep::RedGreen, codes)[..2], exact[..2]);

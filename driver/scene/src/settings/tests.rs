@@ -27,7 +27,7 @@ fn exponent(material: &Material) -> f32 {
 }
 
 #[test]
-fn glass_is_made_of_any_dielectric() {
+fn any_dielectric_becomes_glass() {
     let mut scene = scene();
     for assignment in [
         "metal.metallic=0",
@@ -69,7 +69,7 @@ fn each_property_is_set_on_every_material_of_the_name() {
 }
 
 #[test]
-fn a_metallic_roughness_material_has_properties_of_its_own() {
+fn metallic_roughness_properties_are_set_on_such_materials_alone() {
     let mut scene = scene();
     for assignment in ["metal.metallic=0.5", "metal.roughness=0.25", "metal.diffuse=0.1,0.2,0.3"] {
         scene.apply(assignment).unwrap();
@@ -90,7 +90,7 @@ fn names_may_hold_dots_and_equals_signs() {
 }
 
 #[test]
-fn an_unknown_material_is_answered_with_the_names_there_are() {
+fn an_unknown_material_is_refused_with_similar_names() {
     let error = scene().apply("flor.exponent=32").unwrap_err();
     let help = miette::Diagnostic::help(&error).unwrap().to_string();
     assert!(matches!(error, SceneError::UnknownMaterial { .. }));
@@ -164,7 +164,7 @@ fn lit() -> Scene {
 }
 
 #[test]
-fn colour_and_intensity_of_a_light_are_set_apart() {
+fn colour_and_intensity_of_a_light_are_independent() {
     let mut scene = lit();
     scene.apply("bulb.intensity=8").unwrap();
     assert_eq!(scene.lights[0].intensity, Vec3::new(4.0, 8.0, 2.0));
@@ -187,7 +187,7 @@ fn a_light_with_a_place_is_moved() {
 }
 
 #[test]
-fn the_strength_of_the_environment_replaces_the_one_before() {
+fn the_strength_of_the_environment_is_replaced() {
     let mut scene = lit();
     let before = scene.checksum();
     for (strength, is_lit) in [("3", true), ("0", false), ("2.5", true)] {
@@ -201,7 +201,7 @@ fn the_strength_of_the_environment_replaces_the_one_before() {
 }
 
 #[test]
-fn bad_settings_of_lights_say_what_is_possible() {
+fn bad_settings_of_lights_are_refused_with_a_remedy() {
     let mut scene = lit();
     let untouched = scene.clone();
     for (assignment, said) in [

@@ -1,8 +1,8 @@
-//! Compressed buffer views hold what their uncompressed fallback holds; impossible ones are refused.
+//! Compressed buffer views equal their uncompressed fallback; impossible ones are refused.
 //!
 //! Both files are compressed by meshoptimizer 1.3.0, in version 0 and 1 of its format, and their fallback is
-//! decoded by its reference decoder in JavaScript: a grid of several blocks, coloured, with octahedral
-//! normals; and instances of a strip with exponents and quaternions.
+//! decoded by its reference decoder in JavaScript. They contain a grid of several blocks with colours and
+//! octahedral normals, and instances of a strip with exponents and quaternions.
 
 use crate::support::{load_parts, parts};
 use miette::Diagnostic;
@@ -13,10 +13,10 @@ const FILES: [(&[u8], &str); 2] = [
     (include_bytes!("compressed/meshopt-1.glb"), "KHR_meshopt_compression"),
 ];
 
-/// Maximum difference of filtered values, which the extension defines to one unit of 8 bits.
+/// Maximum difference of filtered values. The extension allows one unit of 8 bits.
 const UNIT: f32 = 1.01 / 127.0;
 
-/// Extension of a buffer view.
+/// Returns the extension of a buffer view.
 fn extension<'v>(json: &'v mut Value, view: usize, name: &str) -> &'v mut Value {
     &mut json["bufferViews"][view]["extensions"][name]
 }
@@ -82,9 +82,9 @@ fn placeholders_need_no_bytes() {
     }
 }
 
-/// Views that only animations or other unused accessors refer to may be of an unknown format.
+/// Views that are used only by animations and unused accessors may have an unknown format.
 #[test]
-fn views_without_a_use_are_not_decoded() {
+fn unused_views_are_not_decoded() {
     let (file, name) = FILES[0];
     let (mut json, bytes) = parts(file);
     let mut view = json["bufferViews"][0].clone();

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// GLB with every feature that the loader reads: hierarchy, sparse positions, normals, Phong extras.
+/// GLB with a node hierarchy, sparse positions, normals and Phong extras.
 fn rich() -> (Value, Vec<u8>) {
     let mut json = triangle_json();
     json["nodes"][0]["children"] = json!([2]);
@@ -28,7 +28,7 @@ fn is_quick(load: impl FnOnce()) {
     assert!(start.elapsed() < PATIENCE);
 }
 
-/// Replaces the `nth` number in the JSON, modulo their count.
+/// Replaces the number at index `nth`, modulo their count, in the JSON.
 fn replace_number(json: &mut Value, nth: usize, value: &Value) {
     fn numbers(value: &mut Value) -> Vec<&mut Value> {
         match value {
@@ -53,7 +53,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn flipped_bytes_and_cuts(
+    fn changed_bytes_and_cuts_are_loaded_or_refused_quickly(
         flips in proptest::collection::vec((any::<usize>(), any::<u8>()), 1..6),
         cut in any::<usize>(),
         is_cut in any::<bool>(),
@@ -71,7 +71,7 @@ proptest! {
     }
 
     #[test]
-    fn odd_numbers_in_the_json(first in any::<usize>(), second in any::<usize>(), a in 0usize..10, b in 0usize..10) {
+    fn odd_numbers_in_the_json_are_loaded_or_refused_quickly(first in any::<usize>(), second in any::<usize>(), a in 0usize..10, b in 0usize..10) {
         let odd = [
             json!(0), json!(-1), json!(1), json!(3), json!(1e300), json!(0.5), json!(u64::MAX), json!(u32::MAX),
             json!(1u64 << 40), json!(3u64 << 20),

@@ -1,9 +1,9 @@
-//! Primitives compressed by Draco hold what the reference decoder finds in them; damaged and impossible ones
-//! are refused.
+//! Primitives compressed by Draco equal the output of the reference decoder; damaged and impossible ones are
+//! refused.
 //!
-//! Both files are encoded by draco3dgltf 1.5.7, one by its Edgebreaker and one sequentially. The file beside
-//! each has what the package's own decoder finds: a wave of 4 x 3 squares with a seam of texture coordinates,
-//! coloured, in two bones, with tangents.
+//! Both files are encoded by draco3dgltf 1.5.7, one by Edgebreaker and one sequentially. The file beside each
+//! is the output of the package's own decoder: a wave of 4 x 3 squares with a seam of texture coordinates,
+//! colours, two bones and tangents.
 
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use crate::support::{load_parts, parts};
 
 const NAME: &str = "KHR_draco_mesh_compression";
 
-/// Compressed files, each with what the reference decoder finds in it.
+/// Compressed files, each with the output of the reference decoder.
 const FILES: [[&[u8]; 2]; 2] = [
     [
         include_bytes!("compressed/draco-edgebreaker.glb"),
@@ -31,7 +31,7 @@ const FILES: [[&[u8]; 2]; 2] = [
 const TRIANGLES: usize = 24;
 const VERTICES: u64 = 24;
 
-/// Maximum time for a scene of some hundred bytes.
+/// Time limit for a scene of some hundred bytes.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 fn primitive(json: &mut Value) -> &mut Value {
@@ -42,13 +42,13 @@ fn extension(json: &mut Value) -> &mut Value {
     &mut primitive(json)["extensions"][NAME]
 }
 
-/// Accessor of an attribute.
+/// Returns the accessor of an attribute.
 fn accessor<'v>(json: &'v mut Value, name: &str) -> &'v mut Value {
     let index = primitive(json)["attributes"][name].as_u64().unwrap() as usize;
     &mut json["accessors"][index]
 }
 
-/// Place of the stream in the binary chunk.
+/// Range of the stream in the binary chunk.
 fn stream(json: &Value) -> std::ops::Range<usize> {
     let view = &json["bufferViews"][0];
     let [start, length] = ["byteOffset", "byteLength"].map(|key| view[key].as_u64().unwrap() as usize);
@@ -113,7 +113,7 @@ fn strips_are_compressed_as_their_triangles() {
 }
 
 /// Attributes that the extension does not name are read from their accessors, in the order of the stream's
-/// vertices; accessors of others may have an uncompressed form, which is left.
+/// vertices. Compressed attributes may have an uncompressed fallback, which is ignored.
 #[test]
 fn attributes_beside_the_stream_are_read() {
     for [file, reference] in FILES {
@@ -199,7 +199,7 @@ fn more_triangles_than_any_scene_has_are_refused_before_they_are_decoded() {
     assert!(matches!(error, SceneError::TooManyTriangles { .. }), "{error}");
 }
 
-/// Many primitives of one small stream, whose accessors claim many vertices.
+/// Uses many primitives of one small stream, whose accessors claim many vertices.
 #[test]
 fn the_memory_of_all_primitives_is_bounded_together() {
     let (mut json, bytes) = parts(FILES[0][0]);
@@ -219,9 +219,9 @@ fn the_memory_of_all_primitives_is_bounded_together() {
     );
 }
 
-/// Streams with every byte changed, and cut at every length.
+/// Tries streams with each byte changed, and cut at every length.
 #[test]
-fn damaged_streams_are_loaded_or_refused_and_soon() {
+fn damaged_streams_are_loaded_or_refused_quickly() {
     let load = |json: &Value, bytes: Vec<u8>| {
         let start = Instant::now();
         let loaded = load_parts(&(json.clone(), bytes));

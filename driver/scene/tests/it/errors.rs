@@ -21,7 +21,7 @@ fn check(error: &SceneError, parts: &[&str]) {
     assert!(error.help().is_some_and(|help| !help.to_string().is_empty()), "{text}: no remedy");
 }
 
-/// Checks that each change of the triangle gives an error whose text contains all parts.
+/// Checks that each change of the triangle's file gives an error whose text contains all parts.
 fn refused(cases: &[(&[&str], Change)]) {
     for (parts, change) in cases {
         match load_changed(change) {
@@ -36,7 +36,7 @@ fn floats(bytes: &mut [u8], at: usize, value: f32) {
 }
 
 #[test]
-fn files_that_are_missing_or_no_scene() {
+fn missing_files_and_files_without_a_scene_are_refused() {
     let missing = gltf::load(Path::new("absent/scene.gltf")).unwrap_err();
     assert!(matches!(missing, SceneError::Unreadable { .. }));
     check(&missing, &["absent/scene.gltf"]);
@@ -92,7 +92,7 @@ fn a_glb_cut_anywhere_is_refused() {
 }
 
 #[test]
-fn versions_extensions_and_dangling_indices() {
+fn wrong_versions_extensions_and_indices_are_refused() {
     refused(&[
         (&["asset.version", "1.0"], |json| json["asset"]["version"] = json!("1.0")),
         (&["asset.version", "2.1"], |json| json["asset"]["minVersion"] = json!("2.1")),
@@ -126,7 +126,7 @@ fn versions_extensions_and_dangling_indices() {
 }
 
 #[test]
-fn accessors_that_reach_out_of_bounds() {
+fn accessors_beyond_their_buffer_are_refused() {
     refused(&[
         (&["accessors[0]", "beyond bufferViews[0]"], |json| json["accessors"][0]["count"] = json!(4)),
         (&["accessors[0]", "beyond"], |json| json["accessors"][0]["count"] = json!(u64::MAX)),
@@ -168,7 +168,7 @@ fn accessors_that_reach_out_of_bounds() {
 }
 
 #[test]
-fn buffers_that_cannot_be_had() {
+fn unavailable_buffers_are_refused() {
     refused(&[
         (&["buffers[0].byteLength", "45"], |json| json["buffers"][0]["byteLength"] = json!(45)),
         (&["buffers[0]", "no uri"], |json| {
@@ -199,7 +199,7 @@ fn a_link_out_of_the_folder_is_not_followed() {
 }
 
 #[test]
-fn vertices_that_are_no_places() {
+fn positions_that_are_not_finite_or_too_large_are_refused() {
     for value in [f32::NAN, f32::INFINITY, -1e30] {
         let mut bytes = triangle_bytes();
         floats(&mut bytes, 16, value);
@@ -220,7 +220,7 @@ fn an_index_beyond_the_vertices_is_named() {
 }
 
 #[test]
-fn hierarchies_that_are_no_trees() {
+fn node_hierarchies_that_are_no_trees_are_refused() {
     refused(&[
         (&["nodes[0]", "twice"], |json| json["nodes"][0]["children"] = json!([0])),
         (&["twice"], |json| {
@@ -240,7 +240,7 @@ fn hierarchies_that_are_no_trees() {
 }
 
 #[test]
-fn scenes_without_light_or_geometry() {
+fn scenes_without_light_or_geometry_are_refused() {
     refused(&[
         (&["no triangles"], |json| json["scenes"][0]["nodes"] = json!([1])),
         (&["no triangles"], |json| json["meshes"][0]["primitives"][0]["mode"] = json!(1)),
@@ -257,7 +257,7 @@ fn a_scene_without_light_loads_and_is_then_refused() {
 }
 
 #[test]
-fn materials_out_of_range() {
+fn materials_out_of_range_are_refused() {
     refused(&[
         (&["materials[0]", "baseColorFactor", "'lamp'", "1.5"], |json| {
             json["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = json!([0, 1.5, 0, 1]);
@@ -291,7 +291,7 @@ fn materials_out_of_range() {
 }
 
 #[test]
-fn cameras_that_see_nothing() {
+fn cameras_without_a_valid_view_are_refused() {
     refused(&[
         (&["cameras[0].perspective.yfov"], |json| json["cameras"][0]["perspective"]["yfov"] = json!(0)),
         (&["cameras[0].perspective.yfov"], |json| json["cameras"][0]["perspective"]["yfov"] = json!(4)),

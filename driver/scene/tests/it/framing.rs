@@ -1,4 +1,4 @@
-//! Views of scenes without a camera: of closed rooms from inside, of all else from the front.
+//! Default views: closed rooms are seen from inside, other scenes from the front.
 
 use glam::Vec3;
 use photoncard_scene::Scene;
@@ -6,8 +6,7 @@ use serde_json::json;
 
 use crate::support::{Extended, push};
 
-/// A box of 6 x 3 x 4 m without the sides of `open`, whose faces look inwards or outwards, with lamps at
-/// `lamps`.
+/// Box of 6 x 3 x 4 m without the sides `open`. Its faces look inwards or outwards; lamps are at `lamps`.
 fn room(open: &[usize], faces_inwards: bool, double_sided: bool, lamps: &[[f32; 3]]) -> Scene {
     let size = Vec3::new(6.0, 3.0, 4.0);
     let mut scene = Extended::new();
@@ -60,7 +59,7 @@ fn a_closed_room_with_a_lamp_is_seen_from_inside_along_its_length() {
 }
 
 #[test]
-fn other_scenes_are_seen_from_the_front() {
+fn scenes_that_are_no_closed_room_are_seen_from_the_front() {
     for (scene, what) in [
         (room(&[], false, false, &[INSIDE]), "walls from behind"),
         (room(&[], true, true, &[OUTSIDE]), "a box under a lamp"),

@@ -1,4 +1,4 @@
-//! Glass in glTF files: solid or a thin wall by the form of each mesh, whatever else its material is on.
+//! Glass in glTF files is solid or thin-walled by the shape of each mesh, whatever else has its material.
 
 use photoncard_scene::{Reflection, Scene, Transmission};
 use serde_json::{Value, json};
@@ -10,8 +10,7 @@ const BLENDER: &str = "Khronos glTF Blender I/O v5.0.21";
 const CORNERS: [[f32; 3]; 4] = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.]];
 const SOLID: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
 
-/// A file of a program in which meshes of triangles, each at 3 m from the one before, have one material of
-/// glass.
+/// Scene of triangle meshes, 3 m apart, that share one glass material with the extension `volume`.
 fn glass(generator: &str, volume: &Value, meshes: &[&[[usize; 3]]]) -> Scene {
     let mut file = Extended::new();
     let json = &mut file.json;
@@ -42,7 +41,7 @@ fn glass(generator: &str, volume: &Value, meshes: &[&[[usize; 3]]]) -> Scene {
     file.load().unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Transmissions of the triangles of glass, each with the name of its material.
+/// Transmission of every glass triangle.
 fn transmissions(scene: &Scene) -> Vec<Transmission> {
     let of = |material: u32| match scene.materials[material as usize].reflection {
         Reflection::MetallicRoughness { transmission, .. } => transmission,
@@ -56,7 +55,7 @@ fn volumes(scene: &Scene) -> Vec<bool> {
 }
 
 #[test]
-fn a_sheet_of_the_same_material_leaves_a_solid_of_blenders_solid() {
+fn a_closed_part_of_a_blender_mesh_is_solid_beside_a_sheet_of_its_material() {
     let alone = glass(BLENDER, &Value::Null, &[&SOLID]);
     assert_eq!((volumes(&alone), alone.materials.len()), (vec![true; 4], 2));
     for (meshes, expected) in [
@@ -72,13 +71,13 @@ fn a_sheet_of_the_same_material_leaves_a_solid_of_blenders_solid() {
 }
 
 #[test]
-fn solids_of_other_programs_are_walls_without_a_thickness() {
+fn solids_of_other_programs_are_thin_walls_without_a_thickness() {
     let scene = glass("another", &Value::Null, &[&SOLID, &SOLID[..1]]);
     assert_eq!((volumes(&scene), scene.remarks.len()), (vec![false; 5], 0));
 }
 
 #[test]
-fn a_flat_sheet_with_a_thickness_is_a_wall_of_it_and_leaves_a_solid_solid() {
+fn a_flat_sheet_with_a_thickness_is_a_thin_wall_beside_a_solid() {
     let volume = |thickness: f32| {
         let colour = [0.5, 1.0, 0.25];
         json!({"thicknessFactor": thickness, "attenuationDistance": 0.1, "attenuationColor": colour})
@@ -95,7 +94,7 @@ fn a_flat_sheet_with_a_thickness_is_a_wall_of_it_and_leaves_a_solid_solid() {
     }
 }
 
-/// A water surface states how deep the water is.
+/// A stated thickness that is the depth of the water does not make its surface a thin wall.
 #[test]
 fn a_sheet_of_great_thickness_and_an_open_mesh_stay_surfaces_of_a_volume() {
     let volume = |thickness: f32| json!({"thicknessFactor": thickness});

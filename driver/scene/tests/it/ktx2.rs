@@ -1,5 +1,5 @@
-//! Textures in KTX2 (`KHR_texture_basisu`) hold what the reference transcoder makes of them, and others than
-//! pictures of the extension's two formats are left out.
+//! Textures in KTX2 (`KHR_texture_basisu`) equal the output of the reference transcoder. Files that are no
+//! picture in one of the extension's two formats are left out.
 //!
 //! The files in `images` were encoded by Basis Universal 2.5 (ktx2-encoder 0.6 of npm).
 
@@ -9,16 +9,16 @@ use serde_json::json;
 
 use crate::support::{check_left_out, embedded, push};
 
-/// Colours of (10 x, 16 y, 200 - 8 x), and further levels.
+/// File with the texels (10 x, 16 y, 200 - 8 x), and mipmaps.
 const ETC1S: &[u8] = include_bytes!("images/etc1s.ktx2");
-/// With alpha of 255 - 5 y.
+/// File with an alpha of 255 - 5 y.
 const ETC1S_ALPHA: &[u8] = include_bytes!("images/etc1s-alpha.ktx2");
-/// 22 x 13 texels.
+/// File of 22 x 13 texels.
 const UASTC: &[u8] = include_bytes!("images/uastc.ktx2");
-/// With alpha of 255 - 5 y, and further levels.
+/// File with an alpha of 255 - 5 y, and mipmaps.
 const UASTC_ZSTANDARD: &[u8] = include_bytes!("images/uastc-zstd.ktx2");
 
-/// Positions of fields in a file.
+/// Positions of header fields, bytes.
 const VK_FORMAT: usize = 12;
 const WIDTH: usize = 20;
 const HEIGHT: usize = 24;
@@ -39,7 +39,7 @@ fn word(file: &[u8], at: usize) -> usize {
     u32::from_le_bytes(file[at..at + 4].try_into().unwrap()) as usize
 }
 
-/// The file with other bytes at a position.
+/// Copy of the file with other bytes at position `at`.
 fn changed(file: &[u8], at: usize, bytes: &[u8]) -> Vec<u8> {
     let mut file = file.to_vec();
     file[at..at + bytes.len()].copy_from_slice(bytes);
@@ -62,7 +62,7 @@ fn check_refused(file: &[u8], part: &str) {
     check_left_out(&embedded(file, "image/ktx2").load().unwrap(), &[part]);
 }
 
-/// Texels are those of the reference transcoder, bit for bit, and near to the encoded picture.
+/// Texels equal those of the reference transcoder, and are close to the encoded picture.
 #[test]
 fn both_codecs_are_decoded() {
     let cases = [
@@ -84,10 +84,9 @@ fn both_codecs_are_decoded() {
     }
 }
 
-/// An image of the extension is used where the texture has none of its own, and the extension may be
-/// required.
+/// The extension may be required. Its image is used only if the texture has no other.
 #[test]
-fn the_texture_s_own_image_comes_first() {
+fn a_textures_own_image_precedes_that_of_the_extension() {
     let mut scene = embedded(UASTC, "image/ktx2");
     scene.json["extensionsRequired"] = json!(["KHR_texture_basisu"]);
     scene.json["textures"] = json!([{"extensions": {"KHR_texture_basisu": {"source": 0}}}]);
@@ -98,7 +97,7 @@ fn the_texture_s_own_image_comes_first() {
     assert_eq!(scene.load().unwrap().images[0].width, 1);
 }
 
-/// A file of UASTC blocks of one colour each, in rows from the top, with a level 0 of these bytes.
+/// UASTC file whose blocks have one colour each, in rows from the top. `level` is the content of level 0.
 fn file(size: [u32; 2], level: &[u8]) -> Vec<u8> {
     let descriptor = word(UASTC, DESCRIPTOR_OFFSET);
     let mut file = UASTC[..descriptor + 44].to_vec();
@@ -115,12 +114,12 @@ fn file(size: [u32; 2], level: &[u8]) -> Vec<u8> {
     file
 }
 
-/// UASTC block of one colour: the code of mode 8, the colour, and hints for other formats.
+/// UASTC block of one colour: the code of mode 8, the colour, and hints for transcoding.
 fn block(colour: [u8; 4]) -> [u8; 16] {
     (0x17 | u128::from(u32::from_le_bytes(colour)) << 5).to_le_bytes()
 }
 
-/// [`file`] with level 0 in Zstandard: a frame of one segment, of raw blocks of at most 2^17 bytes.
+/// [`file`] with level 0 in Zstandard: one frame of a single segment, with raw blocks of at most 2^17 bytes.
 fn in_zstandard(size: [u32; 2], level: &[u8]) -> Vec<u8> {
     let mut frame = b"\x28\xb5\x2f\xfd\xa0".to_vec();
     frame.extend((level.len() as u32).to_le_bytes());
@@ -137,7 +136,7 @@ fn in_zstandard(size: [u32; 2], level: &[u8]) -> Vec<u8> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(32))]
 
-    /// Every block is in its place, also where a side is not a multiple of four.
+    /// Checks sizes that are no multiples of four as well.
     #[test]
     fn blocks_of_one_colour_are_exact(
         (width, height) in (1..20_u32, 1..20_u32),
@@ -182,8 +181,7 @@ fn files_that_are_not_one_picture_of_the_two_formats_are_left_out() {
     check_refused(b"sB\x13\0\x4d\0", ".basis");
 }
 
-/// The key/value data may hold the way that the picture lies, the order of its channels, and the mark of a
-/// video.
+/// The key/value data may state the orientation, a swizzle, or an animation.
 #[test]
 fn metadata_that_change_the_picture_are_refused() {
     let with = |entry: &[u8]| {
@@ -209,7 +207,7 @@ fn metadata_that_change_the_picture_are_refused() {
     check_refused(&with(b"KTXanimData\0............"), "video");
 }
 
-/// Sizes, lengths and places of a header that the file or a limit contradicts.
+/// Changes sizes, lengths and offsets of a header so that they contradict the file or exceed a limit.
 #[test]
 fn headers_that_contradict_the_file_are_refused() {
     for length in [12, 40, 103, 130, 200, UASTC.len() - 1] {
@@ -244,7 +242,7 @@ fn codebooks_that_contradict_their_lengths_are_refused() {
     check_refused(&changed(ETC1S, global + 24, &[0xff; 4]), "blocks are invalid");
 }
 
-/// Zstandard that expands to more or less than the picture takes, or to a window without need.
+/// Tries frames that expand to more or less than the texels take, and frames with too large a window.
 #[test]
 fn zstandard_is_bounded_by_the_size() {
     let blocks = [block([1, 2, 3, 4]); 6].concat();

@@ -1,5 +1,5 @@
-//! Layers of materials in glTF files: clearcoat, sheen, diffuse transmission, textures of the reflectance,
-//! partial coverage, solid glass.
+//! Layers of materials in glTF files: clearcoat, sheen, diffuse transmission, textures of the specular
+//! reflectance, partial coverage, solid glass.
 
 use glam::Vec3;
 use photoncard_scene::{Coat, DiffuseTransmission, Layers, Material, Reflection, Sheen};
@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 
 use crate::support::{Extended, load_changed, push};
 
-/// A PNG of one texel.
+/// PNG image of one texel, as a data URI.
 const TEXEL: &str = "data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR4nGNoOPC/AQAGwwLAqODXqAAAAABJRU5ErkJggg==";
 
-/// The only material after a change of it; the file has one texture.
+/// Material of the triangle after `change`; the file has one texture.
 fn material(change: impl FnOnce(&mut Value)) -> Result<Material, String> {
     let mut scene = Extended::new();
     let coordinates = scene.floats("VEC2", &[[0.0; 2], [1.0, 0.0], [0.0, 1.0]]);
@@ -51,7 +51,7 @@ fn each_layer_is_read_with_its_textures() {
 }
 
 #[test]
-fn a_layer_of_factor_zero_is_none() {
+fn a_layer_with_factor_zero_is_left_out() {
     let found = material(|material| {
         material["extensions"]["KHR_materials_clearcoat"] = json!({"clearcoatTexture": {"index": 0}});
         material["extensions"]["KHR_materials_sheen"] = json!({"sheenRoughnessFactor": 0.5});
@@ -59,9 +59,10 @@ fn a_layer_of_factor_zero_is_none() {
     assert_eq!(found.unwrap().layers, None);
 }
 
-/// Converters from specular-glossiness write an index of 1000, and the reflectance as a colour.
+/// Uses an index of refraction of 1000 with the reflectance as a colour, as converters from
+/// specular-glossiness do.
 #[test]
-fn the_reflectance_of_an_index_of_1000_comes_from_its_texture() {
+fn an_index_of_1000_keeps_the_textures_of_its_reflectance() {
     let found = layers(|material| {
         material["extensions"]["KHR_materials_ior"] = json!({"ior": 1000.0});
         material["extensions"]["KHR_materials_specular"] =
@@ -72,7 +73,7 @@ fn the_reflectance_of_an_index_of_1000_comes_from_its_texture() {
 }
 
 #[test]
-fn what_is_out_of_range_is_refused_with_its_place() {
+fn layers_out_of_range_are_refused_with_their_path() {
     for (name, value, place) in [
         ("KHR_materials_clearcoat", json!({"clearcoatFactor": 1.5}), "KHR_materials_clearcoat"),
         ("KHR_materials_clearcoat", json!({"clearcoatFactor": "much"}), "KHR_materials_clearcoat"),
@@ -104,7 +105,7 @@ fn alpha_blends_and_covers() {
     assert!(found.blends && found.alpha == 0.25 && found.alpha_cutoff.is_none());
 }
 
-/// An open mesh of Blender's stays a thin wall; so does a closed one of another program.
+/// Blender's open meshes stay thin walls, and so do closed meshes of other programs.
 #[test]
 fn glass_of_an_open_mesh_is_a_thin_wall() {
     let scene = load_changed(|json| {

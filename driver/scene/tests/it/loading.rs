@@ -1,4 +1,4 @@
-//! Loading of scenes: all contents of a glTF file that are used arrive, and unused ones are named.
+//! Scenes contain all that the renderer uses of a glTF file, and notices name the rest.
 
 use std::fs;
 
@@ -51,7 +51,7 @@ fn every_container_gives_the_same_scene() {
     }
 }
 
-/// Chunks of unknown types after the BIN chunk are skipped, as the format demands.
+/// GLB requires readers to skip chunks of unknown types.
 #[test]
 fn unknown_chunks_of_a_glb_are_skipped() {
     let mut bytes = glb(triangle_json(), &triangle_bytes());
@@ -134,7 +134,7 @@ fn sparse_elements_replace_those_of_the_base_and_zeros_fill_the_rest() {
 
 /// glTF 2.0, 3.6.2.1: "When undefined, the accessor MUST be initialized with zeros".
 #[test]
-fn an_accessor_without_bytes_is_of_zeros() {
+fn an_accessor_without_a_view_is_zero() {
     let without_bytes = |json: &mut Value, kind: &str| {
         let accessors = json["accessors"].as_array_mut().unwrap();
         accessors.push(json!({"componentType": 5126, "count": 3, "type": kind}));
@@ -178,7 +178,7 @@ fn nodes_place_meshes_by_matrix_or_by_parts_through_their_parents() {
     }
 }
 
-/// A mirroring transform keeps the front: the normal turns with the surface.
+/// A mirroring transform flips the winding, so that the front stays on the side of the normal.
 #[test]
 fn mirrored_nodes_keep_their_front() {
     for (scale, normal) in [
@@ -222,7 +222,7 @@ fn triangles_of_no_area_are_counted_and_left_out() {
 }
 
 #[test]
-fn a_stated_phong_lobe_is_taken() {
+fn a_phong_lobe_in_extras_is_loaded() {
     let scene = load_changed(|json| {
         let phong = json!({"specular": [0.1, 0.2, 0.3], "exponent": 32});
         json["materials"][0]["extras"] = json!({"other": 1, "photoncard": {"phong": phong}});
@@ -243,7 +243,7 @@ fn a_stated_phong_lobe_is_taken() {
 }
 
 #[test]
-fn a_primitive_without_a_material_has_that_of_gltf() {
+fn a_primitive_without_a_material_has_the_default_one() {
     let scene = load_changed(|json| {
         let mut bare = json["meshes"][0]["primitives"][0].clone();
         bare.as_object_mut().unwrap().remove("material");
@@ -311,7 +311,7 @@ fn cameras_are_found_by_name_and_have_unit_axes() {
 
 /// Each unused feature gives exactly one notice that names its location.
 #[test]
-fn what_is_not_used_is_named_once() {
+fn each_unused_feature_is_named_once() {
     type Change = fn(&mut Value);
     let cases: [(&str, &str, Change); 12] = [
         ("occlusion textures", "'lamp'", |json| {

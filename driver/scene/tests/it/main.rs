@@ -1,4 +1,5 @@
-//! Scenes from files: what glTF states is what is loaded, and what it forbids is named.
+//! Loads scenes from files: valid content arrives as stated, and invalid content gives an error with its
+//! path.
 
 mod animations;
 mod compression;

@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 
 use crate::support::{load_changed, push, triangle_bytes, triangle_json};
 
-/// The only material after a change, without the extension and the factor that make it Lambertian.
+/// Material of the triangle after `change`, without the `KHR_materials_specular` that makes it Lambertian.
 fn material(change: impl FnOnce(&mut Value)) -> Material {
     let scene = load_changed(|json| {
         let material = &mut json["materials"][0];
@@ -36,7 +36,7 @@ fn parts(material: &Material) -> (Vec3, f32, f32, Vec3, Option<Transmission>) {
 }
 
 #[test]
-fn a_material_is_metallic_roughness_unless_it_says_otherwise() {
+fn a_material_is_metallic_roughness_by_default() {
     assert_eq!(parts(&material(|_| {})), plain());
     let rough = material(|material| {
         material["pbrMetallicRoughness"]["metallicFactor"] = json!(0.25);
@@ -85,10 +85,9 @@ fn the_reflectance_at_normal_incidence_follows_from_ior_and_specular() {
     close(dielectric(json!({"KHR_materials_specular": bright})), Vec3::new(0.5, 0.02, 0.02));
 }
 
-/// A specular factor of 0 removes the reflection of the dielectric part alone; without a stated metalness the
-/// material is metal.
+/// A `specularFactor` of 0 removes only the reflection of the dielectric part. The default metalness is 1.
 #[test]
-fn metal_reflects_whatever_the_specular_factor() {
+fn a_specular_factor_of_zero_leaves_the_reflection_of_metal() {
     for (factor, metallic) in [(None, 1.0), (Some(1.0), 1.0), (Some(0.25), 0.25)] {
         let metal = material(|material| {
             material["extensions"]["KHR_materials_specular"] = json!({"specularFactor": 0});
@@ -101,7 +100,7 @@ fn metal_reflects_whatever_the_specular_factor() {
 }
 
 #[test]
-fn transmission_is_through_a_wall_or_into_a_volume() {
+fn transmission_is_thin_walled_or_into_a_volume() {
     let transmission = |extensions: Value| {
         parts(&material(|material| {
             material["pbrMetallicRoughness"]["roughnessFactor"] = json!(0);
@@ -139,9 +138,9 @@ fn transmission_is_through_a_wall_or_into_a_volume() {
     assert!(black.is_finite() && black.min_element() > 1e6, "{black}");
 }
 
-/// A specular factor of 0 makes a surface Lambertian, unless it transmits light.
+/// A `specularFactor` of 0 makes a surface Lambertian, unless it transmits light.
 #[test]
-fn glass_without_reflection_is_glass() {
+fn a_specular_factor_of_zero_leaves_the_transmission_of_glass() {
     let scene = load_changed(|json| {
         json["materials"][0]["extensions"]["KHR_materials_transmission"] = json!({"transmissionFactor": 1});
     });
@@ -150,7 +149,7 @@ fn glass_without_reflection_is_glass() {
 }
 
 #[test]
-fn a_mask_has_a_cutoff_and_nothing_else_does() {
+fn only_a_mask_has_an_alpha_cutoff() {
     let alphas = |mode: &str, cutoff: Option<f64>| {
         let material = material(|material| {
             material["alphaMode"] = json!(mode);
@@ -168,7 +167,7 @@ fn a_mask_has_a_cutoff_and_nothing_else_does() {
 }
 
 #[test]
-fn what_is_out_of_range_is_refused() {
+fn values_out_of_range_are_refused() {
     type Change = fn(&mut Value);
     let cases: [(&str, Change); 10] = [
         ("metallicFactor", |material| material["pbrMetallicRoughness"]["metallicFactor"] = json!(1.5)),
@@ -218,7 +217,8 @@ fn what_is_out_of_range_is_refused() {
     }
 }
 
-/// Two materials, and two variants: one maps the primitive to the other material, one leaves it as it is.
+/// File with two materials and two variants. One variant maps the primitive to the other material, one does
+/// not map it.
 fn with_variants() -> Value {
     let mut json = triangle_json();
     push(&mut json, "materials", json!({"name": "other", "emissiveFactor": [1, 1, 1]}));

@@ -1,5 +1,5 @@
-//! Files that glTF 2.0 allows although the types of the `gltf` crate do not, and the places of those that it
-//! does not allow.
+//! Files that glTF 2.0 allows but the types of the `gltf` crate reject are loaded; invalid ones are refused
+//! with their JSON path.
 
 use photoncard_scene::error::SceneError;
 use photoncard_scene::{Concern, Scene};
@@ -9,7 +9,7 @@ use crate::support::{glb, load_bytes, load_changed, load_with, push, triangle_by
 
 type Change = fn(&mut Value);
 
-/// Channel of an animation whose target an extension states.
+/// Animation channel whose target is stated by an extension.
 fn pointer() -> Value {
     json!({"sampler": 0, "target": {
         "path": "pointer",
@@ -22,7 +22,7 @@ fn loaded(change: impl FnOnce(&mut Value)) -> Scene {
 }
 
 #[test]
-fn what_the_schema_allows_is_read_as_its_plain_form() {
+fn unusual_valid_json_is_read_like_its_usual_form() {
     let plain = loaded(|_| ());
     let cases: [(&str, Change); 6] = [
         ("a scene without nodes", |json| {
@@ -197,7 +197,7 @@ fn files_of_other_kinds_are_recognised_with_a_command() {
 }
 
 #[test]
-fn an_orthographic_camera_is_refused_where_it_would_be_seen_by() {
+fn an_orthographic_camera_is_refused_as_the_view() {
     let flat = |json: &mut Value, node: usize| {
         let orthographic = json!({"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9});
         let camera = json!({"name": "flat", "type": "orthographic", "orthographic": orthographic});

@@ -1,4 +1,4 @@
-//! Specular-glossiness materials become metallic-roughness ones, by the formula of the extension's examples.
+//! Specular-glossiness materials become metallic-roughness ones by the formula of the extension's examples.
 
 use photoncard_scene::{Encoding, Reflection, Scene};
 use serde_json::{Value, json};
@@ -7,7 +7,7 @@ use crate::support::{Extended, push};
 
 const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
 
-/// A PNG of rows of texels.
+/// PNG of rows of `width` texels.
 fn image(width: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, texels.len() as u32 / width);
@@ -18,7 +18,7 @@ fn image(width: u32, texels: &[[u8; 4]]) -> Vec<u8> {
     bytes
 }
 
-/// The triangle with coordinates and with a material of the extension alone.
+/// File of the triangle with texture coordinates and a material that has the extension alone.
 fn stated(extension: &Value) -> Extended {
     let mut scene = Extended::new();
     let coordinates = scene.floats("VEC2", &[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
@@ -28,7 +28,7 @@ fn stated(extension: &Value) -> Extended {
     scene
 }
 
-/// Adds a texture of an image.
+/// Adds a texture with the given image file, and returns its index.
 fn texture(scene: &mut Extended, image: &[u8]) -> usize {
     let view = scene.view(image);
     let image = push(&mut scene.json, "images", json!({"bufferView": view, "name": format!("view {view}")}));
@@ -39,7 +39,7 @@ fn extension(scene: &mut Extended) -> &mut Value {
     &mut scene.json["materials"][0]["extensions"][NAME]
 }
 
-/// Base colour, metalness and roughness.
+/// Base colour, metalness and roughness of the material.
 fn factors(scene: &Scene) -> [f32; 5] {
     let Reflection::MetallicRoughness { base_colour, metallic, roughness, .. } =
         scene.materials[0].reflection
@@ -50,7 +50,7 @@ fn factors(scene: &Scene) -> [f32; 5] {
     [red, green, blue, metallic, roughness]
 }
 
-/// The images of the base texture and of the metallic-roughness texture.
+/// Texels of the base colour and metallic-roughness images.
 fn images(scene: &Scene) -> [Vec<[u8; 4]>; 2] {
     let material = &scene.materials[0];
     let images = [material.base_texture, material.metallic_roughness_texture].map(|texture| {
@@ -66,7 +66,7 @@ fn near(found: &[f32], expected: &[f32]) -> bool {
     found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-4)
 }
 
-/// Computed from the examples in JavaScript.
+/// Expected values are from the extension's examples in JavaScript.
 #[test]
 fn factors_are_converted() {
     let cases = [
@@ -99,9 +99,9 @@ fn factors_are_converted() {
     }
 }
 
-/// The extension describes the material better than what is there for programs without it.
+/// The metallic-roughness values beside the extension are a fallback for programs that do not know it.
 #[test]
-fn the_extension_wins() {
+fn the_extension_replaces_metallic_roughness() {
     let mut scene = stated(&json!({"diffuseFactor": [0, 0, 0, 0.25], "specularFactor": [0.9, 0.9, 0.9]}));
     scene.json["materials"][0]["pbrMetallicRoughness"] = json!({"baseColorFactor": [0.2, 0.2, 0.2, 1], "metallicFactor": 0, "roughnessFactor": 0.9,
             "baseColorTexture": {"index": 0}});
@@ -111,7 +111,8 @@ fn the_extension_wins() {
     assert_eq!((scene.materials[0].alpha, scene.materials[0].base_texture), (0.25, None));
 }
 
-/// A diffuse texel without a specular texture, and the reverse. Codes: sRGB 188 is 0.5 linear, 56 is 0.04.
+/// Tests diffuse texels without a specular texture, and specular ones without a diffuse texture. The sRGB
+/// code 188 is 0.5 linear; 56 is 0.04.
 #[test]
 fn textures_are_converted_texel_by_texel() {
     let mut scene = stated(&json!({"specularFactor": [0.04, 0.04, 0.04], "glossinessFactor": 0.7}));
@@ -131,7 +132,7 @@ fn textures_are_converted_texel_by_texel() {
     assert_eq!(images(&scene), expected);
 }
 
-/// The larger image decides; the other one is interpolated.
+/// The larger image determines the size; the smaller one is interpolated.
 #[test]
 fn textures_of_two_sizes_are_combined() {
     let mut scene = stated(&json!({"diffuseFactor": [1, 1, 1, 1]}));
@@ -146,7 +147,7 @@ fn textures_of_two_sizes_are_combined() {
 }
 
 #[test]
-fn a_missing_texture_leaves_the_factor() {
+fn a_texture_without_a_readable_image_leaves_the_factor() {
     let mut scene = stated(&json!({"diffuseFactor": [0, 0, 0, 1], "specularFactor": [1, 0.5, 0.25]}));
     scene.json["images"] = json!([{"uri": "absent.png"}]);
     scene.json["textures"] = json!([{"source": 0}]);

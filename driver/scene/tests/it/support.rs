@@ -1,4 +1,4 @@
-//! Small glTF files made in the tests.
+//! Small glTF files for the tests.
 
 use std::fs;
 
@@ -6,7 +6,7 @@ use photoncard_scene::error::SceneError;
 use photoncard_scene::{Scene, gltf};
 use serde_json::{Value, json};
 
-/// Three vertices, a triangle of 0.5 m^2 that faces +z, and three 16-bit indices.
+/// Buffer with three vertices of a triangle of 0.5 m^2 that faces +z, and three 16-bit indices.
 pub(crate) fn triangle_bytes() -> Vec<u8> {
     let mut bytes: Vec<u8> =
         [0f32, 0., 0., 1., 0., 0., 0., 1., 0.].iter().flat_map(|value| value.to_le_bytes()).collect();
@@ -14,7 +14,8 @@ pub(crate) fn triangle_bytes() -> Vec<u8> {
     bytes
 }
 
-/// One emissive triangle named `lamp`, seen by the camera `eye`; its bytes are in `data.bin`.
+/// Document with one emissive triangle in mesh `panel`, material `lamp` and camera `eye`, whose bytes are in
+/// `data.bin`.
 pub(crate) fn triangle_json() -> Value {
     json!({
         "asset": {"version": "2.0"},
@@ -52,7 +53,7 @@ pub(crate) fn triangle_json() -> Value {
     })
 }
 
-/// A GLB of `json`, whose first buffer becomes the BIN chunk.
+/// GLB of `json`. Its first buffer becomes the BIN chunk.
 #[allow(dead_code, reason = "not every test file makes one")]
 pub(crate) fn glb(mut json: Value, bin: &[u8]) -> Vec<u8> {
     json["buffers"][0].as_object_mut().unwrap().remove("uri");
@@ -71,7 +72,7 @@ pub(crate) fn glb(mut json: Value, bin: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// JSON and binary chunk of a GLB.
+/// Splits a GLB into its JSON and its binary chunk.
 #[allow(dead_code, reason = "not every test file takes one apart")]
 pub(crate) fn parts(file: &[u8]) -> (Value, Vec<u8>) {
     let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
@@ -79,13 +80,13 @@ pub(crate) fn parts(file: &[u8]) -> (Value, Vec<u8>) {
     (json, file[20 + length + 8..].to_vec())
 }
 
-/// Loads a GLB of [`parts`].
+/// Loads a scene from the result of [`parts`].
 #[allow(dead_code, reason = "not every test file takes one apart")]
 pub(crate) fn load_parts((json, bytes): &(Value, Vec<u8>)) -> Result<Scene, SceneError> {
     load_bytes("scene.glb", &glb(json.clone(), bytes))
 }
 
-/// The triangle, to which views and accessors are added.
+/// File of the triangle, to which tests add buffer views and accessors.
 #[allow(dead_code, reason = "not every test file adds accessors")]
 pub(crate) struct Extended {
     pub(crate) json: Value,
@@ -98,7 +99,7 @@ impl Extended {
         Self { json: triangle_json(), bytes: triangle_bytes() }
     }
 
-    /// Adds a buffer view of these bytes, and returns its index.
+    /// Adds a buffer view with these bytes, and returns its index.
     pub(crate) fn view(&mut self, bytes: &[u8]) -> usize {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
         let view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
@@ -107,20 +108,20 @@ impl Extended {
         push(&mut self.json, "bufferViews", view)
     }
 
-    /// Adds an accessor of these bytes, and returns its index.
+    /// Adds an accessor with these bytes, and returns its index.
     pub(crate) fn accessor(&mut self, kind: &str, component: u32, count: usize, bytes: &[u8]) -> usize {
         let view = self.view(bytes);
         let accessor = json!({"bufferView": view, "componentType": component, "count": count, "type": kind});
         push(&mut self.json, "accessors", accessor)
     }
 
-    /// Adds an accessor of single precision, and returns its index.
+    /// Adds a single-precision accessor, and returns its index.
     pub(crate) fn floats<const N: usize>(&mut self, kind: &str, values: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = values.as_flattened().iter().flat_map(|value| value.to_le_bytes()).collect();
         self.accessor(kind, 5126, values.len(), &bytes)
     }
 
-    /// The only primitive.
+    /// Returns the only primitive.
     pub(crate) fn primitive(&mut self) -> &mut Value {
         &mut self.json["meshes"][0]["primitives"][0]
     }
@@ -130,7 +131,7 @@ impl Extended {
     }
 }
 
-/// The triangle with coordinates, whose base colour is texture 0 of image 0.
+/// File of the triangle with texture coordinates. Its base colour is texture 0 with image 0.
 #[allow(dead_code, reason = "not every test file has textures")]
 pub(crate) fn textured(image: &Value) -> Extended {
     let mut scene = Extended::new();
@@ -147,7 +148,7 @@ pub(crate) fn pbr(json: &mut Value) -> &mut Value {
     &mut json["materials"][0]["pbrMetallicRoughness"]
 }
 
-/// [`textured`] with an image in a buffer view.
+/// [`textured`] with the image in a buffer view.
 #[allow(dead_code, reason = "not every test file has textures")]
 pub(crate) fn embedded(bytes: &[u8], kind: &str) -> Extended {
     let mut scene = textured(&json!(null));
@@ -167,7 +168,7 @@ pub(crate) fn check_left_out(scene: &Scene, parts: &[&str]) {
     }
 }
 
-/// Appends to a list at the top of the JSON, and returns the index.
+/// Appends an item to a list of the root, and returns its index.
 #[allow(dead_code, reason = "not every test file appends")]
 pub(crate) fn push(json: &mut Value, list: &str, item: Value) -> usize {
     let list = json.as_object_mut().unwrap().entry(list).or_insert(json!([])).as_array_mut().unwrap();
@@ -175,7 +176,7 @@ pub(crate) fn push(json: &mut Value, list: &str, item: Value) -> usize {
     list.len() - 1
 }
 
-/// Loads a file of these bytes.
+/// Loads a file with these bytes.
 #[allow(dead_code, reason = "not every test file loads raw bytes")]
 pub(crate) fn load_bytes(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> {
     let folder = tempfile::tempdir().unwrap();
@@ -184,7 +185,7 @@ pub(crate) fn load_bytes(name: &str, bytes: &[u8]) -> Result<Scene, SceneError> 
     gltf::load(&path)
 }
 
-/// Loads `json` with `bin` beside it as `data.bin`.
+/// Loads `json`; `bin` is `data.bin` in the same folder.
 #[allow(dead_code, reason = "not every test file loads JSON")]
 pub(crate) fn load_with(json: &Value, bin: &[u8]) -> Result<Scene, SceneError> {
     let folder = tempfile::tempdir().unwrap();
@@ -194,7 +195,7 @@ pub(crate) fn load_with(json: &Value, bin: &[u8]) -> Result<Scene, SceneError> {
     gltf::load(&path)
 }
 
-/// The triangle after `change`.
+/// Loads the triangle's file after `change`.
 #[allow(dead_code, reason = "not every test file changes the triangle")]
 pub(crate) fn load_changed(change: impl FnOnce(&mut Value)) -> Result<Scene, SceneError> {
     let mut json = triangle_json();

@@ -1,4 +1,4 @@
-//! Tangents of normal maps arrive at the corners of the right triangles, stated or computed alike.
+//! Tangents of normal maps belong to the right corners, whether they are stated or computed.
 
 use glam::{Vec3, Vec4};
 use miette::Diagnostic;
@@ -9,8 +9,8 @@ use crate::support::Extended;
 
 const FRONT: [[f32; 3]; 3] = [[0.0, 0.0, 1.0]; 3];
 
-/// The triangle (0, 0), (1, 0), (0, 1) in the plane z = 0 with a normal map, and these texture coordinates.
-/// Without `normals` it has none.
+/// File of the triangle (0, 0), (1, 0), (0, 1) in the plane z = 0 with a normal map and these texture
+/// coordinates. `normals` are optional.
 fn mapped(coordinates: [[f32; 2]; 3], normals: Option<[[f32; 3]; 3]>) -> Extended {
     let mut scene = Extended::new();
     let texel = scene.view(include_bytes!("images/texel.png"));
@@ -26,9 +26,9 @@ fn mapped(coordinates: [[f32; 2]; 3], normals: Option<[[f32; 3]; 3]>) -> Extende
     scene
 }
 
-/// u to the right, v downwards, as in a picture.
+/// Texture coordinates as in a picture: u to the right, v downwards.
 const UPRIGHT: [[f32; 2]; 3] = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]];
-/// u to the left: mirrored.
+/// Mirrored texture coordinates: u to the left.
 const MIRRORED: [[f32; 2]; 3] = [[1.0, 1.0], [0.0, 1.0], [1.0, 0.0]];
 
 fn with_tangents(mut scene: Extended, tangents: [[f32; 4]; 3]) -> Extended {
@@ -37,7 +37,7 @@ fn with_tangents(mut scene: Extended, tangents: [[f32; 4]; 3]) -> Extended {
     scene
 }
 
-/// The tangents of the only triangle.
+/// Tangents of the only triangle.
 fn tangents(scene: &Scene) -> [Vec4; 3] {
     let attributes = scene.attributes[scene.triangles[0].attributes as usize];
     scene.tangents[attributes.tangents as usize]
@@ -86,9 +86,9 @@ fn tangents_follow_the_node() {
     }
 }
 
-/// Corners are reordered in a mirror, and keep their tangents.
+/// A mirroring transform reverses the order of the corners.
 #[test]
-fn a_mirror_takes_each_tangent_to_its_corner() {
+fn each_corner_of_a_mirrored_triangle_keeps_its_tangent() {
     let stated = [[1.0, 0.0, 0.0, 1.0], [0.8, 0.6, 0.0, 1.0], [0.6, -0.8, 0.0, 1.0]];
     let scene = with_tangents(mapped(UPRIGHT, Some(FRONT)), stated);
     let scene = loaded(&scene, |json| json["nodes"][0]["scale"] = json!([-1, 1, 1]));
@@ -110,7 +110,7 @@ fn tangents_are_perpendicular_to_normals() {
 }
 
 #[test]
-fn tangents_that_are_none_are_computed_with_a_notice() {
+fn invalid_tangents_are_computed_with_a_notice() {
     for bad in [[0.0; 4], [f32::NAN, 0.0, 0.0, 1.0], [f32::INFINITY, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0]] {
         let good = [0.0, 1.0, 0.0, 1.0];
         let scene = with_tangents(mapped(UPRIGHT, Some(FRONT)), [good, bad, good]).load().unwrap();
@@ -127,8 +127,7 @@ fn a_texture_that_does_not_vary_has_no_tangent() {
     assert_eq!(tangents(&scene).map(Vec4::truncate), [Vec3::ZERO; 3]);
 }
 
-/// The set is that of the normal texture, overridden by its transform; the transform itself does not turn
-/// tangents.
+/// `texCoord` of `KHR_texture_transform` selects the set; the transform does not rotate tangents.
 #[test]
 fn tangents_are_those_of_the_normal_textures_set() {
     let mut scene = mapped(UPRIGHT, Some(FRONT));

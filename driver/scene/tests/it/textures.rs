@@ -1,4 +1,4 @@
-//! Textures arrive as texels, samplers and transforms; unreadable images are rejected with location and
+//! Textures are loaded with texels, samplers and transforms. Unreadable images are named with their path and
 //! remedy.
 
 use std::fs;
@@ -13,15 +13,15 @@ use serde_json::{Value, json};
 
 use crate::support::{Extended, check_left_out, embedded, glb, pbr, push, textured};
 
-/// One texel: (255, 128, 0, 51).
+/// PNG of one texel: (255, 128, 0, 51).
 const TEXEL: &[u8] = include_bytes!("images/texel.png");
-/// 24 x 16 texels of (10 x, 16 y, 200 - 8 x).
+/// JPEG of 24 x 16 texels (10 x, 16 y, 200 - 8 x).
 const COLOUR: &[u8] = include_bytes!("images/colour.jpg");
 const PROGRESSIVE: &[u8] = include_bytes!("images/progressive.jpg");
 const GREY: &[u8] = include_bytes!("images/grey.jpg");
 const LOSSY_WEBP: &[u8] = include_bytes!("images/lossy.webp");
 const LOSSLESS_WEBP: &[u8] = include_bytes!("images/lossless.webp");
-/// With alpha of 255 - 5 y.
+/// WebP with an alpha of 255 - 5 y.
 const ALPHA_WEBP: &[u8] = include_bytes!("images/alpha.webp");
 const CMYK: &[u8] = include_bytes!("images/cmyk.jpg");
 
@@ -30,7 +30,7 @@ fn base64(bytes: &[u8]) -> String {
     base64::engine::general_purpose::STANDARD.encode(bytes)
 }
 
-/// Loads a scene in a folder with `files`.
+/// Loads a scene from a folder that also contains `files`.
 fn load_beside(scene: &Extended, files: &[(&str, &[u8])]) -> Result<Scene, SceneError> {
     let folder = tempfile::tempdir().unwrap();
     let inside = folder.path().join("scene");
@@ -55,7 +55,7 @@ fn check(error: &SceneError, parts: &[&str]) {
 }
 
 #[test]
-fn an_image_is_the_same_wherever_it_lies() {
+fn an_image_is_the_same_from_any_source() {
     let uri = |uri: &str| textured(&json!({"uri": uri}));
     let data = uri(&format!("data:image/png;base64,{}", base64(TEXEL)));
     let untyped = uri(&format!("data:application/octet-stream;base64,{}", base64(TEXEL)));
@@ -72,7 +72,7 @@ fn an_image_is_the_same_wherever_it_lies() {
     assert_eq!(in_view.load().unwrap().images[0].name, "paint");
 }
 
-/// Both kinds of JPEG keep colours within the error of their quality and chroma subsampling.
+/// Baseline and progressive JPEG keep colours within the error of their quality and chroma subsampling.
 #[test]
 fn jpegs_are_decoded() {
     for bytes in [COLOUR, PROGRESSIVE] {
@@ -97,7 +97,7 @@ fn jpegs_are_decoded() {
     );
 }
 
-/// WebP as an image of its own, and as the image of a texture's extension, which may be required.
+/// WebP is read as a texture's own image, and as that of `EXT_texture_webp`, which may be required.
 #[test]
 fn webps_are_decoded() {
     for (bytes, tolerance, rows) in [(LOSSY_WEBP, 8, 0), (LOSSLESS_WEBP, 0, 0), (ALPHA_WEBP, 8, 5)] {
@@ -164,7 +164,7 @@ fn samplers_and_transforms_are_taken() {
     }
 }
 
-/// Scaling precedes rotation.
+/// The scale is applied before the rotation, and both before the offset.
 #[test]
 fn a_transform_scales_turns_and_moves_in_this_order() {
     let mut scene = embedded(TEXEL, "image/png");
@@ -177,9 +177,9 @@ fn a_transform_scales_turns_and_moves_in_this_order() {
     }
 }
 
-/// One image for colours and one for numbers, although the file has only one; equal textures are merged.
+/// An image that is used for colours and for numbers is stored twice. Equal textures are merged.
 #[test]
-fn images_and_textures_are_there_once_for_each_use() {
+fn an_image_is_stored_once_for_each_encoding() {
     let mut scene = embedded(TEXEL, "image/png");
     scene.json["materials"][0]["extensions"].as_object_mut().unwrap().remove("KHR_materials_specular");
     pbr(&mut scene.json)["metallicRoughnessTexture"] = json!({"index": 0});
@@ -196,7 +196,7 @@ fn images_and_textures_are_there_once_for_each_use() {
     assert!(scene.images.iter().all(|image| image.texels == [[255, 128, 0, 51]]));
 }
 
-/// Images of unused textures are not read: they may be missing, or invalid.
+/// Images of unused textures may be missing or invalid.
 #[test]
 fn images_without_a_use_are_not_read() {
     let mut scene = embedded(TEXEL, "image/png");
@@ -252,9 +252,9 @@ fn textures_without_a_readable_image_are_left_out() {
     check(&beyond.load().unwrap_err(), &["images[0].bufferView", "beyond"]);
 }
 
-/// Other textures keep their images, and a notice has an image once, and not more than eight of them.
+/// A notice lists each unreadable image once, and at most eight of them.
 #[test]
-fn textures_beside_one_that_is_left_out_stay() {
+fn textures_beside_an_unreadable_one_stay() {
     let mut scene = embedded(TEXEL, "image/png");
     let first = push(&mut scene.json, "images", json!({"uri": "absent 0.png"}));
     for number in 1..20 {
@@ -277,16 +277,16 @@ fn textures_beside_one_that_is_left_out_stay() {
     assert!(notice.ends_with("and 12 more"), "{notice}");
 }
 
-/// The format of an image follows from its bytes.
+/// The bytes of an image determine its format.
 #[test]
-fn wrong_media_types_do_no_harm() {
+fn a_wrong_media_type_is_ignored() {
     let right = embedded(COLOUR, "image/jpeg").load().unwrap().checksum();
     assert_eq!(embedded(COLOUR, "image/png").load().unwrap().checksum(), right);
     let uri = format!("data:image/png;base64,{}", base64(COLOUR));
     assert_eq!(textured(&json!({"uri": uri})).load().unwrap().images[0].width, 24);
 }
 
-/// A header alone, with a correct checksum, and a size that is too large or impossible for the file's length.
+/// Uses headers with a correct checksum and a size that exceeds a limit or contradicts the file's length.
 #[test]
 fn sizes_are_refused_by_the_header() {
     let header = |width: u32, height: u32| {
@@ -365,9 +365,9 @@ fn textures_without_coordinates_or_of_wrong_indices_are_refused() {
     check(&endless.load().unwrap_err(), &["TEXCOORD_0", "vertex 1"]);
 }
 
-/// Two scenes that differ in a texel only have different checksums.
+/// Compares two scenes that differ in one texel only.
 #[test]
-fn checksums_tell_texels_and_samplers_apart() {
+fn checksums_depend_on_texels_and_samplers() {
     let scene = embedded(TEXEL, "image/png").load().unwrap();
     let mut other = scene.clone();
     other.images[0].texels[0][1] = 127;
@@ -382,7 +382,7 @@ fn checksums_tell_texels_and_samplers_apart() {
     assert_eq!(scene.checksum(), embedded(TEXEL, "image/png").load().unwrap().checksum());
 }
 
-/// The scene's own folder may be reached through a link.
+/// The path of the scene's own folder may contain a symbolic link.
 #[cfg(unix)]
 #[test]
 fn a_scene_in_a_linked_folder_reads_what_is_beside_it() {
@@ -398,12 +398,12 @@ fn a_scene_in_a_linked_folder_reads_what_is_beside_it() {
     assert_eq!(gltf::load(&linked.join("scene.gltf")).unwrap().images.len(), 1);
 }
 
-/// A texel of 16 bits a channel, grey.
+/// PNG of one grey texel of 16 bits per channel.
 fn deep(grey: u16) -> Vec<u8> {
     deep_of(png::ColorType::Grayscale, &[grey])
 }
 
-/// A texel of 16 bits a channel.
+/// PNG of one texel of 16 bits per channel.
 fn deep_of(colour: png::ColorType, channels: &[u16]) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, 1, 1);

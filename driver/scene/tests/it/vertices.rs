@@ -1,4 +1,4 @@
-//! Vertex attributes arrive at the corners of the right triangles, in world space.
+//! Vertex attributes belong to the right corners, in world space.
 
 use glam::{Vec2, Vec3};
 use miette::Diagnostic;
@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use crate::support::{Extended, push};
 
-/// The attributes of the only triangle.
+/// Attributes of the only triangle.
 fn attributes(scene: &Scene) -> VertexAttributes {
     assert_eq!(scene.triangles.len(), 1);
     scene.attributes[scene.triangles[0].attributes as usize]
@@ -36,7 +36,7 @@ fn triangles_without_attributes_have_none() {
 }
 
 #[test]
-fn normals_of_the_triangles_themselves_are_flat() {
+fn normals_equal_to_the_triangles_are_left_out() {
     let almost = (0.0005_f32).sin();
     for normals in [[[0.0, 0.0, 1.0]; 3], [[0.0, 0.0, 7.0], [almost, 0.0, 1.0], [0.0, -almost, 1.0]]] {
         for scale in [[1, 1, 1], [-1, 1, 1], [2, 3, -1]] {
@@ -47,7 +47,7 @@ fn normals_of_the_triangles_themselves_are_flat() {
     }
 }
 
-/// Normals stay perpendicular to a sphere's surface that is stretched to an ellipsoid.
+/// Normals of a sphere that is stretched to an ellipsoid stay perpendicular to the surface.
 #[test]
 fn normals_are_transformed_by_the_inverse_transposed() {
     let scene = with_normals(TILTED, |json| json["nodes"][0]["scale"] = json!([2, 1, 1]));
@@ -56,7 +56,7 @@ fn normals_are_transformed_by_the_inverse_transposed() {
 }
 
 #[test]
-fn a_mirror_turns_the_corners_and_their_normals_alike() {
+fn a_mirror_reverses_the_corners_with_their_normals() {
     let scene = with_normals(TILTED, |json| json["nodes"][0]["scale"] = json!([-1, 1, 1]));
     assert_eq!(scene.triangles[0].vertices, [Vec3::ZERO, Vec3::Y, -Vec3::X]);
     let expected = [Vec3::Z, Vec3::new(0.0, 0.6, 0.8), Vec3::new(-0.6, 0.0, 0.8)];
@@ -64,7 +64,7 @@ fn a_mirror_turns_the_corners_and_their_normals_alike() {
 }
 
 #[test]
-fn normals_that_are_none_or_of_the_other_side_become_the_triangles() {
+fn normals_that_are_zero_or_on_the_back_become_the_triangles() {
     for bad in [[0.0; 3], [f32::NAN, 0.0, 1.0], [f32::INFINITY, 0.0, 0.0], [0.0, 0.6, -0.8], [1.0, 0.0, 0.0]]
     {
         let scene = with_normals([bad, TILTED[1], TILTED[2]], |_| {});
@@ -116,7 +116,7 @@ fn colours_of_every_format_are_linear_rgba() {
     assert_eq!(white.load().unwrap().triangles[0].attributes, NO_ATTRIBUTES);
 }
 
-/// A square of two triangles as a list, a strip and a fan: all face +z and cover it.
+/// A square of two triangles is stated as a list, a strip and a fan. Its triangles face +z and cover it.
 #[test]
 fn lists_strips_and_fans_give_the_same_square() {
     let (a, b, c, d) = ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]);
@@ -156,10 +156,10 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     assert_eq!(scene.notices, Vec::<String>::new());
 }
 
-/// Many nodes may share a list of instances at almost no cost in bytes: without triangles the list is not
-/// traversed. The zero rotations of this one would be rejected.
+/// Many nodes may share a list of instances at almost no cost in bytes, so that the list is not traversed
+/// without triangles. The zero rotations of this one would be an error.
 #[test]
-fn instances_of_points_are_not_looked_at() {
+fn instances_of_points_are_not_traversed() {
     let mut scene = Extended::new();
     let instances =
         push(&mut scene.json, "accessors", json!({"componentType": 5126, "count": 1 << 24, "type": "VEC4"}));
@@ -178,7 +178,7 @@ fn instances_of_points_are_not_looked_at() {
     assert!(scene.load().unwrap_err().to_string().contains("zero rotation"));
 }
 
-/// Two joints: one at rest, the other moved by 3 along x; its bind pose was at 1.
+/// File with two joints: one at rest, the other moved by 3 along x. The bind pose of the latter is at x = 1.
 fn skinned(weights: [[f32; 4]; 3]) -> Extended {
     let mut scene = Extended::new();
     let joints = scene.accessor("VEC4", 5121, 3, &[0, 1, 0, 0].repeat(3));
@@ -203,7 +203,7 @@ fn skinned(weights: [[f32; 4]; 3]) -> Extended {
 }
 
 #[test]
-fn a_skin_takes_vertices_where_their_joints_are() {
+fn a_skin_moves_vertices_with_their_joints() {
     let scene = skinned([[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [1.0, 1.0, 0.0, 0.0]]).load().unwrap();
     close(scene.triangles[0].vertices, [Vec3::ZERO, Vec3::new(4.0, 0.0, 0.0), Vec3::new(1.5, 1.0, 0.0)]);
     assert_eq!(scene.notices, Vec::<String>::new());
@@ -246,7 +246,8 @@ fn quantised_vertices_are_read_where_the_extension_allows_them() {
     assert_eq!(scene.load().unwrap().triangles[0].vertices, [Vec3::ZERO, Vec3::X * 3.0, Vec3::Y * 3.0]);
 }
 
-/// Normalised and whole integers of all types of the extension, in all attributes that it widens.
+/// Uses normalised and plain integers of all types that `KHR_mesh_quantization` allows, in all attributes
+/// that it extends.
 #[test]
 fn quantised_attributes_mean_what_their_type_says() {
     // The greatest value of each type, as bytes, and what it stands for once normalised.
@@ -343,7 +344,7 @@ fn vertices_that_make_no_whole_triangle_are_ignored() {
     }
 }
 
-/// Texture coordinates are loaded for the sets that a texture uses.
+/// Only sets of texture coordinates that a texture uses are loaded.
 #[test]
 fn texture_coordinates_are_those_of_the_sets_in_use() {
     let shorts: Vec<u8> =

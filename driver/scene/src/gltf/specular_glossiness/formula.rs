@@ -68,7 +68,7 @@ mod tests {
 
     /// Tests metals and dielectrics alone, because the formula is approximate between them.
     #[test]
-    fn what_was_converted_there_is_converted_back() {
+    fn metals_and_dielectrics_survive_conversion_both_ways() {
         for base in [Vec3::new(0.9, 0.6, 0.2), Vec3::splat(0.5), Vec3::new(0.1, 0.3, 0.8)] {
             for metallic in [0.0, 1.0] {
                 let back = backwards(base, metallic, 0.3).converted();
@@ -86,7 +86,7 @@ mod tests {
 
     /// Tests white reflection at all angles, the extreme of the formula.
     #[test]
-    fn extremes_stay_in_range() {
+    fn white_reflection_at_all_angles_stays_in_range() {
         for diffuse in [0.0, 1.0] {
             for specular in [0.0, DIELECTRIC, 1.0] {
                 let white = Vec3::ONE;

@@ -109,7 +109,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn codes_come_back() {
+    fn srgb_codes_are_encoded_from_their_decoded_values() {
         let srgb = Srgb::new();
         assert!((0..=255).all(|code| srgb.encode(srgb.values[usize::from(code)]) == code));
         assert_eq!((srgb.encode(-1.0), srgb.encode(2.0), srgb.encode(f32::NAN)), (0, 255, 0));

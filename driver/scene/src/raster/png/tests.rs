@@ -1,4 +1,4 @@
-//! PNG files of every colour type, and damaged ones.
+//! Decodes PNG files of every colour type, and damaged ones.
 
 use png::{Compression, Encoder};
 
@@ -60,7 +60,7 @@ fn sixteen_bits_are_rounded_to_the_nearest_of_eight() {
     }
 }
 
-/// A picture of 2 x 2 texels, interlaced by Adam7.
+/// Decodes a picture of 2 x 2 texels, interlaced by Adam7.
 #[test]
 fn interlaced_rows_come_in_order() {
     const INTERLACED: &[u8] = &[
@@ -83,7 +83,7 @@ fn interlaced_rows_come_in_order() {
     assert_eq!(decoded(&bytes), [1, 2, 3, 4].map(|value| [value, value, value, 255]));
 }
 
-/// A file of one texel with a palette of `length` bytes.
+/// File of one texel with a palette of `length` bytes.
 fn of_palette(length: usize) -> Vec<u8> {
     let mut file = MAGIC.to_vec();
     let header = [0, 0, 0, 1, 0, 0, 0, 1, 8, 3, 0, 0, 0];

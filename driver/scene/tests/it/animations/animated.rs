@@ -1,4 +1,4 @@
-//! The triangle with animations.
+//! The triangle's file with animations.
 
 use std::ops::Deref;
 
@@ -11,7 +11,7 @@ use tempfile::TempDir;
 
 use crate::support::{Extended, push};
 
-/// The triangle, to which animations are added.
+/// File of the triangle, to which tests add animations.
 pub(crate) struct Animated(pub(crate) Extended);
 
 impl Animated {
@@ -24,8 +24,7 @@ impl Animated {
         push(&mut self.0.json, "animations", json!({"name": name, "channels": [], "samplers": []}))
     }
 
-    /// Adds a channel that moves the property `path` of a node: accessors of times and of values, and the
-    /// interpolation.
+    /// Adds a channel for property `path` of a node. `input` and `output` are accessors of times and values.
     pub(crate) fn channel(
         &mut self,
         animation: usize,
@@ -39,7 +38,7 @@ impl Animated {
         push(animation, "channels", json!({"sampler": sampler, "target": {"node": node, "path": path}}));
     }
 
-    /// Adds a channel of a property with `N` components.
+    /// Adds a channel for a property with `N` components.
     pub(crate) fn moved<const N: usize>(
         &mut self,
         animation: usize,
@@ -58,7 +57,7 @@ impl Animated {
         &mut self.0.json
     }
 
-    /// The file of it.
+    /// Opens the file.
     pub(crate) fn file(&self) -> Result<OpenFile, SceneError> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("scene.gltf");
@@ -71,7 +70,7 @@ impl Animated {
         self.file()?.at(&all_at(seconds))
     }
 
-    /// Corners of the only triangle.
+    /// Corners of the only triangle at a time.
     pub(crate) fn corners(&self, seconds: f64) -> [Vec3; 3] {
         let scene = self.at(seconds).unwrap();
         assert_eq!(scene.triangles.len(), 1);
@@ -79,7 +78,7 @@ impl Animated {
     }
 }
 
-/// An open file, and its folder.
+/// Open file with the temporary folder that contains it.
 pub(crate) struct OpenFile {
     file: SceneFile,
     _folder: TempDir,
@@ -93,7 +92,7 @@ impl Deref for OpenFile {
     }
 }
 
-/// A moment at which all animations play.
+/// Moment at which all animations play.
 pub(crate) fn all_at(seconds: f64) -> Moment {
     Moment { animations: Vec::new(), seconds }
 }

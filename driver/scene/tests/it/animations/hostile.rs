@@ -1,4 +1,4 @@
-//! Animations that contradict each other, and those that glTF does not allow, are refused with their place.
+//! Animations that contradict each other or violate glTF are refused with their JSON path.
 
 use miette::Diagnostic;
 use photoncard_scene::error::SceneError;
@@ -9,7 +9,7 @@ use super::animated::{Animated, all_at};
 
 const NODE: usize = 0;
 
-/// Two animations of the node's place.
+/// File with two animations of the node's translation.
 fn two() -> Animated {
     let mut scene = Animated::new();
     for (name, x) in [("left", -1.0), ("right", 1.0)] {
@@ -24,7 +24,7 @@ fn playing(names: &[&str]) -> Moment {
 }
 
 #[test]
-fn animations_of_one_node_are_chosen_by_name() {
+fn animations_of_one_property_are_chosen_by_name() {
     let file = two().file().unwrap();
     for (name, x) in [("left", -1.0), ("right", 1.0)] {
         let scene = file.at(&playing(&[name, name])).unwrap();
@@ -37,14 +37,14 @@ fn animations_of_one_node_are_chosen_by_name() {
 }
 
 #[test]
-fn an_unknown_name_is_refused_with_those_that_are_there() {
+fn an_unknown_name_is_refused_with_the_known_ones() {
     let error = two().file().unwrap().at(&playing(&["left", "up"])).unwrap_err();
     assert!(error.to_string().contains("'up'"), "{error}");
     let help = error.help().unwrap().to_string();
     assert!(help.contains("'left'") && help.contains("'right'"), "{help}");
 }
 
-/// A linear translation after a change of its JSON.
+/// Evaluates a linear translation after a change of its JSON.
 fn changed(change: impl FnOnce(&mut Value)) -> Result<(), SceneError> {
     let mut scene = Animated::new();
     let animation = scene.animation("walk");
@@ -53,8 +53,7 @@ fn changed(change: impl FnOnce(&mut Value)) -> Result<(), SceneError> {
     both(&scene)
 }
 
-/// Result of the scene at a moment; the list of animations is refused alike, unless it is the value that is
-/// unsound.
+/// Evaluates the scene at a moment. The list of animations must fail alike, unless only a value is invalid.
 fn both(scene: &Animated) -> Result<(), SceneError> {
     let file = scene.file()?;
     let listed = file.animations().map(drop);
@@ -130,7 +129,7 @@ fn times_that_do_not_increase_are_refused() {
 }
 
 #[test]
-fn no_keyframes_are_refused() {
+fn a_sampler_without_keyframes_is_refused() {
     let found = changed(|json| {
         json["accessors"][2]["count"] = json!(0);
         json["accessors"][3]["count"] = json!(0);
@@ -139,7 +138,7 @@ fn no_keyframes_are_refused() {
 }
 
 #[test]
-fn values_that_are_no_poses_are_refused() {
+fn values_that_give_no_pose_are_refused() {
     for value in [f32::NAN, f32::INFINITY] {
         for path in ["translation", "scale"] {
             let mut scene = Animated::new();
@@ -156,7 +155,7 @@ fn values_that_are_no_poses_are_refused() {
     }
 }
 
-/// Weights of a mesh without targets are no values, and nothing moves.
+/// Weights of a mesh without morph targets have no values and move nothing.
 #[test]
 fn weights_without_targets_move_nothing() {
     let mut scene = Animated::new();

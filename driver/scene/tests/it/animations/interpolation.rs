@@ -13,7 +13,7 @@ fn translated(by: Vec3) -> [Vec3; 3] {
     CORNERS.map(|corner| corner + by)
 }
 
-/// A translation whose times and values have exact sums.
+/// File of a translation whose times and values have exact sums.
 fn walk(interpolation: &str) -> Animated {
     let mut scene = Animated::new();
     let animation = scene.animation("walk");
@@ -40,7 +40,7 @@ fn keyframes_are_exact_and_hold_before_the_first_and_after_the_last() {
 }
 
 #[test]
-fn linear_values_follow_the_share_of_the_interval() {
+fn linear_values_are_interpolated_by_time() {
     let scene = walk("LINEAR");
     for (seconds, expected) in [(1.5, [2.0, 0.5, 1.0]), (1.25, [1.5, 0.25, -0.5]), (3.0, [1.0, 0.75, 2.0])] {
         assert_eq!(scene.corners(seconds), translated(expected.into()), "at {seconds}");
@@ -56,7 +56,7 @@ fn a_step_holds_until_the_next_keyframe() {
 }
 
 #[test]
-fn a_single_keyframe_holds_for_ever() {
+fn a_single_keyframe_holds_at_all_times() {
     for interpolation in ["LINEAR", "STEP"] {
         let mut scene = Animated::new();
         let animation = scene.animation("still");
@@ -67,7 +67,7 @@ fn a_single_keyframe_holds_for_ever() {
     }
 }
 
-/// Corners after a turn about +z.
+/// Corners after a rotation about +z.
 fn turned(angle: f64) -> [Vec3; 3] {
     let (sine, cosine) = angle.sin_cos();
     CORNERS.map(|corner| {
@@ -77,7 +77,7 @@ fn turned(angle: f64) -> [Vec3; 3] {
     })
 }
 
-/// Rotation about +z as glTF states it.
+/// Quaternion of a rotation about +z.
 fn about_z(angle: f64) -> [f32; 4] {
     let (sine, cosine) = (0.5 * angle).sin_cos();
     [0.0, 0.0, sine as f32, cosine as f32]
@@ -111,7 +111,7 @@ fn rotations_in_integers_are_normalized() {
     close(scene.corners(1.0), turned(FRAC_PI_2));
 }
 
-/// A number from -1 to 1.
+/// Pseudo-random number from -1 to 1.
 fn random(index: u32) -> f64 {
     let hash = index.wrapping_add(1).wrapping_mul(0x9e37_79b9);
     f64::from((hash ^ (hash >> 15)).wrapping_mul(0x85eb_ca6b)) / f64::from(u32::MAX / 2) - 1.0
@@ -121,8 +121,8 @@ fn vector(index: u32) -> [f32; 3] {
     [0, 1, 2].map(|axis| random(3 * index + axis) as f32)
 }
 
-/// Cubic Bezier curve by de Casteljau's subdivision, whose inner control points are a third of the tangents
-/// away.
+/// Evaluates a cubic Bezier curve by de Casteljau's algorithm. Its inner control points are a third of the
+/// tangents away from the ends.
 fn bezier(points: [DVec3; 2], tangents: [DVec3; 2], interval: f64, share: f64) -> DVec3 {
     let [from, to] = points;
     let mut points =
@@ -171,7 +171,7 @@ fn cubic_rotations_are_of_unit_length() {
     assert!((x.length() - 1.0).abs() < 1e-6, "{x}");
 }
 
-/// Keyframes that an accessor without bytes, or with some elements of others, states.
+/// Keyframes may be in an accessor without a buffer view, with sparse elements.
 #[test]
 fn sparse_values_replace_zeros() {
     let mut scene = Animated::new();

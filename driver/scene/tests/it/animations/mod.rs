@@ -1,4 +1,4 @@
-//! Animations: nodes, joints, morph targets, cameras and lights at a moment.
+//! Animations of nodes, joints, morph targets, cameras and lights, evaluated at a moment.
 
 mod animated;
 mod hostile;

@@ -1,5 +1,4 @@
-//! Each part of a scene that animations move: meshes by morph targets and joints, cameras, lights, and nodes
-//! that others hang on.
+//! Animated parts of a scene: meshes by morph targets and joints, cameras, lights, and parents of nodes.
 
 use glam::{DMat4, DQuat, DVec3, Mat4, Quat, Vec3};
 use photoncard_scene::{PunctualKind, Scene};
@@ -12,7 +11,7 @@ const NODE: usize = 0;
 const TRIPOD: usize = 1;
 
 #[test]
-fn a_moment_leaves_the_scene_at_rest_as_it_stands() {
+fn a_moment_does_not_change_the_scene_at_rest() {
     let mut scene = Animated::new();
     let animation = scene.animation("walk");
     scene.moved(animation, (NODE, "translation"), &[(0.0, [5.0, 0.0, 0.0])], "LINEAR");
@@ -23,9 +22,9 @@ fn a_moment_leaves_the_scene_at_rest_as_it_stands() {
     assert_eq!(rest.notices, Vec::<String>::new());
 }
 
-/// An animated part of a transform takes the place of the node's own; the others stay.
+/// An animated property replaces that of the node; other properties of the node stay.
 #[test]
-fn a_part_of_a_transform_moves_and_the_others_stay() {
+fn an_animated_translation_leaves_rotation_and_scale() {
     let mut scene = Animated::new();
     scene.json()["nodes"][NODE]["scale"] = json!([2, 3, 1]);
     scene.json()["nodes"][NODE]["translation"] = json!([0, 0, 1]);
@@ -49,7 +48,7 @@ fn children_follow_their_parents() {
 }
 
 #[test]
-fn cameras_are_those_of_the_scene_without_its_geometry() {
+fn cameras_without_geometry_equal_those_of_the_scene() {
     let mut scene = Animated::new();
     let animation = scene.animation("pan");
     let turn = Quat::from_rotation_y(0.5).to_array();
@@ -88,7 +87,7 @@ fn lights_move_by_their_nodes() {
     assert!(direction.distance(Vec3::NEG_Y) < 1e-6, "{direction}");
 }
 
-/// The triangle with two targets: one moves the corners, the other corners and normals.
+/// File of the triangle with two morph targets. One displaces positions, the other positions and normals.
 fn morphed() -> Animated {
     let mut scene = Animated::new();
     let normals = scene.0.floats("VEC3", &[[0.0, 0.0, 1.0]; 3]);
@@ -139,7 +138,7 @@ fn weights_of_targets_are_animated_together() {
     }
 }
 
-/// In-tangents of all targets come first, then their values, then their out-tangents.
+/// A keyframe holds the in-tangents of all targets, then their values, then their out-tangents.
 #[test]
 fn weights_of_targets_follow_cubic_splines() {
     let mut scene = morphed();
@@ -195,7 +194,7 @@ fn joints_carry_their_vertices() {
 }
 
 #[test]
-fn a_scene_without_cameras_is_seen_as_at_rest() {
+fn the_default_camera_is_that_at_rest() {
     let mut scene = Animated::new();
     scene.json()["nodes"][TRIPOD].as_object_mut().unwrap().remove("camera");
     let animation = scene.animation("walk");
