@@ -1,4 +1,4 @@
-//! Transfer of tiles: from the scheduler to sessions, and finished ones from sessions to sinks.
+//! Transfers tiles: assignments from the scheduler to sessions, and finished tiles from sessions to sinks.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 use std::time::Duration;
@@ -9,20 +9,20 @@ use photoncard_shared::message::Tile;
 use crate::scheduler::{Answered, CardNumber, Scheduler, SchedulerError, Standing};
 use crate::session::{Event, Session, SessionError};
 
-/// State that the sessions of a render share, each on a thread of its own or all on one.
+/// State that all sessions of a render share. A session may have its own thread, or share one with others.
 pub struct Dispatcher<'a> {
     scheduler: Mutex<Scheduler>,
-    /// Notified when a tile waits again, a card is given up, or all tiles are done.
+    /// Notified when a tile becomes available, a card is given up, or all tiles are done.
     changed: Condvar,
     sinks: Vec<&'a dyn TileSink>,
-    /// Called before the sinks receive a card's tile.
+    /// Called before the sinks receive a tile from a card.
     rendered: &'a (dyn Fn(CardNumber, &Tile) + Sync),
-    /// Held shared while a tile is put into the sinks, exclusively while sinks revoke tiles.
+    /// Locked shared while sinks receive a tile, exclusively while they revoke tiles.
     order: RwLock<()>,
 }
 
 impl<'a> Dispatcher<'a> {
-    /// Dispatcher between the scheduler's cards and all sinks.
+    /// Creates a dispatcher between a scheduler and all sinks.
     pub fn new(scheduler: Scheduler, sinks: Vec<&'a dyn TileSink>) -> Self {
         Self {
             scheduler: Mutex::new(scheduler),
@@ -33,19 +33,19 @@ impl<'a> Dispatcher<'a> {
         }
     }
 
-    /// Dispatcher that calls a function before the sinks receive a card's tile.
+    /// Sets a function that is called before the sinks receive a tile from a card.
     #[must_use]
     pub fn telling(self, rendered: &'a (dyn Fn(CardNumber, &Tile) + Sync)) -> Self {
         Self { rendered, ..self }
     }
 
-    /// The scheduler, which holds the tiles that are left.
+    /// Locks the scheduler, which holds the remaining tiles.
     pub fn scheduler(&self) -> MutexGuard<'_, Scheduler> {
         // A thread that panicked holding the lock ends the render.
         self.scheduler.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Assigns tiles to a card until its credits are used up.
+    /// Assigns tiles to a card until it has no free credit.
     pub fn supply(&self, card: CardNumber, session: &mut Session, now: Duration) {
         while session.wants_tile() {
             match self.scheduler().take(card, now) {
@@ -63,7 +63,7 @@ impl<'a> Dispatcher<'a> {
     /// Handles the events of a session.
     ///
     /// # Errors
-    /// If cards contradict each other, or none can render the tiles that are left.
+    /// If cards contradict each other, or no card can render the remaining tiles.
     pub fn collect(
         &self,
         card: CardNumber,
@@ -118,8 +118,8 @@ impl<'a> Dispatcher<'a> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, and revokes all tiles
-    /// that it alone has rendered.
+    /// Gives up a card that sent wrong messages, or wrong pixels of tile `about`. Revokes all tiles that no
+    /// other card has confirmed.
     pub fn distrust(&self, card: CardNumber, about: Option<Tile>) {
         let _alone = self.order.write().unwrap_or_else(PoisonError::into_inner);
         let revoked = self.scheduler().expel(card, about);
@@ -129,16 +129,16 @@ impl<'a> Dispatcher<'a> {
         self.changed.notify_all();
     }
 
-    /// Fails if other cards outvoted a card whose session has ended.
+    /// Checks whether other cards have outvoted a card whose session has ended.
     ///
     /// # Errors
-    /// [`SessionError`] of the lie.
+    /// [`SessionError`] that names the card's wrong tile.
     pub fn check_card(&self, card: CardNumber) -> Result<(), SessionError> {
         let lie = self.scheduler().lie_of(card);
         lie.map_or(Ok(()), |tile| Err(SessionError::Outvoted { tile }))
     }
 
-    /// Waits at most `longest` for a change; returns at once if all tiles are done.
+    /// Waits at most `longest` for a change. Returns at once if all tiles are done.
     pub fn wait(&self, longest: Duration) {
         let scheduler = self.scheduler();
         if !scheduler.is_complete() {

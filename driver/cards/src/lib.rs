@@ -1,8 +1,8 @@
-//! Cards: links of bytes, the host's end of the protocol, and which card renders which tile.
+//! Access to cards: byte links, the host's end of the protocol, and the assignment of tiles.
 //!
-//! A [`Session`](session::Session) has no I/O: it takes bytes of a [`link`], and says what to send. The
-//! [`Scheduler`](scheduler::Scheduler) deals tiles, and a [`Dispatcher`](dispatcher::Dispatcher) hands
-//! finished ones to their sinks.
+//! A [`Session`](session::Session) performs no I/O: it consumes the bytes that a [`link`] received, and
+//! supplies those to send. The [`Scheduler`](scheduler::Scheduler) deals tiles, and a
+//! [`Dispatcher`](dispatcher::Dispatcher) hands finished ones to their sinks.
 //!
 //! | modules | contents |
 //! |---|---|

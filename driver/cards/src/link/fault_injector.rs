@@ -1,8 +1,8 @@
-//! Simulation of a bad line: bytes are damaged, lost, repeated, delayed and cut into pieces by random
-//! numbers.
+//! Simulates a bad line: pseudo-random numbers decide which bytes are damaged, lost, repeated, delayed or
+//! split into pieces.
 //!
-//! A byte's faults depend on the seed, its direction and its position among all bytes of its direction, not
-//! on time or on the sizes of reads and writes.
+//! The faults of a byte depend on the seed, its direction and its position among all bytes of its direction.
+//! They do not depend on time or on the sizes of reads and writes.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use photoncard_shared::hash::hash;
 use photoncard_shared::link::{Port, PortError};
 
-/// Rates of a line's faults, each a probability per byte of 0 to 0.1, and the seed.
+/// Fault rates of a line, each a probability per byte of 0 to 0.1, and the seed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LineFaults {
     /// Rate of bytes with one inverted bit.
@@ -21,13 +21,13 @@ pub struct LineFaults {
     pub drops: f64,
     /// Rate of bytes that arrive twice.
     pub repeats: f64,
-    /// Rate of delays, on the way to the host: a byte and all behind it are held back for some milliseconds.
+    /// Rate of delays towards the host. A delay holds a byte and all later ones back for some milliseconds.
     pub delays: f64,
     /// Seed of the random numbers.
     pub seed: u32,
 }
 
-/// Maximum rate: a higher one destroys every frame.
+/// Maximum rate. A higher one destroys every frame.
 const MOST: f64 = 0.1;
 
 impl FromStr for LineFaults {
@@ -81,23 +81,23 @@ pub struct FaultInjector {
 
 /// One direction of the line.
 struct Direction {
-    /// Key of its random numbers.
+    /// Key of the direction's pseudo-random numbers.
     key: u32,
-    /// Number of bytes that have entered it, modulo 2^32.
+    /// Number of bytes that have entered the line, modulo 2^32.
     position: u32,
-    /// Bytes that have not left it.
+    /// Bytes in the line.
     bytes: VecDeque<Passing>,
 }
 
-/// A byte in the line, after its faults.
+/// Byte in the line, with its faults applied.
 #[derive(Clone, Copy)]
 struct Passing {
     byte: u8,
-    /// Time that it is held back.
+    /// Time for which the byte is held back.
     delay: Duration,
 }
 
-/// Purpose of a random number; each has a sequence of its own.
+/// Purpose of a pseudo-random number. Each purpose has its own sequence.
 #[derive(Clone, Copy)]
 enum Kind {
     Flip,
@@ -109,7 +109,7 @@ enum Kind {
     Piece,
 }
 
-/// Maximum number of bytes that move at once.
+/// Maximum number of bytes per read or write.
 const PIECE: usize = 600;
 /// Maximum delay, milliseconds.
 const LONGEST_DELAY: u32 = 20;
@@ -119,7 +119,7 @@ impl Direction {
         Self { key, position: 0, bytes: VecDeque::new() }
     }
 
-    /// Random number of the next byte, with a period of 2^32 bytes.
+    /// Pseudo-random number for the next byte. The period is 2^32 bytes.
     fn random(&self, kind: Kind) -> u32 {
         hash(hash(self.position) ^ hash(self.key ^ hash(kind as u32 + 1)))
     }
@@ -128,7 +128,7 @@ impl Direction {
         f64::from(self.random(kind)) < rate * 4_294_967_296.0
     }
 
-    /// Sends bytes into the line.
+    /// Puts bytes into the line.
     fn pass(&mut self, bytes: &[u8], faults: &LineFaults) {
         for &byte in bytes {
             let is_delayed = self.happens(Kind::Delay, faults.delays);
@@ -143,14 +143,14 @@ impl Direction {
         }
     }
 
-    /// Number of bytes that enter at once, at most `most`.
+    /// Number of bytes of the next piece, at most `most`.
     fn piece(&self, most: usize) -> usize {
         (1 + self.random(Kind::Piece) as usize % PIECE).min(most)
     }
 }
 
 impl FaultInjector {
-    /// Faults of the line to card `index`; each card has faults of its own.
+    /// Creates the faults of the line to card `index`. Every card has different ones.
     pub fn new(faults: LineFaults, index: usize) -> Self {
         let key = hash(faults.seed) ^ hash(index as u32 + 1);
         let [incoming, outgoing] = [1, 2].map(|direction| Direction::new(hash(key ^ hash(direction))));
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn a_good_line_changes_nothing_and_a_bad_one_as_much_as_it_says() {
+    fn faults_occur_at_their_rates_and_none_without_them() {
         let bytes: Vec<u8> = (0..200_000_u32).map(|index| hash(index) as u8).collect();
         assert!(through(LineFaults::default(), &bytes) == bytes);
         let lost = through("drops=0.01".parse().unwrap(), &bytes).len();
@@ -261,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_depends_on_the_place_of_its_byte_alone() {
+    fn faults_depend_on_the_position_of_the_byte_alone() {
         let faults: LineFaults = "flips=0.05,drops=0.05,repeats=0.05,delays=0.001,seed=3".parse().unwrap();
         let bytes: Vec<u8> = (0..10_000_u32).map(|index| hash(index) as u8).collect();
         let read = |step: usize, answers: usize| {
@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_taken_goes_on_while_the_host_only_reads() {
+    fn accepted_bytes_move_on_while_the_host_only_reads() {
         let (mut near, mut far) = loopback(4);
         let mut injector = FaultInjector::new(LineFaults::default(), 0);
         let taken = injector.write(&mut near, b"twelve bytes", SOON).unwrap();
@@ -327,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_told_in_words() {
+    fn fault_rates_are_parsed_and_formatted() {
         let faults: LineFaults = "flips=1e-5,drops=0.1,seed=7".parse().unwrap();
         assert_eq!(faults, LineFaults { flips: 1e-5, drops: 0.1, seed: 7, ..LineFaults::default() });
         assert_eq!(faults.to_string().parse(), Ok(faults));

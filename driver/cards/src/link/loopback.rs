@@ -1,9 +1,9 @@
 //! Link within the process: two bounded queues of bytes. They fill up more readily than hardware, which tests
 //! flow control.
 //!
-//! A card writes a frame of some hundred bytes at a time, and to wake the host for each takes longer than the
-//! host's work on it. The end of a [patient](LoopbackPort::patient) writer wakes the reader for many frames
-//! at once.
+//! A card writes a frame of some hundred bytes at a time, and a wake-up per frame would take longer than the
+//! host's work on it. A [patient](LoopbackPort::patient) port therefore wakes its reader once for many
+//! frames.
 
 use std::collections::VecDeque;
 use std::io::Read;
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use photoncard_shared::link::{Port, PortError};
 
-/// Time after which a patient writer's next call wakes the reader in any case.
+/// Time after the first unreported write at which a patient port's next call wakes the reader.
 const PATIENCE: Duration = Duration::from_micros(500);
 
 /// One direction of the link.
@@ -35,7 +35,7 @@ impl Direction {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits until `ready`, the link is closed or the time is over.
+    /// Waits until `ready` holds, the link is closed or `wait` is over.
     fn wait(&self, wait: Duration, ready: impl Fn(&ByteQueue) -> bool) -> MutexGuard<'_, ByteQueue> {
         let queue = self.lock();
         if wait.is_zero() || ready(&queue) || queue.closed {
@@ -56,9 +56,9 @@ pub struct LoopbackPort {
     incoming: Arc<Direction>,
     outgoing: Arc<Direction>,
     capacity: usize,
-    /// Bytes in transit at which a write wakes the reader.
+    /// Number of bytes in transit at which a write wakes the reader.
     wakes_at: usize,
-    /// Time of the first write since the reader was woken, if any.
+    /// Time of the first write since the reader was last woken; `None` if there was none.
     written: Option<Instant>,
 }
 
@@ -77,15 +77,16 @@ pub fn loopback(capacity: usize) -> (LoopbackPort, LoopbackPort) {
 }
 
 impl LoopbackPort {
-    /// The port of a writer that goes on to call it while it has work, and before it waits: the reader is
-    /// woken once so many bytes are there, after some time, or when the writer itself waits for bytes.
+    /// Delays wake-ups of the reader until `wakes_at` bytes are in transit, some time has passed, or this
+    /// port waits for bytes itself. The writer must keep calling the port while it has work, and before it
+    /// waits.
     #[must_use]
     pub fn patient(mut self, wakes_at: usize) -> Self {
         self.wakes_at = wakes_at.min(self.capacity);
         self
     }
 
-    /// Wakes the reader if it is due.
+    /// Wakes the reader of pending writes if `is_due`, or if they have waited for [`PATIENCE`].
     fn wake(&mut self, is_due: bool) {
         if self.written.is_some_and(|written| is_due || written.elapsed() >= PATIENCE) {
             self.written = None;
@@ -137,7 +138,7 @@ mod tests {
     const SOON: Duration = Duration::from_millis(1);
 
     #[test]
-    fn bytes_come_in_order_and_the_queue_pushes_back() {
+    fn bytes_arrive_in_order_and_a_full_queue_blocks() {
         let (mut host, mut card) = loopback(4);
         assert_eq!(host.write(&[1, 2, 3, 4, 5, 6], SOON), Ok(4));
         assert_eq!(host.write(&[5], SOON), Ok(0));
@@ -169,7 +170,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_sent_before_the_end_still_comes() {
+    fn bytes_sent_before_the_end_still_arrive() {
         let (mut host, mut card) = loopback(4);
         card.write(&[7], SOON).unwrap();
         drop(card);

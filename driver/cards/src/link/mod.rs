@@ -1,10 +1,10 @@
 //! Links to cards: ports of bytes.
 //!
-//! A card in this process is on a [`loopback()`]; others are reached over serial ports ([`open_serial`],
-//! listed by [`list_serial_ports`]) and sockets ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the
-//! opposite end: hosts connect to it to reach a card that this process emulates, one after another
-//! ([`HostPort`]). A [`FaultInjector`] simulates a bad line on any of them. A target without an operating
-//! system, such as a browser, has loopback and fault injector alone.
+//! A card in this process is reached by [`loopback()`], others by serial ports ([`open_serial`], listed by
+//! [`list_serial_ports`]) and sockets ([`connect_tcp`], [`connect_unix`]). A [`Listener`] is the card's end:
+//! hosts connect to it, one after another, to reach a card that this process emulates ([`HostPort`]). A
+//! [`FaultInjector`] simulates a bad line on any of them. Targets without an operating system, such as
+//! browsers, have only the loopback and the fault injector.
 
 mod fault_injector;
 mod loopback;

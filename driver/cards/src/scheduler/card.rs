@@ -1,4 +1,4 @@
-//! State of a card in the scheduler.
+//! State of one card in the scheduler.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -14,25 +14,25 @@ pub type CardNumber = usize;
 pub enum Standing {
     /// The card renders tiles.
     Living,
-    /// The card is silent, or its link is closed; it may return.
+    /// The card is silent, or its link is closed. It may return.
     Lost,
-    /// The card is not used any more.
+    /// The card is excluded for the rest of the render.
     GivenUp,
 }
 
-/// State of a card in the scheduler.
 #[derive(Debug)]
 pub(super) struct Card {
     pub(super) standing: Standing,
-    /// Tile of which the card sent wrong pixels.
+    /// Tile of which the card sent wrong pixels; `None` if it sent none.
     pub(super) lie: Option<Tile>,
-    /// Indices of the tiles assigned to the card; it works on the first ones, as many as it has in flight.
+    /// Indices of the tiles assigned to the card. It works on the first ones, up to its number of tiles in
+    /// flight.
     pub(super) tiles: Vec<usize>,
     /// Indices of waiting tiles that this card has rendered before.
     pub(super) at_home: VecDeque<usize>,
-    /// Work on the tiles that this card alone has rendered.
+    /// Work on the tiles that no other card has confirmed.
     pub(super) counters: Counters,
-    /// Maximum over its tiles of the mean time of a ray or gather, seconds.
+    /// Mean time per ray or gather of the card's slowest tile, seconds.
     pub(super) slowest: Option<f64>,
 }
 
@@ -58,7 +58,7 @@ impl Card {
     }
 }
 
-/// Mean of the times from a tile's assignment to its answer.
+/// Mean time from a tile's assignment to its answer.
 #[derive(Debug, Default)]
 pub(super) struct TileTimes {
     sum: Duration,

@@ -1,4 +1,4 @@
-//! Selection of the next tile for a card.
+//! Selects the next tile for a card.
 
 use std::time::Duration;
 
@@ -7,18 +7,19 @@ use super::entry::{Copy, Entry};
 use super::{CRASHES_APART, Scheduler};
 use crate::session::Assignment;
 
-/// Time after which an idle card duplicates another card's tile, in mean times of tiles.
+/// Time after which an idle card duplicates another card's tile, in mean times of a tile.
 const HELP_AFTER: u32 = 2;
-/// Time after which an idle card duplicates another card's tile while no tile is done.
+/// Time after which an idle card duplicates another card's tile before any tile is done.
 const HELP_WITHOUT_MEAN: Duration = Duration::from_secs(1);
-/// Number of waiting tiles for each other card, and each tile that a card has, at which it may have one more.
+/// Ratio of waiting tiles to (tiles of a card times number of other cards) above which the card may take
+/// another tile.
 const PLENTY: usize = 4;
-/// Number of tiles awaiting comparison that are searched for a card before other waiting tiles are
-/// considered.
+/// Number of tiles awaiting comparison that are searched for one that a card can verify, before other waiting
+/// tiles are considered.
 pub(super) const COMPARED_AT_ONCE: usize = 256;
 
 impl Scheduler {
-    /// Next tile for a card with a free credit.
+    /// Assigns the next tile to a card with a free credit; `None` if there is none for it.
     pub fn take(&mut self, card: CardNumber, now: Duration) -> Option<Assignment> {
         if self.cards[card].standing != Standing::Living {
             return None;
@@ -41,20 +42,21 @@ impl Scheduler {
         Some(Assignment { tile: entry.tile, is_suspect: !entry.crashes.is_empty() })
     }
 
-    /// Returns whether any card has crashed at a tile.
+    /// Returns whether any card has crashed at tile `index`.
     fn is_suspect(&self, index: usize) -> bool {
         !self.entries[index].crashes.is_empty()
     }
 
-    /// Returns whether a card may have one tile more: any card that has none, and others as long as plenty
-    /// wait for each other card. Tiles that wait at a card behind a long one are late, and near the end no
-    /// card would be free to take them.
+    /// Returns whether a card may take another tile. A card without tiles may; another one may while enough
+    /// tiles wait for the other cards. Otherwise tiles would wait behind a slow one, and near the end idle
+    /// cards could not take them.
     fn has_share(&self, card: CardNumber) -> bool {
         let others = self.living().filter(|&other| other != card).count();
         self.waiting_anywhere() > PLENTY * self.cards[card].tiles.len() * others
     }
 
-    /// Next tile that no card has: one of its own, or one of all cards; a suspect one only for an idle card.
+    /// Takes the next tile that is on no card: one reserved for this card, else one from the common queue.
+    /// Only an idle card receives a suspect tile.
     fn next_waiting(&mut self, card: CardNumber, is_idle: bool) -> Option<usize> {
         if let Some(own) = self.cards[card].at_home.pop_front() {
             return Some(own);
@@ -63,7 +65,7 @@ impl Scheduler {
         self.waiting.remove(next)
     }
 
-    /// Tile that another card has rendered and this one can verify.
+    /// Takes a tile that another card has rendered and this one can verify.
     fn next_compared(&mut self, card: CardNumber) -> Option<usize> {
         while self.compared.front().is_some_and(|&index| !self.entries[index].is_open()) {
             self.compared.pop_front();
@@ -71,7 +73,7 @@ impl Scheduler {
         self.compared_for(card, COMPARED_AT_ONCE)
     }
 
-    /// First of the next `tiles` tiles awaiting comparison that the card can verify.
+    /// Position of a tile that the card can verify, among the first `tiles` tiles awaiting comparison.
     fn compared_for(&self, card: CardNumber, tiles: usize) -> Option<usize> {
         self.compared.iter().take(tiles).copied().find(|&index| self.is_for(card, index))
     }
@@ -82,8 +84,8 @@ impl Scheduler {
         entry.is_open() && entry.copies.is_empty() && !entry.has_answer_of(card)
     }
 
-    /// Next tile that is set apart, once all others are done, for one of the cards that have crashed at it
-    /// the minimum number of times.
+    /// Takes a tile that is set apart, once all others are done: one at which no living card has crashed less
+    /// often than this one.
     fn next_set_apart(&mut self, card: CardNumber) -> Option<usize> {
         if self.set_apart.is_empty() || self.open_entries().any(|entry| entry.crashes.len() < CRASHES_APART) {
             return None;
@@ -108,13 +110,13 @@ impl Scheduler {
         self.entries.iter().filter(|entry| entry.is_open())
     }
 
-    /// Time that a card may have a tile before idle cards help.
+    /// Time for which a card may have a tile before idle cards duplicate it.
     pub(super) fn patience(&self) -> Duration {
         self.times.mean().map_or(HELP_WITHOUT_MEAN, |mean| mean.saturating_mul(HELP_AFTER))
     }
 
-    /// Tile that an idle card duplicates, because other cards have had it for too long: one with the minimum
-    /// number of copies, and among these the oldest.
+    /// Tile that an idle card duplicates because other cards have had it for too long: the oldest of those
+    /// with the fewest copies.
     fn next_to_help(&mut self, card: CardNumber, now: Duration) -> Option<usize> {
         if !self.has_helpers || !self.cards[card].tiles.is_empty() || now < self.next_help {
             return None;

@@ -1,4 +1,4 @@
-//! Detection of renders that cannot be completed.
+//! Detects renders that cannot be completed.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use super::dealing::COMPARED_AT_ONCE;
 use super::entry::{Entry, Progress};
 use super::{CRASHES_APART, Scheduler, SchedulerError};
 
-/// Time to wait for lost cards when no other card can continue.
+/// Time for which lost cards are awaited when no other card can continue.
 const WAIT_FOR_LOST: Duration = Duration::from_secs(30);
 
 impl Scheduler {
@@ -31,7 +31,7 @@ impl Scheduler {
         if !is_any(Standing::Living) || may_come_back { Ok(()) } else { Err(self.what_is_left()) }
     }
 
-    /// Error of a tile that cards render differently, with none left to decide.
+    /// Error of a tile that cards render differently, with no card left to decide.
     fn undecidable(&self) -> Option<SchedulerError> {
         let disputed = self.compared.iter().take(COMPARED_AT_ONCE).map(|&index| &self.entries[index]);
         let can_decide = |entry: &Entry| {
@@ -43,7 +43,7 @@ impl Scheduler {
         Some(SchedulerError::Disagreement { tile: entry.tile, sources })
     }
 
-    /// Returns whether a tile is in transit to the sinks, or a card is at work or can take a tile.
+    /// Returns whether a tile is in transit to the sinks, or a card is working or can take a tile.
     fn can_go_on(&self) -> bool {
         let is_at_work = || self.cards.iter().any(|card| !card.tiles.is_empty());
         // A found tile is not done yet, but needs no card: another thread passes it to the sinks.
@@ -70,7 +70,7 @@ impl Scheduler {
         }
     }
 
-    /// Remaining tiles, if all of them are set apart because cards have crashed at them.
+    /// Returns the remaining tiles if all are set apart because cards have crashed at them.
     pub fn crashed_at(&self) -> Vec<Tile> {
         let left = || self.entries.iter().filter(|entry| !matches!(entry.progress, Progress::Done(_)));
         if left().any(|entry| entry.crashes.len() < CRASHES_APART) {

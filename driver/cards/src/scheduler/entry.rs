@@ -12,25 +12,25 @@ use super::error::Source;
 /// Progress of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Progress {
-    /// To be rendered or verified.
+    /// Not rendered, or not verified yet.
     Open,
-    /// Rendered, and in transit to the sinks; with its card unless two cards agree on it.
+    /// Rendered, and in transit to the sinks. Holds the card, or `None` if two cards agree on the tile.
     Found(Option<CardNumber>),
-    /// Stored by all sinks; with its card unless two cards agree on it.
+    /// Stored by all sinks. Holds the card, or `None` if two cards agree on the tile.
     Done(Option<CardNumber>),
-    /// Abandoned after five crashes.
+    /// Given up after five crashes.
     Abandoned,
 }
 
-/// Copy of a tile on a card.
+/// Assignment of a tile to a card that has not answered yet.
 #[derive(Debug)]
 pub(super) struct Copy {
     pub(super) card: CardNumber,
-    /// Earliest time at which the card can have started it.
+    /// Earliest time at which the card can have started the tile.
     pub(super) since: Duration,
 }
 
-/// Rendered tile that awaits comparison.
+/// Rendered tile that awaits comparison with another.
 #[derive(Debug)]
 pub(super) struct Answer {
     pub(super) source: Source,
@@ -38,7 +38,7 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// Returns whether two answers are equal bit for bit.
+    /// Returns whether two answers are equal, bit for bit.
     fn agrees_with(&self, other: &Self) -> bool {
         let is_kept = [self, other].iter().any(|answer| answer.source == Source::Kept);
         let work = |answer: &Self| {
@@ -49,16 +49,15 @@ impl Answer {
     }
 }
 
-/// State of a tile: its copies on cards, and their answers.
 #[derive(Debug)]
 pub(super) struct Entry {
     pub(super) tile: Tile,
     pub(super) progress: Progress,
     /// True if two cards must agree on the tile.
     pub(super) is_verified: bool,
-    /// True if the first answer is dazzling: another card is asked, as for a verified tile.
+    /// True if the first answer is dazzling, so that another card renders the tile as well.
     pub(super) is_doubted: bool,
-    /// True if the tile that was believed last is dazzling, and there was no other card to be asked.
+    /// True if the accepted tile is dazzling, and no other card was available to confirm it.
     pub(super) is_dazzling: bool,
     pub(super) copies: Vec<Copy>,
     pub(super) answers: Vec<Answer>,
@@ -83,7 +82,7 @@ impl Entry {
         self.copies.iter().any(|copy| copy.card == card) || self.has_answer_of(card)
     }
 
-    /// Returns whether a card alone is believed that its dazzling tile is right.
+    /// Returns whether the tile is dazzling and accepted from this card without confirmation.
     pub(super) fn is_dazzling_of(&self, card: CardNumber) -> bool {
         let is_its = [Progress::Found(Some(card)), Progress::Done(Some(card))].contains(&self.progress);
         is_its && self.is_dazzling
@@ -108,12 +107,12 @@ impl Entry {
         pairs.into_iter().find(|&[first, second]| self.answers[first].agrees_with(&self.answers[second]))
     }
 
-    /// Returns whether there are several answers, which then differ pairwise.
+    /// Returns whether there are several answers. They differ pairwise, because two that agree are removed.
     pub(super) fn is_disputed(&self) -> bool {
         self.is_open() && self.answers.len() > 1
     }
 
-    /// Removes all answers if two of them agree, and returns the verdict.
+    /// If two answers agree, removes all answers and returns the verdict.
     pub(super) fn judge(&mut self) -> Option<Judgement> {
         let Some([first, second]) = self.agreeing() else { return self.judge_by_light() };
         let answers = std::mem::take(&mut self.answers);
@@ -125,7 +124,7 @@ impl Entry {
         Some(Judgement { tile, agreed, liars })
     }
 
-    /// Believes one of two cards that differ, if the other's tile alone is dazzling.
+    /// Decides between the answers of two cards if exactly one of them is dazzling, in favour of the other.
     fn judge_by_light(&mut self) -> Option<Judgement> {
         let [a, b] = &self.answers[..] else { return None };
         let (believed, liar) = match [a, b].map(|answer| answer.tile.is_dazzling()) {
@@ -139,20 +138,20 @@ impl Entry {
     }
 }
 
-/// Verdict on a verified tile: the tile that is believed, why, and the sources of other answers.
+/// Verdict on a verified tile: the accepted tile, the reason, and the sources of other answers.
 pub(super) struct Judgement {
     pub(super) tile: FinishedTile,
     pub(super) agreed: Agreement,
     pub(super) liars: Vec<Source>,
 }
 
-/// Reason why a tile is believed.
+/// Reason why a tile is accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Agreement {
-    /// Two cards agree on it.
+    /// Two cards agree.
     OfCards,
-    /// A card agrees with the partial file, which has it already.
+    /// A card agrees with the partial file, which contains the tile already.
     WithKept,
-    /// The card's tile is not dazzling, and the other's is.
+    /// The tile of this card is not dazzling, and the other one is.
     ByLight(CardNumber),
 }

@@ -25,10 +25,10 @@ impl Source {
     }
 }
 
-/// Error that ends a render though cards are left.
+/// Error that ends a render although cards are left.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum SchedulerError {
-    /// Error of a tile that cards render differently, with none left to decide.
+    /// Error of a tile that cards render differently, with no card left to decide.
     #[error("the tile {} is rendered differently by {sources:?}", Rectangle(tile))]
     Disagreement {
         /// The disputed tile.
@@ -36,19 +36,19 @@ pub enum SchedulerError {
         /// Sources of its answers.
         sources: Vec<Source>,
     },
-    /// Error of a tile in a partial file that differs from the one that two cards render.
+    /// Error of a tile in a partial file that differs from the one on which two cards agree.
     #[error("the tile {} in the file of finished tiles differs from what cards render", Rectangle(tile))]
     KeptDiffers {
         /// The disputed tile.
         tile: Tile,
     },
-    /// Error of a tile to be verified without a second card.
+    /// Error of a tile that requires verification when there is no second card.
     #[error("no second card is left to verify the tile {}", Rectangle(tile))]
     Unverified {
         /// The unverified tile.
         tile: Tile,
     },
-    /// Error of tiles at which cards have crashed; all others are done.
+    /// Error of tiles at which cards have crashed. All other tiles are done.
     #[error("cards crash at the tiles {}", rectangles(tiles))]
     Unrendered {
         /// The tiles.
@@ -56,8 +56,8 @@ pub enum SchedulerError {
     },
 }
 
-/// Formats a tile as an argument of `--crop`: first column and one past the last, first row and one past the
-/// last.
+/// Formats a tile as an argument of `--crop`: first column, end column, first row, end row; ends are
+/// exclusive.
 pub(crate) struct Rectangle<'a>(pub(crate) &'a Tile);
 
 impl fmt::Display for Rectangle<'_> {

@@ -1,5 +1,5 @@
-//! Homes: the cards that have rendered the tiles of a picture before, and hold the irradiance records of
-//! these.
+//! Reserves tiles for their home, the card that rendered them in an earlier pass and holds their irradiance
+//! records.
 
 use std::collections::HashMap;
 use std::time::Duration;
@@ -10,8 +10,8 @@ use super::Scheduler;
 use super::card::CardNumber;
 use super::entry::Progress;
 
-/// Number of tiles at home up to which a card that is at work is waited for, as others would have to gather
-/// their records.
+/// Number of reserved tiles of a working card that other cards do not take, because they would have to gather
+/// the irradiance records again.
 const MAX_AT_HOME: usize = 4;
 
 impl Scheduler {
@@ -30,25 +30,25 @@ impl Scheduler {
         self
     }
 
-    /// Tiles that a card alone has rendered.
+    /// Tiles of which this card's answer was accepted without another.
     pub fn rendered_by(&self, card: CardNumber) -> impl Iterator<Item = &Tile> {
         let entries = self.entries.iter().filter(move |entry| entry.progress == Progress::Done(Some(card)));
         entries.map(|entry| &entry.tile)
     }
 
-    /// Number of tiles that no card has.
+    /// Number of tiles that are on no card.
     pub(super) fn waiting_anywhere(&self) -> usize {
         self.waiting.len() + self.cards.iter().map(|card| card.at_home.len()).sum::<usize>()
     }
 
-    /// Releases the tiles of a card that cannot take them.
+    /// Makes the tiles that are reserved for a card available to all.
     pub(super) fn release_homes(&mut self, card: CardNumber) {
         let tiles = std::mem::take(&mut self.cards[card].at_home);
         self.waiting.extend(tiles);
     }
 
-    /// Takes a tile from the card that has most at home, and would render it last; `None` if that card is
-    /// about to render its own.
+    /// Takes the last tile from the card with the most reserved tiles; `None` if that card will soon render
+    /// it itself.
     pub(super) fn next_of_others(&mut self, now: Duration) -> Option<usize> {
         let patience = self.patience();
         let has_most = |card: &CardNumber| self.cards[*card].at_home.len();

@@ -1,18 +1,18 @@
 //! Assignment of tiles to cards.
 //!
 //! Tiles wait in one queue. A card with a free credit takes the next one, unless so few are left that other
-//! cards would go without; no card waits for another, and results arrive in any order. A tile's pixels do not
-//! depend on its card or its time.
+//! cards would have none. No card waits for another, and results arrive in any order. The pixels of a tile
+//! depend neither on its card nor on time.
 //!
-//! - A tile to be verified is rendered by a second card as soon as one is free. If they differ, a third
-//!   decides; the tiles that the outvoted card alone has rendered are rendered again.
-//! - A tile that is brighter than any but a lamp beside a surface makes it is verified as well, if there is
-//!   another card. A tile that is not is believed against one that is. A card alone is believed, and its
-//!   tiles counted.
+//! - A second card renders a tile that requires verification, as soon as one is free. If the two differ, a
+//!   third decides. All tiles of the outvoted card that no other card has confirmed are rendered again.
+//! - A dazzling tile is verified as well, if there is another card. A tile is dazzling if its radiance is
+//!   higher than any source but a lamp next to a surface explains. If exactly one of two answers is dazzling,
+//!   the other one is accepted. The dazzling tiles of a single card are accepted and counted.
 //! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the
-//!   cards that have crashed at it the minimum number of times, and is abandoned after five crashes.
-//! - A tile of a picture by passes waits for the card that rendered it before, which has kept its irradiance
-//!   records. Idle cards take tiles of others from the end, unless these will soon come to them.
+//!   cards with the fewest crashes at it, and is abandoned after five crashes.
+//! - In a render by passes, a tile is reserved for the card that rendered it before and holds its irradiance
+//!   records. Idle cards take reserved tiles of other cards from the end, unless these will be rendered soon.
 //! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once
 //!   that exceeds twice the mean time of a tile. The first answer counts.
 //!
@@ -49,10 +49,11 @@ use self::entry::{Agreement, Answer, Entry, Judgement, Progress};
 const CRASHES_APART: usize = 2;
 /// Number of crashes after which a tile is abandoned.
 const MAX_CRASHES: usize = 5;
-/// Maximum time of a ray over the mean of the card's slowest tile.
+/// Maximum time per ray, as a multiple of the mean time per ray in the card's slowest tile.
 const SLOWER_THAN_BEFORE: f64 = 50.0;
-/// Maximum time of a ray over the mean of the slowest tile of all cards, for a card without rendered tiles: a
-/// Cortex-M4F takes some 400 times as long as a chip that a desktop computer emulates.
+/// Maximum time per ray of a card without rendered tiles, as a multiple of the mean time per ray in the
+/// slowest tile of all cards. A Cortex-M4F takes some 400 times as long as a chip that a desktop computer
+/// emulates.
 const SLOWER_THAN_OTHERS: f64 = 1000.0;
 
 /// Tiles of a picture, with their progress.
@@ -60,17 +61,17 @@ const SLOWER_THAN_OTHERS: f64 = 1000.0;
 pub struct Scheduler {
     entries: Vec<Entry>,
     by_id: HashMap<u32, usize>,
-    /// Queue of tiles that no card has.
+    /// Queue of tiles that are on no card.
     waiting: VecDeque<usize>,
-    /// Tiles with an answer that await a second one.
+    /// Tiles with one answer that await a second one.
     compared: VecDeque<usize>,
-    /// Open tiles at which cards have crashed so often that they wait until all others are done.
+    /// Unfinished tiles with several crashes, which wait until all others are done.
     set_apart: Vec<usize>,
     cards: Vec<Card>,
     has_helpers: bool,
-    /// Time before which no card has had a tile for too long.
+    /// Time before which no tile can be due for duplication.
     next_help: Duration,
-    /// Time since which no card can continue, though the render is not complete.
+    /// Time since which no card can continue an incomplete render; `None` while one can.
     stuck_since: Option<Duration>,
     times: TileTimes,
     /// Work on verified tiles.
@@ -79,12 +80,12 @@ pub struct Scheduler {
     counts: TileCounts,
 }
 
-/// Numbers of tiles that were taken over or rendered more than once.
+/// Numbers of tiles that were taken over, verified, repeated or revoked.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TileCounts {
-    /// Tiles taken over from an earlier render, without those to be verified.
+    /// Tiles taken over from an earlier render, without those that are verified.
     pub kept: usize,
-    /// Dazzling tiles among these.
+    /// Dazzling tiles among those taken over.
     pub kept_dazzling: usize,
     /// Tiles on which two cards agree.
     pub verified: usize,
@@ -97,16 +98,16 @@ pub struct TileCounts {
 /// Consequences of an answer.
 #[derive(Debug, Default)]
 pub struct Answered {
-    /// Tile for the sinks; [`Scheduler::complete`] confirms that they have it.
+    /// Tile to store in the sinks, to be confirmed by [`Scheduler::complete`].
     pub found: Option<FinishedTile>,
-    /// Cards that were outvoted at the tile: arguments of [`Scheduler::expel`].
+    /// Cards that were outvoted at the tile, to be passed to [`Scheduler::expel`].
     pub liars: Vec<CardNumber>,
-    /// Error that ends the render.
+    /// Error that ends the render; `None` to continue.
     pub fault: Option<SchedulerError>,
 }
 
 impl Scheduler {
-    /// Scheduler of `tiles` for `cards` cards.
+    /// Creates a scheduler of `tiles` for `cards` cards.
     pub fn new(tiles: Vec<Tile>, cards: usize) -> Self {
         Self {
             by_id: tiles.iter().zip(0..).map(|(tile, index)| (tile.id, index)).collect(),
@@ -125,7 +126,7 @@ impl Scheduler {
         }
     }
 
-    /// Enables other cards to render tiles as well that a card has had for too long, or that are dazzling.
+    /// Enables duplication of late tiles and verification of dazzling ones, by other cards.
     #[must_use]
     pub fn with_helpers(self) -> Self {
         Self { has_helpers: true, ..self }
@@ -143,7 +144,8 @@ impl Scheduler {
         self
     }
 
-    /// Takes over the tiles of a film. Tiles to be verified are compared with a card's.
+    /// Takes over the tiles of a film from an earlier render. Those to be verified are compared with the
+    /// answer of one card.
     #[must_use]
     pub fn with_kept(mut self, film: &Film) -> Self {
         for (index, entry) in self.entries.iter_mut().enumerate() {
@@ -231,8 +233,8 @@ impl Scheduler {
         }
     }
 
-    /// Removes a tile from a card that has not rendered it. It goes to the front of the queue, as it has
-    /// waited longest. `has_crashed` is true if the card was working on it.
+    /// Removes an unfinished tile from a card. The tile goes to the front of the queue, because it has waited
+    /// longest. `has_crashed` is true if the card was working on it.
     pub fn give_back(&mut self, card: CardNumber, id: u32, has_crashed: bool, now: Duration) {
         let Some((index, _)) = self.remove_copy(card, id, now) else { return };
         let entry = &mut self.entries[index];
@@ -254,7 +256,8 @@ impl Scheduler {
         self.release_doubted();
     }
 
-    /// Removes a tile from a card. Returns its index and the time since which the card had it.
+    /// Removes the copy of a tile from a card. Returns the tile's index, and the time at which the card can
+    /// have started it.
     fn remove_copy(&mut self, card: CardNumber, id: u32, now: Duration) -> Option<(usize, Duration)> {
         let index = *self.by_id.get(&id)?;
         let copies = &mut self.entries[index].copies;
@@ -273,7 +276,7 @@ impl Scheduler {
         Some((index, since))
     }
 
-    /// Sets the availability of a card; a card that was given up stays so.
+    /// Sets the availability of a card. A card that was given up stays so.
     pub fn set_standing(&mut self, card: CardNumber, standing: Standing) {
         if self.cards[card].standing != Standing::GivenUp {
             self.cards[card].standing = standing;
@@ -284,7 +287,7 @@ impl Scheduler {
         }
     }
 
-    /// Has the last card render doubted tiles again, as no other card is left to be asked.
+    /// Makes dazzling tiles that await confirmation available to the last card, because no other is left.
     fn release_doubted(&mut self) {
         if self.living().nth(1).is_some() {
             return;
@@ -310,14 +313,13 @@ impl Scheduler {
         self.living().next().is_some()
     }
 
-    /// Tile at which a card was outvoted.
+    /// Tile at which a card was outvoted; `None` if there is none.
     pub fn lie_of(&self, card: CardNumber) -> Option<Tile> {
         self.cards[card].lie
     }
 
-    /// Gives up a card that sent wrong pixels, of the tile `about`, or wrong messages, with all tiles that it
-    /// alone has rendered. Returns the tiles for the sinks to revoke. None of its tiles may be in transit to
-    /// the sinks.
+    /// Gives up a card that sent wrong messages, or wrong pixels of tile `about`. Returns its tiles that no
+    /// other card has confirmed, which the sinks must revoke. None of them may be in transit to the sinks.
     pub fn expel(&mut self, card: CardNumber, about: Option<Tile>) -> Vec<Tile> {
         self.set_standing(card, Standing::GivenUp);
         self.cards[card].lie = about;
@@ -344,8 +346,8 @@ impl Scheduler {
         revoked
     }
 
-    /// Maximum time of a ray or its gather on a card, seconds, from the times of rendered tiles; `None`
-    /// before the first tile of any card.
+    /// Time limit per ray or gather of a card, seconds, from the times of rendered tiles; `None` before the
+    /// first tile of any card.
     pub fn slowest(&self, card: CardNumber) -> Option<f64> {
         let before = self.cards[card].slowest.map(|seconds| seconds * SLOWER_THAN_BEFORE);
         let others = self.cards.iter().filter_map(|card| card.slowest).reduce(f64::max);
@@ -357,29 +359,29 @@ impl Scheduler {
         self.done == self.entries.len()
     }
 
-    /// Number of tiles that are done, and of all tiles, both without tiles taken over from an earlier render.
+    /// Numbers of finished tiles and of all tiles, both without those taken over from an earlier render.
     pub fn progress(&self) -> (usize, usize) {
         (self.done - self.counts.kept, self.entries.len() - self.counts.kept)
     }
 
-    /// Numbers of tiles that were taken over or rendered more than once.
+    /// Numbers of tiles that were taken over, verified, repeated or revoked.
     pub fn counts(&self) -> TileCounts {
         self.counts
     }
 
-    /// Number of dazzling tiles that a card alone has rendered, without another that could be asked.
+    /// Number of dazzling tiles accepted from a card without confirmation by another.
     pub fn dazzling_of(&self, card: CardNumber) -> usize {
         self.entries.iter().filter(|entry| entry.is_dazzling_of(card)).count()
     }
 
-    /// Work on the tiles of the picture, each counted once.
+    /// Work on the tiles of the picture. A tile that was rendered twice counts once.
     pub fn counters(&self) -> Counters {
         let mut sum = self.verified_work;
         self.cards.iter().for_each(|card| sum.add(&card.counters));
         sum
     }
 
-    /// Work on the tiles that a card alone has rendered.
+    /// Work on the tiles of a card that no other card has confirmed.
     pub fn counters_of(&self, card: CardNumber) -> &Counters {
         &self.cards[card].counters
     }

@@ -5,7 +5,7 @@ use super::*;
 
 const SECOND: Duration = Duration::from_secs(1);
 
-/// Scheduler of `tiles` tiles of one pixel each.
+/// Scheduler of `tiles` one-pixel tiles.
 fn scheduler(tiles: u32, cards: usize) -> Scheduler {
     Scheduler::new((0..tiles).map(tile).collect(), cards)
 }
@@ -21,18 +21,18 @@ fn finished(id: u32, value: u8) -> FinishedTile {
     FinishedTile::new(tile(id), records, SumFormat::ONE, counters).unwrap()
 }
 
-/// A tile of so much green light.
+/// Finished tile with this sum of green light.
 fn lit(id: u32, light: i64) -> FinishedTile {
     let sums = PixelSums { light: [0, light, 0], ..PixelSums::default() };
     FinishedTile::of_pixels(tile(id), [sums], SumFormat::ONE).unwrap()
 }
 
-/// Assigns the next tile to a card.
+/// Assigns the next tile to a card and returns its id.
 fn take(scheduler: &mut Scheduler, card: CardNumber, now: Duration) -> Option<u32> {
     scheduler.take(card, now).map(|assignment| assignment.tile.id)
 }
 
-/// Answers with a tile and passes it to the sinks. Returns the outvoted cards.
+/// Answers with a tile and stores it in the sinks. Returns the outvoted cards.
 fn answer(scheduler: &mut Scheduler, card: CardNumber, id: u32, value: u8, now: Duration) -> Vec<CardNumber> {
     let answered = scheduler.answer(card, finished(id, value), now);
     scheduler.complete(id);
@@ -40,7 +40,7 @@ fn answer(scheduler: &mut Scheduler, card: CardNumber, id: u32, value: u8, now: 
 }
 
 #[test]
-fn an_idle_card_takes_what_is_at_another_for_too_long_and_the_first_answer_counts() {
+fn an_idle_card_duplicates_a_late_tile_and_the_first_answer_counts() {
     let mut scheduler = scheduler(4, 3).with_helpers();
     for (card, id) in [(0, 0), (1, 1), (2, 2)] {
         assert_eq!(take(&mut scheduler, card, Duration::ZERO), Some(id));
@@ -79,7 +79,7 @@ fn the_last_tiles_go_singly_to_idle_cards() {
 }
 
 #[test]
-fn a_render_goes_on_while_its_last_tile_is_on_its_way_to_the_sinks() {
+fn a_render_continues_while_its_last_tile_is_in_transit_to_the_sinks() {
     let mut scheduler = scheduler(1, 2);
     for card in 0..2 {
         scheduler.set_standing(card, Standing::Living);
@@ -93,7 +93,7 @@ fn a_render_goes_on_while_its_last_tile_is_on_its_way_to_the_sinks() {
 }
 
 #[test]
-fn a_card_finds_what_it_can_verify_behind_many_tiles_of_its_own() {
+fn a_card_finds_a_tile_to_verify_behind_many_of_its_own() {
     const TILES: u32 = 300;
     let mut scheduler = scheduler(TILES, 2).verifying(1.0, 0);
     for card in 0..2 {
@@ -114,7 +114,7 @@ fn a_card_finds_what_it_can_verify_behind_many_tiles_of_its_own() {
 }
 
 #[test]
-fn a_tile_that_a_card_has_crashed_at_is_helped_as_well() {
+fn a_late_tile_with_a_crash_is_duplicated() {
     let mut scheduler = scheduler(1, 3).with_helpers();
     assert_eq!(take(&mut scheduler, 0, Duration::ZERO), Some(0));
     scheduler.give_back(0, 0, true, SECOND);
@@ -130,7 +130,7 @@ fn without_helpers_no_tile_is_rendered_twice() {
 }
 
 #[test]
-fn a_majority_of_three_tells_who_lies_and_all_its_tiles_are_rendered_again() {
+fn a_card_outvoted_by_two_loses_all_its_tiles() {
     for liar in 0..3 {
         let mut scheduler = scheduler(2, 3).verifying(1e-9, 7);
         let verified = scheduler.entries.iter().position(|entry| entry.is_verified).unwrap() as u32;
@@ -160,7 +160,7 @@ fn a_majority_of_three_tells_who_lies_and_all_its_tiles_are_rendered_again() {
 }
 
 #[test]
-fn two_cards_that_differ_cannot_be_told_apart() {
+fn two_cards_that_differ_end_the_render() {
     let mut scheduler = scheduler(1, 2).verifying(1.0, 0);
     for card in 0..2 {
         assert!(scheduler.check(SECOND).is_ok());
@@ -172,9 +172,10 @@ fn two_cards_that_differ_cannot_be_told_apart() {
     assert_eq!(scheduler.check(SECOND), Err(SchedulerError::Disagreement { tile: tile(0), sources }));
 }
 
-/// A card alone is believed; of two, the one with less light; two that agree are right.
+/// One card alone is believed. Of two that differ, the one with less light is believed. Two that agree are
+/// believed.
 #[test]
-fn dazzling_light_is_verified_where_there_is_another_card() {
+fn dazzling_tiles_are_verified_if_there_is_another_card() {
     let dazzling = 1 << 57;
     for (cards, second, liars, end) in
         [(1, None, vec![], dazzling), (2, Some(7), vec![0], 7), (2, Some(dazzling), vec![], dazzling)]
@@ -234,7 +235,7 @@ fn dazzling_light_is_verified_where_there_is_another_card() {
 }
 
 #[test]
-fn work_that_differs_is_a_lie_but_for_how_gathers_wait() {
+fn counters_must_agree_except_those_of_the_gather_queue() {
     for (counters, agrees) in [
         (Counters { eye_rays: 10, drains: 7, most_waiting: 9, ..Counters::ZERO }, true),
         (Counters { eye_rays: 11, ..Counters::ZERO }, false),
@@ -264,7 +265,7 @@ fn a_share_of_the_tiles_is_verified_and_one_at_least() {
 }
 
 #[test]
-fn a_tile_that_has_taken_two_cards_waits_until_all_others_are_done() {
+fn a_tile_with_two_crashes_waits_until_all_others_are_done() {
     let mut scheduler = scheduler(3, 4);
     for card in 0..2 {
         assert_eq!(take(&mut scheduler, card, SECOND), Some(0));
@@ -314,7 +315,7 @@ fn kept_tiles_are_verified_by_one_card() {
 }
 
 #[test]
-fn a_card_has_time_as_its_own_tiles_or_those_of_others_tell() {
+fn the_time_limit_of_a_card_follows_from_its_own_tiles_or_those_of_others() {
     let mut scheduler = scheduler(3, 2);
     assert_eq!(scheduler.slowest(0), None);
     take(&mut scheduler, 0, Duration::ZERO);
@@ -323,7 +324,8 @@ fn a_card_has_time_as_its_own_tiles_or_those_of_others_tell() {
     assert_eq!([scheduler.slowest(0), scheduler.slowest(1)], [Some(0.1 * 50.0), Some(0.1 * 1000.0)]);
 }
 
-/// Scheduler of `tiles` tiles of which the first card of two has rendered the first `of_first` before.
+/// Scheduler of `tiles` tiles for two cards. The first `of_first` are reserved for card 0, the others for
+/// card 1.
 fn with_homes(tiles: u32, of_first: u32) -> Scheduler {
     let before: Vec<Tile> = (0..tiles).map(tile).collect();
     scheduler(tiles, 2).with_homes(before.iter().map(|tile| (usize::from(tile.id >= of_first), tile)))
@@ -363,7 +365,7 @@ fn an_idle_card_takes_the_last_of_many_tiles_of_another() {
 }
 
 #[test]
-fn tiles_of_a_lost_card_and_other_rectangles_are_any_cards() {
+fn any_card_takes_tiles_reserved_for_a_lost_card_or_of_another_size() {
     let mut scheduler = with_homes(3, 0);
     assert_eq!(take(&mut scheduler, 1, Duration::ZERO), Some(0));
     assert_eq!(take(&mut scheduler, 0, Duration::ZERO), None);

@@ -1,24 +1,24 @@
-//! Tiles of a picture, and orders of their gathers.
+//! Tiles of a picture, and the order of their photon gathers.
 
 use photoncard_picture::choice::choices;
 use photoncard_picture::film::Window;
 use photoncard_shared::message::{Drain, Tile};
 
-/// Order of photon gathers. The picture does not depend on it.
+/// Order of photon gathers. It has no effect on the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GatherOrder {
     /// Pixels along scanlines, each with its rays in the sampler's order.
     Naive,
     /// Pixels along the scanlines of square tiles, each with its rays in the sampler's order.
     Tiled,
-    /// Within a tile, the rays of one direction bin for all pixels, then the rays of the next bin.
+    /// Within a tile, all pixels' rays in one direction bin, then those in the next bin.
     DirectionBins,
-    /// Rays by direction bins; gathers wait in the queue and are sorted by a spatial hash of their positions.
+    /// Rays by direction bins. Gathers wait in the queue, sorted by a spatial hash of their positions.
     Hash,
-    /// Rays by direction bins; gathers wait in the queue and are sorted along a Hilbert curve.
+    /// Rays by direction bins. Gathers wait in the queue, sorted along a Hilbert curve.
     Sort,
-    /// All gathers of the frame along one Hilbert curve. Only emulated chips can do it: they leave their
-    /// gathers to the host.
+    /// All gathers of the frame along one Hilbert curve. Only emulated chips support it, because the host
+    /// does the gathers.
     Hilbert,
 }
 
@@ -33,7 +33,7 @@ choices!(GatherOrder {
 });
 
 impl GatherOrder {
-    /// Policy by which a chip empties its queue of gathers.
+    /// Policy by which a chip empties its gather queue.
     pub fn drain(self) -> Drain {
         match self {
             Self::Naive | Self::Tiled | Self::DirectionBins => Drain::Immediate,
@@ -47,8 +47,8 @@ impl GatherOrder {
         matches!(self, Self::Hash | Self::Sort)
     }
 
-    /// Returns whether the gathers of the whole frame are ordered together: the host does them, and all tiles
-    /// are finished at the end.
+    /// Returns whether the gathers of the whole frame are sorted together. The host then does them, and all
+    /// tiles finish at the end.
     pub fn is_of_whole_frame(self) -> bool {
         self == Self::Hilbert
     }
@@ -59,7 +59,7 @@ impl GatherOrder {
     }
 }
 
-/// Tiles of a window, each of at most `side * side` pixels, numbered from 0.
+/// Divides a window into tiles of at most `side * side` pixels, numbered from 0.
 pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     let side = side.max(1);
     let (tile_width, tile_height) = match order {
@@ -81,17 +81,17 @@ pub fn tiles(window: Window, side: u32, order: GatherOrder) -> Vec<Tile> {
     tiles
 }
 
-/// Tiles, numbered from 0, in an order in which the first ones of any number lie all over the picture, so
-/// that they take about as long as any others: by the fraction of `number / golden ratio`. Between the first
-/// `k` of `n` numbers there are gaps of three lengths at most, all about `n / k` (three-gap theorem).
+/// Sorts tiles, numbered from 0, so that any first `k` of them are spread over the picture and take a typical
+/// time. The key is the fractional part of `number / golden ratio`. The gaps between the first `k` of `n`
+/// numbers have at most three lengths, all about `n / k` (three-gap theorem).
 pub fn spread(mut tiles: Vec<Tile>) -> Vec<Tile> {
-    /// `2^32` over the golden ratio.
+    /// `2^32` divided by the golden ratio.
     const GOLDEN: u32 = 0x9E37_79B9;
     tiles.sort_by_key(|tile| GOLDEN.wrapping_mul(tile.id));
     tiles
 }
 
-/// Tiles by the distance of their middles from a pixel, the nearest first.
+/// Sorts tiles by the distance of their centres from a pixel, the nearest first.
 pub fn near(mut tiles: Vec<Tile>, [x, y]: [u32; 2]) -> Vec<Tile> {
     // Twice the distance of the middle, which may lie between pixels.
     let along = |start: u32, length: u32, at: u32| {
@@ -106,7 +106,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_tile_of_a_pixel_is_the_first_near_it() {
+    fn the_nearest_tile_is_the_one_that_contains_the_pixel() {
         let window = Window { x0: 0, x1: 100, y0: 0, y1: 70 };
         let all = tiles(window, 16, GatherOrder::Sort);
         for (x, y) in [(0, 0), (40, 24), (99, 69), (8, 60)] {
@@ -118,9 +118,9 @@ mod tests {
         assert_eq!(near(all, [u32::MAX; 2]).len(), 35);
     }
 
-    /// All tiles are there once; between the first ones of any number there are no large gaps.
+    /// Every tile occurs once, and the first `k` tiles have no large gaps between them.
     #[test]
-    fn spread_tiles_are_the_same_and_lie_all_over_the_picture() {
+    fn spread_tiles_are_complete_and_evenly_distributed() {
         for count in 1..=150 {
             let all = tiles(Window { x0: 1, x1: 1 + 8 * count, y0: 7, y1: 9 }, 8, GatherOrder::Sort);
             let found = spread(all.clone());

@@ -1,4 +1,4 @@
-//! A session's end of the link: the transport, commands that wait for its window, and counts of bytes.
+//! Session's end of the link: the transport, commands that wait for its send window, and counts of bytes.
 
 use std::collections::VecDeque;
 
@@ -9,18 +9,17 @@ use photoncard_shared::transport::Transport;
 
 use super::LinkBytes;
 
-/// A session's end of the link.
 pub(super) struct Channel {
     pub(super) transport: Transport,
     /// Encoded commands that wait for room in the send window.
     commands: VecDeque<Vec<u8>>,
-    /// Number of the link's current session.
+    /// Number of the present session on the link.
     number: u32,
     pub(super) bytes: LinkBytes,
 }
 
 impl Channel {
-    /// Channel whose first session has the number after `number`.
+    /// Creates a channel. Its first session has the number after `number`.
     pub(super) fn before(number: u32) -> Self {
         Self {
             transport: Transport::host(),
@@ -30,7 +29,7 @@ impl Channel {
         }
     }
 
-    /// Begins the next session of the link with a greeting.
+    /// Starts the next session of the link with a greeting.
     pub(super) fn greet(&mut self) {
         self.number = self.number.wrapping_add(1);
         self.commands.clear();
@@ -47,17 +46,17 @@ impl Channel {
         }
     }
 
-    /// Drops the commands that wait.
+    /// Drops the waiting commands.
     pub(super) fn drop_commands(&mut self) {
         self.commands.clear();
     }
 
-    /// Returns whether no command waits, and the window has room for one.
+    /// Returns whether no command waits and the window has room for one.
     pub(super) fn is_free(&self) -> bool {
         self.commands.is_empty() && self.transport.can_send()
     }
 
-    /// Sends commands that wait, as far as the window has room.
+    /// Sends waiting commands while the window has room.
     pub(super) fn forward(&mut self) {
         while self.transport.can_send()
             && let Some(command) = self.commands.pop_front()

@@ -1,39 +1,39 @@
-//! Clock of a session: time limits of silence and of missing progress, and times of probes.
+//! Clock of a session: time limits of silence and of missing progress, and the times of probes.
 
 use std::time::Duration;
 
 use super::SessionError;
 
-/// Maximum silence of a card while an answer is due: it answers between any two steps of its work.
+/// Maximum silence of a card that owes an answer. Cards answer between any two steps of their work.
 const SILENCE: Duration = Duration::from_secs(10);
-/// Silence before the first probe; it doubles with each probe that is not answered.
+/// Silence before the first probe. It doubles with each unanswered probe.
 const PATIENCE: Duration = Duration::from_millis(200);
 const MAX_PATIENCE: Duration = Duration::from_secs(1);
-/// Maximum time from a card's first answer to its reply to the hello. A slow serial line takes a second or
-/// two.
+/// Maximum time from a card's first answer to its hello. A slow serial line takes a second or two.
 const GREETING: Duration = Duration::from_secs(5);
-/// Lower bound of the time limit of a tile, if times of rendered tiles are known.
+/// Minimum time limit of a tile if times of rendered tiles are known.
 const TILE: Duration = Duration::from_secs(30);
-/// Maximum time without progress, except for tiles. The longest step, the verification of a received image,
+/// Maximum time without progress, except for tiles. The longest step is the check of a received image, which
 /// takes seconds.
 const STANDSTILL: Duration = Duration::from_secs(120);
-/// Time per ray with its gather that extends [`STANDSTILL`] while a tile is rendered and no times are known,
-/// as all pixels may arrive at its end: some fifty times the slowest chip measured.
+/// Time per ray or gather that is added to [`STANDSTILL`] while a tile is rendered and no times are known,
+/// because all pixels may arrive at the end of a tile. It is some fifty times that of the slowest chip
+/// measured.
 const RAY: Duration = Duration::from_millis(20);
 
-/// Maximum time between two polls of the link that counts as time. Longer gaps mean that the host itself was
-/// stopped, or without a processor.
+/// Maximum counted time between two polls of the link. A longer gap means that the host was suspended or had
+/// no processor time.
 const MAX_BETWEEN_LOOKS: Duration = Duration::from_secs(1);
 
-/// Times of a session's link.
+/// Times of events on a session's link.
 pub(super) struct Clock {
     /// Time of the first frame received in the session.
     heard: Option<Duration>,
     /// Start of the present silence.
     since: Duration,
-    /// Time of the last message that was delivered, in either direction.
+    /// Time of the last delivered message, in either direction.
     passed: Duration,
-    /// Time from which the present wait for an answer counts.
+    /// Time from which the wait for the present answer counts.
     asked: Duration,
     patience: Duration,
     /// Time of the last poll.
@@ -63,13 +63,13 @@ impl Clock {
         self.heard.is_some()
     }
 
-    /// Records that bytes were sent, whose answer takes its time. A line that accepts no bytes counts as
+    /// Records that bytes were sent; time for the answer starts again. A line that accepts no bytes counts as
     /// silent.
     pub(super) fn sent(&mut self, now: Duration) {
         self.asked = now;
     }
 
-    /// Records a poll of the link. Time in which the host did not run is not the card's silence.
+    /// Records a poll of the link. Time in which the host did not run does not count as silence of the card.
     pub(super) fn look(&mut self, now: Duration) {
         let absent = now.saturating_sub(self.looked).saturating_sub(MAX_BETWEEN_LOOKS);
         self.looked = now;
@@ -79,7 +79,7 @@ impl Clock {
         }
     }
 
-    /// Restarts all limits: no answer is due.
+    /// Restarts all time limits, because no answer is due.
     pub(super) fn rest(&mut self, now: Duration) {
         self.since = now;
         self.passed = now;
@@ -96,16 +96,16 @@ impl Clock {
         must_ask
     }
 
-    /// Returns whether the card answers a greeting without a hello for too long.
+    /// Returns whether the card has answered for too long without a hello.
     pub(super) fn is_greeted_in_vain(&self, now: Duration) -> bool {
         self.heard.is_some_and(|heard| now.saturating_sub(heard) > GREETING)
     }
 
-    /// Checks the silence, and the time without progress, of a card whose largest tile has `rays` rays.
-    /// `slowest` is the maximum time of a ray or its gather, seconds, if known.
+    /// Checks the limits of silence and of time without progress, for a card whose largest tile has `rays`
+    /// rays. `slowest` is the time limit per ray or gather, seconds, if known.
     ///
     /// # Errors
-    /// If either is too long.
+    /// If the card has exceeded either limit.
     pub(super) fn check(&self, rays: u64, slowest: Option<f64>, now: Duration) -> Result<(), SessionError> {
         if now.saturating_sub(self.since) > SILENCE {
             return Err(SessionError::Silent(SILENCE));
@@ -122,7 +122,7 @@ impl Clock {
     }
 }
 
-/// Duration of `seconds` seconds, at most [`Duration::MAX`].
+/// Duration of `seconds`, limited to [`Duration::MAX`].
 fn time(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
 }

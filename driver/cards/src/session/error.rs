@@ -28,11 +28,11 @@ pub enum SessionError {
         /// Version of this program.
         host: u16,
     },
-    /// Error of a card without credits for tiles.
+    /// Error of a card that accepts no tiles at once.
     #[error("the card says that it has room for no tile command at all")]
     #[diagnostic(help("correct `tiles` in the budget of the card's firmware"))]
     NoTiles,
-    /// Error of a card that returns with another budget: it was replaced, or its firmware was.
+    /// Error of a card that returns with another budget, because it or its firmware was replaced.
     #[error("the card has come back with another budget than it had at first")]
     #[diagnostic(help(
         "leave a card and its firmware as they are while a picture is rendered; to use it as it is now, begin again with \
@@ -49,11 +49,11 @@ pub enum SessionError {
     #[error("the card's answer is out of order: {0}")]
     #[diagnostic(help("install the firmware and the program of one release"))]
     Unexpected(&'static str),
-    /// Error of silence.
+    /// Error of a card that was silent for this long.
     #[error("the card has not answered for {} s", .0.as_secs())]
     #[diagnostic(help("check that the card is powered and its firmware runs"))]
     Silent(Duration),
-    /// Error of a line on which bytes come, but no frame.
+    /// Error of a line on which bytes arrive but no valid frames.
     #[error("{bytes} bytes have come from the card in {} s, and no message among them", time.as_secs())]
     #[diagnostic(help(
         "another bit rate garbles all (`serial:PATH@BAUD`, as the card's firmware sets it); or the firmware \
@@ -72,7 +72,7 @@ pub enum SessionError {
          fault of the card's firmware: please report it with the command used"
     ))]
     Standstill(Duration),
-    /// Error of repeated resets, or repeated lack of progress.
+    /// Error of a card that was reset, or made no progress, too many times.
     #[error("the card was reset or came no further {0} times without completing a tile")]
     #[diagnostic(help(
         "it may crash at a tile, lack power, or have a line that damages nearly all (--stats counts `damaged_frames`): \
@@ -121,7 +121,7 @@ pub enum SessionError {
     },
 }
 
-/// Cause of the end of a link, as the predicate of its name.
+/// Verb phrase for the cause of a link's end; its subject is the name of the link.
 fn ending(error: &PortError) -> String {
     match error {
         PortError::Closed => "was closed by the other end".to_owned(),
@@ -129,8 +129,8 @@ fn ending(error: &PortError) -> String {
     }
 }
 
-/// Checks a card's versions. They are decoded before the rest of a hello, whose format may differ between
-/// versions.
+/// Checks the versions of a card. They are decoded before the rest of a hello, whose format may differ
+/// between versions.
 pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     if card.protocol != PROTOCOL_VERSION {
         return Err(SessionError::Protocol { card: card.protocol, host: PROTOCOL_VERSION });
@@ -141,8 +141,7 @@ pub(super) fn check_versions(card: Versions) -> Result<(), SessionError> {
     Ok(())
 }
 
-/// Checks a card's budget against the first one that it reported, for which settings, image and tiles were
-/// checked.
+/// Checks that a card's budget equals its first one, against which settings, image and tiles were checked.
 pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<(), SessionError> {
     if budget.tiles == 0 {
         return Err(SessionError::NoTiles);
@@ -154,8 +153,7 @@ pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<()
 }
 
 impl SessionError {
-    /// Tile of which the card sent wrong pixels, if this is the error: none of its pixels can be trusted
-    /// then.
+    /// Tile of which the card sent wrong pixels, if this is the error. None of its pixels can be trusted.
     pub fn lie(&self) -> Option<Tile> {
         match *self {
             Self::Value { tile, .. } | Self::Outvoted { tile } => Some(tile),
@@ -163,15 +161,14 @@ impl SessionError {
         }
     }
 
-    /// Returns whether the card is wrong about what it was asked, so that nothing of what it has rendered can
-    /// be trusted: it lies, its messages are none that a sound card sends, or its chip has found itself at
-    /// fault.
+    /// Returns whether nothing that the card has rendered can be trusted: it sent wrong pixels or invalid
+    /// messages, or its chip reported a fault of its own.
     pub fn is_wrong(&self) -> bool {
         self.lie().is_some()
             || matches!(self, Self::Unexpected(_) | Self::Fault(Fault { code: FaultCode::Internal, .. }))
     }
 
-    /// Returns whether the card may be retried: it has been silent, slow or disconnected, but not wrong.
+    /// Returns whether the card may be retried: it was silent, slow or disconnected, but not wrong.
     pub fn may_pass(&self) -> bool {
         matches!(self, Self::Silent(_) | Self::Garbled { .. } | Self::Standstill(_) | Self::Port(_))
     }

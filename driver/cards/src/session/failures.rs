@@ -1,16 +1,15 @@
-//! Count of a card's failures: resets and lack of progress. Closed links and silence are no failures.
+//! Counts a card's failures: resets and lack of progress. Closed links and silence are no failures.
 
 use super::SessionError;
 
-/// Maximum number of failures without a completed tile: a card receives the tile at which it crashed again.
+/// Maximum number of failures without a completed tile. A card receives the tile at which it crashed again.
 const MAX_FAILURES: u32 = 4;
 
-/// Failures of a card.
 #[derive(Default)]
 pub(super) struct Failures {
-    /// Number of resets or standstills since the last completed tile.
+    /// Number of resets and standstills since the last completed tile.
     failed: u32,
-    /// Number of lines that the card has written; a smaller number in its next hello shows a reset.
+    /// Number of lines that the card has written. A smaller number in its next hello reveals a reset.
     written_lines: u32,
 }
 
@@ -24,22 +23,23 @@ impl Failures {
         if self.failed > MAX_FAILURES { Err(SessionError::Failures(self.failed)) } else { Ok(()) }
     }
 
-    /// Marks a known reset, so that the next hello does not count it again.
+    /// Forgets the written lines after a known reset, so that the next hello does not count it again.
     pub(super) fn forget_lines(&mut self) {
         self.written_lines = 0;
     }
 
-    /// Compares the written lines of a hello. Returns whether the card was reset since it was loaded.
+    /// Compares the number of written lines in a hello with the last one. Returns whether the card was reset
+    /// since it was loaded.
     pub(super) fn says_hello(&mut self, written_lines: u32) -> bool {
         std::mem::replace(&mut self.written_lines, written_lines) > written_lines
     }
 
-    /// Records that the card has an image of `lines` lines.
+    /// Records that the card holds an image of `lines` lines.
     pub(super) fn is_loaded(&mut self, lines: u32) {
         self.written_lines = lines;
     }
 
-    /// Restarts the count after a completed tile.
+    /// Resets the count after a completed tile.
     pub(super) fn completes_tile(&mut self) {
         self.failed = 0;
     }

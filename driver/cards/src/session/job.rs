@@ -1,4 +1,4 @@
-//! Input and output of a session: jobs, tiles and events.
+//! Input and output of a session: jobs, assignments and events.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use photoncard_shared::message::{FrameParameters, MemoryTest, Tile};
 
 use super::{PixelLimits, Upload};
 
-/// Work of all cards of a render.
+/// Work that all cards of a render share: image, frame and limits.
 #[derive(Clone)]
 pub struct Job {
     /// The card image.
@@ -23,11 +23,11 @@ pub struct Job {
 pub struct Assignment {
     /// The assigned tile.
     pub tile: Tile,
-    /// True if a card has crashed at the tile before: another crash at it is not the card's fault.
+    /// True if a card has crashed at the tile before. Another crash at it is not counted against the card.
     pub is_suspect: bool,
 }
 
-/// Event of a session.
+/// Event that a session reports.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "most events are finished tiles, and few wait")]
 pub enum Event {
@@ -35,15 +35,15 @@ pub enum Event {
     Ready,
     /// The card has rendered a tile with valid values.
     TileDone(FinishedTile),
-    /// The card was reset or lost before it completed a tile.
+    /// The card was reset or lost before it completed the tile.
     TileLost {
         /// The returned tile.
         tile: Tile,
-        /// True if the card may have been working on the tile, which may be the cause.
+        /// True if the card may have been working on the tile, which may have caused the loss.
         was_at_work: bool,
     },
-    /// The card has computed the requested results.
+    /// Results of the requested operand triples.
     Computed(Vec<u8>),
-    /// The card has tested a part of its memory.
+    /// Progress or result of a memory test.
     MemoryTested(MemoryTest),
 }

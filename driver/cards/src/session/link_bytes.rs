@@ -1,4 +1,4 @@
-//! Statistics of a link's bytes.
+//! Counts of bytes and repairs on a link.
 
 use photoncard_shared::transport::LineStatistics;
 
@@ -11,14 +11,14 @@ pub struct LinkBytes {
     pub payload: u64,
     /// All bytes in both directions.
     pub wire: u64,
-    /// Frames that the host's end has repeated or received damaged or repeated.
+    /// Frames that the host repeated, and frames that it received damaged or repeated.
     pub line: LineStatistics,
     /// Number of times that the card was greeted again.
     pub resets: u64,
 }
 
 impl LinkBytes {
-    /// Adds the statistics of another link.
+    /// Adds the counts of another link.
     pub fn add(&mut self, other: &Self) {
         self.image += other.image;
         self.payload += other.payload;
@@ -30,7 +30,7 @@ impl LinkBytes {
         self.resets += other.resets;
     }
 
-    /// Statistics since an earlier time, of the same link.
+    /// Difference to earlier counts of the same link.
     #[must_use]
     pub fn since(&self, earlier: &Self) -> Self {
         Self {

@@ -1,5 +1,5 @@
-//! Loading of the image: only runs of lines that the card lacks are sent. They follow from the image that it
-//! holds or, if that is not known, from the checksums of its chunks.
+//! Loads the image: sends only runs of lines that the card lacks. They follow from the image that the card
+//! holds or, if that is unknown, from the checksums of its chunks.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use photoncard_shared::transport::Transport;
 use super::SessionError;
 use super::upload::{Runs, Upload, add_run};
 
-/// Comparison of the card's chunks with the image's, by their checksums.
+/// Comparison of chunk checksums between the card's memory and the image.
 #[derive(Default)]
 pub(super) struct Comparison {
     /// Number of lines that the card has written, of any image.
@@ -19,17 +19,17 @@ pub(super) struct Comparison {
     asked: u32,
     /// Number of chunks whose checksums were received.
     compared: u32,
-    /// Runs of compared lines that the card lacks.
+    /// Runs of compared lines that differ.
     lacking: Vec<Range<usize>>,
 }
 
 impl Comparison {
-    /// Start of a comparison; `written` is the number of lines that the card has written.
+    /// Starts a comparison. `written` is the number of lines that the card has written.
     pub(super) fn new(written: u32) -> Self {
         Self { written, ..Self::default() }
     }
 
-    /// Request for the next checksums; `None` after all chunks that the card has written.
+    /// Command that requests the next checksums; `None` after all chunks that the card has written.
     pub(super) fn next_question(&mut self, upload: &Upload) -> Option<Command<'static>> {
         // An incomplete chunk, of the card or of the image, is not compared.
         let chunks = (self.written.min(upload.lines().len() as u32)) / CHUNK_LINES;
@@ -39,7 +39,7 @@ impl Comparison {
         (count > 0).then_some(Command::ReadChecksums { first, count })
     }
 
-    /// Compares received checksums with the image's.
+    /// Compares received checksums with those of the image.
     ///
     /// # Errors
     /// If they are not the checksums that were last requested.
@@ -60,7 +60,7 @@ impl Comparison {
         Ok(())
     }
 
-    /// Runs of lines that the card lacks, after the comparison.
+    /// Runs of lines that the card lacks, once all checksums are compared.
     pub(super) fn finish(&mut self, upload: &Upload) -> Runs {
         let compared = (self.compared * CHUNK_LINES) as usize;
         add_run(&mut self.lacking, compared..upload.lines().len());
@@ -68,15 +68,15 @@ impl Comparison {
     }
 }
 
-/// Progress of the lines to a card.
+/// Progress of sending lines to a card.
 #[derive(Default)]
 pub(super) struct Load {
     runs: Runs,
-    /// Number of runs that were sent.
+    /// Number of runs that were sent completely.
     run: usize,
     /// Index of the next line, in or before the next run.
     next: usize,
-    /// True if the runs follow from the image that the card held.
+    /// True if the runs are the difference to the image that the card held.
     pub(super) is_change: bool,
 }
 
@@ -90,7 +90,7 @@ impl Load {
         self.next
     }
 
-    /// Sends the next lines that the card lacks. Returns their size in bytes; 0 after the last.
+    /// Sends the next lines that the card lacks. Returns their size in bytes; 0 after the last ones.
     pub(super) fn next_lines(&mut self, upload: &Upload, transport: &mut Transport) -> usize {
         let Some(run) = self.runs.get(self.run) else { return 0 };
         let first = self.next.max(run.start);

@@ -1,9 +1,9 @@
-//! The host's end of a card's link: a state machine without I/O, whose inputs are bytes, tiles and a clock.
+//! Host's end of a card's link: a state machine without I/O, whose inputs are bytes, tiles and a clock.
 //!
 //! A session greets the card, sends the parts of the image that the card lacks, sets the frame, requests
-//! tiles and checks their pixels. Its results are [`Event`]s. A card that was reset is greeted and loaded
-//! again, and its tiles are returned. Threads, ports, time, scheduler and sinks are outside:
-//! `photoncard_render` runs one session per thread, a simulator many in one.
+//! tiles and checks their pixels. It reports [`Event`]s. A card that was reset is greeted and loaded again,
+//! and its tiles are returned. Threads, ports, time, scheduler and sinks are outside: `photoncard_render`
+//! runs one session per thread, a simulator many in one.
 
 mod channel;
 mod clock;
@@ -43,7 +43,7 @@ use self::self_test::Request;
 use self::state::State;
 use self::tiles::TilesInFlight;
 
-/// Maximum number of tiles on a card, whatever its budget: the tiles of a lost card are delayed.
+/// Maximum number of tiles on a card, whatever its budget. More would be delayed if the card were lost.
 const MAX_CREDITS: u32 = 16;
 
 /// Session with one card.
@@ -60,7 +60,7 @@ pub struct Session {
     /// Requested part of the self-test.
     request: Request,
     tiles: TilesInFlight,
-    /// Maximum number of replies about tiles of an earlier frame that may still come.
+    /// Maximum number of outstanding replies about tiles of an earlier frame.
     stale_replies: u64,
     events: VecDeque<Event>,
     channel: Channel,
@@ -68,15 +68,15 @@ pub struct Session {
     failures: Failures,
     /// True if the card was working on a suspect tile when it was last greeted.
     left_suspect: bool,
-    /// True after a [`Command::Flush`], until the next tile.
+    /// True after [`Command::Flush`], until the next tile.
     is_flushed: bool,
-    /// Number of bytes received since the last frame of the session.
+    /// Number of bytes received since the session's last frame.
     unheard_bytes: u64,
 }
 
 impl Session {
-    /// Session that starts with a greeting. `number` distinguishes it from frames of other sessions on the
-    /// line; any value is valid.
+    /// Creates a session, which starts with a greeting. `number` distinguishes its frames from those of other
+    /// sessions on the line. Any value is valid.
     pub fn new(number: u32, now: Duration) -> Self {
         let mut session = Self {
             state: State::Greeting,
@@ -117,14 +117,14 @@ impl Session {
         self.memory_use
     }
 
-    /// States that the card's memory holds the image of a checksum: the next load sends no line of it, and
-    /// the card checks it as it checks what it has received.
+    /// Declares that the card's memory holds the image with this checksum. The next load sends no lines of
+    /// it; the card checks it like a received one.
     pub fn assume(&mut self, checksum: u64) {
         self.assumed = Some(checksum);
     }
 
-    /// Sets the job of the card, which starts as soon as the card has answered the greeting. A card that has
-    /// rendered another job receives only what it lacks; what is left of that job is dropped.
+    /// Sets the job of the card, which starts as soon as the card has answered the greeting. A card with an
+    /// earlier job receives only the lines that it lacks, and unfinished work on that job is dropped.
     pub fn start(&mut self, job: Job, now: Duration) {
         self.clock.rest(now);
         self.events.clear();
@@ -137,8 +137,8 @@ impl Session {
         }
     }
 
-    /// Continues with the job on a card that holds the image `held`, and may be at work on tiles of an
-    /// earlier frame.
+    /// Continues with the job on a card that holds image `held` and may be working on tiles of an earlier
+    /// frame.
     fn go_on_from(&mut self, held: &Upload, now: Duration) {
         let Some(job) = &self.job else { return };
         let Some(runs) = job.upload.missing_from(held.checksum()) else { return self.greet_anew(now) };
@@ -154,7 +154,7 @@ impl Session {
     }
 
     /// Requests the results of operand triples, at most [`message::CASES_PER_COMMAND`], from a card that has
-    /// said hello and has no job: [`Event::Computed`].
+    /// said hello and has no job. The answer is [`Event::Computed`].
     pub fn compute(&mut self, operands: &[[u8; OPERAND_BYTES]], now: Duration) {
         self.ask(
             Request::Compute(operands.len()),
@@ -163,7 +163,7 @@ impl Session {
         );
     }
 
-    /// Requests the test of its memory from a card that has said hello and has no job:
+    /// Requests a test of the memory of a card that has said hello and has no job. The answers are
     /// [`Event::MemoryTested`], until the test is over.
     pub fn test_memory(&mut self, now: Duration) {
         self.ask(Request::Memory(None), &Command::TestMemory, now);
@@ -181,21 +181,21 @@ impl Session {
         self.events.pop_front()
     }
 
-    /// Returns whether the card has a free credit, and the send window room for a command.
+    /// Returns whether the card has a free credit and the send window has room for a command.
     pub fn wants_tile(&self) -> bool {
         let credits = self.budget.map_or(1, |budget| budget.tiles.min(MAX_CREDITS) as usize);
         self.is_loaded() && self.tiles.len() < credits && self.channel.is_free()
     }
 
-    /// Assigns a tile to a card for which [`Self::wants_tile`] is true.
+    /// Assigns a tile to the card. [`Self::wants_tile`] must be true.
     pub fn give(&mut self, assignment: Assignment) {
         self.tiles.push(assignment);
         self.is_flushed = false;
         self.send(&Command::RenderTile(assignment.tile));
     }
 
-    /// Sends [`Command::Flush`] to a card for which [`Self::wants_tile`] is true and there is no tile: it
-    /// does the gathers of its tiles in flight instead of waiting for another.
+    /// Sends [`Command::Flush`] when no tile is available: the card does the gathers of its tiles in flight
+    /// instead of waiting for another tile. [`Self::wants_tile`] must be true.
     pub fn flush(&mut self) {
         if !self.tiles.is_empty() && !std::mem::replace(&mut self.is_flushed, true) {
             self.send(&Command::Flush);
@@ -231,7 +231,7 @@ impl Session {
         self.state == State::Rendering
     }
 
-    /// Returns whether the card is loaded, has no tile, and no bytes are to be sent.
+    /// Returns whether the card is loaded and has no tile, and there are no bytes to send.
     pub fn is_idle(&mut self) -> bool {
         self.is_loaded() && !self.is_waiting() && self.channel.transport.outgoing().is_empty()
     }
@@ -266,7 +266,7 @@ impl Session {
         true
     }
 
-    /// Bytes to send now.
+    /// Bytes that can be sent now.
     pub fn outgoing(&mut self) -> &[u8] {
         self.channel.transport.outgoing()
     }
@@ -277,7 +277,7 @@ impl Session {
             || self.state == State::Loading && self.channel.transport.can_send()
     }
 
-    /// Removes the first `bytes` bytes of [`Self::outgoing`], which were sent.
+    /// Removes the first `bytes` bytes of [`Self::outgoing`] after they were sent.
     pub fn sent(&mut self, bytes: usize, now: Duration) {
         self.channel.transport.sent(bytes);
         self.channel.bytes.wire += bytes as u64;
@@ -324,13 +324,13 @@ impl Session {
         Ok(())
     }
 
-    /// Acknowledges received frames; to be called when the line is quiet.
+    /// Acknowledges received frames. Call it when the line is quiet.
     pub fn acknowledge(&mut self) {
         self.channel.transport.acknowledge();
     }
 
-    /// Advances the clock; to be called often. Probes a card that has been quiet for too long. `slowest` is
-    /// the maximum time of a ray or its gather, seconds, if known
+    /// Advances the clock; call it often. Probes a card that has been quiet for too long. `slowest` is the
+    /// time limit per ray or gather, seconds, if known
     /// ([`Scheduler::slowest`](crate::scheduler::Scheduler::slowest)).
     ///
     /// # Errors
@@ -360,19 +360,20 @@ impl Session {
         result
     }
 
-    /// Returns whether bytes have come in place of frames, and not a frame alone that was cut off.
+    /// Returns whether too many bytes arrived without a valid frame: any before the session's first frame, at
+    /// least `MAX_FRAME` after it, because one frame may be truncated.
     fn is_garbled(&self) -> bool {
         let least = if self.clock.has_heard() { MAX_FRAME as u64 } else { 1 };
         self.unheard_bytes >= least
     }
 
-    /// Returns the unfinished tiles of a card that is lost or was reset, as events.
+    /// Reports the unfinished tiles of a lost or reset card as events.
     pub fn give_back(&mut self) {
         let at_work = self.at_work();
         self.tiles.give_back(at_work, &mut self.events);
     }
 
-    /// Greets the card again, with a new session number, after its link was closed or it was silent. Its
+    /// Greets the card again with a new session number, after its link was closed or the card was silent. Its
     /// tiles are returned.
     pub fn greet_again(&mut self, now: Duration) {
         self.left_suspect = self.tiles.is_at_suspect();
@@ -381,14 +382,14 @@ impl Session {
         self.greet_anew(now);
     }
 
-    /// Greets the card with a new session number; what it works at is dropped.
+    /// Greets the card with a new session number. The card drops its work.
     fn greet_anew(&mut self, now: Duration) {
         self.tiles = TilesInFlight::default();
         self.clock = Clock::new(now);
         self.greet_card();
     }
 
-    /// Greets a card again that does not know the session, or that answers without a reply to the hello.
+    /// Greets a card again that does not know the session, or that answers the greeting without a hello.
     fn reset(&mut self, now: Duration) -> Result<(), SessionError> {
         self.failures.forget_lines();
         self.fail()?;
@@ -412,7 +413,7 @@ impl Session {
         self.channel.send(command);
     }
 
-    /// Requests the next checksums of the card's chunks; after the last ones starts to send lines.
+    /// Requests the next checksums of the card's chunks. After the last ones, starts to send lines.
     fn begin_load(&mut self) {
         let Some(job) = &self.job else { return };
         if let Some(runs) = self.assumed.take().and_then(|held| job.upload.missing_from(held)) {

@@ -1,4 +1,4 @@
-//! Ranges of pixel sums that a chip can produce: a value outside shows that the card or its memory is wrong.
+//! Ranges of pixel sums that a chip can produce. A value outside shows that the card or its memory is faulty.
 
 use photoncard_picture::sums::SumFormat;
 use photoncard_shared::image::Header;
@@ -10,7 +10,7 @@ use photoncard_shared::message::{
 const NORMAL_ROUNDING: f64 = 1.0 / (1 << 19) as f64;
 /// Rounding error of a surface's position along the view's axis, relative to the scene's maximum coordinate.
 const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
-/// Maximum number of cells of the photon grid along the scene's longest side.
+/// Maximum number of cells of the photon grid along the longest side of the scene.
 const GRID_CELLS: f32 = (1 << 20) as f32;
 
 /// Ranges of a frame's pixel sums over n samples, of which s see a surface.
@@ -25,7 +25,7 @@ const GRID_CELLS: f32 = (1 << 20) as f32;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     format: SumFormat,
-    /// Minimum and maximum depth of a sample, multiples of 1 / [`DEPTH_STEPS`] units.
+    /// Minimum and maximum depth of a sample, in units of 1 / [`DEPTH_STEPS`].
     depths: [f64; 2],
 }
 
@@ -37,7 +37,7 @@ pub(super) struct BadValue {
 }
 
 impl PixelLimits {
-    /// Limits of a frame of the image with the header `header`.
+    /// Computes the limits of a frame of the image with this header.
     pub fn new(header: &Header, frame: &FrameParameters) -> Self {
         let grid = &header.photon_grid;
         let corners = grid.origin.iter().map(|&origin| (origin as f32).abs() * grid.cell);
@@ -88,8 +88,8 @@ impl PixelLimits {
     }
 }
 
-/// Distance from the eye to the farthest corner of the photon grid, which holds the scene, metres; an axis of
-/// another length than 1 counts.
+/// Distance from the eye to the farthest corner of the photon grid, which contains the scene, metres. It is
+/// multiplied by the length of the view vector if that exceeds 1.
 fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
     let grid = &header.photon_grid;
     let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();

@@ -1,4 +1,4 @@
-//! Replies of the card: the state that each is valid in, and the change of the session.
+//! Replies of the card: the state in which each is valid, and the state that it leads to.
 
 use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{Fault, FaultCode, Reply};
@@ -9,10 +9,10 @@ use super::state::State;
 use super::{Event, Session, SessionError};
 
 impl Session {
-    /// Takes a reply.
+    /// Processes a reply.
     ///
     /// # Errors
-    /// If it reports a fault, or is no answer to what was requested.
+    /// If it reports a fault, or does not answer a request.
     pub(super) fn take(&mut self, reply: &Reply) -> Result<(), SessionError> {
         match (self.state, *reply) {
             (State::Greeting, Reply::Hello { budget, written_lines, memory_use, build, .. }) => {
@@ -83,7 +83,7 @@ impl Session {
         }
     }
 
-    /// Takes the card's hello.
+    /// Processes the card's hello.
     fn greet(&mut self, budget: Budget, written_lines: u32) -> Result<(), SessionError> {
         check_budget(&budget, self.budget.as_ref())?;
         if self.failures.says_hello(written_lines) && !self.left_suspect {

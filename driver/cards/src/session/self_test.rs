@@ -12,15 +12,15 @@ pub(super) enum Request {
     Nothing,
     /// Results of this number of operand triples.
     Compute(usize),
-    /// The test of the memory, and its last progress; `None` before the first.
+    /// Memory test with the last reported progress; `None` before the first report.
     Memory(Option<MemoryTest>),
 }
 
 impl Request {
-    /// The event of a reply, and whether it is the last.
+    /// Event of a reply, and whether the reply is the last one.
     ///
     /// # Errors
-    /// If it does not answer the request.
+    /// If the reply does not answer the request.
     pub(super) fn take(&mut self, reply: &Reply) -> Result<(Event, bool), SessionError> {
         match (self, reply) {
             (Self::Compute(cases), Reply::Computed { results }) if results.len() == *cases * RESULT_BYTES => {

@@ -1,6 +1,5 @@
 //! States of a session.
 
-/// State of a session.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum State {
     /// The hello is sent.

@@ -15,9 +15,9 @@ pub(super) struct TilesInFlight(Vec<TileInFlight>);
 
 struct TileInFlight {
     assignment: Assignment,
-    /// Records of all pixels; those received so far are valid.
+    /// Records of all pixels, valid where `is_received`.
     records: Vec<u8>,
-    /// For each pixel, whether its record was received.
+    /// Whether the record of each pixel was received.
     is_received: Vec<bool>,
 }
 
@@ -34,7 +34,8 @@ impl TilesInFlight {
         self.0.push(TileInFlight { assignment, records: Vec::new(), is_received: Vec::new() });
     }
 
-    /// Returns whether cards have crashed before at the card's tile; such a tile is dealt alone.
+    /// Returns whether the card's tile is one at which cards have crashed before. Such a tile is assigned
+    /// alone.
     pub(super) fn is_at_suspect(&self) -> bool {
         self.0.first().is_some_and(|in_flight| in_flight.assignment.is_suspect)
     }
@@ -74,7 +75,7 @@ impl TilesInFlight {
         Ok(())
     }
 
-    /// Completes a tile, whose pixels must all have been received.
+    /// Completes a tile. All its pixels must have been received.
     pub(super) fn complete(
         &mut self,
         id: u32,
@@ -93,7 +94,7 @@ impl TilesInFlight {
         FinishedTile::new(tile, records, *limits.format(), counters).ok_or(not_complete)
     }
 
-    /// Returns all tiles as events, in reverse order. The card was working on the oldest `at_work`.
+    /// Returns all tiles as events, in reverse order. The card was working on the oldest `at_work` ones.
     pub(super) fn give_back(&mut self, at_work: usize, events: &mut VecDeque<Event>) {
         while let Some(TileInFlight { assignment, .. }) = self.0.pop() {
             let was_at_work = self.0.len() < at_work;
@@ -101,12 +102,12 @@ impl TilesInFlight {
         }
     }
 
-    /// Maximum number of replies about the tiles: each holds a pixel at the least, or is the end of a tile.
+    /// Maximum number of replies about the tiles: each contains at least a pixel, or ends a tile.
     pub(super) fn most_replies(&self) -> u64 {
         self.0.iter().map(|in_flight| in_flight.assignment.tile.pixels() + 1).sum()
     }
 
-    /// Approximate number of rays of the `at_work` largest tiles, all of which may be done at the same time.
+    /// Approximate number of rays of the `at_work` largest tiles. All of them may finish at the same time.
     pub(super) fn most_rays(&self, at_work: usize, frame: &FrameParameters) -> u64 {
         let mut pixels: Vec<u64> =
             self.0.iter().map(|in_flight| in_flight.assignment.tile.pixels()).collect();
@@ -167,7 +168,7 @@ mod tests {
         in_flight
     }
 
-    /// Records of pixels that see nothing, whose red is their index in the tile.
+    /// Records of pixels without a surface; red is the index in the tile.
     fn pixels(indices: std::ops::Range<u32>) -> Vec<u8> {
         let of_pixel = |index: u32| {
             let mut bytes = [0; PIXEL_BYTES];
@@ -207,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_card_was_at_work_on_as_many_of_its_tiles_as_it_has_in_flight() {
+    fn a_lost_card_was_working_on_its_tiles_in_flight_alone() {
         let tile = |id| Tile { id, ..TILE };
         for at_work in 1..4 {
             let mut events = VecDeque::new();

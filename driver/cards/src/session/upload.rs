@@ -1,4 +1,4 @@
-//! Card image as it is sent to cards: everything that is computed of it once, for all cards.
+//! Card image as it is sent to cards, with checksums that are computed once for all of them.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -7,31 +7,30 @@ use photoncard_shared::address::Line;
 use photoncard_shared::checksum::image_checksum;
 use photoncard_shared::message::CHUNK_LINES;
 
-/// Runs of consecutive lines of an image, in order and without overlap.
+/// Ascending, disjoint runs of consecutive lines of an image.
 pub(super) type Runs = Arc<[Range<usize>]>;
 
-/// Lines of an image, in memory that the host keeps.
+/// Lines of an image in memory that the host keeps.
 type SharedLines = Arc<dyn AsRef<[Line]> + Send + Sync>;
 
-/// Card image as it is sent to cards. Checksums and changed lines are computed once, however many cards there
-/// are.
+/// Card image as it is sent to cards. Checksums and changed lines are computed once for all cards.
 pub struct Upload {
     lines: SharedLines,
     checksum: u64,
-    /// Checksums of all whole chunks, as soon as a card's are compared with them.
+    /// Checksums of all whole chunks, computed when a card's are first compared with them.
     chunks: OnceLock<Vec<u64>>,
-    /// Checksum of the image before, and runs of the lines in which this one differs from it.
+    /// Checksum of the previous image, and the runs of lines in which this one differs from it.
     change: Option<(u64, Runs)>,
 }
 
 impl Upload {
-    /// Image for cards that hold none, or any other.
+    /// Creates the upload of an image to cards with unknown contents.
     pub fn new(lines: Arc<impl AsRef<[Line]> + Send + Sync + 'static>) -> Self {
         let checksum = image_checksum((*lines).as_ref());
         Self { lines, checksum, chunks: OnceLock::new(), change: None }
     }
 
-    /// Image for cards that may hold the image `before`.
+    /// Records the difference to image `before`, for cards that hold it.
     #[must_use]
     pub fn after(self, before: &Self) -> Self {
         let runs = changed_runs(before.lines(), self.lines());
@@ -54,7 +53,8 @@ impl Upload {
         self.chunks.get_or_init(sums)
     }
 
-    /// Runs of lines that a card lacks that holds the image of a checksum; `None` if they are not known.
+    /// Runs of lines that a card lacks if it holds the image with checksum `held`; `None` if they are
+    /// unknown.
     pub(super) fn missing_from(&self, held: u64) -> Option<Runs> {
         if held == self.checksum {
             return Some(Runs::default());
@@ -63,7 +63,7 @@ impl Upload {
     }
 }
 
-/// Runs of the lines of `after` that `before` lacks or has otherwise.
+/// Runs of the lines of `after` that `before` lacks or that differ in it.
 pub fn changed_runs(before: &[Line], after: &[Line]) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     for (index, line) in after.iter().enumerate() {
@@ -74,7 +74,7 @@ pub fn changed_runs(before: &[Line], after: &[Line]) -> Vec<Range<usize>> {
     runs
 }
 
-/// Appends a run, which follows all others.
+/// Appends a run, which must follow all others, and merges it with an adjacent one.
 pub(super) fn add_run(runs: &mut Vec<Range<usize>>, run: Range<usize>) {
     match runs.last_mut() {
         Some(last) if last.end == run.start => last.end = run.end,
@@ -96,7 +96,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn changed_runs_make_one_image_of_the_other_and_hold_no_equal_line(
+        fn changed_runs_turn_one_image_into_the_other_without_equal_lines(
             before in proptest::collection::vec(0..3_u8, 0..40),
             after in proptest::collection::vec(0..3_u8, 0..40),
         ) {
@@ -115,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_card_lacks_nothing_of_the_image_that_it_holds_and_changed_lines_of_the_one_before() {
+    fn a_card_lacks_changed_lines_of_the_previous_image_and_none_of_the_same() {
         let [first, other] =
             [[1, 2, 3, 4, 5], [1, 7, 8, 4, 9]].map(|bytes| Upload::new(Arc::new(lines(&bytes))));
         let [held, checksum] = [first.checksum(), other.checksum()];

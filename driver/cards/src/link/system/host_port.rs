@@ -10,40 +10,39 @@ use photoncard_shared::link::{Port, PortError};
 
 use super::Listener;
 
-/// The card's end of the links to consecutive hosts.
+/// Card's end of the links to consecutive hosts.
 ///
-/// To the card this is one link that never closes. Its output is lost while no host is connected, as on an
+/// To the card this is one link that never closes. Output is lost while no host is connected, as on an
 /// unplugged cable. Between two hosts the link is cut at the end of a frame in both directions. A host
-/// receives nothing before it has sent a byte. A second host is refused while one is served: its connection
-/// is closed at once. A socket connection that has sent no whole frame within 10 s is no host, and is closed;
-/// after its first frame a host may be silent, as it packs a scene.
+/// receives nothing before it has sent a byte. While one host is served, the connection of a second is closed
+/// at once. A socket connection that has sent no whole frame within 10 s is closed. After its first frame a
+/// host may be silent, because packing a scene takes time.
 pub struct HostPort {
     listener: Listener,
     stop: Arc<AtomicBool>,
     host: Option<Host>,
-    /// Another host that has connected. It is refused as soon as the present one is known to be connected
-    /// still.
+    /// Second host that has connected. It is refused once the present host is known to be connected.
     next: Option<Box<dyn Port + Send>>,
     /// Time of the last poll of the host and of the listener.
     looked: Instant,
-    /// True if the card's last byte was not the end of a frame.
+    /// True if the last byte of the card was not the end of a frame.
     in_frame: bool,
-    /// Sink of messages about hosts.
+    /// Receives messages about hosts.
     say: fn(fmt::Arguments),
 }
 
 struct Host {
     port: Box<dyn Port + Send>,
     since: Instant,
-    /// Parser that waits for the first whole frame; `None` afterwards.
+    /// Parser of the first whole frame; `None` once it has arrived.
     first_frame: Option<FrameReader>,
     has_spoken: bool,
-    /// True while the card sends the rest of a frame that began before the host's first byte.
+    /// True while the card sends the rest of a frame that it began before the host's first byte.
     skips_frame: bool,
 }
 
-/// Minimum time between two polls: a busy card reads its port after every short step, and a system call each
-/// time would slow it down.
+/// Minimum time between two polls. A busy card reads its port after every short step, and a system call at
+/// each would slow it down.
 const LOOK_INTERVAL: Duration = Duration::from_micros(200);
 /// Time limit of a host's first whole frame.
 const FIRST_FRAME: Duration = Duration::from_secs(10);
@@ -51,8 +50,8 @@ const FIRST_FRAME: Duration = Duration::from_secs(10);
 const FRAME_END: u8 = 0;
 
 impl HostPort {
-    /// Port for the hosts that connect to `listener`, until `stop` is set. `say` receives messages about
-    /// closed connections.
+    /// Creates a port for the hosts that connect to `listener`, until `stop` is set. `say` receives messages
+    /// about closed connections.
     pub fn new(listener: Listener, stop: Arc<AtomicBool>, say: fn(fmt::Arguments)) -> Self {
         Self { listener, stop, host: None, next: None, looked: Instant::now(), in_frame: false, say }
     }
@@ -68,9 +67,9 @@ impl HostPort {
         }
     }
 
-    /// Accepts another host, to be refused or served next. The system delivers a link's data before later
-    /// events on other links: a host that was accepted before the present one was found silent, but
-    /// connected, came too early and is refused.
+    /// Accepts a second host, to be refused or served next. The system delivers the data of a link before
+    /// later events on other links. A host that was accepted before the present one was found silent but
+    /// connected is therefore too early, and is refused.
     fn look_for_others(&mut self, is_silent: bool) {
         if is_silent {
             self.next = None;
@@ -80,8 +79,8 @@ impl HostPort {
         }
     }
 
-    /// Accepts the next host. Returns the byte that ends a frame that the previous host may have left
-    /// unfinished.
+    /// Accepts the next host. Puts the end of a frame into `buffer`, because the previous host may have left
+    /// a frame unfinished. Returns the number of bytes in `buffer`.
     fn welcome(&mut self, buffer: &mut [u8], wait: Duration) -> usize {
         let Some(byte) = buffer.first_mut() else { return 0 };
         let Some(port) = self.next.take().or_else(|| self.listener.accept(wait)) else { return 0 };
@@ -95,7 +94,7 @@ impl HostPort {
 }
 
 impl Host {
-    /// Reads the bytes received now. Returns true if no whole frame has arrived so far.
+    /// Parses the bytes received now. Returns true while no whole frame has arrived.
     fn is_none_yet(&mut self, mut bytes: &[u8]) -> bool {
         while let Some(reader) = self.first_frame.as_mut().filter(|_| !bytes.is_empty()) {
             let (taken, frame) = reader.read(bytes);

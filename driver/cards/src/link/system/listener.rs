@@ -1,4 +1,4 @@
-//! Listeners on which hosts reach a card that this process emulates.
+//! Listeners by which hosts reach a card that this process emulates.
 
 use std::io::{self, ErrorKind};
 use std::net::{TcpListener, ToSocketAddrs};
@@ -19,7 +19,7 @@ use super::socket::unix_port;
 use super::socket::{host_name, tcp_address, tcp_port};
 use super::stream::wait_for;
 
-/// Address to listen on: an argument of `--listen`.
+/// Address to listen on, an argument of `--listen`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ListenAddress {
     /// A new pseudo terminal.
@@ -38,7 +38,7 @@ pub enum ListenAddress {
     },
 }
 
-/// Default address: only this machine can reach the card.
+/// Default host name, which only this machine can reach.
 const LOCAL_HOST: &str = "127.0.0.1";
 
 impl FromStr for ListenAddress {
@@ -62,7 +62,7 @@ impl FromStr for ListenAddress {
     }
 }
 
-/// Listener for connections of hosts to a card. Dropping it removes a Unix socket's file.
+/// Accepts connections of hosts to a card. Dropping it removes the file of a Unix socket.
 pub struct Listener {
     kind: Kind,
     card_address: String,
@@ -80,7 +80,7 @@ impl Listener {
     /// Starts to listen.
     ///
     /// # Errors
-    /// If the address is not this machine's, or in use.
+    /// If the address does not belong to this machine, or is in use.
     pub fn new(address: &ListenAddress) -> Result<Self, LinkError> {
         match address {
             ListenAddress::Tcp { host, port } => {
@@ -140,7 +140,7 @@ impl Listener {
         Ok(Self { kind: Kind::Pty(pty), card_address: format!("serial:{}", path.display()) })
     }
 
-    /// Argument of `--card` with which a host reaches the card.
+    /// Argument of `--card` by which a host reaches the card.
     pub fn card_address(&self) -> &str {
         &self.card_address
     }
@@ -165,8 +165,8 @@ impl Listener {
         }
     }
 
-    /// The next host, if one connects within `wait`; `None` also if it is gone already or the system has no
-    /// resources for it.
+    /// Accepts the next host; `None` if none connects within `wait`, if it is gone already, or if the system
+    /// lacks the resources.
     pub(super) fn accept(&mut self, wait: Duration) -> Option<Box<dyn Port + Send>> {
         match &mut self.kind {
             Kind::Tcp(listener) => {
@@ -190,8 +190,8 @@ impl Listener {
         }
     }
 
-    /// Another host that connects while one is served, if any. Hosts on a terminal exclude each other by its
-    /// lock.
+    /// Accepts a second host while one is served; `None` if there is none. A terminal has no second host,
+    /// because hosts lock it.
     pub(super) fn accept_other(&mut self) -> Option<Box<dyn Port + Send>> {
         match self.kind {
             Kind::Tcp(_) => self.accept(Duration::ZERO),

@@ -1,4 +1,4 @@
-//! The card's end of a pseudo terminal, which hosts open as a serial port.
+//! Card's end of a pseudo terminal, which hosts open as a serial port.
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -41,7 +41,7 @@ impl Pty {
         Ok((Self { controller: File::from(controller) }, path))
     }
 
-    /// Port to the host that has the terminal open, if any.
+    /// Port to the host that has the terminal open; `None` if there is none.
     pub(super) fn accept(&mut self) -> io::Result<Option<StreamPort<File>>> {
         if !wait_for(&self.controller, PollFlags::IN, Duration::ZERO).contains(PollFlags::HUP) {
             return Ok(Some(StreamPort::new(self.controller.try_clone()?)));

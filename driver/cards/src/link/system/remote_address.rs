@@ -1,4 +1,4 @@
-//! Addresses of cards at the other end of a link.
+//! Addresses of cards that are not emulated in this process.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -32,21 +32,21 @@ pub enum RemoteAddress {
 /// Default speed of a serial port, bit/s.
 const DEFAULT_BAUD: u32 = 115_200;
 /// Minimum speed of a serial port, bit/s. A card is silent while it receives two whole frames and
-/// acknowledges them. Even if one acknowledgement is lost, the next must arrive within the 10 s after which a
-/// card counts as lost.
+/// acknowledges them. An acknowledgement must arrive within the 10 s after which a card counts as lost, even
+/// if the previous one was lost.
 const MIN_BAUD: u32 = 4800;
 
 impl RemoteAddress {
-    /// Forms of an address, for a line of help.
+    /// Valid forms of an address, for help texts.
     pub const FORMS: &str = "serial:PATH[@BAUD], tcp:HOST:PORT or unix:PATH";
 
-    /// Card on a serial port at the default speed.
+    /// Creates the address of a serial port at the default speed.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
         Self::Serial { path: path.into(), baud: DEFAULT_BAUD }
     }
 
-    /// Address of a kind of link: the text in front of the first colon, and what follows it. `None` if there
-    /// is no such kind.
+    /// Parses an address. `kind` is the text before the first colon, and `rest` the text after it. `None` if
+    /// there is no such kind of link.
     ///
     /// # Errors
     /// A sentence that names the valid form.

@@ -15,17 +15,17 @@ use serialport::{ClearBuffer, DataBits, FlowControl, Parity, SerialPort as _, Se
 use super::LinkError;
 use super::stream::moved;
 
-/// Silence after which a line has no stale bytes.
+/// Duration of silence after which a line holds no stale bytes.
 const QUIET: Duration = Duration::from_millis(50);
-/// Maximum time in which stale bytes of a busy card are dropped.
+/// Maximum time for which stale bytes of a busy card are dropped.
 const STALE: Duration = Duration::from_secs(1);
-/// Inverse of the maximum relative deviation of the speed, 2 %: a frame of ten bits tolerates more.
+/// Inverse of the maximum relative deviation of the speed, 2 %. A frame of ten bits tolerates more.
 const SPEED_TOLERANCE: u32 = 50;
-/// Minimum timeout: Windows treats 0 as infinite.
+/// Minimum timeout. Windows interprets 0 as infinite.
 const MIN_WAIT: Duration = if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };
 
-/// Link over a serial port or a pseudo terminal. Every call is bounded: by `poll` before a non-blocking read
-/// or write, on Windows by the driver's timeouts, whose minimum is a millisecond.
+/// Link over a serial port or a pseudo terminal. The time of every call is bounded: by `poll` before a
+/// non-blocking read or write; on Windows by the driver's timeouts, of at least a millisecond.
 pub struct SerialLink {
     port: SystemPort,
 }
@@ -60,12 +60,12 @@ fn open(path: &Path, baud: u32) -> io::Result<SerialLink> {
     Ok(link)
 }
 
-/// Opens a port, locks it for this process and sets `O_NONBLOCK`: `serialport` leaves the port blocking, and
-/// a write would wait for as long as the line is full.
+/// Opens a port, locks it for this process and sets `O_NONBLOCK`. `serialport` leaves the port blocking, so
+/// that a write would wait as long as the line is full.
 ///
 /// `serialport` takes a shared lock before it configures the port, and fails if another session has the
-/// exclusive lock. Its exclusive mode, TIOCEXCL, is not used: on a pseudo terminal it would outlive a killed
-/// host, and exclude the next one.
+/// exclusive lock. Its exclusive mode, TIOCEXCL, is not used, because on a pseudo terminal it would outlive a
+/// killed host and exclude the next one.
 #[cfg(unix)]
 fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     use std::os::fd::AsRawFd;
@@ -80,14 +80,14 @@ fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     Ok(port)
 }
 
-/// Opens a port, exclusively as always on Windows.
+/// Opens a port. Windows always opens ports exclusively.
 #[cfg(windows)]
 fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
     settings.open_native().map_err(device_error)
 }
 
-/// Returns whether a path names a pseudo terminal of macOS, which rejects any speed; `serialport` sets none
-/// if it is 0.
+/// Returns whether a path names a pseudo terminal of macOS, which rejects any speed. `serialport` sets no
+/// speed if it is 0.
 fn is_without_speed(path: &Path) -> bool {
     let is_terminal = |path: &Path| path.to_str().is_some_and(|name| name.starts_with("/dev/ttys"));
     cfg!(target_os = "macos") && path.canonicalize().is_ok_and(|path| is_terminal(&path))
@@ -104,8 +104,8 @@ fn device_error(error: serialport::Error) -> io::Error {
     }
 }
 
-/// Ends a frame that an earlier session may have left unfinished, and drops stale bytes: until the line is
-/// quiet or, from a busy card, up to the end of a frame.
+/// Ends a frame that an earlier session may have left unfinished, and drops stale bytes. It stops once the
+/// line is quiet or, if the card is busy, at the end of a frame.
 fn begin(port: &mut impl Port) -> Result<(), PortError> {
     port.write(&[0], QUIET)?;
     let start = Instant::now();
@@ -155,7 +155,7 @@ impl Port for SerialLink {
     }
 }
 
-/// Number of bytes moved; 0 on a timeout.
+/// Number of bytes moved; 0 after a timeout.
 fn moved_in_time(result: io::Result<usize>) -> Result<usize, PortError> {
     match result {
         Err(error) if error.kind() == ErrorKind::TimedOut => Ok(0),

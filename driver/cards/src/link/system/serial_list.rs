@@ -1,4 +1,4 @@
-//! Serial ports of this machine, where cards may be.
+//! Lists the serial ports of this machine.
 
 use std::io;
 
@@ -6,10 +6,10 @@ use serialport::SerialPortType;
 
 use super::LinkError;
 
-/// A serial port of this machine.
+/// Serial port of this machine.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ListedPort {
-    /// Path, on Windows name.
+    /// Path of the port; its name on Windows.
     pub path: String,
     /// Manufacturer and product as a USB device reports them, arbitrary text; empty for other ports.
     pub usb_name: String,
@@ -57,7 +57,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_port_has_what_its_device_tells() {
+    fn a_port_has_the_names_that_its_device_reports() {
         let usb = |manufacturer: Option<&str>, product: Option<&str>, serial_number: Option<&str>| {
             let [manufacturer, product, serial_number] =
                 [manufacturer, product, serial_number].map(|text| text.map(str::to_owned));

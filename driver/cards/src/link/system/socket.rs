@@ -18,7 +18,7 @@ const CONNECT_WAIT: Duration = Duration::from_secs(5);
 /// Connects to a card that listens on a TCP port.
 ///
 /// # Errors
-/// If the host has no address, or none accepts within 5 s.
+/// If the host name has no address, or no address accepts the connection within 5 s.
 pub fn connect_tcp(host: &str, port: u16) -> Result<StreamPort<TcpStream>, LinkError> {
     connect(host, port).map_err(|error| LinkError::connect(tcp_address(host, port), &error))
 }
@@ -28,7 +28,7 @@ pub fn tcp_address(host: &str, port: u16) -> String {
     if host.contains(':') { format!("tcp:[{host}]:{port}") } else { format!("tcp:{host}:{port}") }
 }
 
-/// Host of an address, without the brackets of an IPv6 address.
+/// Parses a host name or address; the brackets of an IPv6 address are removed.
 pub fn host_name(text: &str) -> Result<String, String> {
     match text.strip_prefix('[').and_then(|text| text.strip_suffix(']')) {
         Some(address) if !address.is_empty() => Ok(address.into()),
@@ -48,7 +48,7 @@ fn connect(host: &str, port: u16) -> io::Result<StreamPort<TcpStream>> {
     Err(last)
 }
 
-/// Port on a TCP connection: small frames are sent at once, and a vanished peer is detected.
+/// Creates a port on a TCP connection. Small frames are sent at once, and a vanished peer is detected.
 pub(super) fn tcp_port(stream: TcpStream) -> io::Result<StreamPort<TcpStream>> {
     stream.set_nonblocking(true)?;
     stream.set_nodelay(true)?;
@@ -58,8 +58,8 @@ pub(super) fn tcp_port(stream: TcpStream) -> io::Result<StreamPort<TcpStream>> {
     Ok(StreamPort::new(stream))
 }
 
-/// Enables keep-alive: a connection ends after a minute of silence without an answer to probes. On other
-/// systems their default of hours holds.
+/// Enables keep-alive: the connection ends after a minute without an answer to probes. Systems without the
+/// setting keep their default of hours.
 #[cfg(target_os = "linux")]
 fn probe_soon(stream: &TcpStream) -> io::Result<()> {
     sockopt::set_tcp_keepidle(stream, Duration::from_secs(30))?;

@@ -13,7 +13,7 @@ pub struct StreamPort<S> {
 }
 
 impl<S: Read + Write + AsFd> StreamPort<S> {
-    /// Port on a stream, which must be non-blocking.
+    /// Creates a port on a stream, which must be non-blocking.
     pub(super) fn new(stream: S) -> Self {
         Self { stream }
     }
@@ -55,7 +55,7 @@ impl<S: Read + Write + AsFd> Port for StreamPort<S> {
     }
 }
 
-/// Waits until one of `events` occurs on a stream, at most for `wait`. Returns the events that occurred.
+/// Waits until one of `events` occurs on a stream, at most `wait`. Returns the events that occurred.
 pub(super) fn wait_for(stream: &impl AsFd, events: PollFlags, wait: Duration) -> PollFlags {
     let mut streams = [PollFd::new(stream, events)];
     // A signal ends the wait early. A time beyond the system's maximum means no limit.
@@ -79,14 +79,15 @@ pub(super) fn moved(result: io::Result<usize>) -> Result<usize, PortError> {
     })
 }
 
-/// Returns whether the device of a terminal is gone.
+/// Returns whether the error of a terminal means that its device is gone.
 #[cfg(unix)]
 fn is_gone(error: &io::Error) -> bool {
     use rustix::io::Errno;
     Errno::from_io_error(error).is_some_and(|errno| [Errno::IO, Errno::NODEV, Errno::NXIO].contains(&errno))
 }
 
-/// Sockets, the only streams on other systems, report it by the kind of the error.
+/// Returns false. Sockets, the only streams on other systems, report a closed connection by the kind of the
+/// error.
 #[cfg(not(unix))]
 fn is_gone(_: &io::Error) -> bool {
     false

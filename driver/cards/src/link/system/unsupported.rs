@@ -6,7 +6,7 @@ use std::path::Path;
 use super::LinkError;
 use crate::link::LoopbackPort;
 
-/// Fails: this system has no Unix sockets.
+/// Fails, because this system has no Unix sockets.
 ///
 /// # Errors
 /// Always.
