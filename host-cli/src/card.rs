@@ -1,4 +1,4 @@
-//! `photoncard card`.
+//! Command `photoncard card`.
 
 use std::time::Duration;
 
@@ -8,8 +8,8 @@ use photoncard_driver::render::{CardAddress, MAX_BINS, MemoryUse, card_info, car
 use crate::console::print;
 use crate::failure::Failure;
 
-/// Prints the budget that a card reports, the memory use that a board has measured and, for an emulated card,
-/// the firmware's buffers.
+/// Prints the budget that a card reports, the memory use that a board measures and, for an emulated card, the
+/// sizes of the firmware's buffers.
 pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     let info = card_info(address)?;
     let budget = info.budget;
@@ -44,7 +44,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     print(&lines)
 }
 
-/// Rows of the on-chip memory that a board's firmware takes, as measured by the board.
+/// Table rows with the on-chip memory of a board's firmware, as the board measures it.
 fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     let MemoryUse { static_bytes, stack_bytes, stack_used } = memory_use;
     [
@@ -53,7 +53,7 @@ fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     ]
 }
 
-/// On-chip memory of the firmware's buffers, which the host knows for emulated chips.
+/// Table rows with the on-chip memory of the firmware's buffers, which the host knows for emulated chips.
 fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     let techniques = kind.techniques();
     [
@@ -65,7 +65,7 @@ fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     ]
 }
 
-/// Greets a card `count` times, and prints the time until each answer.
+/// Greets a card `count` times and prints the time of each answer.
 pub(crate) fn ping(address: &CardAddress, count: u16) -> Result<(), Failure> {
     let answers = card_ping(address, count.into())?;
     let mut lines = Vec::new();

@@ -1,4 +1,4 @@
-//! `photoncard card list`.
+//! Command `photoncard card list`.
 
 use photoncard_driver::link::{ListedPort, list_serial_ports};
 use photoncard_driver::printable::printable;
@@ -9,8 +9,7 @@ use crate::failure::Failure;
 
 const COLUMNS: [&str; 4] = ["path", "USB name", "serial number", "--card"];
 
-/// Prints the serial ports of this machine, one per line, below the names of the columns; nothing if there
-/// are none.
+/// Prints a table of this machine's serial ports, one per line; nothing if there are none.
 pub(crate) fn run() -> Result<(), Failure> {
     let ports = list_serial_ports().map_err(Failure::work)?;
     if ports.is_empty() {
@@ -22,7 +21,8 @@ pub(crate) fn run() -> Result<(), Failure> {
     print(&table(&ports))
 }
 
-/// Columns as wide as their longest entry, separated by two blanks; a dash stands for missing values.
+/// Lines of a table whose columns are as wide as their longest entry and two blanks apart. A dash stands for
+/// a missing value.
 fn table(ports: &[ListedPort]) -> Vec<String> {
     let rows: Vec<[String; 4]> =
         [COLUMNS.map(str::to_owned)].into_iter().chain(ports.iter().map(row)).collect();
@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ports_are_lines_of_columns_that_nothing_breaks() {
+    fn the_table_of_ports_survives_foreign_text() {
         let port = |path: &str, usb_name: &str, serial_number: &str| ListedPort {
             path: path.into(),
             usb_name: usb_name.into(),

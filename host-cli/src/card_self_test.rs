@@ -1,4 +1,4 @@
-//! `photoncard card selftest`.
+//! Command `photoncard card selftest`.
 
 use std::time::Duration;
 
@@ -11,7 +11,7 @@ use crate::console::print;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
-/// Tests a card, and prints what was tested and what is wrong.
+/// Tests a card and prints its results.
 pub(crate) fn run(address: &CardAddress, quiet: bool) -> Result<(), Failure> {
     let progress = Progress::start(quiet, 1).map_err(|error| Failure::work_error(&error))?;
     let result = card_self_test(address, &progress);
@@ -70,14 +70,14 @@ fn pattern_lines(test: &PatternTest, bytes: u64) -> Vec<String> {
     lines
 }
 
-/// A time, and the bytes a second.
+/// Formats a duration with the rate in bytes per second.
 fn time(time: Duration, bytes: u64) -> String {
     let seconds = time.as_secs_f64();
     let rate = if seconds > 0.0 { bytes as f64 / seconds / 1e6 } else { 0.0 };
     format!("{seconds:.3} s ({rate:.1} MB/s)")
 }
 
-/// Error of a card that has failed, with a remedy.
+/// Error of a card that failed the test, with a remedy.
 fn failure(test: &SelfTest) -> Failure {
     let mut parts = Vec::new();
     if !test.arithmetic.wrong.is_empty() {

@@ -1,5 +1,5 @@
-//! Standard streams: a closed or full one never makes the program panic. All output passes through this
-//! module, and foreign text is escaped.
+//! Standard streams: all output passes through this module. A closed or full stream never makes the program
+//! panic, and foreign text is escaped.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stderr, stdout};
@@ -8,17 +8,17 @@ use photoncard_driver::printable::printable;
 
 use crate::failure::Failure;
 
-/// Writes a line to standard error. If that fails, the work goes on.
+/// Writes a line to standard error. Errors of the stream are ignored.
 pub(crate) fn say(line: Arguments) {
     let _ = writeln!(stderr(), "{}", printable(&line.to_string()));
 }
 
-/// Writes a failure to standard error, on lines of its own; its report escapes foreign text.
+/// Writes a failure to standard error on lines of its own. Its report escapes foreign text.
 pub(crate) fn say_failure(failure: &Failure) {
     let _ = writeln!(stderr(), "{failure}");
 }
 
-/// A number with its noun.
+/// Formats a number with its noun, in the plural unless it is 1.
 pub(crate) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
@@ -33,8 +33,8 @@ pub(crate) fn print_json(text: &str) -> Result<(), Failure> {
     write_out(&(printable_json(text) + "\n"))
 }
 
-/// Escapes all characters of JSON that do not print as themselves. Except for line ends, they occur in
-/// strings alone.
+/// Escapes all characters of JSON that do not print as themselves. Apart from line ends, they can only occur
+/// in strings.
 pub(crate) fn printable_json(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -51,12 +51,13 @@ pub(crate) fn printable_json(text: &str) -> String {
     escaped
 }
 
-/// Writes text of the program's own to standard output as it is. A reader that closes it early is no error.
+/// Writes text of the program's own to standard output unescaped. A reader that closes the stream early is no
+/// error.
 pub(crate) fn write_out(text: &str) -> Result<(), Failure> {
     write_bytes(text.as_bytes())
 }
 
-/// [`write_out`] of any bytes.
+/// [`write_out`] for arbitrary bytes.
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = stdout().lock();
     match out.write_all(bytes).and_then(|()| out.flush()) {
@@ -72,7 +73,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn json_is_the_same_and_prints() {
+    fn escaped_json_is_printable_and_parses_to_the_same_value() {
         let value = json!({ "a\"b\\\u{9b}": ["\u{202e}\u{e0041}\u{7f}\n", "Größe", 1.5, null] });
         for text in [value.to_string(), serde_json::to_string_pretty(&value).unwrap()] {
             let escaped = printable_json(&text);

@@ -1,4 +1,4 @@
-//! `photoncard diff`.
+//! Command `photoncard diff`.
 
 use photoncard_driver::difference::compare;
 use photoncard_driver::exr::read_rgb;
@@ -7,7 +7,7 @@ use crate::arguments::DiffOptions;
 use crate::console::print_json;
 use crate::failure::Failure;
 
-/// Prints the difference of two pictures as JSON.
+/// Prints the difference between two pictures as JSON.
 pub(crate) fn run(options: &DiffOptions) -> Result<(), Failure> {
     let read = |path| read_rgb(path).map_err(|error| Failure::input_error(&error));
     let reference = read(&options.reference)?;

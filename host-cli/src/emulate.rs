@@ -1,4 +1,4 @@
-//! `photoncard emulate`.
+//! Command `photoncard emulate`.
 
 use photoncard_driver::emulator::serve_card;
 use photoncard_driver::link::{HostPort, Listener};
@@ -8,7 +8,7 @@ use crate::console::{print, say};
 use crate::failure::Failure;
 use crate::progress::stop_on_signals;
 
-/// Serves an emulated card to hosts, one after another, until an interrupt.
+/// Serves an emulated card to one host after another until an interrupt.
 pub(crate) fn run(options: &EmulateOptions) -> Result<(), Failure> {
     let stop = stop_on_signals().map_err(|error| Failure::work_error(&error))?;
     let listener = Listener::new(&options.listen).map_err(Failure::work)?;

@@ -1,4 +1,4 @@
-//! The option `--environment`.
+//! Value of the option `--environment`.
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -7,7 +7,7 @@ use photoncard_driver::scene::{BRIGHTEST, Environment};
 
 use crate::failure::Failure;
 
-/// Environment light as the argument of an option.
+/// Environment light that `--environment` states.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum EnvironmentOption {
     /// Constant radiance, W/(sr m^2).
@@ -34,7 +34,7 @@ impl FromStr for EnvironmentOption {
 }
 
 impl EnvironmentOption {
-    /// Loads the environment, and a notice on its texels if there is one.
+    /// Loads the environment. Returns it with a notice about clamped texels, if there are any.
     pub(crate) fn load(&self) -> Result<(Environment, Option<String>), Failure> {
         match self {
             Self::Constant(radiance) => Ok((Environment::constant((*radiance).into()), None)),
@@ -42,7 +42,7 @@ impl EnvironmentOption {
         }
     }
 
-    /// Description of the environment in the picture's provenance.
+    /// Description of the environment for the provenance of a picture.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Constant([red, green, blue]) => format!("{red},{green},{blue}"),
@@ -56,7 +56,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn three_numbers_are_a_radiance_and_a_text_is_a_file() {
+    fn three_numbers_are_a_radiance_and_other_text_is_a_file() {
         let parsed = |text: &str| text.parse::<EnvironmentOption>();
         assert_eq!(parsed("0.5, 1,2e3"), Ok(EnvironmentOption::Constant([0.5, 1.0, 2000.0])));
         assert_eq!(parsed("sky.exr"), Ok(EnvironmentOption::File("sky.exr".into())));

@@ -12,47 +12,47 @@ use photoncard_driver::render::RenderError;
 pub(crate) enum Failure {
     /// Invalid arguments or unreadable input: status 2.
     Input(Report),
-    /// The work failed: status 1.
+    /// Failure of the work: status 1.
     Work(Report),
-    /// An interrupt: status 130, as for a process ended by SIGINT. The text names the files that remain.
+    /// Interrupt: status 130, as for a process ended by SIGINT. The text names the files that remain.
     Stopped(&'static str),
 }
 
 impl Failure {
-    /// Failure of input, with a remedy.
+    /// Creates a failure of the input from an error with a remedy.
     pub(crate) fn input(error: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self::Input(Report::new(error))
     }
 
-    /// Failure of the work, with a remedy.
+    /// Creates a failure of the work from an error with a remedy.
     pub(crate) fn work(error: impl Diagnostic + Send + Sync + 'static) -> Self {
         Self::Work(Report::new(error))
     }
 
-    /// Failure of input, with its causes and without a remedy.
+    /// Creates a failure of the input from an error without a remedy. The causes are kept.
     pub(crate) fn input_error(error: &(dyn std::error::Error + 'static)) -> Self {
         Self::Input(Report::new(MietteDiagnostic::new(with_causes(error))))
     }
 
-    /// Failure of the work, with its causes and without a remedy.
+    /// Creates a failure of the work from an error without a remedy. The causes are kept.
     pub(crate) fn work_error(error: &(dyn std::error::Error + 'static)) -> Self {
         Self::Work(Report::new(MietteDiagnostic::new(with_causes(error))))
     }
 
-    /// Failure of writing to standard output.
+    /// Creates the failure of writing to standard output.
     pub(crate) fn output(error: &std::io::Error) -> Self {
         let text = format!("cannot write to standard output: {error}");
         let help = "check the space of the file or the device that it is directed to";
         Self::Work(Report::new(MietteDiagnostic::new(text).with_help(help)))
     }
 
-    /// Failure of making a folder.
+    /// Creates the failure of making a folder.
     pub(crate) fn folder(path: &Path, error: &std::io::Error) -> Self {
         let text = format!("cannot make the folder {}: {error}", path.display());
         Self::Input(Report::new(MietteDiagnostic::new(text).with_help("choose another folder")))
     }
 
-    /// Failure of a folder that is to be there.
+    /// Creates the failure of a folder that should exist.
     pub(crate) fn no_folder(path: &Path, error: &std::io::Error) -> Self {
         let text = format!("cannot use the folder {}: {error}", path.display());
         Self::Input(Report::new(
@@ -60,7 +60,7 @@ impl Failure {
         ))
     }
 
-    /// The message and its causes, in one line.
+    /// Message with its causes, in one line.
     pub(crate) fn line(&self) -> String {
         match self {
             Self::Input(report) | Self::Work(report) => {
@@ -82,7 +82,7 @@ impl Failure {
 }
 
 impl fmt::Display for Failure {
-    /// Message and remedy.
+    /// Writes message and remedy.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Input(report) | Self::Work(report) => write!(f, "{report:?}"),

@@ -1,9 +1,9 @@
-//! Hang-ups of the terminal that started the process.
+//! Hang-ups (SIGHUP) of the terminal that started the process.
 
-/// Returns whether the process was started to go on without its terminal, as by `nohup`: it ignores SIGHUP,
-/// by the mask in `/proc`. `None` if that is not known.
+/// Returns whether the process ignores SIGHUP, as `nohup` arranges, according to the signal mask in `/proc`.
+/// `None` if the mask is not available.
 pub(crate) fn is_ignored() -> Option<bool> {
-    /// Bit of SIGHUP, the signal 1.
+    /// Bit of SIGHUP, signal 1, in the mask.
     const HANG_UP: u64 = 1;
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"))?;

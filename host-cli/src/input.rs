@@ -12,7 +12,7 @@ use crate::arguments::SceneOptions;
 use crate::environment::EnvironmentOption;
 use crate::failure::Failure;
 
-/// The files, each with its description.
+/// Lists the input files, each with its description.
 pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
     let mut files = vec![(options.path.as_path(), "the scene")];
     if let Some(EnvironmentOption::File(path)) = &options.environment {
@@ -21,25 +21,25 @@ pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
     files
 }
 
-/// Loads the scene for cards of `dram_bytes`, before the assignments to its materials.
+/// Loads a scene for cards of `dram_bytes` bytes. Assignments are not applied.
 pub(crate) fn load(options: &SceneOptions, dram_bytes: u32) -> Result<Scene, Failure> {
     let Input { file, environment, rotation, compensates_energy } = Input::open(options, dram_bytes)?;
     let scene = file.into_rest().map_err(Failure::input)?;
     Ok(completed(scene, (environment, rotation), compensates_energy))
 }
 
-/// Scene file and environment, which are read once for scenes at several moments.
+/// Opened scene file and environment, which are read once for all frames.
 pub(crate) struct Input {
     pub(crate) file: SceneFile,
-    /// Environment, and the notice on its texels.
+    /// Environment, with the notice about its clamped texels.
     environment: Option<(Environment, Option<String>)>,
-    /// Stated rotation of the environment, degrees.
+    /// Rotation of the environment, degrees; `None` if it is not stated.
     rotation: Option<f32>,
     compensates_energy: bool,
 }
 
 impl Input {
-    /// Opens the files for cards of `dram_bytes`.
+    /// Opens the files for cards of `dram_bytes` bytes.
     pub(crate) fn open(options: &SceneOptions, dram_bytes: u32) -> Result<Self, Failure> {
         let (variant, light_units) = (options.variant.clone(), options.lights.light_units);
         let load = LoadSettings { dram_bytes, variant, light_units };
@@ -51,13 +51,13 @@ impl Input {
         })
     }
 
-    /// The scene as it stands, before the assignments to its materials.
+    /// Scene at rest. Assignments are not applied.
     pub(crate) fn at_rest(&self) -> Result<Scene, Failure> {
         let scene = self.file.at_rest().map_err(Failure::input)?;
         Ok(self.completed(scene))
     }
 
-    /// The scene at a moment of its animations, before the assignments to its materials.
+    /// Scene at a moment of its animations. Assignments are not applied.
     pub(crate) fn at(&self, moment: &Moment) -> Result<Scene, Failure> {
         let scene = self.file.at(moment).map_err(Failure::input)?;
         Ok(self.completed(scene))
@@ -68,7 +68,7 @@ impl Input {
     }
 }
 
-/// The scene with an environment and its notice.
+/// Adds the environment and its notice to a scene.
 fn completed(
     mut scene: Scene,
     (environment, rotation): (Option<(Environment, Option<String>)>, Option<f32>),
@@ -93,12 +93,12 @@ fn completed(
     scene
 }
 
-/// File name of the scene.
+/// File name of the scene, without its folder.
 pub(crate) fn name(options: &SceneOptions) -> String {
     options.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Names of the inputs and of their changes, for the provenance of pixels.
+/// Names of the inputs and of the changes to them, for the provenance of a picture.
 pub(crate) fn provenance(options: &SceneOptions) -> NamedSettings {
     let inputs = [
         ("scene", json!(name(options))),

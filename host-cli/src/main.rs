@@ -9,7 +9,7 @@
 //! | `failure` | errors with their exit status |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `input` | scene and environment of a render |
-//! | `notices` | what is ignored of a scene |
+//! | `notices` | contents of a scene that are ignored |
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |

@@ -1,4 +1,4 @@
-//! `photoncard merge`.
+//! Command `photoncard merge`.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::render::{part, video};
 /// Maximum number of missing parts whose commands are printed.
 const MAX_COMMANDS: usize = 100;
 
-/// Merges parts to the picture, and writes it.
+/// Merges the parts of a picture and writes it.
 pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
     let MergeOptions { parts: paths, pictures, sample_type, tone, progress } = options;
     if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
@@ -41,7 +41,7 @@ pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Prints the commands that make the missing parts.
+/// Prints the commands that render the missing parts.
 fn say_missing(parts: &Parts) {
     let missing = parts.missing();
     let Some(head) = parts.any() else { return };
@@ -49,7 +49,7 @@ fn say_missing(parts: &Parts) {
     missing.iter().take(MAX_COMMANDS).for_each(|part| say(format_args!("{}", command(part))));
 }
 
-/// Prints that pixels have light as that of a faulty card.
+/// Prints a warning about dazzling pixels, which a faulty card may have caused.
 fn say_dazzling(film: &Film) {
     let pixels = film.dazzling_pixels();
     if pixels > 0 {
@@ -61,7 +61,7 @@ fn say_dazzling(film: &Film) {
     }
 }
 
-/// Failure of a merge: that of its input, but for a disk or memory that is full.
+/// Failure of a merge. A full disk or memory is a failure of the work, all else one of the input.
 fn failure(error: PartError) -> Failure {
     match error {
         PartError::Film(_) | PartError::Unequal { .. } => Failure::work(error),

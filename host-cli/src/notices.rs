@@ -1,4 +1,5 @@
-//! Notices on a scene: what is ignored or missing in it, and what is taken in another way than it is stated.
+//! Notices about a scene: contents that are ignored, missing, or interpreted in another way than they are
+//! stated.
 
 use std::path::Path;
 
@@ -10,10 +11,10 @@ use crate::arguments::{FrameOptions, SceneOptions};
 use crate::console::say;
 use crate::failure::Failure;
 
-/// Maximum number of notices of a kind that are printed, besides their number.
+/// Maximum number of sentences per notice. Further ones are counted.
 const NAMED: usize = 3;
 
-/// What pictures use of a scene's file.
+/// Contents of the scene's file that the pictures use.
 pub(crate) struct Uses {
     view: bool,
     animations: bool,
@@ -21,7 +22,7 @@ pub(crate) struct Uses {
 }
 
 impl Uses {
-    /// Uses of a picture, or of `frames`. Its camera is one that can be seen by.
+    /// Contents that a picture, or `frames`, uses. The picture has a valid camera.
     pub(crate) fn of(options: &SceneOptions, picture: &Picture, frames: Option<&FrameOptions>) -> Self {
         Self {
             view: !picture.states_view(),
@@ -40,10 +41,10 @@ impl Uses {
     }
 }
 
-/// Prints what is ignored or missing of what is used; with `--strict` it is an error.
+/// Prints notices about contents that the pictures use and that are ignored or missing.
 ///
 /// # Errors
-/// If anything is ignored or missing, and the options are strict.
+/// If there is such a notice and `--strict` is given.
 pub(crate) fn say_ignored(options: &SceneOptions, scene: &Scene, uses: &Uses) -> Result<(), Failure> {
     let notices = scene.notices_on(|concern| uses.uses(concern));
     let Some(line) = first(&options.path, &notices) else { return Ok(()) };
@@ -56,7 +57,7 @@ pub(crate) fn say_ignored(options: &SceneOptions, scene: &Scene, uses: &Uses) ->
     Err(Failure::Input(Report::new(report.with_help(help))))
 }
 
-/// Prints what is taken in another way than it is stated.
+/// Prints remarks about contents that are interpreted in another way than they are stated.
 pub(crate) fn say_remarks(path: &Path, scene: &Scene) {
     let remarks: Vec<_> = scene.remarks.iter().map(String::as_str).collect();
     if let Some(line) = first(path, &remarks) {
@@ -64,7 +65,7 @@ pub(crate) fn say_remarks(path: &Path, scene: &Scene) {
     }
 }
 
-/// The first sentences, and the number of the others.
+/// Text of the first sentences, with the number of the others.
 fn first(path: &Path, sentences: &[&str]) -> Option<String> {
     let mut said = sentences.get(..NAMED.min(sentences.len()))?.join("; ");
     if said.is_empty() {
@@ -106,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_ignored_is_an_error_of_a_strict_render() {
+    fn strict_renders_refuse_ignored_contents() {
         let scene = Scene { notices: vec!["n0".into(); 5], remarks: vec!["r".into()], ..Scene::default() };
         assert_eq!(refused("", &scene).unwrap().matches("n0").count(), 5);
         let lenient = SceneOptions { strict: false, ..options("").scene };
@@ -115,10 +116,9 @@ mod tests {
         assert_eq!(refused("", &Scene { notices: Vec::new(), ..scene }), None);
     }
 
-    /// A notice on each concern, in place of which the command line may state another view, play no
-    /// animation, or have another sky.
+    /// Each notice concerns contents that the command line replaces: the view, animations or the environment.
     #[test]
-    fn what_the_command_line_states_itself_is_no_error_of_a_strict_render() {
+    fn strict_renders_accept_contents_that_the_command_line_replaces() {
         for (concern, replaced, used) in [
             (Concern::View, "--camera-at 1,2,3 --look-at 0,0,0", Some("--camera-at 1,2,3 --fov 30")),
             (Concern::OtherCameras, "--camera eye", None),

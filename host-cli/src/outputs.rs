@@ -1,4 +1,4 @@
-//! Checks of output files before any work.
+//! Checks of output files before any work starts.
 
 use std::path::{Path, PathBuf};
 
@@ -8,8 +8,8 @@ use photoncard_driver::tone_mapping::is_of_photoncard;
 
 use crate::failure::Failure;
 
-/// Checks that the files `written` can be written, and that none of them or of `reserved` is one of the
-/// inputs, each with its description, or another output.
+/// Checks that the files `written` are writable, and that no file of `written` or `reserved` is an input,
+/// described by its text, or another output.
 pub(crate) fn check(inputs: &[(&Path, &str)], written: &[&Path], reserved: &[&Path]) -> Result<(), Failure> {
     for path in written {
         output::check_writable(path).map_err(|error| Failure::input_error(&error))?;
@@ -26,7 +26,7 @@ pub(crate) fn check(inputs: &[(&Path, &str)], written: &[&Path], reserved: &[&Pa
     Ok(())
 }
 
-/// Checks that files of names that were not stated are photoncard's own.
+/// Checks that existing files at derived paths were written by photoncard, so that they may be replaced.
 pub(crate) fn check_foreign(mut paths: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
     let Some(other) = paths.find(|path| path.exists() && !is_of_photoncard(path)) else {
         return Ok(());

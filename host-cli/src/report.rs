@@ -1,4 +1,4 @@
-//! Layout of errors: with colours and line breaks on a terminal, and with foreign text escaped.
+//! Layout of errors, with colours and line breaks on a terminal. Foreign text is escaped.
 
 use std::error::Error;
 use std::fmt::{Display, Formatter, Result};
@@ -9,11 +9,10 @@ use clap::builder::styling::{AnsiColor, Style};
 use miette::{Diagnostic, ReportHandler};
 use photoncard_driver::printable::printable;
 
-/// Columns before an excerpt.
+/// Width of the mark before an excerpt, columns.
 const EXCERPT_MARK: usize = 5;
 
-/// Installs the layout. Lines are broken on a terminal only: elsewhere a path in a message stays in one
-/// piece.
+/// Installs the layout. Lines are broken on a terminal only, so that a path in a log stays in one piece.
 pub(crate) fn lay_out_errors() {
     let build = |_: &_| {
         let width = terminal_size::terminal_size_of(stderr()).map(|(width, _)| usize::from(width.0));
@@ -25,9 +24,9 @@ pub(crate) fn lay_out_errors() {
     let _ = miette::set_hook(Box::new(build));
 }
 
-/// Prints an error with its causes, the excerpt of a file that it points into, and its remedy.
+/// Prints an error with its causes, the excerpt of a file to which it points, and its remedy.
 struct Layout {
-    /// Columns at which lines are broken.
+    /// Column at which lines are broken.
     width: usize,
     has_colours: bool,
 }
@@ -61,7 +60,7 @@ impl Layout {
         if self.has_colours { format!("{style}{text}{style:#}") } else { text.to_string() }
     }
 
-    /// Lines of a text, the first behind one mark and the others behind another.
+    /// Prints the lines of a text. The first line has the first mark before it, the others the second.
     fn paragraph(&self, f: &mut Formatter<'_>, style: Style, marks: [&str; 2], text: &str) -> Result {
         let [mut mark, next] = marks;
         for line in text.lines() {
@@ -73,8 +72,8 @@ impl Layout {
         Ok(())
     }
 
-    /// The line that an error points into, with a mark below the place. Its author escapes it, as labels are
-    /// offsets.
+    /// Prints the line of a file to which an error points, with a mark below the position. The line is
+    /// already escaped by the error, because labels are offsets in it.
     fn excerpt(&self, f: &mut Formatter<'_>, error: &dyn Diagnostic) -> Result {
         let (Some(source), Some(labels)) = (error.source_code(), error.labels()) else { return Ok(()) };
         for label in labels {
@@ -95,7 +94,7 @@ impl Layout {
     }
 }
 
-/// Messages of an error and of its causes, escaped; a cause that the message before it ends with is left out.
+/// Escaped messages of an error and its causes. A cause is left out if the message before it ends with it.
 fn messages(error: &dyn Diagnostic) -> Vec<String> {
     let mut texts = vec![escaped(error)];
     let mut cause: Option<&dyn Error> =
@@ -110,7 +109,7 @@ fn messages(error: &dyn Diagnostic) -> Vec<String> {
     texts
 }
 
-/// Remedy of an error, or of the first of its causes that has one, escaped.
+/// Escaped remedy of an error, or of its first cause with a remedy.
 fn help(error: &dyn Diagnostic) -> Option<String> {
     match error.help() {
         Some(help) => Some(escaped(help)),
@@ -118,7 +117,7 @@ fn help(error: &dyn Diagnostic) -> Option<String> {
     }
 }
 
-/// Parts of a line of at most `width` characters, broken at spaces; a longer word stays in one piece.
+/// Breaks a line at spaces into parts of at most `width` characters. Longer words stay whole.
 fn broken(line: &str, width: usize) -> Vec<String> {
     let mut words = line.split(' ');
     let mut parts = vec![words.next().unwrap_or_default().to_owned()];
@@ -134,8 +133,8 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
-/// The part of a line around column `at` that has at most `width` characters, and the column of `at` in it.
-/// Ellipses stand for what is left out.
+/// Part of a line around column `at` of at most `width` characters, and the column of `at` in it. Ellipses
+/// stand for the rest.
 fn around(line: &str, at: usize, width: usize) -> (String, usize) {
     let count = line.chars().count();
     if count <= width {
@@ -162,7 +161,7 @@ mod tests {
 
     use super::*;
 
-    /// What [`Layout`] prints of a report.
+    /// Output of [`Layout`] for a report.
     fn printed(report: &Report, width: usize) -> String {
         struct Printed<'a>(&'a dyn Diagnostic, Layout);
         impl Display for Printed<'_> {

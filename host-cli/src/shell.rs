@@ -1,8 +1,8 @@
-//! Commands for a shell.
+//! Commands for a POSIX shell.
 
 pub(crate) use photoncard_driver::printable::shell_word as quoted;
 
-/// Command line of this program with these arguments, for a POSIX shell.
+/// Quoted command line of this program with the given arguments.
 pub(crate) fn command(arguments: impl IntoIterator<Item = String>) -> String {
     let arguments = arguments.into_iter().map(|argument| quoted(&argument).into_owned());
     std::iter::once("photoncard".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")

@@ -1,4 +1,4 @@
-//! `photoncard tonemap`.
+//! Command `photoncard tonemap`.
 
 use photoncard_driver::exr::read_with_provenance;
 use photoncard_driver::tone_mapping::{PngError, write_png};
@@ -7,7 +7,7 @@ use crate::arguments::TonemapOptions;
 use crate::failure::Failure;
 use crate::outputs;
 
-/// Tone-maps a picture.
+/// Tone-maps a picture and writes it.
 pub(crate) fn run(options: &TonemapOptions) -> Result<(), Failure> {
     let TonemapOptions { input, output, tone } = options;
     outputs::check(&[(input, "the picture to read")], &[output], &[])?;

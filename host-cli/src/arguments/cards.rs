@@ -1,4 +1,4 @@
-//! Options of the cards, and of their tests.
+//! Options of cards and of their links.
 
 use std::path::PathBuf;
 
@@ -58,7 +58,7 @@ pub(crate) struct CardOptions {
 }
 
 impl CardOptions {
-    /// Settings of these options.
+    /// Settings of the cards that these options state.
     pub(super) fn settings(&self) -> CardSet {
         let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
         let cards = CardSet {

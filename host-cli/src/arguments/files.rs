@@ -1,5 +1,4 @@
-//! Names of output files: the name's ending states the format, and `-` is standard output where text goes
-//! there.
+//! Names of output files. The suffix states the format, and `-` is standard output where a command allows it.
 
 use std::path::{Path, PathBuf};
 
@@ -22,7 +21,7 @@ impl TextOutput {
     }
 }
 
-/// Format of a picture.
+/// Format of a picture file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum PictureFormat {
     /// `OpenEXR`: linear radiance and layers.
@@ -58,8 +57,8 @@ impl PictureOutput {
     }
 }
 
-/// Formats of pictures that are not written, by the endings of their names, each with its name and the end of
-/// the command that makes one of a PNG or an EXR.
+/// Formats that are not written: suffixes, name, and the end of the command that converts a PNG or an EXR to
+/// the format.
 const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
     (&["jpg", "jpeg", "jpe"], "JPEG", "out.png, then: magick out.png out.jpg"),
     (&["webp"], "WebP", "out.png, then: magick out.png out.webp"),
@@ -75,7 +74,7 @@ const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
     (&["card"], "a prepared scene", "SCENE.card to photoncard prepare"),
 ];
 
-/// Error of an ending that is none of a picture that is written.
+/// Error of a suffix that is not that of a supported picture format.
 fn other_format(ending: Option<&str>) -> String {
     let other =
         OTHER_FORMATS.iter().find(|(endings, ..)| ending.is_some_and(|ending| endings.contains(&ending)));
@@ -87,7 +86,7 @@ fn other_format(ending: Option<&str>) -> String {
     }
 }
 
-/// Parser of outputs for pictures, by the ending of their names.
+/// Parser of the outputs for pictures. The suffix states the format.
 pub(super) fn picture() -> impl TypedValueParser<Value = PictureOutput> {
     PathBufValueParser::new().try_map(|path| {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
@@ -103,7 +102,7 @@ pub(super) fn picture() -> impl TypedValueParser<Value = PictureOutput> {
     })
 }
 
-/// Parser of outputs that are a PNG picture.
+/// Parser of the output for a PNG picture.
 pub(super) fn png() -> impl TypedValueParser<Value = PathBuf> {
     picture().try_map(|output| match output {
         PictureOutput { path, format: PictureFormat::Png } if path.as_os_str() != STANDARD_OUTPUT => Ok(path),
@@ -111,7 +110,7 @@ pub(super) fn png() -> impl TypedValueParser<Value = PathBuf> {
     })
 }
 
-/// Parser of outputs for text.
+/// Parser of the output for text.
 pub(super) fn text() -> impl TypedValueParser<Value = TextOutput> {
     PathBufValueParser::new().map(|path| match path.to_str() {
         Some("-") => TextOutput::StandardOutput,
@@ -119,7 +118,7 @@ pub(super) fn text() -> impl TypedValueParser<Value = TextOutput> {
     })
 }
 
-/// Parser of outputs that cannot be standard output.
+/// Parser of an output that cannot be standard output.
 pub(super) fn file() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| match path.to_str() {
         Some("-") => {
@@ -145,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn the_ending_states_the_format() {
+    fn the_suffix_states_the_format() {
         for (name, format) in [
             ("a.exr", Some(PictureFormat::Exr)),
             ("b.c/A.EXR", Some(PictureFormat::Exr)),
@@ -166,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn formats_that_are_not_written_are_named_with_what_makes_them() {
+    fn unsupported_formats_are_refused_with_a_command_that_converts() {
         for (ending, parts) in [
             ("jpg", ["JPEG", "magick"]),
             ("tiff", ["TIFF", "oiiotool"]),

@@ -1,4 +1,4 @@
-//! Options of frames: moments of a scene's animations, each a picture of its own.
+//! Options of frames: pictures of a scene at several times of its animations.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -8,9 +8,9 @@ use photoncard_driver::render::NamedSettings;
 use photoncard_driver::scene::gltf::Moment;
 use serde_json::json;
 
-/// Number of frames in a second, if it is not stated: Blender's.
+/// Default frames per second, that of Blender.
 const FPS: f64 = 24.0;
-/// Maximum number of frames in a second.
+/// Maximum frames per second.
 const MAX_FPS: f64 = 100_000.0;
 /// Maximum number of a frame.
 const MAX_FRAME: u32 = 999_999;
@@ -33,22 +33,22 @@ pub(crate) struct FrameOptions {
     fps: Option<f64>,
 }
 
-/// Numbers of frames, increasing.
+/// Frame numbers, increasing.
 #[derive(Clone, Debug, PartialEq)]
 struct Frames(BTreeSet<u32>);
 
 impl FrameOptions {
-    /// Numbers of the frames, increasing; `None` for a picture of the scene as it stands.
+    /// Numbers of the frames, increasing; `None` for one picture of the scene at rest.
     pub(crate) fn numbers(&self) -> Option<impl Iterator<Item = u32>> {
         self.frames.as_ref().map(|Frames(numbers)| numbers.iter().copied())
     }
 
-    /// Names of the animations that play; all for none.
+    /// Names of the animations that play. All play if the list is empty.
     pub(crate) fn animations(&self) -> &[String] {
         &self.animations
     }
 
-    /// Settings that all frames share, of those that [`Self::provenance`] holds.
+    /// Part of [`Self::provenance`] that all frames have in common.
     pub(crate) fn shared_provenance(&self) -> NamedSettings {
         let named = [("fps", json!(self.fps())), ("animation", json!(self.animations))];
         named.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
@@ -59,20 +59,20 @@ impl FrameOptions {
         self.fps.unwrap_or(FPS)
     }
 
-    /// Moment of a frame.
+    /// Time and animations of a frame.
     pub(crate) fn moment(&self, frame: u32) -> Moment {
         Moment { animations: self.animations.clone(), seconds: f64::from(frame) / self.fps() }
     }
 
-    /// Settings that a frame's pixels depend on, besides the options of a picture.
+    /// Settings of frames on which the pixels of `frame` depend.
     pub(crate) fn provenance(&self, frame: u32) -> NamedSettings {
         let own = ("frame".to_owned(), json!(frame));
         self.shared_provenance().into_iter().chain([own]).collect()
     }
 }
 
-/// Path of the file of the greatest number up to a frame's that a pattern with a run of `#` names; the
-/// pattern itself without one.
+/// Path of the last existing file up to `frame` that matches a pattern with a run of `#`. A pattern without
+/// one is returned as it is.
 pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     if numbered(pattern, frame).is_none() {
         return Some(pattern.to_owned());
@@ -89,8 +89,8 @@ pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     numbered(pattern, last)
 }
 
-/// Path of a frame's output: the last run of `#` in the file's name becomes the number, with zeros before it.
-/// `None` without a `#`.
+/// Path of a frame's output: the frame's number, padded with zeros, replaces the last run of `#` in the file
+/// name. `None` without a `#`.
 pub(crate) fn numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     let name = pattern.file_name()?.to_str()?;
     let end = name.rfind('#')? + 1;
@@ -107,7 +107,7 @@ fn frames(text: &str) -> Result<Frames, String> {
     Ok(Frames(ranges.into_iter().flatten().collect()))
 }
 
-/// Range of frames: `7`, `1-240` or `1-240x10`.
+/// Parses a range of frames: `7`, `1-240` or `1-240x10`.
 fn range(text: &str) -> Option<impl Iterator<Item = u32>> {
     let (ends, step) = text.split_once('x').unwrap_or((text, "1"));
     let (first, last) = ends.split_once('-').unwrap_or((ends, ends));
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_run_of_signs_in_the_name_is_the_number() {
+    fn the_number_replaces_the_last_run_of_signs() {
         for (pattern, frame, expected) in [
             ("out.####.exr", 7, Some("out.0007.exr")),
             ("out.#.exr", 12, Some("out.12.exr")),

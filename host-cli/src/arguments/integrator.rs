@@ -1,4 +1,4 @@
-//! Options of the estimation of light by rays.
+//! Options of the integrator: samples, rays and the irradiance cache.
 
 use clap::{ArgAction, Args};
 use photoncard_driver::choice::Choice;
@@ -50,7 +50,7 @@ pub(crate) struct IntegratorOptions {
     adaptive: Option<Adaptive>,
 }
 
-/// Value of `--adaptive`.
+/// Stated value of `--adaptive`.
 #[derive(Clone, Copy)]
 enum Adaptive {
     Off,
@@ -61,7 +61,7 @@ enum Adaptive {
 const DEFAULT_IC_ERROR: f32 = 0.025;
 
 impl IntegratorOptions {
-    /// Settings of these options; `base` gives those that are not stated.
+    /// Settings of these options. `base` supplies those that are not stated.
     pub(super) fn settings(&self, base: &Integrator) -> Integrator {
         let gather_rays = self.gather_rays.unwrap_or(base.gather_rays);
         let error = self.ic_error.or(base.irradiance_error).unwrap_or(DEFAULT_IC_ERROR);
@@ -81,7 +81,7 @@ impl IntegratorOptions {
         }
     }
 
-    /// Options that are stated, of those that a quality chooses for a scene.
+    /// Flags of the stated options among those that a quality chooses.
     pub(super) fn stated(&self) -> Stated {
         Stated {
             samples: self.spp.is_some(),
@@ -97,7 +97,7 @@ impl IntegratorOptions {
         self.irradiance_cache.unwrap_or(base.irradiance_error.is_some())
     }
 
-    /// For each option, whether it has no effect, its name, and the reason.
+    /// Options, each with whether it has no effect, its name, and the reason.
     pub(super) fn without_effect(&self, base: &Integrator) -> [(bool, &'static str, String); 3] {
         let is_cached = self.is_cached(base);
         let has_no_rays = self.gather_rays == Some(0);

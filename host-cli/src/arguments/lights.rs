@@ -1,4 +1,4 @@
-//! Options of the lights in a scene's file.
+//! Options of punctual lights in a scene's file.
 
 use clap::Args;
 use photoncard_driver::choice::Choice;

@@ -1,4 +1,4 @@
-//! Arguments of the machine that a study's times are of.
+//! Options of the machine for which a study computes times.
 
 use std::ops::RangeInclusive;
 use std::str::FromStr;
@@ -32,22 +32,22 @@ pub(crate) struct MachineOptions {
     tasks: u32,
 }
 
-/// Bandwidths and arithmetic, in thousand millions a second.
+/// Valid range of bandwidth, GB/s, and of arithmetic, GFLOPS.
 const GIGA: RangeInclusive<f64> = 0.1..=1e6;
-/// Latencies, nanoseconds; 0 is allowed.
+/// Valid range of latency, nanoseconds.
 const LATENCY: RangeInclusive<f64> = 0.0..=10_000.0;
-/// Tasks in flight.
+/// Valid range of tasks in flight.
 const TASKS: RangeInclusive<u32> = 1..=65_536;
 
 impl RateOptions {
-    /// The machine of these rates.
+    /// Nominal machine with these rates.
     pub(crate) fn machine(&self) -> Machine {
         Machine { bandwidth: 1e9 * self.bandwidth, flops: 1e9 * self.flops, ..Machine::NOMINAL }
     }
 }
 
 impl MachineOptions {
-    /// The machine.
+    /// Machine with these options.
     pub(crate) fn machine(&self) -> Machine {
         Machine { latency: self.latency / 1e9, tasks: self.tasks, ..self.rates.machine() }
     }
@@ -65,7 +65,7 @@ fn tasks(text: &str) -> Result<u32, String> {
     within(text, &TASKS)
 }
 
-/// Number of a range.
+/// Parses a number within a range.
 fn within<T: FromStr + PartialOrd + std::fmt::Display>(
     text: &str,
     range: &RangeInclusive<T>,
@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn the_machine_without_options_is_the_nominal_one() {
+    fn the_default_machine_is_the_nominal_one() {
         assert_eq!(parsed(&[]).unwrap(), Machine::NOMINAL);
     }
 
@@ -107,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_machine_has_is_refused() {
+    fn rates_out_of_range_are_refused() {
         for arguments in [
             ["--bandwidth", "0"],
             ["--bandwidth", "nan"],

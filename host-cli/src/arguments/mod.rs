@@ -76,7 +76,8 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
-/// Version of the program, of what it shares with cards, and the kinds of links that this build has.
+/// Text of `--version`: version of the program, versions of the protocol shared with cards, and the kinds of
+/// links of this build.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let links = if cfg!(unix) { "serial, tcp, unix, pty" } else { "serial, tcp" };
     format!(
@@ -88,7 +89,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 });
 
 impl Command {
-    /// Form in which the command tells of its progress and its failure.
+    /// Form in which the command reports progress and failure.
     pub(crate) fn progress(&self) -> ProgressForm {
         match self {
             Self::Render(options) => options.progress,
@@ -100,7 +101,8 @@ impl Command {
 }
 
 impl Arguments {
-    /// Parses the arguments of the process. Invalid ones end it with a message in which they are escaped.
+    /// Parses the arguments of the process. Invalid ones end the process with a message in which they are
+    /// escaped.
     pub(crate) fn parse_printably() -> Self {
         let given = of_scene_alone(std::env::args_os().collect());
         Self::try_parse_from(&given).unwrap_or_else(|error| {
@@ -112,7 +114,7 @@ impl Arguments {
     }
 }
 
-/// The arguments, of which those of a scene without a command are those of a view that is opened.
+/// Inserts `view --open` into arguments that consist of a scene without a command.
 fn of_scene_alone(mut given: Vec<OsString>) -> Vec<OsString> {
     let is_scene = |word: &OsString| {
         let ending = Path::new(word).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
@@ -267,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn words_of_other_renderers_are_answered() {
+    fn options_of_other_renderers_are_answered_with_their_equivalent() {
         for (line, part) in [
             ("photoncard render a.glb --samples 64", "--spp"),
             ("photoncard render a.glb --samples=64", "--spp"),
@@ -290,7 +292,7 @@ mod tests {
         assert!(said("photoncard render a.glb b.glb").contains("unexpected argument"));
     }
 
-    /// Command of a name, all of whose options are known.
+    /// Command of this name, built so that all its options are known.
     fn named(name: &str) -> clap::Command {
         let mut command = Arguments::command();
         command.build();
@@ -298,7 +300,7 @@ mod tests {
         words.fold(command, |command, word| command.find_subcommand(word).expect(name).clone())
     }
 
-    /// Returns whether the command, or all that it has, take an option `-o` or `--name`.
+    /// Returns whether a command, or every command below it, takes an option `-o` or `--name`.
     fn takes(command: &clap::Command, option: &str) -> bool {
         let is_it = |argument: &clap::Arg| match option.strip_prefix("--") {
             Some(long) => argument.get_long() == Some(long),
@@ -310,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn remedies_state_options_of_their_commands_alone() {
+    fn remedies_state_options_that_their_commands_have() {
         let mut count = 0;
         for suggestions::Word { remedy, commands, .. } in &suggestions::OF_OTHERS {
             let words = remedy.split([' ', ':', ';', ',']).filter(|word| word.starts_with('-'));
@@ -325,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn commands_of_commands_are_found_among_all_words() {
+    fn the_path_of_a_command_is_found_among_its_arguments() {
         let words = ["photoncard", "card", "--out", "a", "selftest", "b.glb"].map(str::to_owned);
         assert_eq!(suggestions::command_of(Arguments::command(), &words), "card selftest");
         assert_eq!(suggestions::command_of(Arguments::command(), &words[..1]), "");

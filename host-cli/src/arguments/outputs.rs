@@ -44,13 +44,13 @@ pub(crate) struct OutputOptions {
 }
 
 impl OutputOptions {
-    /// Returns whether a render goes on with what is there.
+    /// Returns whether the render continues with finished tiles or frames of an earlier one.
     pub(crate) fn resumes(&self) -> bool {
         self.resume
     }
 
-    /// Outputs with the PNG beside a scene, or the numbered ones of its frames, if no picture is stated;
-    /// `None` if one is.
+    /// Default outputs: a PNG beside the scene, or a numbered one for each frame. `None` if a picture is
+    /// stated.
     pub(crate) fn beside(&self, scene: &Path, has_frames: bool) -> Option<Self> {
         if !self.pictures.is_empty() {
             return None;
@@ -61,13 +61,13 @@ impl OutputOptions {
         Some(Self { pictures: vec![PictureOutput { path, format: PictureFormat::Png }], ..self.clone() })
     }
 
-    /// File of finished tiles; none beside standard output.
+    /// Settings of the file of finished tiles; `None` for standard output.
     pub(super) fn partial(&self) -> Option<PartialSettings> {
         self.main()?.file()?;
         Some(PartialSettings { path: self.partial_path(), resume: self.resume })
     }
 
-    /// Path of the file in which finished tiles are kept until the picture is written.
+    /// Path of the file that holds finished tiles until the picture is written.
     pub(crate) fn partial_path(&self) -> PathBuf {
         let mut name = self.main_path().as_os_str().to_owned();
         name.push(".partial");
@@ -77,7 +77,7 @@ impl OutputOptions {
     /// Outputs of a frame.
     ///
     /// # Errors
-    /// If a name has no place for the frame's number: the name.
+    /// The first path without a place for the frame's number.
     pub(crate) fn of_frame(&self, frame: u32) -> Result<Self, &Path> {
         let mut outputs = self.clone();
         for (output, pattern) in outputs.pictures.iter_mut().zip(&self.pictures) {
@@ -94,12 +94,12 @@ impl OutputOptions {
         self.sample_type.unwrap_or(SampleFormat::Float)
     }
 
-    /// Returns whether a picture of the format is written.
+    /// Returns whether a picture of this format is written.
     pub(super) fn has(&self, format: PictureFormat) -> bool {
         self.pictures.iter().any(|picture| picture.format == format)
     }
 
-    /// Picture that the render is named after: the first EXR, or the first picture without one.
+    /// Picture that names the render: the first EXR, or the first picture without one.
     pub(crate) fn main(&self) -> Option<&PictureOutput> {
         let exr = self.pictures.iter().find(|picture| picture.format == PictureFormat::Exr);
         exr.or(self.pictures.first())
@@ -109,7 +109,7 @@ impl OutputOptions {
         self.main().map_or(Path::new(""), |picture| &picture.path)
     }
 
-    /// Display server, and the picture's name on it: that of its file.
+    /// Display server, and the name of the picture on it, which is that of its file.
     pub(super) fn display(&self) -> Option<DisplaySettings> {
         let address = self.display_server.clone()?;
         let path = self.main_path();

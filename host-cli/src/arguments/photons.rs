@@ -50,7 +50,7 @@ impl PhotonOptions {
         self.photons.is_some()
     }
 
-    /// Settings of these options; `base` gives those that are not stated.
+    /// Settings of these options. `base` supplies those that are not stated.
     pub(super) fn settings(&self, base: &PhotonMaps) -> PhotonMaps {
         PhotonMaps {
             count: self.photons.unwrap_or(base.count),

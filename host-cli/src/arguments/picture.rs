@@ -1,4 +1,4 @@
-//! Options of the picture and of the camera that sees it.
+//! Options of the picture and of its camera.
 
 use clap::Args;
 use photoncard_driver::film::Window;
@@ -8,24 +8,24 @@ use photoncard_driver::scene::Camera;
 
 use super::choice::choice;
 
-/// Longer side of a picture without a given size, pixels.
+/// Default length of the longer side, pixels.
 const SIDE: u32 = 512;
 
-/// Aspect ratio of video.
+/// Aspect ratio of a picture that is stated like a video format.
 const WIDE: f32 = 16.0 / 9.0;
 
-/// Size of a picture, pixels.
+/// Stated size of a picture, pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Size {
     Exact(u32, u32),
-    /// The longer side.
+    /// Length of the longer side.
     Longer(u32),
-    /// The height, as of video.
+    /// Height, as for a video format.
     Height(u32),
 }
 
 impl Size {
-    /// Width and height with a camera's aspect ratio, as far as both state nothing else.
+    /// Width and height. The camera's aspect ratio supplies what the size leaves open.
     fn of(self, camera: Option<&Camera>) -> (u32, u32) {
         let aspect = camera.and_then(|camera| camera.aspect);
         match self {
@@ -84,7 +84,7 @@ pub(crate) struct PictureOptions {
 }
 
 impl PictureOptions {
-    /// Settings of these options; `base` gives those that are not stated.
+    /// Settings of these options. `base` supplies those that are not stated.
     pub(super) fn settings(&self, base: &Picture) -> Picture {
         let Self { size, crop, camera, camera_at, look_at, fov, aov: _, filter } = self;
         let (width, height) = size.unwrap_or(Size::Longer(SIDE)).of(None);
@@ -106,13 +106,13 @@ impl PictureOptions {
         self.size.is_some()
     }
 
-    /// Layers of the picture.
+    /// Layers that the picture stores.
     pub(crate) fn layers(&self) -> Layers {
         self.aov.clone().unwrap_or_default()
     }
 
-    /// Gives the picture the camera's aspect ratio, if width and height are not both stated. Returns a notice
-    /// if those that are have another.
+    /// Gives the picture the camera's aspect ratio, unless width and height are both stated. Returns a notice
+    /// if these have another ratio.
     pub(crate) fn fit(&self, camera: &Camera, picture: &mut Picture) -> Option<String> {
         let size = self.size.unwrap_or(Size::Longer(SIDE));
         (picture.width, picture.height) = size.of(Some(camera));
@@ -148,7 +148,7 @@ fn size(text: &str) -> Result<Size, String> {
     })
 }
 
-/// Longer side of a percentage of the default, at least a pixel.
+/// Length of the longer side for a percentage of the default, at least one pixel.
 fn percent_of_side(percent: &str) -> Option<u32> {
     let percent = percent.parse().ok().filter(|percent: &f32| *percent > 0.0 && percent.is_finite())?;
     Some(((SIDE as f32 * percent / 100.0 + 0.5) as u32).max(1))
@@ -174,7 +174,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_are_those_of_the_camera_where_they_state_less() {
+    fn the_aspect_ratio_of_the_camera_completes_sizes() {
         let camera = |aspect| {
             let [origin, right, up, forward] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
             let [origin, right, up, forward] = [origin, right, up, forward].map(Into::into);

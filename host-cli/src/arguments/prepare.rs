@@ -55,12 +55,12 @@ pub(crate) struct PrepareOptions {
 }
 
 impl PrepareOptions {
-    /// Options that are stated, of those that a quality chooses for a scene.
+    /// Flags of the stated options among those that a quality chooses.
     pub(crate) fn stated(&self) -> Stated {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
-    /// Settings of a picture of these options, with those of the quality for a scene that is not known.
+    /// Settings of a picture with these options. The quality supplies others without knowing the scene.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings();
         RenderSettings {

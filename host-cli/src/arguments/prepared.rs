@@ -1,9 +1,9 @@
-//! The option of a render that its scene is a prepared one.
+//! Option of a render whose input is a prepared scene.
 
 use clap::Args;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
-/// Options of what is prepared.
+/// Ids of the options that belong to `photoncard prepare`.
 pub(crate) const OF_PREPARATION: [&str; 29] = [
     "assignments",
     "energy_compensation",
@@ -47,7 +47,7 @@ pub(crate) struct PreparedOption {
     pub(crate) prepared: bool,
 }
 
-/// The error of arguments with a remedy, if one of them is of the preparation.
+/// Adds a remedy to an error about an option that belongs to `photoncard prepare`.
 pub(super) fn with_remedy(mut error: Error) -> Error {
     let names = |option: &str| {
         [ContextKind::InvalidArg, ContextKind::PriorArg].into_iter().any(|kind| match error.get(kind) {

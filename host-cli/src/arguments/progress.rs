@@ -1,4 +1,4 @@
-//! Form in which a command tells of its progress.
+//! Form in which a command reports progress and failure.
 
 use clap::ValueEnum;
 

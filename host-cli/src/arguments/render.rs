@@ -69,17 +69,17 @@ pub(crate) struct RenderOptions {
     pub(crate) progress: ProgressForm,
 }
 
-/// Settings that a fit changes where they are not stated.
+/// Settings before a fit, which may change those that are not stated.
 pub(crate) struct Unfitted {
     pub(crate) settings: RenderSettings,
-    /// Settings that are stated, or those of kept samples.
+    /// Flags of the settings that are stated or taken from kept samples.
     pub(crate) stated: Stated,
-    /// If there are kept samples.
+    /// True if there are kept samples.
     pub(crate) are_kept: bool,
 }
 
 impl RenderOptions {
-    /// Options that are stated, of those that a quality chooses for a scene.
+    /// Flags of the stated options among those that a quality chooses.
     pub(crate) fn stated(&self) -> Stated {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
@@ -89,8 +89,8 @@ impl RenderOptions {
         self.integrator.planned_spp.is_some()
     }
 
-    /// Settings that a fit begins with: those of kept samples in place of `settings` where the options state
-    /// none, if the render goes on from any.
+    /// Settings before a fit. If the render continues with kept samples, theirs replace those of `settings`
+    /// that the options do not state.
     ///
     /// # Errors
     /// If the file of kept samples cannot be read.
@@ -102,7 +102,7 @@ impl RenderOptions {
         Ok(Unfitted { settings, stated: Stated { samples: stated.samples, ..Stated::ALL }, are_kept: true })
     }
 
-    /// Settings that the quality finds for a scene; `None` if all that it would choose is stated or kept.
+    /// Finds the settings of the quality for a scene. `None` if all that it would choose are stated or kept.
     ///
     /// # Errors
     /// As [`Quality::fit`].
@@ -121,7 +121,7 @@ impl RenderOptions {
         Ok(fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise))))
     }
 
-    /// Settings of these options, with those of the quality for a scene that is not known.
+    /// Settings of these options. The quality supplies others without knowing the scene.
     pub(crate) fn settings(&self) -> RenderSettings {
         self.settings_of(self.quality)
     }
@@ -140,18 +140,18 @@ impl RenderOptions {
         }
     }
 
-    /// Returns whether a pilot chooses the cameras that the photons are for.
+    /// Returns whether a pilot decides if photons are guided to the camera.
     pub(crate) fn leaves_cameras_open(&self) -> bool {
         self.photons_for() == PhotonsFor::Auto
     }
 
-    /// Guiding of the photons: by the scene, where several pictures share them.
+    /// Guiding of the photons. It is by the scene if several pictures share them.
     fn photons_for(&self) -> PhotonsFor {
         let is_shared = self.frames.numbers().is_some() || self.prepared.prepared;
         if is_shared { PhotonsFor::Scene } else { self.photons_for }
     }
 
-    /// Settings of these outputs while a picture is rendered.
+    /// Settings of outputs that are written while a picture is rendered.
     pub(crate) fn tile_outputs(&self, outputs: &OutputOptions) -> TileOutputs {
         TileOutputs {
             // Finished passes are no tiles that a render could go on with.

@@ -1,4 +1,4 @@
-//! Options of pictures by passes: an aim in place of a number of samples, and samples that are kept.
+//! Options of pictures by passes: an aim that replaces the number of samples, and samples that are kept.
 
 use std::time::Duration;
 
@@ -27,12 +27,12 @@ pub(crate) struct SampleOptions {
     pub(crate) keep_samples: bool,
 }
 
-/// Options that a picture by passes does not have: their number of samples, memory or tiles are of one
-/// render.
+/// Ids of options that a picture by passes cannot have, because their number of samples, memory or tiles are
+/// those of a single render.
 const NOT_BY_PASSES: [&str; 6] = ["spp", "resume", "cache", "trace", "verify", "frames"];
 
 impl SampleOptions {
-    /// Aim of the passes; `None` for a picture of a stated number of samples.
+    /// Aim of the passes; `None` for a picture with a stated number of samples.
     pub(crate) fn aim(&self) -> Option<Aim> {
         let Self { time, noise, keep_samples: _ } = *self;
         (time.is_some() || noise.is_some()).then_some(Aim { time, noise })
@@ -64,7 +64,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_have_units_and_noise_is_a_share() {
+    fn times_have_units_and_noise_is_a_fraction() {
         for (text, seconds) in [("90", 90.0), ("0.5s", 0.5), ("5m", 300.0), ("2h", 7200.0)] {
             assert_eq!(time(text), Ok(Duration::from_secs_f64(seconds)));
         }

@@ -1,4 +1,4 @@
-//! Options of the scene: its file, and changes of it.
+//! Options of the scene: its file, and changes to it.
 
 use std::path::PathBuf;
 

@@ -1,4 +1,4 @@
-//! Options of the order of the work.
+//! Options of tiles, of the order of the work, and of parts.
 
 use clap::Args;
 use photoncard_driver::choice::Choice;

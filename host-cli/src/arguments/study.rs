@@ -41,7 +41,7 @@ pub(crate) enum StudyCommand {
     Sweep(Box<SweepArguments>),
 }
 
-/// Studies by a name.
+/// Studies that a name selects.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Selection {
     One(Study),
@@ -49,10 +49,10 @@ pub(crate) enum Selection {
 }
 
 impl Selection {
-    /// The name of all studies together.
+    /// Name that selects all studies.
     const ALL: &str = "all";
 
-    /// Parser of the studies' names and of the one for all.
+    /// Parser of the names of studies, and of the name of all.
     fn parser() -> impl TypedValueParser<Value = Self> {
         let all = PossibleValue::new(Self::ALL).help("All of them, each in a folder of its own");
         let studies = Study::ALL.iter().copied().map(possible_value);
@@ -61,7 +61,7 @@ impl Selection {
         })
     }
 
-    /// The studies.
+    /// Selected studies.
     pub(crate) fn studies(self) -> Vec<Study> {
         match self {
             Self::One(study) => vec![study],
@@ -69,7 +69,7 @@ impl Selection {
         }
     }
 
-    /// Returns whether the reports are a collection, each in a folder of its own.
+    /// Returns whether there are several reports, each in its own folder.
     pub(crate) fn is_collection(self) -> bool {
         matches!(self, Self::All)
     }

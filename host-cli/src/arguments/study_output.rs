@@ -1,4 +1,4 @@
-//! Arguments of the output of a study, and of the extent of its work.
+//! Options of a study's output and of its sampling.
 
 use std::path::PathBuf;
 

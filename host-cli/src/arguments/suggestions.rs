@@ -1,26 +1,27 @@
-//! Remedies for what is typed as for other renderers.
+//! Remedies for arguments in the syntax of other renderers.
 
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
 use crate::shell;
 
-/// Commands that render a scene, with any cards.
+/// Commands that render a scene on any cards.
 const RENDER: &[&str] = &["render", "view", "farm"];
-/// Commands that take the settings of a picture.
+/// Commands with settings of a picture.
 const PICTURE: &[&str] = &["render", "prepare", "view", "study sweep", "farm"];
-/// Commands that write pictures of either format.
+/// Commands that write pictures in several formats.
 const WRITE: &[&str] = &["render", "merge", "farm"];
 
-/// Options of other renderers; what states the same here, by options of these commands alone. Without
-/// commands it is of all.
+/// Option of another renderer with its equivalent here. The remedy uses options that only `commands` have;
+/// without commands it is valid for all.
 pub(super) struct Word {
     options: &'static [&'static str],
     pub(super) remedy: &'static str,
     pub(super) commands: &'static [&'static str],
 }
 
-/// Of several with an option the first one of the command counts.
+/// Options of other renderers. If an option occurs several times, the first entry for the given command
+/// applies.
 pub(super) const OF_OTHERS: [Word; 17] = [
     Word {
         options: &["--samples", "--sample", "--num-samples", "-s"],
@@ -105,11 +106,11 @@ const THREADS: &[&str] = &["--threads", "--cores", "--jobs", "-j", "-t", "--nthr
 const OUTPUT: &[&str] = &["--outfile", "--render-output", "--image"];
 const VERBOSE: &[&str] = &["--verbose", "-v", "--log-level"];
 
-/// Endings of pictures' names.
+/// Suffixes of picture files.
 const PICTURES: [&str; 5] = [".png", ".exr", ".jpg", ".jpeg", ".part"];
 
-/// The error of an unknown argument with what states the same here, if that is known. `given` are all words
-/// for `program`, its name first.
+/// Adds a remedy to the error about an unknown argument, if the equivalent is known. `given` are all
+/// arguments for `program`, including its name.
 pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[String]) -> Error {
     if error.kind() != ErrorKind::UnknownArgument {
         return error;
@@ -123,12 +124,12 @@ pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[Strin
     error
 }
 
-/// Those of some commands that this program was built with.
+/// Commands of a list that this build contains.
 pub(super) fn built(commands: &'static [&'static str]) -> impl Iterator<Item = &'static str> {
     commands.iter().copied().filter(|command| cfg!(feature = "study") || !command.starts_with("study"))
 }
 
-/// Name of the command, without the program's: `render`, `study sweep`.
+/// Path of the command without the program's name: `render`, `study sweep`.
 pub(super) fn command_of(program: Command, given: &[String]) -> String {
     let mut command = program;
     let mut names = Vec::new();
@@ -141,7 +142,7 @@ pub(super) fn command_of(program: Command, given: &[String]) -> String {
 }
 
 impl Word {
-    /// Returns whether the command, or one that it is of, is among those of the remedy.
+    /// Returns whether the remedy is for this command or for one that contains it.
     fn is_of(&self, command: &str) -> bool {
         let is_within = |of: &&str| {
             command.strip_prefix(*of).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
@@ -149,7 +150,7 @@ impl Word {
         self.commands.is_empty() || self.commands.iter().any(is_within)
     }
 
-    /// The remedy, with the names of its commands if `command` is none of them.
+    /// Text of the remedy. It names the commands that have the option if `command` is none of them.
     fn remedy_for(&self, command: &str) -> String {
         if self.is_of(command) {
             return self.remedy.to_owned();

@@ -62,11 +62,11 @@ struct SweepSettings {
     caches: Vec<CacheSettings>,
 }
 
-/// Name of the axis of caches.
+/// Name of the axis that varies caches.
 pub(crate) const CACHE: &str = "cache";
 
 impl SweepArguments {
-    /// Axes: those of `--vary`, and the caches if there are several.
+    /// Axes of the sweep: those of `--vary`, and the caches if there are several.
     pub(crate) fn axes(&self) -> Vec<Axis> {
         let caches = &self.settings.caches;
         let several = (caches.len() > 1).then(|| Axis {
@@ -76,7 +76,7 @@ impl SweepArguments {
         self.vary.iter().cloned().chain(several).collect()
     }
 
-    /// Point of these options, of the scene `name`, behind the first of the caches.
+    /// Point of a sweep with these options. It has the first of the caches; `name` is that of the scene.
     pub(crate) fn point(&self, name: &str) -> Point {
         let SweepSettings { quality, picture, photons, integrator, schedule, card, caches } = &self.settings;
         let base = quality.settings();
@@ -124,7 +124,7 @@ fn axis(text: &str) -> Result<Axis, String> {
     Ok(Axis { name: name.to_owned(), values })
 }
 
-/// Checks that values between commas are caches, and not the parts of one.
+/// Checks that comma-separated values are whole caches and not parts of one.
 fn check_parts(values: &[String]) -> Result<(), String> {
     let part = |value: &String| value.split_once('=').map(|(part, _)| part.to_owned());
     let parts: Vec<_> = values.iter().map(part).collect();
@@ -143,7 +143,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_of_a_cache_are_not_taken_for_caches() {
+    fn parts_of_a_cache_are_refused_as_values() {
         for (text, count) in [
             ("cache=64K,128K", 2),
             ("cache=photon=64K/128/4,photon=128K/128/4", 2),

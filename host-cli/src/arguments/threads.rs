@@ -1,6 +1,6 @@
-//! Parser of numbers of threads.
+//! Parser of thread counts.
 
-/// Maximum number of threads: a system that runs out of them while they start ends the process.
+/// Maximum number of threads. A system that runs out of them while they start ends the process.
 const MAX_THREADS: usize = 1024;
 
 /// Parses a number of threads.

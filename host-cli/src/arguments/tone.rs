@@ -29,7 +29,7 @@ pub(super) enum Exposure {
 }
 
 impl ToneOptions {
-    /// Tone mapping of these options.
+    /// Tone mapping with these options.
     pub(crate) fn mapping(&self) -> ToneMapping {
         ToneMapping {
             exposure: match self.exposure {

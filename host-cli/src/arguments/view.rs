@@ -52,12 +52,12 @@ pub(crate) struct ViewOptions {
 }
 
 impl ViewOptions {
-    /// Options that are stated, of those that a quality chooses for a scene.
+    /// Flags of the stated options among those that a quality chooses.
     pub(crate) fn stated(&self) -> Stated {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
-    /// Settings of the settled picture, with those of the quality for a scene that is not known.
+    /// Settings of the settled picture. The quality supplies others without knowing the scene.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings();
         RenderSettings {
@@ -71,7 +71,8 @@ impl ViewOptions {
     }
 }
 
-/// Parses the address of a page. No other name than `localhost` is looked up, which could take long.
+/// Parses the address of a page. Only the name `localhost` is resolved, because other look-ups could take
+/// long.
 fn listen(text: &str) -> Result<SocketAddr, String> {
     let local = || Some((Ipv4Addr::LOCALHOST, text.strip_prefix("localhost:")?.parse().ok()?).into());
     let address = text.parse().ok().or_else(local);
@@ -86,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_page_listens_at_an_ip_address_or_at_localhost() {
+    fn the_address_of_a_page_is_an_ip_address_or_localhost() {
         for text in ["127.0.0.1:8080", "localhost:8080"] {
             assert_eq!(listen(text), Ok(([127, 0, 0, 1], 8080).into()));
         }

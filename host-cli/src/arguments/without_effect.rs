@@ -1,4 +1,4 @@
-//! Notices on options without effect, because an option that they need is not given.
+//! Notices about options that have no effect because an option that they need is missing.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::render::Radiance;
@@ -8,7 +8,7 @@ use super::files::PictureFormat;
 use super::render::RenderOptions;
 
 impl RenderOptions {
-    /// One sentence for each option that has no effect on the render of `scene`.
+    /// Sentences about the options without effect on a render of `scene`.
     pub(crate) fn without_effect(&self, scene: &Scene) -> Vec<String> {
         let order = self.schedule.order;
         let name = order.name();
@@ -61,7 +61,8 @@ impl RenderOptions {
         said.map(|(_, option, why)| format!("{option} has no effect {why}")).collect()
     }
 
-    /// Options on the order of the work that the order does not have.
+    /// Options that only other gather orders have. Each entry is whether it has no effect, its name, and the
+    /// reason.
     fn of_order(&self) -> [(bool, &'static str, String); 4] {
         let order = self.schedule.order;
         let no_bins = format!("with --order {}, which has no direction bins", order.name());
@@ -75,7 +76,8 @@ impl RenderOptions {
         ]
     }
 
-    /// Options on a format of pictures that is not written.
+    /// Options of picture formats that are not written. Each entry is whether it has no effect, its name, and
+    /// the reason.
     fn of_pictures(&self) -> [(bool, &'static str, String); 4] {
         let outputs = &self.outputs;
         let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !outputs.has(format));

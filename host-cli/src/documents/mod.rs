@@ -1,4 +1,4 @@
-//! `photoncard completions` and `photoncard man`: documents made from the arguments.
+//! Commands `photoncard completions` and `photoncard man`: documents that are generated from the arguments.
 
 // Packages have `photoncard study`, and so has the reference.
 #[cfg(all(test, feature = "study"))]
@@ -15,17 +15,17 @@ use crate::arguments::Arguments;
 use crate::console::write_out;
 use crate::failure::Failure;
 
-/// Name of the command.
+/// Name of the program.
 const NAME: &str = env!("CARGO_BIN_NAME");
 
-/// Prints the completions of a shell.
+/// Prints the completions for a shell.
 pub(crate) fn completions(shell: Shell) -> Result<(), Failure> {
     let mut script = Vec::new();
     generate(shell, &mut Arguments::command(), NAME, &mut script);
     write_out(&String::from_utf8_lossy(&script))
 }
 
-/// Writes a manual page for each command.
+/// Writes a manual page for each command into a folder.
 pub(crate) fn man(folder: &Path) -> Result<(), Failure> {
     std::fs::create_dir_all(folder).map_err(|error| Failure::folder(folder, &error))?;
     let mut command = Arguments::command().disable_help_subcommand(true);
@@ -33,7 +33,7 @@ pub(crate) fn man(folder: &Path) -> Result<(), Failure> {
     write_pages(&command, folder)
 }
 
-/// Writes the manual page of a command, and of all below it.
+/// Writes the manual pages of a command and of all commands below it.
 fn write_pages(command: &Command, folder: &Path) -> Result<(), Failure> {
     let page = Man::new(command.clone());
     let mut text = Vec::new();

@@ -1,5 +1,5 @@
-//! The reference of commands in `docs/cli.md`, made from the arguments. `UPDATE_DOCS=1 cargo test -p
-//! photoncard --features study reference` writes it.
+//! Checks that the reference of commands in `docs/cli.md` equals the one generated from the arguments.
+//! `UPDATE_DOCS=1 cargo test -p photoncard --features study reference` writes it.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,27 +11,27 @@ use clap::{Arg, Command, CommandFactory as _, Parser as _};
 
 use crate::arguments::Arguments;
 
-/// Line that ends the written part of the document.
+/// Line that ends the hand-written part of the document.
 const HEADING: &str = "\n## Commands\n";
 
-/// The program's command, with the names of all below it.
+/// Root command, built so that the names of all commands below it are known.
 fn program() -> Command {
     let mut command = Arguments::command().disable_help_subcommand(true);
     command.build();
     command
 }
 
-/// Returns a command, then all below it.
+/// Lists a command and all commands below it.
 fn with_commands_below(command: &Command) -> Vec<&Command> {
     once(command).chain(command.get_subcommands().flat_map(with_commands_below)).collect()
 }
 
-/// Name of a command, after those of the program and of the group that it is in.
+/// Name of a command within its group, without the program's name.
 fn name(command: &Command) -> &str {
     command.get_bin_name().unwrap_or(command.get_name())
 }
 
-/// Arguments that help shows, except for help itself.
+/// Arguments that appear in the help, except for the help option itself.
 fn shown(command: &Command) -> impl Iterator<Item = &Arg> {
     let hidden = ["help", "version"];
     command
@@ -39,7 +39,7 @@ fn shown(command: &Command) -> impl Iterator<Item = &Arg> {
         .filter(move |argument| !argument.is_hide_set() && !hidden.contains(&argument.get_id().as_str()))
 }
 
-/// Help as Markdown: options as code, the marks of Markdown escaped.
+/// Converts help text to Markdown: options become code, and special characters are escaped.
 fn prose(help: &impl ToString) -> String {
     let word = |word: &str| {
         let option = word.trim_end_matches(['.', ',', ':', ';', ')', ']']);
@@ -52,7 +52,7 @@ fn prose(help: &impl ToString) -> String {
     help.to_string().split_whitespace().map(word).collect::<Vec<_>>().join(" ")
 }
 
-/// A text with the full stop that help leaves out at its end.
+/// Appends the full stop that help texts leave out.
 fn sentence(text: String) -> String {
     if text.ends_with(['.', ':']) { text } else { text + "." }
 }
@@ -67,7 +67,7 @@ fn forms(argument: &Arg) -> String {
     if takes_values { format!("{names} {values}").trim().to_owned() } else { names }
 }
 
-/// Item of a list: forms, help, default and possible values of an argument.
+/// List item of an argument: forms, help, default and possible values.
 fn item(argument: &Arg) -> String {
     let help = argument.get_long_help().or(argument.get_help()).expect("the argument has help").to_string();
     let mut parts: Vec<_> = help.split("\n\n").map(|paragraph| sentence(prose(&paragraph))).collect();
@@ -85,7 +85,7 @@ fn item(argument: &Arg) -> String {
     format!("- `{}`: {}\n{}", forms(argument), parts.join(" "), values.collect::<String>())
 }
 
-/// Arguments by their heading, in the order of help.
+/// Arguments grouped by heading, in the order of the help.
 fn groups(command: &Command) -> Vec<(&str, Vec<&Arg>)> {
     let mut groups: Vec<(&str, Vec<&Arg>)> = Vec::new();
     for argument in shown(command) {
@@ -99,8 +99,8 @@ fn groups(command: &Command) -> Vec<(&str, Vec<&Arg>)> {
     groups
 }
 
-/// Section of a command. `described` has the items of earlier sections, each with its command: what has one
-/// is named alone.
+/// Section of a command. `described` maps the items of earlier sections to their commands; such an item is
+/// named without its description.
 fn section(command: &Command, described: &mut BTreeMap<String, String>) -> String {
     let about = sentence(prose(command.get_about().expect("the command has help")));
     let usage = command.clone().render_usage().to_string();
@@ -128,7 +128,7 @@ fn section(command: &Command, described: &mut BTreeMap<String, String>) -> Strin
     text
 }
 
-/// The generated part of the document: a list of commands, and a section for each.
+/// Generated part of the document: a list of commands, and a section for each.
 fn reference(program: &Command) -> String {
     let commands = &with_commands_below(program)[1..];
     let line = |command: &&Command| {
@@ -141,7 +141,7 @@ fn reference(program: &Command) -> String {
 }
 
 #[test]
-fn the_reference_of_commands_is_that_of_their_arguments() {
+fn the_reference_in_the_document_equals_the_generated_one() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/cli.md");
     let document = fs::read_to_string(&path).expect("the document can be read");
     let (written, is) = document.split_once(HEADING).expect("the document has the heading");

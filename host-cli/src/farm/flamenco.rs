@@ -1,4 +1,4 @@
-//! A job type for Flamenco: a script of JavaScript, which the manager compiles to tasks.
+//! Job type for Flamenco: a JavaScript file that the manager compiles to tasks.
 
 use serde_json::json;
 
@@ -6,7 +6,7 @@ use super::job::Job;
 use super::script::functions;
 use crate::shell::quoted;
 
-/// The script of a job type.
+/// Script of the job type.
 pub(super) fn script(job: &Job) -> String {
     let shell = format!("set -eu\ncd {}\n{}\n\"$@\"\n", quoted(&job.home), functions(job, ""));
     // A string of JSON is one of JavaScript.

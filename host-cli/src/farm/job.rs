@@ -1,4 +1,4 @@
-//! A job: the steps by which a farm renders a picture or frames.
+//! Farm job: the steps that render a picture or frames.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use super::words::Words;
 use crate::arguments::{Arguments, FarmOptions, PictureFormat};
 use crate::failure::Failure;
 
-/// Consecutive frames.
+/// Range of consecutive frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Frames {
     pub(super) first: u32,
@@ -20,11 +20,11 @@ pub(super) struct Frames {
 
 /// Steps of a farm's work on a picture or on frames.
 pub(super) struct Job {
-    /// Name of the job: that of the picture's file.
+    /// Name of the job, which is that of the picture's file.
     pub(super) name: String,
-    /// Folder in which all paths of the job begin.
+    /// Folder to which the paths of the job are relative.
     pub(super) home: String,
-    /// Folder of the prepared scene and of the parts.
+    /// Folder of the prepared scene and the parts.
     pub(super) folder: String,
     pub(super) words: Words,
     /// Number of parts of a picture.
@@ -33,10 +33,10 @@ pub(super) struct Job {
 }
 
 impl Job {
-    /// Job of options, and of the words that they were read from.
+    /// Creates a job from options. `given` are the arguments from which they were parsed.
     ///
     /// # Errors
-    /// If an option is of no job, a name is not text, or frames have no place in one.
+    /// If an option is not allowed in a job, a name is not text, or a job cannot render the frames.
     pub(super) fn new(options: &FarmOptions, given: impl Iterator<Item = OsString>) -> Result<Self, Failure> {
         let pictures = &options.render.outputs.pictures;
         if pictures.is_empty() || pictures.iter().any(|picture| picture.file().is_none()) {
@@ -80,7 +80,7 @@ impl Job {
     }
 }
 
-/// The frames of options, if there are any.
+/// Frames of the options; `None` for a single picture.
 fn frames(options: &FarmOptions) -> Result<Option<Frames>, Failure> {
     let Some(numbers) = options.render.frames.numbers() else { return Ok(None) };
     let numbers: Vec<u32> = numbers.collect();

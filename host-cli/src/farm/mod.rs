@@ -1,8 +1,8 @@
-//! `photoncard farm`: the job of a render, printed for a farm's engine.
+//! Command `photoncard farm`: prints a render job for a farm's engine.
 //!
-//! Each engine gets the same script ([`script`]), whose steps may be repeated at any time: a scene that is
-//! prepared again is compared with the one that is there, parts that are there are not rendered again, and a
-//! part that was begun is gone on with. The engines differ in who calls the steps.
+//! All engines run the same script ([`script`]), whose steps may be repeated at any time. A scene that is
+//! prepared again is compared with the existing one, existing parts are not rendered again, and unfinished
+//! parts are continued. Engines differ only in what calls the steps.
 
 mod flamenco;
 mod job;

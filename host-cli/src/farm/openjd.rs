@@ -1,11 +1,11 @@
-//! A job template of Open Job Description, version 2023-09.
+//! Job template of Open Job Description, version 2023-09.
 
 use serde_json::{Value, json};
 
 use super::job::{Frames, Job};
 use super::script::functions;
 
-/// The template of a job, as JSON.
+/// Job template as JSON.
 pub(super) fn template(job: &Job) -> String {
     let template = json!({
         "specificationVersion": "jobtemplate-2023-09",
@@ -27,14 +27,14 @@ pub(super) fn template(job: &Job) -> String {
     format!("{template:#}\n")
 }
 
-/// Name of the job, as the format allows: printable, at most 128 characters, and no expression.
+/// Name of the job in the form that the format allows: printable, at most 128 characters, without
+/// expressions.
 fn name(job: &Job) -> String {
     let name: String = job.name.chars().filter(|c| !c.is_control() && !"{}".contains(*c)).take(100).collect();
     format!("photoncard {name}")
 }
 
-/// Step that renders all tasks. A chunk of frames is rendered by one process, one of parts by one after
-/// another.
+/// Step that renders all tasks. A process renders a chunk of frames at once, and parts one after another.
 fn render(job: &Job) -> Value {
     let chunks = json!({"defaultTaskCount": 1, "rangeConstraint": "CONTIGUOUS"});
     let parts = format!("1-{}", job.parts);
@@ -56,7 +56,7 @@ fn render(job: &Job) -> Value {
     step
 }
 
-/// Step that calls the script.
+/// Step that calls the script with `arguments`.
 fn step(job: &Job, name: &str, arguments: &[&str]) -> Value {
     let words = ["{{Task.File.Job}}", name].into_iter().chain(arguments.iter().copied());
     json!({

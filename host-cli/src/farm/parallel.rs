@@ -1,10 +1,10 @@
-//! A job for GNU parallel: a script that calls itself for each task.
+//! Job for GNU parallel: a script that calls itself for each task.
 
 use super::job::Job;
 use super::script::functions;
 use crate::shell::quoted;
 
-/// The script of a job.
+/// Script of the job.
 pub(super) fn script(job: &Job) -> String {
     let (home, last) = (quoted(&job.home), job.tasks() - 1);
     let functions = functions(job, "");
@@ -29,7 +29,7 @@ esac
     )
 }
 
-/// Text of a comment: one line.
+/// Converts text to one line, for a comment.
 pub(super) fn comment(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }

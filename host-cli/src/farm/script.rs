@@ -1,10 +1,11 @@
-//! The steps of a job as functions of a POSIX shell. Each may be repeated, also while or after it was killed.
+//! Steps of a job as functions of a POSIX shell. Each may be repeated, even while an earlier run is active or
+//! after it was killed.
 
 use super::job::{Frames, Job};
 use crate::shell::quoted;
 
-/// Functions `prepare`, `part` and `merge`, and `task`, which renders the task of a number from 0 on. `extra`
-/// are further options of renders. The script that has them begins in the job's home.
+/// Definitions of the functions `prepare`, `part`, `merge` and `task`. `task` renders the task with a number
+/// from 0. `extra` are further options of renders. The script must start in the job's home.
 pub(super) fn functions(job: &Job, extra: &str) -> String {
     let parts = job.parts;
     let (folder, prepare) = (word(&job.folder), prepare(job, extra));
@@ -27,23 +28,24 @@ pub(super) fn functions(job: &Job, extra: &str) -> String {
     }
 }
 
-/// Words in the quotes of a shell, each with a blank before it.
+/// Quoted words, each after a blank.
 fn words(words: &[String]) -> String {
     words.iter().map(|each| format!(" {}", word(each))).collect()
 }
 
-/// A word in the quotes of a shell. No two braces follow each other: they enclose expressions of Open Job
+/// Quoted word. Adjacent braces are separated, because double ones enclose expressions of Open Job
 /// Description.
 fn word(word: &str) -> String {
     quoted(word).replace('{', "{''").replace('}', "}''")
 }
 
-/// Name of the prepared scene, in the folder of cards.
+/// Name of the prepared scene in the job's folder.
 fn card(job: &Job) -> &'static str {
     if job.frames.is_some() { "######.card" } else { "scene.card" }
 }
 
-/// The scene is prepared again by each job. Parts of another scene under its name are removed.
+/// Function `prepare`. Every job prepares its scene again; parts of another scene with the same name are
+/// removed.
 fn prepare(job: &Job, extra: &str) -> String {
     let words = [&job.words.scene, &job.words.prepare, &job.words.both].map(|list| words(list)).concat();
     let frames =
@@ -79,7 +81,7 @@ fn part(job: &Job, extra: &str) -> String {
     )
 }
 
-/// A part of one frame, or of the frames A-B.
+/// Function `part` of a job with frames: renders one frame, or the frames A-B.
 fn part_of_frames(job: &Job, extra: &str) -> String {
     let parts = job.parts;
     let render = render(job, extra);
@@ -92,7 +94,7 @@ fn part_of_frames(job: &Job, extra: &str) -> String {
     )
 }
 
-/// Beginning of the command that renders a part.
+/// First part of the command that renders a part.
 fn render(job: &Job, extra: &str) -> String {
     let words = [&job.words.both, &job.words.render].map(|list| words(list)).concat();
     format!("photoncard render --prepared \"$folder/cards/{}\"{words}{extra}", card(job))
@@ -113,7 +115,7 @@ fn merge_frames(job: &Job, [first, last]: [u32; 2], extra: &str) -> String {
     )
 }
 
-/// A word in quotes, in which the number of the frame replaces the last run of `#`.
+/// Quoted word in which the frame's number replaces the last run of `#`.
 fn numbered(text: &str) -> String {
     let Some((before, after)) = text.rsplit_once('#') else { return word(text) };
     let kept = before.trim_end_matches('#');

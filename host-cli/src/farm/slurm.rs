@@ -1,15 +1,14 @@
-//! A job for Slurm: a script that submits itself in three steps, each after the one before.
+//! Job for Slurm: a script that submits itself in three steps, each after the previous one.
 
 use super::job::Job;
 use super::parallel::comment;
 use super::script::functions;
 use crate::shell::quoted;
 
-/// Maximum number of tasks in an array: one less than Slurm's own limit if its administrator has set no
-/// other.
+/// Maximum number of tasks in an array, one less than Slurm's default limit.
 const MAX_ARRAY: u64 = 1000;
 
-/// The script of a job.
+/// Script of the job.
 pub(super) fn script(job: &Job) -> String {
     let (home, tasks) = (quoted(&job.home), job.tasks());
     let functions = functions(job, "");

@@ -1,17 +1,17 @@
-//! The words of a command line, sorted by the steps of a job that they are of.
+//! Sorts the words of a command line by the steps of a job to which they belong.
 
 use clap::{ArgAction, Command};
 
 use crate::arguments::OF_PREPARATION;
 
-/// Options of the picture, of which the pilot of a preparation is as well, and of any work.
+/// Ids of options that preparation and render both need.
 const OF_BOTH: [&str; 10] =
     ["size", "crop", "camera", "camera_at", "look_at", "fov", "aov", "filter", "threads", "quiet"];
-/// Options of the picture's files.
+/// Ids of options of the picture's files.
 const OF_MERGE: [&str; 4] = ["pictures", "sample_type", "exposure", "curve"];
-/// Options of the job itself.
+/// Ids of options of the job itself.
 const OF_JOB: [&str; 2] = ["parts", "frames"];
-/// Options that a job states itself, or that are of one render alone.
+/// Ids of options that the job sets itself, or that are not possible in a job.
 const OF_NO_JOB: [&str; 12] = [
     "photons_for",
     "part",
@@ -27,25 +27,25 @@ const OF_NO_JOB: [&str; 12] = [
     "progress",
 ];
 
-/// Words of a command line.
+/// Words of a command line, sorted by step.
 #[derive(Debug, Default, PartialEq)]
 pub(super) struct Words {
     pub(super) scene: Vec<String>,
-    /// Options of the scene, of photons and of rays.
+    /// Options of the scene, of photons and of the integrator.
     pub(super) prepare: Vec<String>,
-    /// Options of the picture, and of any work.
+    /// Options that preparation and render both need.
     pub(super) both: Vec<String>,
-    /// Options of cards, and of the order of the work.
+    /// Options of cards and of the order of the work.
     pub(super) render: Vec<String>,
     /// Options of the picture's files.
     pub(super) merge: Vec<String>,
 }
 
 impl Words {
-    /// Sorts words that `command` takes.
+    /// Sorts the arguments of `command`.
     ///
     /// # Errors
-    /// If an option is of no job: its name.
+    /// Name of an option that is not allowed in a job.
     pub(super) fn new(given: impl IntoIterator<Item = String>, command: &Command) -> Result<Self, String> {
         let mut words = Self::default();
         let mut given = given.into_iter();
@@ -75,7 +75,8 @@ impl Words {
         Ok(words)
     }
 
-    /// Words that an option is among; `Some(None)` for one of the job itself, `None` for one of no job.
+    /// List of words to which an option belongs; `Some(None)` for an option of the job itself, `None` for one
+    /// that is not allowed in a job.
     fn room(&mut self, id: &str) -> Option<Option<&mut Vec<String>>> {
         Some(Some(match id {
             _ if OF_NO_JOB.contains(&id) => return None,
@@ -114,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn options_of_one_render_are_of_no_job() {
+    fn options_of_a_single_render_are_refused() {
         for option in [
             "--part=1/2",
             "--prepared",
@@ -131,9 +132,9 @@ mod tests {
         }
     }
 
-    /// No name is of an option that is not.
+    /// Checks that the lists above contain no outdated name.
     #[test]
-    fn each_name_is_that_of_an_option() {
+    fn every_listed_name_is_an_option() {
         let command = Arguments::command();
         let farm = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm")).unwrap();
         let names = OF_BOTH.iter().chain(&OF_MERGE).chain(&OF_JOB).chain(&OF_NO_JOB).chain(&OF_PREPARATION);

@@ -1,4 +1,4 @@
-//! Progress of a render or of a card's self-test: a bar on a terminal, otherwise a line for each tenth of a
+//! Progress of a render or of a card's self-test: a bar on a terminal, elsewhere a line for each tenth of a
 //! phase.
 
 pub(crate) mod openjd;
@@ -22,18 +22,18 @@ use crate::console::say;
 #[cfg(target_os = "linux")]
 use crate::hang_up;
 
-/// Display of the progress of a render or of a card's self-test; SIGINT, SIGTERM and SIGHUP stop it.
+/// Display of the progress of a render or self-test. SIGINT, SIGTERM and SIGHUP stop the work.
 pub(crate) struct Progress {
     stopped: Arc<AtomicBool>,
     kept: AtomicBool,
-    /// Statistics of the last render that has failed.
+    /// Statistics of the last render that failed.
     failed: Mutex<Option<Value>>,
     display: Option<Mutex<Display>>,
-    /// Progress as a farm's engine reads it.
+    /// Progress reports for a farm's engine; `None` unless requested.
     percent: Option<Percent>,
 }
 
-/// Seconds of a phase before the tiles until its first line, without a terminal.
+/// Duration of a preparatory phase before its first line, seconds, without a terminal.
 const SILENT_SECONDS: f64 = 1.0;
 
 struct Display {
@@ -50,8 +50,8 @@ struct Display {
 }
 
 impl Progress {
-    /// Starts the display of work on `cards` cards, which is empty if `quiet`. The first signal stops the
-    /// work, a second one ends the process.
+    /// Starts the display of work on `cards` cards; nothing is shown if `quiet`. The first signal stops the
+    /// work, the second one ends the process.
     pub(crate) fn start(quiet: bool, cards: usize) -> std::io::Result<Self> {
         let display = Display {
             phase: None,
@@ -67,7 +67,7 @@ impl Progress {
         Ok(Self { stopped, kept, failed: Mutex::default(), display, percent: None })
     }
 
-    /// Progress in a form, of which a phase is most of the work.
+    /// Sets the form of the progress. `phase` is the one that takes most of the time.
     pub(crate) fn in_form(self, form: ProgressForm, phase: Phase) -> Self {
         match form {
             ProgressForm::Text => self,
@@ -75,13 +75,12 @@ impl Progress {
         }
     }
 
-    /// [`Self::start`] for frames, one after another. Without a terminal a frame tells nothing before its
-    /// end.
+    /// [`Self::start`] for a sequence of frames. Without a terminal, a frame is reported only at its end.
     pub(crate) fn of_frames(quiet: bool, cards: usize) -> std::io::Result<Self> {
         Self::start(quiet || !std::io::stderr().is_terminal(), cards)
     }
 
-    /// Begins the display of the next frame.
+    /// Starts the display of the next frame.
     pub(crate) fn begin_frame(&self) {
         self.kept.store(false, Ordering::Relaxed);
         if let Some(mut display) = self.display() {
@@ -89,12 +88,13 @@ impl Progress {
         }
     }
 
-    /// Returns whether finished tiles are in the partial file.
+    /// Returns whether the partial file contains finished tiles.
     pub(crate) fn has_kept(&self) -> bool {
         self.kept.load(Ordering::Relaxed)
     }
 
-    /// Statistics of the render that has failed, as JSON; `None` if it has failed before its cards began.
+    /// Removes the statistics of the render that failed, as JSON; `None` if it failed before its cards
+    /// started.
     pub(crate) fn take_failed(&self) -> Option<Value> {
         self.failed.lock().unwrap_or_else(PoisonError::into_inner).take()
     }
@@ -212,7 +212,7 @@ impl Display {
     }
 }
 
-/// Flag that SIGINT, SIGTERM and SIGHUP set; a second SIGINT or SIGTERM ends the process.
+/// Flag that SIGINT, SIGTERM and SIGHUP set. A second SIGINT or SIGTERM ends the process.
 pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     let stopped = Arc::new(AtomicBool::new(false));
     for signal in [SIGINT, SIGTERM] {
@@ -228,7 +228,7 @@ pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     Ok(stopped)
 }
 
-/// Seconds in words: `8 s`, `2 min 05 s`, `3 h 20 min`.
+/// Formats seconds: `8 s`, `2 min 05 s`, `3 h 20 min`.
 pub(crate) fn duration(seconds: f64) -> String {
     let whole = seconds.round() as u64;
     match (whole / 3600, whole / 60 % 60, whole % 60) {
@@ -254,7 +254,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn durations_are_rounded_to_what_matters() {
+    fn durations_are_rounded_to_two_units() {
         for (seconds, text) in [
             (0.4, "0 s"),
             (59.4, "59 s"),

@@ -1,5 +1,5 @@
-//! Progress and failure as Open Job Description reads them from standard output: `openjd_progress: PERCENT`,
-//! `openjd_fail: MESSAGE`.
+//! Progress and failure in the syntax of Open Job Description, on standard output: `openjd_progress:
+//! PERCENT`, `openjd_fail: MESSAGE`.
 
 use std::sync::Mutex;
 use std::sync::PoisonError;
@@ -9,19 +9,19 @@ use photoncard_driver::render::Phase;
 use crate::console::print;
 use crate::failure::Failure;
 
-/// Progress of one phase, which is most of a command's work.
+/// Progress of the phase that takes most of a command's time.
 pub(super) struct Percent {
     phase: Phase,
     told: Mutex<Option<u64>>,
 }
 
 impl Percent {
-    /// Nothing told yet of a phase.
+    /// Creates a progress of zero percent.
     pub(super) fn of(phase: Phase) -> Self {
         Self { phase, told: Mutex::default() }
     }
 
-    /// Tells of progress, if it is of the phase and a percent more than was told.
+    /// Prints progress of `phase`, if that is the reported phase and the percentage has increased.
     pub(super) fn tell(&self, phase: Phase, done: u64, total: u64) {
         let percent = 100 * done.min(total) / total.max(1);
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
@@ -33,7 +33,7 @@ impl Percent {
     }
 }
 
-/// Tells of a failure.
+/// Prints a failure.
 pub(crate) fn fail(failure: &Failure) {
     let _ = print(&[format!("openjd_fail: {}", failure.line())]);
 }

@@ -2,33 +2,33 @@
 
 use std::collections::VecDeque;
 
-/// Estimate of the remaining time of pieces of work that `workers` do in parallel.
+/// Estimates the remaining time of pieces of work that `workers` process in parallel.
 ///
-/// A worker does a piece after another, so that the last completion times of all workers add up to the time
-/// that the finished pieces took. With `n` finished pieces, the mean `t` of the last `min(n, workers)`
-/// completion times and `N` pieces in all, the work ends at about `t N / max(n, workers)`. Between
-/// completions the time counts down, until a piece that takes longer than the mean is overdue. Pieces
-/// finished before the start count as done, and not as speed.
+/// Each worker processes one piece after another, so that the sum of the last completion times of all workers
+/// is the time spent on finished pieces. `n` is the number of finished pieces, `N` that of all pieces, and
+/// `t` the mean of the last `min(n, workers)` completion times. The work ends at about `t N / max(n,
+/// workers)`. Between completions the estimate counts down, until a piece takes longer than the mean. Pieces
+/// that were finished before the start count as done, but not for the speed.
 pub(crate) struct Remaining {
     workers: usize,
-    /// Pieces finished before the start.
+    /// Number of pieces finished before the start.
     before: u64,
     done: u64,
-    /// Maximum of `done`, which may fall when finished pieces are taken back.
+    /// Maximum of `done`, which may decrease when finished pieces are revoked.
     most_done: u64,
     total: u64,
-    /// Last completion times, seconds since the start: at most one for each worker.
+    /// Last completion times, seconds since the start; at most one per worker.
     completions: VecDeque<f64>,
 }
 
 impl Remaining {
-    /// Estimate at the start, with `before` pieces finished.
+    /// Creates the estimate at the start, when `before` pieces are finished.
     pub(crate) fn new(workers: usize, before: u64) -> Self {
         let workers = workers.max(1);
         Self { workers, before, done: before, most_done: before, total: before, completions: VecDeque::new() }
     }
 
-    /// Reports that `done` of `total` pieces are finished, `now` seconds after the start.
+    /// Reports `done` of `total` pieces as finished, `now` seconds after the start.
     pub(crate) fn report(&mut self, done: u64, total: u64, now: f64) {
         let new = done.saturating_sub(self.most_done).min(self.workers as u64);
         self.completions.extend((0..new).map(|_| now));
@@ -38,7 +38,7 @@ impl Remaining {
         (self.done, self.most_done, self.total) = (done, self.most_done.max(done), total);
     }
 
-    /// Remaining seconds, `now` seconds after the start; `None` before a piece is finished.
+    /// Remaining seconds at `now` seconds after the start; `None` before the first piece is finished.
     pub(crate) fn seconds(&self, now: f64) -> Option<f64> {
         let finished = self.most_done - self.before;
         if finished == 0 {
@@ -71,9 +71,8 @@ mod tests {
 
     use super::*;
 
-    /// Estimates of a render whose tiles take `costs` seconds, done in their order by `workers`: at each time
-    /// the estimate, and the time that is left in truth, at all completions and at ten times between each
-    /// two.
+    /// Simulates a render whose tiles cost `costs` seconds each, processed in this order by `workers`.
+    /// Returns time, estimate and true remaining time, at all completions and at ten times between each two.
     fn estimates(costs: &[f64], workers: usize, before: u64) -> Vec<(f64, Option<f64>, f64)> {
         let mut free = vec![0.0_f64; workers];
         let mut ends: Vec<f64> = Vec::new();
@@ -105,9 +104,8 @@ mod tests {
         (0..count).map(|index| low + (high - low) * (0.618_034 * (index + 1) as f64).fract()).collect()
     }
 
-    /// Checks that the estimate is right within a share of the remaining time once a fifth of the time is
-    /// over, except for the last `tail` seconds, and that it never jumps by more than that share from one
-    /// report to the next.
+    /// Checks that the relative error of the estimate is at most `share` after a fifth of the time, except
+    /// for the last `tail` seconds, and that consecutive estimates differ by at most that share.
     fn check_steady(estimates: &[(f64, Option<f64>, f64)], share: f64, tail: f64) {
         let end = estimates[0].2;
         let mut previous: Option<(f64, f64)> = None;
@@ -124,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_said_before_the_first_piece() {
+    fn there_is_no_estimate_before_the_first_piece() {
         let mut remaining = Remaining::new(2, 5);
         for now in [0.0, 10.0] {
             remaining.report(5, 20, now);
@@ -158,8 +156,7 @@ mod tests {
         }
     }
 
-    /// A fourth of the picture costs ten times as much as the rest; its tiles come spread, as a render deals
-    /// them.
+    /// A fourth of the tiles cost ten times as much as the others, and are spread as in a render.
     #[test]
     fn a_heavy_region_is_right_within_a_third_after_a_fifth() {
         for first_heavy in [0, 8, 20, 24] {
@@ -175,14 +172,14 @@ mod tests {
     }
 
     #[test]
-    fn pieces_of_an_earlier_render_are_done_and_no_speed() {
+    fn pieces_of_an_earlier_render_do_not_count_for_the_speed() {
         let costs = varied(100, 1.0, 2.0);
         let [fresh, resumed] = [0, 900].map(|before| estimates(&costs, 2, before));
         assert_eq!(fresh, resumed);
     }
 
     #[test]
-    fn a_piece_that_takes_long_is_not_nearly_done_for_ever() {
+    fn an_overdue_piece_raises_the_estimate() {
         let mut remaining = Remaining::new(1, 0);
         remaining.report(1, 11, 1.0);
         assert_eq!(remaining.seconds(1.0), Some(10.0));
@@ -192,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_taken_back_are_left_again() {
+    fn revoked_pieces_count_as_remaining() {
         let mut remaining = Remaining::new(1, 0);
         remaining.report(5, 10, 5.0);
         assert_eq!(remaining.seconds(5.0), Some(5.0));

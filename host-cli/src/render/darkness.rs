@@ -1,19 +1,19 @@
-//! Messages on pictures that are black, or for the greater part.
+//! Messages about pictures that are black, or mostly black.
 
 use photoncard_driver::film::Film;
 use photoncard_driver::scene::{Camera, Scene};
 
 use crate::console::say;
 
-/// Share of the pixels that see a surface from which on black ones are told of.
+/// Fraction of the pixels with a surface that must be black for a message.
 const MANY: f64 = 0.5;
 
-/// Facts on a scene and its view that explain darkness.
+/// Facts about a scene and its view that explain darkness.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Circumstances {
-    /// True if Blender's exporter wrote the file, and no environment was added.
+    /// True if Blender's exporter wrote the file and no environment was added.
     lacks_world: bool,
-    /// True if the camera is outside of the scene's bounds.
+    /// True if the camera is outside the scene's bounding box.
     is_outside: bool,
 }
 
@@ -25,7 +25,7 @@ impl Circumstances {
     }
 }
 
-/// Prints why a picture may be dark, if it is.
+/// Prints the probable reason if the picture is dark.
 pub(super) fn say_dark(film: &Film, circumstances: Circumstances) {
     let pixels = film.pixels().map(|pixel| (pixel.radiance, pixel.depth));
     if let Some(line) = line(pixels, circumstances) {
@@ -33,7 +33,7 @@ pub(super) fn say_dark(film: &Film, circumstances: Circumstances) {
     }
 }
 
-/// Message on pixels of these radiances and depths.
+/// Message about pixels with these radiances and depths; `None` if they are not dark.
 fn line(
     all: impl Iterator<Item = ([f32; 3], f32)>,
     Circumstances { lacks_world, is_outside }: Circumstances,

@@ -1,11 +1,11 @@
-//! End of a picture by passes.
+//! Message about the end of a picture by passes.
 
 use photoncard_driver::render::{Aim, Ending, Statistics};
 
 use crate::arguments::RenderOptions;
 use crate::console::say;
 
-/// End of a picture by passes.
+/// Result of a picture by passes.
 pub(super) struct End {
     pub(super) aim: Aim,
     pub(super) noise: Option<f64>,
@@ -15,7 +15,7 @@ pub(super) struct End {
 }
 
 impl End {
-    /// Prints the end, and the options that render an equal picture at once.
+    /// Prints the result, with the options `at_once` that render an equal picture in one pass.
     pub(super) fn say(&self, at_once: &str) {
         say(format_args!("photoncard: this picture in one render: {at_once}"));
         say(format_args!("photoncard: {}", self.line()));
@@ -44,14 +44,14 @@ impl End {
     }
 }
 
-/// A share in per cent, without zeros at the end.
+/// Formats a fraction as a percentage without trailing zeros.
 fn percent(share: f64) -> String {
     let digits = format!("{:.6}", 100.0 * share);
     format!("{} %", digits.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// Options that render the picture of `statistics` at once, beside those of the command but its aim;
-/// `is_fitted` if a pilot has found some.
+/// Options that render the picture of `statistics` in one pass, beside those of the command without its aim.
+/// `is_fitted` is true if a pilot has found settings.
 pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
     let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
     let are_needed = [
@@ -89,7 +89,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_missed_aim_is_told() {
+    fn a_missed_aim_is_reported() {
         let of = |noise, estimated, ending| {
             let aim = Aim { noise, time: None };
             End { aim, noise: estimated, passes: 13, samples: 4096, ending }.line()

@@ -21,8 +21,8 @@ use crate::console::{print_json, printable_json, say, write_bytes};
 use crate::failure::Failure;
 use crate::input;
 
-/// Checks that all files can be written, that none replaces the scene, the environment or another one, and
-/// that no finished tiles are lost.
+/// Checks that all files can be written, that none is an input or another output, and that no finished tiles
+/// are lost.
 pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     part::check(options.parts.part, &outputs.pictures)?;
     check_standard_output(&outputs.pictures, outputs.stats.as_ref(), options.progress)?;
@@ -38,8 +38,8 @@ pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<
     }
 }
 
-/// Checks that standard output takes one picture, the statistics or the progress, and is no terminal if it
-/// takes a picture.
+/// Checks that standard output is used for only one of picture, statistics and progress, and that a picture
+/// does not go to a terminal.
 pub(crate) fn check_standard_output(
     pictures: &[PictureOutput],
     stats: Option<&TextOutput>,
@@ -58,7 +58,7 @@ pub(crate) fn check_standard_output(
     Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
 }
 
-/// Checks that finished tiles that are asked for have a file.
+/// Checks that there is a file for finished tiles if they are to be kept.
 fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     let is_piped = outputs.main().is_some_and(|picture| picture.file().is_none());
     if !is_piped || !(outputs.resume || options.samples.keep_samples) {
@@ -69,8 +69,8 @@ fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Fa
     Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
 }
 
-/// Outputs with a picture beside the scene, if none is stated and no part is rendered. A file of that name
-/// that photoncard did not write stays.
+/// Default outputs, with a picture beside the scene; `None` if a picture is stated or a part is rendered. An
+/// existing file of that name is replaced only if photoncard wrote it.
 pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptions>, Failure> {
     let has_frames = options.frames.numbers().is_some();
     let outputs = options.outputs.beside(&options.scene.path, has_frames);
@@ -110,7 +110,7 @@ pub(super) fn write(
     write_statistics(outputs, serde_json::to_string_pretty(&rendering.statistics))
 }
 
-/// Writes statistics, if the outputs have a place for them.
+/// Writes statistics if an output for them is stated.
 pub(super) fn write_statistics(
     outputs: &OutputOptions,
     text: serde_json::Result<String>,
@@ -124,7 +124,7 @@ pub(super) fn write_statistics(
     }
 }
 
-/// Form of pictures, beside the format of their files.
+/// Options of a picture beyond the format of its file.
 pub(crate) struct Form {
     /// Layers of an EXR.
     pub(crate) layers: Layers,
@@ -136,7 +136,7 @@ pub(crate) struct Form {
     pub(crate) part: Option<PartHead>,
 }
 
-/// Writes a picture with its provenance, whole or not at all.
+/// Writes a picture with its provenance. The file is complete or unchanged.
 pub(crate) fn write_picture(
     picture: &PictureOutput,
     film: &Film,

@@ -1,4 +1,5 @@
-//! Frames that are finished: their files say that a render would write them again as they are, and are whole.
+//! Recognises finished frames: their files are complete, and their provenance shows that a render would write
+//! them again.
 
 use std::path::Path;
 
@@ -11,19 +12,19 @@ use serde_json::Value;
 use super::messages;
 use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 
-/// Settings in a picture that follow from the others: a render finds them when it traces photons and places
-/// the camera.
+/// Settings in a picture's provenance that a render derives from others when it traces photons and places the
+/// camera.
 const FOUND: [&str; 2] = ["max-distance", "view"];
 
-/// Returns whether all files of a frame are there, so that it may be finished.
+/// Returns whether all files of a frame exist, so that the frame may be finished.
 pub(super) fn may_be(outputs: &OutputOptions) -> bool {
     let stats = outputs.stats.as_ref().and_then(TextOutput::path);
     let mut files = outputs.pictures.iter().map(|picture| &*picture.path).chain(stats);
     outputs.resumes() && files.all(Path::is_file)
 }
 
-/// Returns whether the pictures of a frame are those of these settings, and of `inputs`, which the library
-/// does not know, and its files are whole. Names a file that is not.
+/// Returns whether the pictures of a frame have these settings and `inputs`, which the library does not know,
+/// and its files are complete. Prints the name of a damaged file.
 pub(super) fn is_finished(
     options: &RenderOptions,
     outputs: &OutputOptions,
@@ -52,7 +53,7 @@ pub(super) fn is_finished(
     damaged(outputs).inspect(|path| messages::say_damaged(path)).is_none()
 }
 
-/// The first file of a frame that is not as it was written.
+/// First file of a frame that is damaged; `None` if all are complete.
 fn damaged(outputs: &OutputOptions) -> Option<&Path> {
     let is_intact = |PictureOutput { path, format }: &PictureOutput| match format {
         PictureFormat::Exr => exr::is_intact(path),
@@ -69,7 +70,7 @@ fn damaged(outputs: &OutputOptions) -> Option<&Path> {
     outputs.pictures.iter().find(|picture| !is_intact(picture)).map(|picture| &*picture.path).or(stats)
 }
 
-/// Provenance of a picture that has the form of the outputs.
+/// Provenance of an existing picture, if it has the layers and the sample type of the outputs.
 fn provenance(
     options: &RenderOptions,
     outputs: &OutputOptions,

@@ -1,4 +1,4 @@
-//! Frames of a scene's animations, one after another on the same cards.
+//! Renders frames of a scene's animations, one after another on the same cards.
 
 use std::time::Instant;
 
@@ -19,7 +19,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::progress::Progress;
 
-/// Renders the frames of these numbers, and writes their pictures and all other requested outputs.
+/// Renders the frames with these numbers, and writes all requested outputs.
 pub(super) fn run(options: &RenderOptions, numbers: impl Iterator<Item = u32>) -> Result<(), Failure> {
     let start = Instant::now();
     let mut settings = options.settings();
@@ -42,7 +42,7 @@ pub(super) fn run(options: &RenderOptions, numbers: impl Iterator<Item = u32>) -
     Ok(())
 }
 
-/// Outputs of a frame, which can be written.
+/// Outputs of a frame, checked to be writable.
 pub(super) fn outputs_of(options: &RenderOptions, number: u32) -> Result<OutputOptions, Failure> {
     if options.cards.trace.is_some() {
         let report = MietteDiagnostic::new("--trace is of one picture, and --frames are several");
@@ -57,15 +57,15 @@ pub(super) fn outputs_of(options: &RenderOptions, number: u32) -> Result<OutputO
     Ok(outputs)
 }
 
-/// The frames of a scene, and what they share.
+/// Sequence of frames, with the state that they share.
 struct Sequence<'a> {
     options: &'a RenderOptions,
     moments: Moments<'a>,
-    /// The scene as it stands, by which the settings are chosen; `None` once they are.
+    /// Scene at rest, for which the settings are chosen; `None` once they are.
     rest: Option<Scene>,
     renderer: Renderer,
     progress: Progress,
-    /// Time of reading that is not told of yet, seconds.
+    /// Time of reading that was not reported yet, seconds.
     scene_seconds: f64,
 }
 
@@ -87,7 +87,7 @@ impl<'a> Sequence<'a> {
         })
     }
 
-    /// Renders a frame, and writes its outputs. The settings become those that are chosen for the scene.
+    /// Renders a frame and writes its outputs. `settings` are replaced by those chosen for the scene.
     fn render(
         &mut self,
         number: u32,
@@ -125,7 +125,7 @@ impl<'a> Sequence<'a> {
         finish(self.options, outputs, finished)
     }
 
-    /// Chooses the settings before any frame is rendered, as frames that are finished are known by them.
+    /// Chooses the settings before any frame is rendered, because finished frames are recognised by them.
     fn settle(&mut self, settings: &mut RenderSettings) -> Result<(), Failure> {
         let Self { options, rest, progress, .. } = self;
         let Some(rest) = rest.take() else { return Ok(()) };
@@ -138,8 +138,8 @@ impl<'a> Sequence<'a> {
         Ok(())
     }
 
-    /// The picture of the scene. Its settings are chosen with the first one, by the scene as it stands,
-    /// whichever frame that is.
+    /// Renders the picture of the present scene. The first call chooses the settings for the scene at rest,
+    /// whichever frame it renders.
     fn picture(&mut self, settings: &mut RenderSettings) -> Result<(Rendering, Option<Fit>), RenderError> {
         let Self { options, moments, rest, renderer, progress, .. } = self;
         let scene = moments.scene();

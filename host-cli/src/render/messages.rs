@@ -1,4 +1,4 @@
-//! Messages of a render: what was loaded, what is ignored, and what was written.
+//! Messages of a render: contents that were loaded or ignored, and files that were written.
 
 use std::path::Path;
 
@@ -17,11 +17,11 @@ use crate::failure::Failure;
 use crate::notices::{self, Uses};
 use crate::progress::duration;
 
-/// Prints what was loaded, what is ignored of it, and options without effect; if `options` are quiet, only
-/// what is ignored.
+/// Prints loaded contents, ignored contents and options without effect; only ignored contents if `options`
+/// are quiet.
 ///
 /// # Errors
-/// If anything is ignored, and `options` are strict.
+/// If anything is ignored and `options` are strict.
 pub(super) fn say_loaded(
     options: &RenderOptions,
     settings: &RenderSettings,
@@ -45,7 +45,7 @@ pub(super) fn say_loaded(
     Ok(())
 }
 
-/// Prints that fewer photons were stored than were requested.
+/// Prints a warning if fewer photons were stored than requested.
 pub(super) fn say_sparse(statistics: &Statistics) {
     let requested = statistics.provenance.pixels.get("photons").and_then(Value::as_u64);
     let Statistics { photons, photon_paths, .. } = statistics;
@@ -57,7 +57,7 @@ pub(super) fn say_sparse(statistics: &Statistics) {
     }
 }
 
-/// Prints that tiles were believed without a second card whose light is as that of a faulty one.
+/// Prints a warning about dazzling tiles that no second card has confirmed.
 pub(super) fn say_dazzling(statistics: &Statistics) {
     let Statistics { dazzling_tiles, dazzling_cards, .. } = statistics;
     if *dazzling_tiles > 0 {
@@ -70,7 +70,7 @@ pub(super) fn say_dazzling(statistics: &Statistics) {
     }
 }
 
-/// Prints what was prepared, and the view of it.
+/// Prints the contents of a prepared scene, and its view.
 pub(super) fn say_prepared(path: &Path, settings: &RenderSettings, inputs: &NamedSettings, camera: &Camera) {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let scene = inputs.get("scene").and_then(Value::as_str).unwrap_or_default();
@@ -81,13 +81,13 @@ pub(super) fn say_prepared(path: &Path, settings: &RenderSettings, inputs: &Name
     ));
 }
 
-/// Origin of settings that a quality has found for a scene.
+/// Clause that names the quality as the origin of settings.
 pub(super) fn by_quality(quality: Quality) -> String {
     format!("quality {}", quality.name())
 }
 
-/// Settings of a render that are found for a scene or kept; `are_planned` if passes decide the number of
-/// samples.
+/// Text about settings that were found for a scene or taken from kept samples. `are_planned` is true if
+/// passes decide the number of samples.
 pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     let RenderSettings { photons, integrator, .. } = settings;
     let (interpolated, of) = match integrator.irradiance_error {
@@ -111,8 +111,8 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     )
 }
 
-/// Messages of a fit, where settings are not stated: gain of photons for the camera, and settings that the
-/// scene would take beyond the bounds of its quality.
+/// Messages of a fit about settings that are not stated: the gain of guiding photons to the camera, and
+/// settings that the bounds of the quality have limited.
 pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Vec<String> {
     let gain = fit.measured.photons_for_camera.map(|ratio| {
         let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };
@@ -130,7 +130,7 @@ pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Ve
     [gain, photons, gather_rays].into_iter().flatten().collect()
 }
 
-/// Contents of a scene, and the view of it.
+/// Text about the contents of a scene and its view.
 fn loaded(path: &Path, picture: &Picture, scene: &Scene, camera: &Camera) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let left_out = match scene.skipped_triangles {
@@ -147,7 +147,7 @@ fn loaded(path: &Path, picture: &Picture, scene: &Scene, camera: &Camera) -> Str
     format!("{name}: {}; seen by '{}', {width} x {height} pixels", contents.join(", "), camera.name)
 }
 
-/// Sources of light, by kind.
+/// Text about the light sources of each kind.
 fn lights(scene: &Scene) -> String {
     let emissive = scene.emissive_triangles();
     let kinds = [
@@ -158,7 +158,7 @@ fn lights(scene: &Scene) -> String {
     format!("light of {}", kinds.into_iter().flatten().collect::<Vec<_>>().join(" and "))
 }
 
-/// Prints the end of a picture: its files, its time, and its samples or what a frame has cost.
+/// Prints the end of a picture: its files, its time, and its number of samples or the cost of its frame.
 pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Option<u32>) {
     let statistics = &rendering.statistics;
     if let Some(memory) = &statistics.memory {
@@ -173,23 +173,23 @@ pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Op
     say(format_args!("photoncard: {pictures}: {summary}"));
 }
 
-/// Prints the end of all frames.
+/// Prints the number and the time of all frames.
 pub(super) fn say_frames(count: usize, seconds: f64) {
     say(format_args!("photoncard: {} in {}", counted(count, "frame"), duration(seconds)));
 }
 
-/// Prints that the files of a frame are there.
+/// Prints that the files of a frame exist already.
 pub(super) fn say_finished(outputs: &OutputOptions, number: u32) {
     let path = outputs.pictures.first().map_or(Path::new(""), |picture| &picture.path);
     say(format_args!("photoncard: {}: frame {number} is finished", path.display()));
 }
 
-/// Prints that a file of a frame cannot stay.
+/// Prints that a file of a frame is damaged and is rendered again.
 pub(super) fn say_damaged(path: &Path) {
     say(format_args!("photoncard: {} is not as it was written: its frame is rendered again", path.display()));
 }
 
-/// Costs of a frame, and of what it does not share with the one before.
+/// Text about the time of a frame, and of the parts that it does not share with the previous one.
 fn cost(statistics: &Statistics) -> String {
     let Statistics { time_s, link, .. } = statistics;
     let Times { total, scene, pilot, photons, pack, load, render, .. } = time_s;
@@ -200,7 +200,7 @@ fn cost(statistics: &Statistics) -> String {
     format!("{total:.2} s: {phases}{sent} bytes sent in {load:.2} s, tiles {render:.2} s")
 }
 
-/// Time, samples, and what the picture was limited by as far as the statistics know.
+/// Text about time, samples and, if the statistics have it, what limited the render.
 fn summary(statistics: &Statistics, pixels: usize) -> String {
     let Statistics { samples, rays, lost_paths, time_s, .. } = statistics;
     let total = if time_s.total < 10.0 { format!("{:.1} s", time_s.total) } else { duration(time_s.total) };
@@ -218,7 +218,7 @@ fn summary(statistics: &Statistics, pixels: usize) -> String {
     text
 }
 
-/// The phase that took the most time, and its seconds.
+/// Longest phase, with its seconds.
 fn longest(times: &Times) -> (&'static str, f64) {
     let phases = [
         ("reading the scene", times.scene),
@@ -231,7 +231,7 @@ fn longest(times: &Times) -> (&'static str, f64) {
     phases.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
 }
 
-/// Prints a table of the reads of card memory.
+/// Prints a table of reads from card memory.
 fn say_memory(memory: &MemoryStatistics, statistics: &Statistics) {
     let gathers = statistics.gathers;
     let rays = &statistics.rays;
@@ -256,7 +256,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_end_states_time_samples_and_limits() {
+    fn the_final_message_states_time_samples_and_limits() {
         let mut statistics = Statistics { samples: 4, ..Statistics::default() };
         statistics.time_s = Times { photons: 1.0, render: 3.0, total: 4.0, ..Times::default() };
         statistics.rays.eye = 1000;

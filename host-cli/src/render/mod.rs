@@ -1,4 +1,4 @@
-//! `photoncard render`.
+//! Command `photoncard render`.
 
 mod darkness;
 mod end;
@@ -31,7 +31,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::progress::Progress;
 
-/// Renders a scene, and writes the pictures and all other requested outputs.
+/// Renders a scene, and writes all requested outputs.
 pub(crate) fn run(options: &mut RenderOptions) -> Result<(), Failure> {
     if let Some(outputs) = files::beside_scene(options)? {
         options.outputs = outputs;
@@ -46,7 +46,7 @@ pub(crate) fn run(options: &mut RenderOptions) -> Result<(), Failure> {
     videos.iter().try_for_each(|video| video.write(options))
 }
 
-/// Renders the scene as it stands.
+/// Renders the scene at rest.
 fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     let mut settings = options.settings();
     files::check(options, &options.outputs)?;

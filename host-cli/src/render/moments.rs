@@ -1,4 +1,4 @@
-//! The scene of each frame.
+//! Scenes of consecutive frames.
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::scene::{FixedScene, Scene};
@@ -8,18 +8,18 @@ use crate::arguments::{FrameOptions, SceneOptions};
 use crate::failure::Failure;
 use crate::input::Input;
 
-/// A scene at one moment of its animations after another.
+/// Scene that is moved from one time of its animations to another.
 pub(super) struct Moments<'a> {
     options: &'a SceneOptions,
     frames: &'a FrameOptions,
     input: Input,
-    /// The scene of the last frame; at first that at rest, if nothing but cameras moves.
+    /// Scene of the last frame. It starts at rest if only cameras move.
     scene: FixedScene<'static>,
     is_still: bool,
 }
 
 impl<'a> Moments<'a> {
-    /// Opens a scene for cards of `dram_bytes`. Returns it at rest as well.
+    /// Opens a scene for cards of `dram_bytes` bytes. Also returns it at rest.
     pub(super) fn open(
         options: &'a SceneOptions,
         frames: &'a FrameOptions,
@@ -33,17 +33,17 @@ impl<'a> Moments<'a> {
         Ok((Self { options, frames, input, scene, is_still }, rest))
     }
 
-    /// Returns whether every frame has the geometry and the lights of the others.
+    /// Returns whether geometry and lights are equal in all frames.
     pub(super) fn is_still(&self) -> bool {
         self.is_still
     }
 
-    /// The scene of the last frame.
+    /// Scene of the last frame.
     pub(super) fn scene(&self) -> &FixedScene<'static> {
         &self.scene
     }
 
-    /// Places the scene as it is in a frame. Where nothing but cameras moves, all else of it stays.
+    /// Moves the scene to a frame. If only cameras move, all other contents and their checksums are kept.
     pub(super) fn move_to(&mut self, number: u32) -> Result<(), Failure> {
         let moment = self.frames.moment(number);
         if !self.is_still {

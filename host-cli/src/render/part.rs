@@ -1,4 +1,4 @@
-//! A part of a picture as the output of a render, and the command that makes another one.
+//! Part of a picture as the output of a render, and the commands that render the other parts.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use crate::arguments::{PictureFormat, PictureOutput};
 use crate::failure::Failure;
 use crate::shell;
 
-/// Checks that a part is written exactly if one is rendered.
+/// Checks that the output is a part file exactly if a part is rendered.
 pub(super) fn check(part: Option<Part>, pictures: &[PictureOutput]) -> Result<(), Failure> {
     let are_parts = pictures.iter().any(|picture| picture.format == PictureFormat::Part);
     match part {
@@ -22,7 +22,7 @@ pub(super) fn check(part: Option<Part>, pictures: &[PictureOutput]) -> Result<()
     }
 }
 
-/// Error of a part's file without a part.
+/// Error of a part file as the output of a render without `--part`.
 pub(crate) fn needless() -> Failure {
     refusal(
         "a file OUT.part is a part of a picture".to_owned(),
@@ -39,12 +39,12 @@ pub(super) fn arguments() -> Vec<String> {
     std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// Command that makes another part, by the head of one that is there.
+/// Command that renders another part, derived from the head of an existing one.
 pub(crate) fn command(head: &PartHead, part: Part) -> String {
     shell::command(with_part(head, part))
 }
 
-/// The arguments of the head with another part, the name of its file, and the frame of the head alone.
+/// Arguments of the head, with another part and its file name, and only the head's frame.
 fn with_part(head: &PartHead, part: Part) -> Vec<String> {
     let frame = head.settings.get("frame").map(ToString::to_string);
     let changed = |option: &str, value: &str| match option {
@@ -70,8 +70,8 @@ fn with_part(head: &PartHead, part: Part) -> Vec<String> {
     words
 }
 
-/// Path of another part: the last number of the name that is the part's is replaced, with the zeros before
-/// it; without one the number goes before the ending.
+/// Path of another part. The last number in the name that equals the part's is replaced and keeps its leading
+/// zeros. Without such a number, the part's is inserted before the suffix.
 fn name_of(path: &Path, part: Part, other: Part) -> PathBuf {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut pieces: Vec<String> = Vec::new();
@@ -98,7 +98,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_command_of_a_part_is_that_of_another_with_other_names() {
+    fn the_command_of_a_part_differs_from_that_of_another_by_names() {
         let film = Film::new(1, 1, Window::full(1, 1), SumFormat::ONE).unwrap();
         let head = |frame: Option<u32>, line: &str| {
             let settings = frame.map(|frame| ("frame".to_owned(), frame.into())).into_iter().collect();

@@ -1,4 +1,4 @@
-//! `photoncard prepare`.
+//! Command `photoncard prepare`.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -20,7 +20,7 @@ use crate::notices::{self, Uses};
 use crate::progress::Progress;
 use crate::{input, outputs};
 
-/// Prepares a scene, as it stands or in frames, and writes it.
+/// Prepares a scene, at rest or in frames, and writes it.
 pub(crate) fn run(options: &PrepareOptions) -> Result<(), Failure> {
     match options.frames.numbers() {
         None => prepare_rest(options),
@@ -37,7 +37,7 @@ fn prepare_rest(options: &PrepareOptions) -> Result<(), Failure> {
     preparation.write(&prepared, &options.output)
 }
 
-/// Frames that differ from those before by their cameras alone share a file.
+/// Prepares frames. A frame that differs from the previous one only by its cameras shares its file.
 fn prepare_frames(options: &PrepareOptions, numbers: &[u32]) -> Result<(), Failure> {
     let path = |number: u32| numbered(&options.output, number).unwrap_or_else(|| options.output.clone());
     numbers.iter().try_for_each(|&number| check(options, &path(number)))?;
@@ -81,17 +81,17 @@ fn one_file(output: &Path) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// Common part of the files of a preparation.
+/// State that all files of a preparation share.
 struct Preparation<'a> {
     options: &'a PrepareOptions,
     settings: RenderSettings,
     progress: Progress,
-    /// Settings that the quality has found, in words.
+    /// Text about the settings that the quality has found.
     said: OnceLock<String>,
 }
 
 impl<'a> Preparation<'a> {
-    /// Preparation of a picture that shows `scene`.
+    /// Starts the preparation for pictures of `scene`.
     fn new(options: &'a PrepareOptions, scene: &Scene) -> Result<Self, Failure> {
         let mut settings = options.settings();
         let camera = settings.camera(scene)?;
@@ -107,7 +107,7 @@ impl<'a> Preparation<'a> {
         Ok(Self { options, settings, progress, said: OnceLock::new() })
     }
 
-    /// Photons and integrator that the quality chooses by `scene`, where they are not stated.
+    /// Chooses photons and integrator for `scene`, unless they are stated.
     fn choose(&self, scene: &Scene, packed: &PackedScene) -> Chosen {
         let Self { options, settings, progress, said } = self;
         let stated = options.stated();
@@ -153,7 +153,7 @@ impl<'a> Preparation<'a> {
     }
 }
 
-/// Notes for renders: the quality, the inputs by their names, and what all frames share.
+/// Metadata for renders: the quality, the names of the inputs, and the settings that all frames share.
 fn notes(options: &PrepareOptions) -> Map<String, Value> {
     let mut inputs = input::provenance(&options.scene);
     if options.frames.numbers().is_some() {

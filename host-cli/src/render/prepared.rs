@@ -19,7 +19,7 @@ use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
-/// Renders a prepared scene, or frames of one, and writes the pictures and all other requested outputs.
+/// Renders a prepared scene or frames of one, and writes all requested outputs.
 pub(super) fn run(options: &RenderOptions) -> Result<(), Failure> {
     let outputs: Vec<(Option<u32>, OutputOptions)> = match options.frames.numbers() {
         Some(numbers) => {
@@ -52,7 +52,7 @@ pub(super) fn run(options: &RenderOptions) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Path of the prepared scene that has a frame.
+/// Path of the prepared scene that contains a frame.
 fn path_of(pattern: &Path, frame: Option<u32>) -> Result<PathBuf, Failure> {
     let Some(frame) = frame else { return Ok(pattern.to_owned()) };
     last_numbered(pattern, frame).ok_or_else(|| without_frame(pattern, frame))
@@ -67,19 +67,19 @@ fn refusal(text: String, help: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// A prepared scene, and its renderer.
+/// Prepared scene with its renderer.
 struct OpenScene {
     path: PathBuf,
     prepared: PreparedScene,
     renderer: Renderer,
     quality: Quality,
     inputs: NamedSettings,
-    /// Time of opening that is not told of yet, seconds.
+    /// Time of opening that was not reported yet, seconds.
     seconds: f64,
 }
 
 impl OpenScene {
-    /// Opens the prepared scene of a file, which `is_rest` if no frame of it is asked for.
+    /// Opens a prepared scene. `is_rest` is true if no frame is requested.
     fn open(options: &RenderOptions, path: PathBuf, is_rest: bool) -> Result<Self, Failure> {
         let start = Instant::now();
         let prepared = PreparedScene::open(&path).map_err(Failure::input)?;

@@ -1,4 +1,4 @@
-//! Steps of a render that a picture and a frame share.
+//! Steps that renders of a picture and of a frame have in common.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::{Fit, Quality};
@@ -15,8 +15,7 @@ use crate::console::say;
 use crate::failure::Failure;
 use crate::progress::Progress;
 
-/// Says where the finished tiles of a render are that was ended by an error, and writes its statistics up to
-/// then.
+/// Prints where the finished tiles of a failed render are, and writes its statistics so far.
 pub(super) fn end_early(error: &RenderError, progress: &Progress, outputs: &OutputOptions) {
     if error.is_input() {
         return;
@@ -33,22 +32,22 @@ pub(super) fn end_early(error: &RenderError, progress: &Progress, outputs: &Outp
     }
 }
 
-/// A finished picture, and what it was made by.
+/// Finished picture, with the facts for its messages and provenance.
 pub(super) struct Finished {
     pub(super) rendering: Rendering,
     /// Time of reading the scene, seconds.
     pub(super) scene_seconds: f64,
-    /// Inputs of the scene, by their names, and the frame's moment if it is one.
+    /// Names of the scene's inputs, and the time of the frame if there is one.
     pub(super) inputs: NamedSettings,
     pub(super) quality: Quality,
-    /// Settings that the quality has found for the scene, if there was a pilot.
+    /// Settings that the quality has found for the scene; `None` without a pilot.
     pub(super) fit: Option<Fit>,
-    /// Number of the frame, if it is one.
+    /// Number of the frame; `None` for a picture at rest.
     pub(super) frame: Option<u32>,
     pub(super) circumstances: Circumstances,
 }
 
-/// Writes the outputs of a finished picture, and says so.
+/// Writes the outputs of a finished picture, and prints the end.
 pub(super) fn finish(
     options: &RenderOptions,
     outputs: &OutputOptions,
@@ -77,8 +76,7 @@ pub(super) fn finish(
     Ok(())
 }
 
-/// Photons and integrator of the options, with what the quality has found for this scene where nothing is
-/// stated or kept.
+/// Photons and integrator of the options. The fit replaces settings that are neither stated nor kept.
 pub(super) fn chosen(
     options: &RenderOptions,
     unfitted: Unfitted,
@@ -99,12 +97,12 @@ pub(super) fn chosen(
     (settings.photons, settings.integrator)
 }
 
-/// Memory of the largest card, bytes: cards that are too small are left out.
+/// Memory of the largest card, bytes. Cards whose memory is too small for the scene are not used.
 pub(super) fn dram_bytes(settings: &RenderSettings) -> u32 {
     settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX)
 }
 
-/// The scene with the options' assignments; it has light.
+/// Applies the options' assignments to a scene, and checks that it has light.
 pub(super) fn assigned(options: &SceneOptions, mut scene: Scene) -> Result<Scene, Failure> {
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
@@ -113,7 +111,7 @@ pub(super) fn assigned(options: &SceneOptions, mut scene: Scene) -> Result<Scene
     Ok(scene)
 }
 
-/// Gives the picture the aspect ratio of the camera, and says what was loaded.
+/// Gives the picture the camera's aspect ratio, and prints the loaded contents.
 pub(super) fn view(
     options: &RenderOptions,
     settings: &mut RenderSettings,

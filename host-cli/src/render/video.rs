@@ -1,4 +1,4 @@
-//! Videos of frames, which the program ffmpeg makes of PNG pictures.
+//! Videos of frames, which ffmpeg encodes from PNG pictures.
 
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -13,13 +13,13 @@ use crate::shell;
 
 const FFMPEG: &str = "ffmpeg";
 
-/// A video, and the pattern of the pictures that it is made of.
+/// Video, with the path pattern of its pictures.
 pub(super) struct Video {
     path: PathBuf,
     pictures: PathBuf,
 }
 
-/// Replaces the videos among the outputs by the pictures that they are made of.
+/// Replaces the videos among the outputs by the pictures from which they are encoded.
 ///
 /// # Errors
 /// If there are no frames, ffmpeg cannot be started, or a video is one of the inputs.
@@ -53,7 +53,7 @@ pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     Ok(videos)
 }
 
-/// Error of a video whose name has a place for the number of a frame.
+/// Error of a video whose name has a place for a frame's number.
 fn of_each_frame(path: &Path) -> Failure {
     let text = format!(
         "{} is one video of all frames, and a run of # in its name stands for the number of each",
@@ -64,7 +64,7 @@ fn of_each_frame(path: &Path) -> Failure {
     refusal(text, &format!("leave the # out: -o {one}; or write the frames alone: -o {frames}"))
 }
 
-/// The name without the runs of `#`, and without the dot before each.
+/// Name of the video: the pattern without runs of `#` and without the dot before each.
 fn as_one(pattern: &Path) -> PathBuf {
     let name = pattern.file_name().unwrap_or_default().to_string_lossy();
     let kept: Vec<_> = name.split('.').map(|word| word.replace('#', "")).collect();
@@ -79,10 +79,10 @@ fn is_there() -> bool {
 }
 
 impl Video {
-    /// Makes the video of rendered frames.
+    /// Encodes the video from rendered frames.
     ///
     /// # Errors
-    /// If ffmpeg fails: its last line, and the command.
+    /// If ffmpeg fails. The error contains its last line and the command.
     pub(super) fn write(&self, options: &RenderOptions) -> Result<(), Failure> {
         let pictures = options.frames.numbers().into_iter().flatten();
         let pictures: Vec<PathBuf> = pictures.filter_map(|number| numbered(&self.pictures, number)).collect();
@@ -129,7 +129,7 @@ impl Video {
     }
 }
 
-/// Error of a video that is no output of a render of frames.
+/// Error of a video as the output of a command that renders no frames.
 pub(crate) fn needless() -> Failure {
     refusal(
         "a video is of frames that photoncard render makes".to_owned(),
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_name_of_a_video_has_no_number() {
+    fn the_name_of_a_video_is_the_pattern_without_signs() {
         for (pattern, expected) in [
             ("a#/view.####.mp4", "a#/view.mp4"),
             ("take#2.webm", "take2.webm"),

@@ -1,4 +1,4 @@
-//! Contents of a scene as JSON. The keys are stable.
+//! Contents of a scene as JSON with stable keys.
 
 use glam::Vec3;
 use photoncard_driver::scene::gltf::Animation;
@@ -7,7 +7,7 @@ use photoncard_driver::scene::{
 };
 use serde_json::{Value, json};
 
-/// All contents of a scene but its vertices and texels.
+/// Contents of a scene, except vertices and texels.
 pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
     let (lower, upper) = scene.bounds();
     json!({

@@ -1,4 +1,4 @@
-//! `photoncard scene info`.
+//! Command `photoncard scene info`.
 
 mod json;
 
@@ -13,7 +13,7 @@ use crate::arguments::LightOptions;
 use crate::console::{print, print_json};
 use crate::failure::Failure;
 
-/// Prints the contents of a scene: a report, or JSON.
+/// Prints the contents of a scene as a report or as JSON.
 pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(), Failure> {
     let settings = LoadSettings { light_units: lights.light_units, ..LoadSettings::default() };
     let file = SceneFile::open(path, &settings).map_err(Failure::input)?;
@@ -44,7 +44,7 @@ pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(),
     print(&lines)
 }
 
-/// Triangles, size and texels of a scene.
+/// Table rows about triangles, size and texels of a scene.
 fn geometry(scene: &Scene) -> [String; 5] {
     let (lower, upper) = scene.bounds();
     let size = upper - lower;

@@ -1,4 +1,4 @@
-//! `photoncard study`.
+//! Command `photoncard study`.
 
 mod sweep;
 
@@ -23,7 +23,7 @@ use crate::shell;
 /// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
-/// Makes the reports of studies that ship, or of one of the user's own.
+/// Writes the reports of built-in studies, or of a sweep.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     match arguments {
         StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => {
@@ -59,7 +59,7 @@ fn run_shipped(
     observed(output.quiet, |progress| study(&options, progress).map_err(failure))
 }
 
-/// Does work whose progress is shown unless `quiet`.
+/// Runs `work`. Its progress is shown unless `quiet`.
 fn observed(quiet: bool, work: impl FnOnce(&StudyProgress) -> Result<(), Failure>) -> Result<(), Failure> {
     let progress = StudyProgress::start(quiet).map_err(|error| Failure::work_error(&error))?;
     let result = work(&progress);
@@ -75,12 +75,12 @@ fn failure(error: StudyError) -> Failure {
     }
 }
 
-/// Command line as typed, with the program's name without its folder.
+/// Command line as typed. The program's name has no folder.
 fn command_line() -> String {
     shell::command(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
 }
 
-/// Progress of a study: a bar on a terminal, otherwise a line for each tenth.
+/// Progress of a study: a bar on a terminal, elsewhere a line for each tenth.
 struct StudyProgress {
     stopped: Arc<AtomicBool>,
     display: Option<Mutex<Display>>,
@@ -89,10 +89,10 @@ struct StudyProgress {
 struct Display {
     study: String,
     bar: ProgressBar,
-    /// Remaining time, which the bar shows whenever it is drawn.
+    /// Estimate of the remaining time, which the bar shows whenever it is drawn.
     remaining: Arc<Mutex<Remaining>>,
     on_terminal: bool,
-    /// Number of tenths of the study that were printed, without a terminal.
+    /// Number of tenths that were printed, without a terminal.
     told: usize,
 }
 
@@ -138,7 +138,7 @@ fn lock<T>(value: &Mutex<T>) -> MutexGuard<'_, T> {
     value.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Remaining time in words, `now` seconds after the start; empty before a point is measured.
+/// Text of the remaining time, `now` seconds after the start; empty before a point is measured.
 fn left(remaining: &Mutex<Remaining>, now: f64) -> String {
     let seconds = lock(remaining).seconds(now);
     seconds.map_or(String::new(), |seconds| format!(", {} left", duration(seconds)))
@@ -161,7 +161,7 @@ impl Display {
         }
     }
 
-    /// Starts the bar of a study of which `done` points are in the store.
+    /// Starts the bar of a study of whose points `done` are stored already.
     fn begin(&mut self, study: &str, done: usize, total: usize) {
         self.bar.finish_and_clear();
         study.clone_into(&mut self.study);

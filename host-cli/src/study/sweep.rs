@@ -1,4 +1,4 @@
-//! Sweep of `photoncard study sweep`: its points, by the arguments with some of them replaced.
+//! Points of `photoncard study sweep`, from the command line with some arguments replaced.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -20,10 +20,10 @@ use crate::failure::Failure;
 use crate::input;
 use crate::notices::{self, Uses};
 
-/// Name and value of an axis.
+/// Name of an axis, and a value on it.
 type Value<'a> = (&'a str, &'a str);
 
-/// Loads the scene of a sweep, and makes its points.
+/// Loads the scene of a sweep and creates its points.
 pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Result<SweepOptions, Failure> {
     let scene = input::load(&arguments.scene, u32::MAX)?;
     let name = input::name(&arguments.scene);
@@ -48,8 +48,7 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     Ok(SweepOptions { sweep, name, scene, out, threads, machine, provenance })
 }
 
-/// Point of the arguments with values replaced. The picture has the camera's aspect ratio, if no size is
-/// given.
+/// Point of the sweep with these values. If no size is stated, the picture has the camera's aspect ratio.
 fn point(
     arguments: &SweepArguments,
     values: &[Value],
@@ -71,7 +70,7 @@ fn point(
     Ok(point)
 }
 
-/// Arguments of the command line with values replaced; `None` if none are.
+/// Arguments of the command line with these values; `None` if there are no values.
 fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
     if values.is_empty() {
         return Ok(None);
@@ -92,7 +91,7 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
     }
 }
 
-/// Notice on caches that take more than the on-chip memory of the chip.
+/// Notice about caches that exceed the on-chip memory of the chip.
 fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
     let sizes = match caches {
         CacheSettings::Split { photon, scene } => [photon.bytes, scene.bytes],
@@ -108,7 +107,8 @@ fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
     })
 }
 
-/// Caches of `--vary cache=`: as of `--cache`, or those of the photon map alone as SIZE/LINE/WAYS or SIZE.
+/// Parses caches of `--vary cache=`: in the syntax of `--cache`, or the photon cache alone as SIZE/LINE/WAYS
+/// or SIZE.
 fn cache(text: &str) -> Result<CacheSettings, String> {
     match (text.contains('='), text.contains('/')) {
         (true, _) => text.parse(),
@@ -117,14 +117,14 @@ fn cache(text: &str) -> Result<CacheSettings, String> {
     }
 }
 
-/// The first paragraph of an error of arguments.
+/// First paragraph of an error about arguments.
 fn reason(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let text = text.strip_prefix("error: ").unwrap_or(&text);
     text.split("\n\n").next().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Failure of values that their options refuse.
+/// Failure of values that an option refuses.
 fn refused(values: &[Value], reason: &str) -> Failure {
     let values: Vec<_> = values.iter().map(|(name, value)| format!("{name}={value}")).collect();
     let text = format!("--vary {} is not possible: {reason}", values.join(" with "));
@@ -132,7 +132,7 @@ fn refused(values: &[Value], reason: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// Failure of a point, or of the axes.
+/// Failure of a point or of the axes.
 struct PointError(Failure);
 
 impl From<AxisError> for PointError {
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn caches_beyond_the_memory_of_a_chip_are_told() {
+    fn caches_beyond_the_memory_of_a_chip_are_reported() {
         for (chip, caches, is_beyond) in [
             (EmulatedKind::Reference, "photon=128K/128/4", false),
             (EmulatedKind::Reference, "unified=1M/128/16", false),

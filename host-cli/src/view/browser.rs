@@ -1,4 +1,4 @@
-//! The browser of this machine.
+//! Browser of this machine.
 
 use std::process::{Command, Stdio};
 

@@ -1,8 +1,7 @@
-//! The tiles that pages are shown: those of the newest wish that has any, numbered in the order in which they
-//! were finished.
+//! Tiles for pages, from the newest wish that has any, numbered in the order in which they were finished.
 //!
-//! A page needs to remember one number alone, that of the next tile: tiles that are outdated are gone when it
-//! asks. So a slow page gets fewer and newer tiles, and takes no memory.
+//! A page remembers only the number of its next tile, because outdated tiles are dropped before it asks. A
+//! slow page therefore receives fewer and newer tiles, and needs no buffer.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
@@ -12,7 +11,7 @@ use photoncard_driver::layer::{Layer, Layers};
 use photoncard_driver::sink::FinishedTile;
 use photoncard_shared::counters::Counters;
 
-/// Radiance or a layer, as a page shows it.
+/// Radiance or a layer that a page shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     Radiance,
@@ -20,7 +19,7 @@ pub(super) enum Shown {
 }
 
 impl Shown {
-    /// Returns whether chips render it in pictures with layers alone.
+    /// Returns whether chips render this layer only in pictures with layers.
     pub(super) fn is_of_chip(self) -> bool {
         match self {
             Self::Radiance => false,
@@ -29,27 +28,27 @@ impl Shown {
     }
 }
 
-/// Origin of tiles.
+/// Origin of a tile: wish, resolution and number of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin {
     /// Number of the wish.
     pub(super) version: u32,
-    /// True for a picture by cheap settings.
+    /// True for a picture with cheap settings.
     pub(super) is_coarse: bool,
-    /// Side of the square that a pixel stands for.
+    /// Side of the square of pixels that a rendered pixel stands for.
     pub(super) step: u32,
-    /// Samples of a pixel.
+    /// Samples per pixel.
     pub(super) samples: u32,
 }
 
-/// Work of a tile, for all samples of its pixels.
+/// Work on a tile, for all samples of its pixels.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TileWork {
-    /// Searches for photons.
+    /// Number of photon gathers.
     gathers: u64,
-    /// Irradiance records gathered.
+    /// Number of irradiance records gathered.
     records: u64,
-    /// Lines read from DRAM, if memory is modelled.
+    /// Number of lines read from DRAM; `None` if memory is not modelled.
     dram_lines: Option<u64>,
 }
 
@@ -59,7 +58,7 @@ impl TileWork {
         Self { gathers, records: counters.records, dram_lines }
     }
 
-    /// Work of this and of more samples.
+    /// Sum of the work on earlier and on further samples.
     fn and(self, more: Self) -> Self {
         Self {
             gathers: self.gathers.saturating_add(more.gathers),
@@ -68,28 +67,28 @@ impl TileWork {
         }
     }
 
-    /// Counts for a tile's header; [`UNKNOWN`] for one that is not known.
+    /// Counts for a tile's header; [`UNKNOWN`] replaces unknown ones.
     fn words(self) -> [u32; 3] {
         [Some(self.gathers), Some(self.records), self.dram_lines]
             .map(|count| count.map_or(UNKNOWN, |count| count.min(u64::from(UNKNOWN - 1)) as u32))
     }
 }
 
-/// A tile with its origin.
+/// Tile with its origin and the card that rendered it.
 #[derive(Debug)]
 pub(super) struct Patch {
     pub(super) origin: Origin,
-    /// Number of the card.
+    /// Index of the card.
     card: u32,
     tile: FinishedTile,
     work: TileWork,
 }
 
-/// Count that is not known.
+/// Value of an unknown count.
 const UNKNOWN: u32 = u32::MAX;
-/// Bytes of a tile's header.
+/// Size of a tile's header, bytes.
 const HEADER: usize = 44;
-/// Bytes of a pixel.
+/// Size of a pixel, bytes.
 const PIXEL: usize = 12;
 
 impl Patch {
@@ -97,7 +96,7 @@ impl Patch {
         Self { origin, card, tile, work }
     }
 
-    /// Returns whether this tile has further samples of the pixels of another one of its area.
+    /// Returns whether this tile adds samples to an earlier one of the same area.
     fn goes_on(&self, earlier: &Self) -> bool {
         earlier.origin.samples < self.origin.samples
             && Origin { samples: self.origin.samples, ..earlier.origin } == self.origin
@@ -108,12 +107,12 @@ impl Patch {
         (tile.x, tile.y, tile.pixels())
     }
 
-    /// Bytes of the message that shows the tile.
+    /// Size of the message with this tile, bytes.
     pub(super) fn bytes(&self) -> usize {
         HEADER + PIXEL * self.tile.tile().pixels() as usize
     }
 
-    /// Message that shows the tile.
+    /// Message with this tile, for a page that shows `shown`.
     pub(super) fn message(&self, shown: Shown) -> Vec<u8> {
         let Origin { version, is_coarse: _, step, samples } = self.origin;
         let [gathers, records, lines] = self.work.words();
@@ -128,7 +127,7 @@ impl Patch {
         bytes
     }
 
-    /// The pixel at `(x, y)` of the full picture.
+    /// Pixel of the tile at `(x, y)` of the full picture; `None` if it is outside.
     fn pixel(&self, [x, y]: [u32; 2]) -> Option<FilmPixel> {
         let [x, y] = [x, y].map(|at| at / self.origin.step);
         let tile = self.tile.tile();
@@ -139,7 +138,7 @@ impl Patch {
     }
 }
 
-/// Values of a pixel as a page shows them; a scalar is repeated.
+/// Channel values of a pixel for a page. A scalar is repeated.
 fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     let Shown::Layer(layer) = shown else { return pixel.pixel.radiance };
     match layer.channels() {
@@ -149,21 +148,21 @@ fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     }
 }
 
-/// Corner and number of pixels of a tile, which differ between the tiles of a picture.
+/// Corner and number of pixels, which identify a tile of a picture.
 type Area = (u32, u32, u64);
 
-/// The tiles of the newest wish that has any.
+/// Tiles of the newest wish that has any.
 #[derive(Debug, Default)]
 pub(super) struct Canvas {
     patches: VecDeque<(u64, Arc<Patch>)>,
-    /// Numbers of the tiles of each area, from the oldest on.
+    /// Numbers of the tiles of each area, the oldest first.
     by_area: HashMap<Area, Vec<u64>>,
     /// Number of the next tile.
     next: u64,
 }
 
 impl Canvas {
-    /// Adds a tile, and drops those of older wishes. Its work is added to that of the samples before.
+    /// Adds a tile and drops those of older wishes. The work on its earlier samples is added to its own.
     pub(super) fn put(&mut self, mut patch: Patch) {
         let version = patch.origin.version;
         if self.patches.front().is_some_and(|(_, oldest)| oldest.origin.version < version) {
@@ -189,12 +188,12 @@ impl Canvas {
         self.retain(|patch| patch.origin.version == version);
     }
 
-    /// Drops the tiles of other passes, once the picture of a pass is complete.
+    /// Drops the tiles of other passes, once a pass is complete.
     pub(super) fn keep(&mut self, origin: Origin) {
         self.retain(|patch| patch.origin == origin);
     }
 
-    /// Drops a tile that was revoked.
+    /// Removes a revoked tile.
     pub(super) fn revoke(&mut self, origin: Origin, id: u32) {
         self.retain(|patch| !(patch.origin == origin && patch.tile.tile().id == id));
     }
@@ -207,20 +206,20 @@ impl Canvas {
         }
     }
 
-    /// The oldest tile from the number `from` on, and its number.
+    /// Oldest tile with a number of at least `from`, and its number.
     pub(super) fn after(&self, from: u64) -> Option<(u64, Arc<Patch>)> {
         let index = self.patches.partition_point(|(number, _)| *number < from);
         self.patches.get(index).cloned()
     }
 
-    /// Depth of the newest pixel of a wish that shows `at`, metres; `None` where nothing is seen.
+    /// Depth of the newest pixel of a wish at `at`, metres; `None` where no surface is seen.
     pub(super) fn depth(&self, version: u32, at: [u32; 2]) -> Option<f32> {
         let mut of_wish = self.patches.iter().rev().filter(|(_, patch)| patch.origin.version == version);
         let seen = of_wish.find_map(|(_, patch)| patch.pixel(at))?;
         Some(seen.pixel.depth).filter(|depth| depth.is_finite() && *depth > 0.0)
     }
 
-    /// Number of tiles.
+    /// Number of stored tiles.
     #[cfg(test)]
     pub(super) fn len(&self) -> usize {
         self.patches.len()
@@ -247,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn the_work_of_a_tile_is_that_of_all_its_samples() {
+    fn the_work_of_a_tile_includes_earlier_samples() {
         let mut canvas = Canvas::default();
         for pass in [1, 2, 4] {
             (0..3).for_each(|x| canvas.put(patch(pass, x, 10 * u64::from(pass) + u64::from(x))));

@@ -5,9 +5,9 @@ use std::time::Duration;
 use photoncard_driver::render::{CardAddress, CardSet};
 use serde_json::{Value, json};
 
-/// Pause before the first attempt to reach a lost card; it doubles with each one.
+/// Pause before the first attempt to reconnect to a lost card. It doubles with each attempt.
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
-/// Maximum of that pause.
+/// Maximum pause between attempts.
 const MAX_PAUSE: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,7 +20,7 @@ enum Standing {
 
 struct Card {
     name: String,
-    /// Address of a card elsewhere, which can be reached again.
+    /// Address of a remote card, which can be reconnected; `None` for an emulated card.
     address: Option<CardAddress>,
     standing: Standing,
     tiles: u64,
@@ -29,7 +29,7 @@ struct Card {
     pause: Duration,
 }
 
-/// The cards of a view.
+/// Cards of a view.
 pub(super) struct CardBoard {
     cards: Vec<Card>,
 }
@@ -57,7 +57,7 @@ impl CardBoard {
         self.cards.iter_mut().enumerate().find(|(_, card)| card.name == name)
     }
 
-    /// Counts a tile of a card. Returns the card's number, and whether it was not known to be ready.
+    /// Counts a tile of a card. Returns the card's index, and whether the card was not known to be ready.
     pub(super) fn rendered(&mut self, name: &str) -> (u32, bool) {
         let Some((number, card)) = self.of_name(name) else { return (0, false) };
         card.tiles += 1;
@@ -67,7 +67,7 @@ impl CardBoard {
         (number as u32, is_new)
     }
 
-    /// Notes that a card is lost.
+    /// Records that a card is lost.
     pub(super) fn lose(&mut self, name: &str, error: String, now: Duration) {
         if let Some((_, card)) = self.of_name(name) {
             (card.standing, card.error) = (Standing::Lost, Some(error));
@@ -75,8 +75,7 @@ impl CardBoard {
         }
     }
 
-    /// A lost card elsewhere that is to be tried now, with its number; each is tried after a pause that
-    /// doubles.
+    /// Remote lost card whose pause is over, with its index. The pause doubles with each attempt.
     pub(super) fn next_to_try(&mut self, now: Duration) -> Option<(usize, CardAddress)> {
         let is_due =
             |card: &Card| card.standing == Standing::Lost && card.address.is_some() && card.try_at <= now;
@@ -87,14 +86,14 @@ impl CardBoard {
         Some((number, address))
     }
 
-    /// Notes that a lost card has answered.
+    /// Records that a lost card has answered.
     pub(super) fn returns(&mut self, number: usize) {
         if let Some(card) = self.cards.get_mut(number) {
             (card.standing, card.error) = (Standing::Ready, None);
         }
     }
 
-    /// The cards for pages.
+    /// States of the cards as a message to pages.
     pub(super) fn describe(&self) -> Value {
         let card = |card: &Card| {
             let state = match card.standing {

@@ -1,4 +1,4 @@
-//! The command line that renders a settled picture, with every option that pixels depend on.
+//! Command line that renders a settled picture, with every option on which pixels depend.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::Quality;
@@ -23,12 +23,12 @@ pub(super) fn words(scene: &SceneOptions, quality: Quality, wish: &Wish) -> Vec<
     words.0
 }
 
-/// Words as a shell takes them.
+/// Words quoted for a shell.
 pub(super) fn quoted(words: &[String]) -> String {
     words.iter().map(|word| quote(word)).collect::<Vec<_>>().join(" ")
 }
 
-/// A path that is no option.
+/// Path that cannot be mistaken for an option.
 fn path(path: &str) -> String {
     if path.starts_with('-') { format!("./{path}") } else { path.to_owned() }
 }
@@ -139,7 +139,7 @@ fn of_rays(integrator: &Integrator, words: &mut Words) {
     words.add("--adaptive", &adaptive_threshold.map_or("off".to_owned(), |threshold| threshold.to_string()));
 }
 
-/// A word as a shell takes it.
+/// Word quoted for a shell.
 fn quote(word: &str) -> String {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_@%+=:,./-".contains(&byte);
     if !word.is_empty() && word.bytes().all(is_plain) {

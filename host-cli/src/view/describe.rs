@@ -1,4 +1,4 @@
-//! Scene and state of a view as messages to pages.
+//! Messages to pages about the scene and the state of a view.
 
 use glam::Vec3;
 use photoncard_driver::choice::Choice;
@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::wish::Wish;
 
-/// Description of a scene in the first message to a page.
+/// Facts about a scene for the first message to a page.
 pub(super) struct SceneFacts {
     name: String,
     low: Vec3,
@@ -24,7 +24,7 @@ impl SceneFacts {
         Self { name, low, high }
     }
 
-    /// Greeting of a page; `scene` has materials and lights before edits.
+    /// First message to a page. `scene` has the materials and lights before edits.
     pub(super) fn hello(&self, scene: &Scene, out: Option<&str>, steers: bool) -> Value {
         let layers = ["radiance"].into_iter().chain(Layer::ALL.map(Layer::name));
         let cameras = scene.cameras.iter().map(|camera| {
@@ -49,7 +49,7 @@ impl SceneFacts {
         })
     }
 
-    /// A camera of a scene, and a place in its direction at about the distance of the scene's middle.
+    /// Description of a camera, with a point in its direction at about the distance of the scene's centre.
     pub(super) fn camera(&self, camera: &Camera, scene: &Scene) -> Value {
         let middle = 0.5 * (self.low + self.high);
         let size = (self.high - self.low).length().max(1e-3);
@@ -81,7 +81,7 @@ fn light(light: &PunctualLight, scene: &Scene) -> Value {
     })
 }
 
-/// Each material, once for its name, with the properties that can be set.
+/// Descriptions of the materials, one for each name, with the properties that can be set.
 fn materials(scene: &Scene) -> Vec<Value> {
     let is_first = |index: usize, material: &Material| {
         !scene.materials[..index].iter().any(|other| other.name == material.name)
@@ -116,7 +116,7 @@ fn properties(material: &Material) -> Map<String, Value> {
     properties
 }
 
-/// Changes of the scene by pages.
+/// Changes of the scene that pages have made.
 pub(super) fn changes(wish: &Wish) -> Value {
     let change = |(name, value): &(String, Vec<f64>)| match value[..] {
         [value] => json!({"name": name, "value": value}),
@@ -125,7 +125,7 @@ pub(super) fn changes(wish: &Wish) -> Value {
     wish.edits().iter().map(change).collect()
 }
 
-/// Settings of the settled picture that pages can change, and others of interest.
+/// Settings of the settled picture that pages can change, and others that they show.
 pub(super) fn settings(settings: &RenderSettings) -> Value {
     let RenderSettings { photons, integrator, schedule, picture, .. } = settings;
     json!({
@@ -142,10 +142,11 @@ pub(super) fn settings(settings: &RenderSettings) -> Value {
     })
 }
 
-/// Cost of the newest image and of the newest pass.
+/// Cost of the newest image and of the newest pass, for pages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cost {
-    /// Seconds of photons, of the rest of the image, of loading it and of rendering.
+    /// Seconds that photons took; the other fields are those of the rest of the image, of its loading and of
+    /// rendering.
     photons: f64,
     pack: f64,
     load: f64,
@@ -155,7 +156,7 @@ pub(super) struct Cost {
 }
 
 impl Cost {
-    /// Adds a finished pass. Those of the image are those of the pass for which it was made.
+    /// Adds a finished pass. The cost of the image is that of the pass for which it was built.
     pub(super) fn add(&mut self, statistics: &Statistics) {
         let times = &statistics.time_s;
         if times.photons > 0.0 {

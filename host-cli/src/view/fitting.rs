@@ -1,5 +1,5 @@
-//! Pilot renders, by which a quality finds its settings: on a thread beside the painter, so that a new wish
-//! need not wait for them.
+//! Pilot renders by which a quality finds its settings. They run on a thread beside the painter, so that a
+//! new wish need not wait for them.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,23 +11,23 @@ use photoncard_driver::quality::{Fit, Quality};
 use photoncard_driver::render::{Observer, Phase, RenderError, RenderSettings};
 use photoncard_driver::scene::FixedScene;
 
-/// Result of pilot renders; `None` where no setting depends on the scene.
+/// Result of pilot renders; `None` if no setting depends on the scene.
 pub(super) type Found = Result<Option<Fit>, RenderError>;
 
-/// Time between two looks at the thread.
+/// Time between two polls of the thread.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// Pilot renders at work.
+/// Running pilot renders.
 pub(super) struct Fitting {
     thread: JoinHandle<Found>,
     stop: Arc<AtomicBool>,
 }
 
 impl Fitting {
-    /// Begins pilot renders of the settings' view, with at most `threads` threads.
+    /// Starts pilot renders for the view of `settings`, with at most `threads` threads.
     ///
     /// # Errors
-    /// If their thread cannot be started.
+    /// If the thread cannot be started.
     pub(super) fn start(
         scene: Arc<FixedScene<'static>>,
         quality: Quality,
@@ -47,7 +47,7 @@ impl Fitting {
         Ok(Self { thread: std::thread::Builder::new().name("pilot".into()).spawn(work)?, stop })
     }
 
-    /// Waits for the result, or until `must_stop`; then the work goes on.
+    /// Waits for the result. If `must_stop` becomes true, returns the pilot renders, which continue.
     pub(super) fn wait(self, must_stop: &dyn Fn() -> bool) -> Result<Found, Self> {
         while !self.thread.is_finished() {
             if must_stop() {
@@ -58,7 +58,7 @@ impl Fitting {
         Ok(self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     }
 
-    /// Ends the work, whose result is lost.
+    /// Stops the pilot renders. Their result is lost.
     pub(super) fn stop(self) {
         self.stop.store(true, Ordering::Relaxed);
         // Its panic would be one of a result that nobody wants.

@@ -1,8 +1,8 @@
-//! Who may have what: checks of a request's address, its origin and its token.
+//! Access control: checks of a request's address, its origin and its token.
 //!
-//! A page of another site must not reach the view. A browser states in `Host` which name it has looked up, so
-//! that a foreign name that leads here is refused (DNS rebinding); in `Origin` it states whose script asks
-//! for a connection; and only who has seen the printed address knows the token.
+//! A page of another site must not reach the view. Browsers state in `Host` the name that they resolved, so
+//! that foreign names that resolve to this machine are refused (DNS rebinding). They state in `Origin` the
+//! site whose script opens a connection. Only those who have seen the printed address know the token.
 
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr};
 
@@ -11,33 +11,33 @@ use super::page_files::{PageFile, page_file};
 
 /// Path of the page.
 const PAGE: &str = "/";
-/// Path of the page's file, which is the page.
+/// Path of the page's file, which is also the page.
 const PAGE_FILE: &str = "/index.html";
 /// Path of the WebSocket.
 const SOCKET: &str = "/socket";
 
-/// Conditions of a request.
+/// Resource that a request may have.
 #[derive(Debug, PartialEq)]
 pub(super) enum Resource {
-    /// A file of the page.
+    /// File of the page.
     File(&'static PageFile),
-    /// A WebSocket, by this key of the request.
+    /// WebSocket, with the key of the request.
     Socket(String),
 }
 
-/// Checks of requests.
+/// Access control of a server.
 pub(super) struct Gate {
     address: SocketAddr,
     token: String,
 }
 
 impl Gate {
-    /// Gate of a server at `address`, whose port is known.
+    /// Creates the access control of a server at `address`, whose port is known.
     pub(super) fn new(address: SocketAddr, token: String) -> Self {
         Self { address, token }
     }
 
-    /// Address of the page on this machine, with the token.
+    /// URL of the page on this machine, with the token.
     pub(super) fn url(&self) -> String {
         let Self { address, token } = self;
         let ip = match address.ip() {
@@ -49,10 +49,10 @@ impl Gate {
         format!("http://{here}{PAGE}?token={token}")
     }
 
-    /// Conditions of a request.
+    /// Checks a request and returns its resource.
     ///
     /// # Errors
-    /// If it may have nothing.
+    /// The refusal, if the request may have no resource.
     pub(super) fn check(&self, head: &Head) -> Result<Resource, Refusal> {
         if head.method != "GET" {
             return Err(Refusal::new(405, "Method Not Allowed", "only GET is answered"));
@@ -83,8 +83,8 @@ impl Gate {
         .ok_or(Refusal::new(404, "Not Found", "there is nothing at this address"))
     }
 
-    /// Returns whether a name of a host is one of this server's: the address that it listens at, `localhost`
-    /// on this machine, or any address, but no name, if it listens at all of them.
+    /// Returns whether a host name is one of this server: the address at which it listens, or `localhost` for
+    /// this machine. A server that listens at all addresses accepts any address but no name.
     fn is_own(&self, host: &str) -> bool {
         let Self { address, .. } = self;
         let name = match host.strip_suffix(&format!(":{}", address.port())) {
@@ -124,7 +124,7 @@ mod tests {
         Gate::new(address.parse().unwrap(), TOKEN.into())
     }
 
-    /// Status of a request; 101 for a WebSocket.
+    /// HTTP status of a request; 101 for a WebSocket.
     fn status(gate: &Gate, target: &str, headers: &str) -> u16 {
         let text = format!("GET {target} HTTP/1.1\r\n{headers}\r\n");
         match Head::parse(text.as_bytes()).map(|head| gate.check(&head.unwrap())) {
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_takes_its_host_and_the_token() {
+    fn the_page_requires_its_host_and_the_token() {
         let gate = gate("127.0.0.1:8080");
         assert_eq!(gate.url(), format!("http://127.0.0.1:8080/?token={TOKEN}"));
         assert_eq!(self::gate("0.0.0.0:8080").url(), gate.url());
@@ -172,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn the_socket_takes_the_pages_own_origin_and_the_token() {
+    fn the_socket_requires_the_origin_of_the_page_and_the_token() {
         let gate = gate("127.0.0.1:8080");
         let socket = format!("/socket?token={TOKEN}");
         let upgrade = "Connection: keep-alive, Upgrade\r\nUpgrade: websocket\r\nSec-WebSocket-Version: 13\r\n\

@@ -1,4 +1,4 @@
-//! The few parts of HTTP that a page needs: the head of a request, and answers that close the connection.
+//! Subset of HTTP that a page needs: the head of a request, and answers that close the connection.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -10,7 +10,7 @@ use super::page_files::PageFile;
 const MAX_HEAD: usize = 8 << 10;
 /// Maximum number of headers.
 const MAX_HEADERS: usize = 64;
-/// Time in which a request's head must arrive.
+/// Time limit for a request's head.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Head of a request.
@@ -18,11 +18,11 @@ const PATIENCE: Duration = Duration::from_secs(5);
 pub(super) struct Head {
     pub(super) method: String,
     pub(super) target: String,
-    /// Names in lower case, with their values.
+    /// Header names in lower case, with their values.
     headers: Vec<(String, String)>,
 }
 
-/// A request that is not answered.
+/// Answer to a request that is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Refusal {
     pub(super) status: u16,
@@ -39,7 +39,7 @@ impl Refusal {
         Self::new(403, "Forbidden", text)
     }
 
-    /// Answers a request.
+    /// Sends the answer.
     pub(super) fn send(&self, stream: &mut TcpStream) -> std::io::Result<()> {
         let Self { status, reason, text } = self;
         respond(stream, &format!("{status} {reason}"), "text/plain; charset=utf-8", "", text.as_bytes())
@@ -51,7 +51,7 @@ const TOO_LARGE: Refusal = Refusal::new(431, "Request Header Fields Too Large", 
 const TOO_SLOW: Refusal = Refusal::new(408, "Request Timeout", "the request did not arrive in time");
 
 impl Head {
-    /// Reads a request's head from a connection, in bounded time and memory.
+    /// Reads a request's head from a connection. Time and memory are bounded.
     pub(super) fn read(stream: &mut TcpStream) -> Result<Self, Refusal> {
         let start = Instant::now();
         let mut bytes = Vec::new();
@@ -99,17 +99,17 @@ impl Head {
         Ok(Some(Self { method: method.to_owned(), target: target.to_owned(), headers }))
     }
 
-    /// Values of all headers of a name.
+    /// Values of all headers with this name.
     pub(super) fn all(&self, name: &str) -> Vec<&str> {
         self.headers.iter().filter(|(known, _)| known == name).map(|(_, value)| value.as_str()).collect()
     }
 
-    /// Value of the only header of a name.
+    /// Value of the only header with this name; `None` if there is none or several.
     pub(super) fn one(&self, name: &str) -> Option<&str> {
         if let [value] = self.all(name)[..] { Some(value) } else { None }
     }
 
-    /// Key of a request for a WebSocket of the version that is known.
+    /// Key of a WebSocket request with the supported version.
     pub(super) fn socket_key(&self) -> Option<String> {
         let has = |name: &str, word: &str| {
             self.all(name)
@@ -123,7 +123,7 @@ impl Head {
     }
 }
 
-/// Sends a file of the page; `host` is the name by which the page has reached this server.
+/// Sends a file of the page. `host` is the name by which the page has reached this server.
 pub(super) fn send_file(stream: &mut TcpStream, file: &PageFile, host: &str) -> std::io::Result<()> {
     // `'self'` does not name WebSockets in all browsers.
     let policy = format!(
@@ -133,7 +133,7 @@ pub(super) fn send_file(stream: &mut TcpStream, file: &PageFile, host: &str) -> 
     respond(stream, "200 OK", file.kind, &policy, file.text.as_bytes())
 }
 
-/// Answers a request for a WebSocket.
+/// Accepts a WebSocket request.
 pub(super) fn accept_socket(stream: &mut TcpStream, key: &str) -> std::io::Result<()> {
     let accept = tungstenite::handshake::derive_accept_key(key.as_bytes());
     let head = format!(
@@ -160,7 +160,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heads_of_any_kind_end_in_an_answer() {
+    fn every_head_is_answered() {
         let many = "A: b\r\n".repeat(MAX_HEADERS + 1);
         for (text, status) in [
             ("GET / HTTP/1.1\r\nHost: a\r\n", None),

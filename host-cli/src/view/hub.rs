@@ -1,4 +1,5 @@
-//! Where the threads of a view meet: its state under one lock, and a bell that rings at each change.
+//! Meeting point of a view's threads: the state under one lock, and a condition variable that is notified of
+//! each change.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +19,7 @@ use crate::arguments::{PictureFormat, PictureOutput};
 use crate::console::printable_json;
 use crate::render::files::{Form, write_picture};
 
-/// The settled picture.
+/// Settled picture, ready to be saved.
 pub(super) struct Settled {
     pub(super) version: u32,
     pub(super) rendering: Rendering,
@@ -27,17 +28,17 @@ pub(super) struct Settled {
     pub(super) provenance: NamedSettings,
 }
 
-/// State of a view, for all threads.
+/// State of a view that all threads share.
 pub(super) struct Hub {
     view: Mutex<View>,
-    /// Rings at each change.
+    /// Notified of each change.
     changed: Condvar,
     must_stop: AtomicBool,
-    /// Set by signals, and when no picture is rendered any more.
+    /// Set by signals, and when no picture will be rendered any more.
     is_over: Arc<AtomicBool>,
     is_card_back: AtomicBool,
     settled: Mutex<Option<Arc<Settled>>>,
-    /// Held while a picture is saved.
+    /// Folder of saved pictures, locked while one is saved.
     folder: Mutex<Option<Folder>>,
     start: Instant,
 }
@@ -60,7 +61,7 @@ impl Hub {
         self.view.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the state, and tells all threads.
+    /// Changes the state and notifies all threads.
     pub(super) fn change<T>(&self, act: impl FnOnce(&mut View, Duration) -> T) -> T {
         let mut view = self.lock();
         let result = act(&mut view, self.start.elapsed());
@@ -88,7 +89,7 @@ impl Hub {
 
     /// Waits for the next work; `None` when the view is over.
     pub(super) fn next_task(&self) -> Option<Task> {
-        /// Time in which the end of the view is noticed: a signal rings no bell.
+        /// Interval at which the end of the view is checked, because signals do not notify.
         const ATTENTION: Duration = Duration::from_millis(100);
         let mut view = self.lock();
         while !self.is_over() {
@@ -105,12 +106,12 @@ impl Hub {
         None
     }
 
-    /// Keeps a settled picture for saving.
+    /// Keeps a settled picture, so that it can be saved.
     pub(super) fn keep(&self, settled: Settled) {
         *self.settled.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::new(settled));
     }
 
-    /// Takes a message of a page. Returns whether its connection stays.
+    /// Processes a message from a page. Returns whether its connection stays open.
     pub(super) fn receive(&self, page: PageNumber, text: &str) -> bool {
         match self.change(|view, now| view.receive(page, text, now)) {
             Effect::Nothing => true,
@@ -140,12 +141,12 @@ impl Hub {
         folder.save(&saving.name, |path, format| write(path, format, &settled, saving.tone))
     }
 
-    /// Waits until no picture is being saved; none is from then on, as the view is over.
+    /// Waits until no picture is being saved. Later ones are refused, because the view is over.
     pub(super) fn finish_saving(&self) {
         drop(self.folder.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Waits for the next message to a page, at most for `longest`, and no longer than the page is there.
+    /// Waits at most `longest` for the next message to a page; `None` once the page has gone.
     pub(super) fn next_message(
         &self,
         page: PageNumber,
@@ -165,13 +166,13 @@ impl Hub {
         }
     }
 
-    /// Notes that a card elsewhere answers again.
+    /// Records that a remote card answers again.
     pub(super) fn card_returns(&self, number: usize) {
         self.is_card_back.store(true, Ordering::Relaxed);
         self.change(|view, _| view.card_returns(number));
     }
 
-    /// Returns whether a card has come back since the last call.
+    /// Returns whether a card has returned since the last call.
     pub(super) fn take_card_back(&self) -> bool {
         self.is_card_back.swap(false, Ordering::Relaxed)
     }

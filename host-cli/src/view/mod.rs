@@ -3,12 +3,12 @@
 //! | module | contents |
 //! |---|---|
 //! | `refinement` | order of the pictures: a state machine |
-//! | `wish`, `passes`, `command_line` | what is to be seen: settings, those of coarse pictures, and the command that renders the same |
-//! | `canvas`, `pages`, `cards` | tiles of the newest wish; what each page is sent next; states of the cards |
+//! | `wish`, `passes`, `command_line` | the requested picture: its settings, those of coarse pictures, and the command that renders it |
+//! | `canvas`, `pages`, `cards` | tiles of the newest wish; the next message to each page; states of the cards |
 //! | `request`, `describe` | messages of a page, and messages to it |
 //! | `state` | all of these as one state, without threads, clock, input or output |
 //! | `hub`, `painter`, `fitting`, `returning` | the state under a lock, the threads that render and that run pilot renders, and the one that looks for lost cards |
-//! | `http`, `gate`, `page_files`, `socket`, `server` | requests, who may have what, the page's files, WebSockets |
+//! | `http`, `gate`, `page_files`, `socket`, `server` | requests, access control, the page's files, WebSockets |
 //! | `saving`, `browser` | pictures that a page saves, and the browser that shows it |
 
 mod browser;
@@ -62,7 +62,7 @@ use crate::notices::{self, Uses};
 use crate::progress::stop_on_signals;
 use crate::render::on_threads;
 
-/// Time in which the end of the view is noticed.
+/// Interval at which the end of the view is checked.
 const ATTENTION: Duration = Duration::from_millis(50);
 
 /// Shows a scene until an interrupt.
@@ -107,7 +107,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     Err(Failure::Stopped("stopped; the view is over"))
 }
 
-/// Checks that the settings are those of a view.
+/// Checks that a view supports the settings.
 fn check(settings: &RenderSettings) -> Result<(), Failure> {
     let [option, reason] = if settings.picture.crop.is_some() {
         ["--crop", "a view shows the whole picture"]
@@ -121,7 +121,7 @@ fn check(settings: &RenderSettings) -> Result<(), Failure> {
     Err(Failure::Input(Report::new(report.with_help("leave it out, or use photoncard render"))))
 }
 
-/// Checks that a view shows pictures of the size.
+/// Checks that a view supports pictures of this size.
 fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
     if is_size_of_view(width.into(), height.into()) {
         return Ok(());
@@ -134,7 +134,7 @@ fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
     )))
 }
 
-/// Loads the scene, before its assignments.
+/// Loads the scene. Assignments are not applied.
 fn load(options: &ViewOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX);
     let scene = input::load(&options.scene, dram_bytes)?;
@@ -159,7 +159,7 @@ fn listen(address: SocketAddr) -> Result<TcpListener, Failure> {
     })
 }
 
-/// Random token of 128 bits.
+/// Random token of 128 bits, in text.
 fn token() -> Result<String, Failure> {
     let mut bytes = [0_u8; 16];
     getrandom::fill(&mut bytes).map_err(|error| Failure::work_error(&error))?;
@@ -169,7 +169,7 @@ fn token() -> Result<String, Failure> {
     }))
 }
 
-/// Prints the page's address, and opens it.
+/// Prints the page's address, and opens it if requested.
 fn announce(options: &ViewOptions, address: SocketAddr, gate: &Gate) -> Result<(), Failure> {
     if !address.ip().is_loopback() {
         say(format_args!(

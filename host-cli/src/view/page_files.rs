@@ -1,10 +1,10 @@
-//! Files of the page, which the program holds.
+//! Files of the page, embedded in the program.
 
-/// A file of the page.
+/// File of the page.
 #[derive(Debug, PartialEq)]
 pub(super) struct PageFile {
     name: &'static str,
-    /// Type of its contents.
+    /// Media type of the contents.
     pub(super) kind: &'static str,
     pub(super) text: &'static str,
 }
@@ -41,7 +41,7 @@ static FILES: &[PageFile] = &files![
     SCRIPT "tone.js",
 ];
 
-/// The file of a name.
+/// Embedded file with this name; `None` if there is none.
 pub(super) fn page_file(name: &str) -> Option<&'static PageFile> {
     FILES.iter().find(|file| file.name == name)
 }
@@ -50,7 +50,7 @@ pub(super) fn page_file(name: &str) -> Option<&'static PageFile> {
 mod tests {
     use super::*;
 
-    /// A file of the folder that the table lacks would be missed by the page alone.
+    /// A file that is missing in the table would be noticed by browsers only.
     #[test]
     fn the_table_has_every_file_of_the_page() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");

@@ -1,49 +1,49 @@
-//! Messages to pages: what each is sent next, in memory that is bounded for each.
+//! Messages to pages: selects the next one for each page, in bounded memory.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::canvas::{Canvas, Patch, Shown};
 
-/// Bytes of tiles that may be on the way to a page, beyond one tile.
+/// Maximum size of unacknowledged tiles, bytes, beyond one tile.
 const MAX_ON_THE_WAY: u64 = 4 << 20;
-/// Maximum number of answers that wait for a page; older ones are dropped.
+/// Maximum number of answers that wait for a page. Older ones are dropped.
 const MAX_REPLIES: usize = 64;
 
-/// A message to a page.
+/// Message to a page.
 #[derive(Debug)]
 pub(super) enum Outgoing {
-    /// An answer.
+    /// Answer to a message.
     Reply(String),
-    /// The newest state; for a page that has all tiles, if it is true.
+    /// Newest state. It may state that the picture is settled only if the flag is true.
     State(bool),
-    /// The newest states of the cards.
+    /// Newest states of the cards.
     Cards,
-    /// A tile, as the page shows it.
+    /// Tile, and the layer that the page shows.
     Tile(Arc<Patch>, Shown),
 }
 
-/// Numbers of the newest state and of the newest states of cards.
+/// Revision numbers of the state and of the states of cards.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Revisions {
     pub(super) state: u64,
     pub(super) cards: u64,
 }
 
-/// A connected page.
+/// Connected page.
 #[derive(Debug)]
 pub(super) struct Page {
     replies: VecDeque<String>,
     seen: Revisions,
-    /// Number of the wish of the last state that was sent: a page must know a picture's size before its
+    /// Number of the wish in the last state that was sent. A page must know the size of a picture before its
     /// tiles.
     told: u32,
     shown: Shown,
     /// Number of the next tile.
     next: u64,
-    /// Bytes of tiles that were sent.
+    /// Total size of the tiles sent, bytes.
     sent: u64,
-    /// Bytes of tiles that the page has acknowledged.
+    /// Total size of the tiles that the page has acknowledged, bytes.
     received: u64,
 }
 
@@ -60,7 +60,7 @@ impl Page {
         }
     }
 
-    /// Answers the page.
+    /// Queues an answer.
     pub(super) fn reply(&mut self, text: String) {
         if self.replies.len() == MAX_REPLIES {
             self.replies.pop_front();
@@ -68,24 +68,24 @@ impl Page {
         self.replies.push_back(text);
     }
 
-    /// Shows another layer: all tiles are sent again.
+    /// Selects another layer. All tiles are sent again.
     pub(super) fn show(&mut self, shown: Shown) {
         (self.shown, self.next) = (shown, 0);
     }
 
-    /// Returns whether the page shows a layer that only pictures with layers of chips have.
+    /// Returns whether the page shows a layer that chips render only in pictures with layers.
     pub(super) fn shows_layer_of_chip(&self) -> bool {
         self.shown.is_of_chip()
     }
 
-    /// Takes the acknowledgement of all bytes of tiles so far.
+    /// Records the total size of tiles that the page has received.
     pub(super) fn acknowledge(&mut self, bytes: u64) {
         // A page cannot have received what was not sent.
         self.received = self.received.max(bytes.min(self.sent));
     }
 
-    /// Next message to send; `None` if there is nothing, or the page is behind. A state comes before the
-    /// first tile of its wish, and the settled one after the last tile.
+    /// Next message to send; `None` if there is none, or if the page is behind. The state of a wish precedes
+    /// its first tile, and the settled state follows the last tile.
     pub(super) fn take(
         &mut self,
         canvas: &Canvas,

@@ -1,4 +1,4 @@
-//! The thread that renders a view's pictures, one after another on the same cards.
+//! Thread that renders a view's pictures, one after another on the same cards.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -18,7 +18,7 @@ use super::state::{Task, with_remedy};
 use crate::arguments::{SceneOptions, ViewOptions};
 use crate::input;
 
-/// Renders what pages wish for, until the view is over.
+/// Renders the pictures that pages request, until the view is over.
 pub(super) struct Painter<'a> {
     hub: &'a Hub,
     options: &'a SceneOptions,
@@ -26,14 +26,14 @@ pub(super) struct Painter<'a> {
     renderer: Renderer,
     threads: Option<usize>,
     scene: Arc<FixedScene<'static>>,
-    /// Pilot renders of the scene, which go on beside pictures.
+    /// Running pilot renders of the scene, which continue beside pictures.
     fitting: Option<Fitting>,
-    /// Assignments that the scene has; `None` before the first picture.
+    /// Assignments that are applied to the scene; `None` before the first picture.
     assigned: Option<Vec<String>>,
 }
 
 impl<'a> Painter<'a> {
-    /// Painter of a scene before its assignments.
+    /// Creates the painter of a scene, to which no assignments are applied yet.
     pub(super) fn new(hub: &'a Hub, scene: Scene, options: &'a ViewOptions) -> Self {
         let ViewOptions { scene: scene_options, quality, threads, .. } = options;
         Self {
@@ -48,7 +48,7 @@ impl<'a> Painter<'a> {
         }
     }
 
-    /// Renders until the view is over. A panic ends the view.
+    /// Renders until the view is over. A panic also ends the view.
     pub(super) fn run(mut self) {
         let _end = EndOnDrop(self.hub);
         while let Some(task) = self.hub.next_task() {
@@ -66,7 +66,7 @@ impl<'a> Painter<'a> {
         self.fitting.take().into_iter().for_each(Fitting::stop);
     }
 
-    /// Gives the scene the materials and lights of a task.
+    /// Applies the materials and lights of a task to the scene.
     fn assign(&mut self, task: &Task) -> Result<(), RenderError> {
         let assignments = task.wish.assignments();
         if self.assigned.as_ref() == Some(&assignments) {
@@ -85,8 +85,8 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Waits for what pilot renders find. Those that a new wish has interrupted go on, and are of the view in
-    /// which they began.
+    /// Waits for the result of pilot renders. Those that a new wish interrupts continue, with the view for
+    /// which they were started.
     fn fit(&mut self, task: &Task) -> Result<(), RenderError> {
         let begin = || Fitting::start(self.scene.clone(), self.quality, task.settings.clone(), self.threads);
         let fitting = match self.fitting.take() {
@@ -123,7 +123,7 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Renders a picture by passes that double the samples of a pixel.
+    /// Renders a picture by passes, each of which doubles the samples per pixel.
     fn render_by_passes(&mut self, task: &Task) -> Result<Rendering, RenderError> {
         let asked = &task.settings.integrator;
         let with = |samples: u32| {
@@ -167,7 +167,7 @@ impl<'a> Painter<'a> {
     }
 }
 
-/// Guard that ends the view when its painter does.
+/// Guard that ends the view when its painter ends.
 struct EndOnDrop<'a>(&'a Hub);
 
 impl Drop for EndOnDrop<'_> {
@@ -176,12 +176,13 @@ impl Drop for EndOnDrop<'_> {
     }
 }
 
-/// Observer of one pass, which shows its tiles.
+/// Observer of one pass that shows its tiles.
 struct Easel<'a> {
     hub: &'a Hub,
     origin: Origin,
     is_preparing: AtomicBool,
-    /// Card of each tile, and lines that it has read from DRAM, between its report and its pixels.
+    /// Card of each tile, and the lines that it read from DRAM, from the tile's report until its pixels
+    /// arrive.
     cards: Mutex<HashMap<u32, (String, Option<u64>)>>,
 }
 

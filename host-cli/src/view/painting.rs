@@ -1,4 +1,4 @@
-//! The painter's side of a view: its next task, tiles, and the ends of passes.
+//! Interface of a view's state for the painter: the next task, finished tiles, and ends of passes.
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use super::refinement::{Next, Outcome, Pass};
 use super::state::{Task, View};
 
 impl View {
-    /// Next thing to do.
+    /// Next task, or the time until which to wait for one.
     pub(super) fn next(&mut self, now: Duration) -> Result<Task, Option<Duration>> {
         let work = match self.refinement.next(now) {
             Next::Work(work) => work,
@@ -34,13 +34,13 @@ impl View {
         self.refinement.must_stop()
     }
 
-    /// Tells that the running work has begun or ended to trace photons and to build the card image.
+    /// Records that the running work starts or ends the preparation: tracing photons and building the card
+    /// image.
     pub(super) fn prepares(&mut self, is_preparing: bool, now: Duration) {
         self.refinement.prepares(is_preparing, now);
     }
 
-    /// Takes a tile of the running work, which `card` has rendered, with the lines that it has read from
-    /// DRAM.
+    /// Adds a tile of the running work. `card` has rendered it and read `dram_lines` lines from DRAM.
     pub(super) fn put(&mut self, origin: Origin, card: &str, dram_lines: Option<u64>, tile: &FinishedTile) {
         let (number, is_new) = self.cards.rendered(card);
         if is_new {
@@ -56,12 +56,12 @@ impl View {
         }
     }
 
-    /// Takes a tile back.
+    /// Removes a revoked tile.
     pub(super) fn revoke(&mut self, origin: Origin, id: u32) {
         self.canvas.revoke(origin, id);
     }
 
-    /// Takes the end of the running work. Its picture was that of `statistics`.
+    /// Records the end of the running work. `statistics` are those of its picture.
     pub(super) fn finish(
         &mut self,
         task: &Task,
@@ -82,8 +82,8 @@ impl View {
         self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
     }
 
-    /// Takes the end of work that is not possible. The newest wish goes back to the settings of the picture
-    /// that settled last, if these are others.
+    /// Records that the requested work is impossible. The newest wish takes the settings of the last settled
+    /// picture, if they differ.
     pub(super) fn refuse(&mut self, task: &Task, reason: &str, now: Duration) {
         self.tell_error(reason);
         self.finish(task, Outcome::Refused, None, now);
@@ -97,14 +97,14 @@ impl View {
         }
     }
 
-    /// Takes a complete pass of fewer samples than the picture's.
+    /// Records a complete pass with fewer samples than the picture will have.
     pub(super) fn refine(&mut self, origin: Origin, statistics: &Statistics) {
         self.cost.add(statistics);
         self.keep(origin);
         self.revisions.state += 1;
     }
 
-    /// Keeps the tiles of a complete pass of the newest wish alone.
+    /// Drops all tiles but those of a complete pass of the newest wish.
     fn keep(&mut self, origin: Origin) {
         if origin.version == self.refinement.version() {
             self.done = Some(origin);
@@ -112,7 +112,7 @@ impl View {
         }
     }
 
-    /// Takes the settings that pilot renders have found.
+    /// Records the settings that pilot renders have found.
     pub(super) fn fit(&mut self, task: &Task, fit: Option<&Fit>, now: Duration) {
         let photons = self.wish.settings.photons.count;
         if let Some(fit) = fit {
@@ -126,7 +126,7 @@ impl View {
         self.finish(task, Outcome::Fitted { has_other_photons }, None, now);
     }
 
-    /// Notes that a card is lost.
+    /// Records that a card is lost.
     pub(super) fn lose_card(&mut self, name: &str, error: String, now: Duration) {
         self.cards.lose(name, error, now);
         self.revisions.cards += 1;

@@ -1,18 +1,18 @@
-//! Settings of each pass.
+//! Settings of coarse and full passes.
 
 use photoncard_driver::render::{Filter, Integrator, RenderSettings, Sampling};
 
-/// Number of pixels up to which a coarse picture gathers for each of them; beyond, interpolating irradiance
-/// is faster.
+/// Maximum number of pixels of a coarse picture that gathers at each pixel. Above it, interpolation of
+/// irradiance is faster.
 const FEW_PIXELS: u64 = 1 << 12;
-/// Gather rays of a pixel, and of an irradiance record.
+/// Gather rays per pixel and per irradiance record, in coarse pictures.
 const RAYS: [u32; 2] = [6, 16];
-/// Relative error of interpolated irradiance.
+/// Maximum relative error of interpolated irradiance in coarse pictures.
 const IRRADIANCE_ERROR: f32 = 1.0;
 
-/// Settings of a coarse picture, a pixel for each square of `step` x `step`. The photon maps are those of the
-/// settled picture: none is traced anew. Few rays are best sent by the reflection alone, which takes no
-/// search of photons for a table of directions.
+/// Settings of a coarse picture with one pixel for each square of `step` x `step`. The photon maps are those
+/// of the settled picture, so that none is traced again. Rays follow the reflection alone, which for few rays
+/// is faster than to search photons for a table of directions.
 pub(super) fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
     settings.clone().with(|settings| {
         let picture = &mut settings.picture;
@@ -35,7 +35,7 @@ pub(super) fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
     })
 }
 
-/// Settings of the settled picture, with tiles near `focus` first.
+/// Settings of the settled picture. Tiles near `focus` come first.
 pub(super) fn full(settings: &RenderSettings, focus: Option<[u32; 2]>) -> RenderSettings {
     settings.clone().with(|settings| {
         let middle = [settings.picture.width / 2, settings.picture.height / 2];

@@ -1,38 +1,39 @@
-//! Order of a view's pictures: from the coarsest one of a new camera to the picture of `photoncard render`. A
-//! state machine without thread, clock or picture.
+//! Order of a view's pictures, from the coarsest picture of a new camera to the picture of `photoncard
+//! render`. It is a state machine without threads, clock or pictures.
 //!
-//! The newest wish wins: it stops what is rendered for an older one. The first pass of a wish is spared if
-//! the one before it was stopped, so that there is always a picture, however fast wishes follow each other;
-//! and photons that serve the newest wish as well are traced to their end.
+//! The newest wish stops the work for an older one. The first pass of a wish is not stopped if that of the
+//! previous wish was, so that there is always a picture, however fast wishes follow each other. Photons that
+//! the newest wish can use are also traced to their end.
 
 use std::time::Duration;
 
-/// Time without a camera message after which a camera that moves counts as resting.
+/// Time after the last camera message at which a moving camera counts as resting.
 pub(super) const REST: Duration = Duration::from_millis(150);
 
-/// Pause after the first failure of all cards; it doubles with each one.
+/// Pause after the first failure of all cards. It doubles with each failure.
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
-/// Maximum of that pause.
+/// Maximum pause after a failure.
 const MAX_PAUSE: Duration = Duration::from_secs(8);
 
 /// Side of the squares of the first pass, pixels.
 pub(super) const COARSEST: u32 = 8;
-/// Time of the pass of every pixel up to which no other follows the first: their pictures would hardly be
-/// seen.
+/// Duration of a pass with every pixel up to which it directly follows the first pass. Pictures in between
+/// would hardly be seen.
 const SEEN: Duration = Duration::from_millis(800);
-/// Time of the pass of every pixel up to which that of every second is left out, which takes a quarter of it.
+/// Duration of a pass with every pixel up to which the pass with every second one, a quarter of the work, is
+/// left out.
 const AWAITED: Duration = Duration::from_secs(4);
-/// Side of the squares before that pass.
+/// Side of the squares before the pass with every second pixel.
 const FINE: u32 = 4;
 
-/// One picture on the way to the settled one.
+/// Pass on the way to the settled picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
-    /// A pixel for each square of this side, by cheap settings.
+    /// Picture with one pixel for each square of this side, by cheap settings.
     Coarse(u32),
     /// Pilot renders, by which a quality finds its settings.
     Fit,
-    /// The picture of `photoncard render`.
+    /// Picture of `photoncard render`.
     Full,
 }
 
@@ -41,7 +42,7 @@ impl Pass {
     pub(super) const FIRST: Self = Self::Coarse(COARSEST);
 }
 
-/// The pass after another one that took `time`; `None` after the last.
+/// Pass after one that took `time`; `None` after the last.
 fn next_pass(pass: Pass, time: Duration, is_fitted: bool) -> Option<Pass> {
     match pass {
         Pass::Coarse(step) if step > 1 => Some(Pass::Coarse(next_step(step, time))),
@@ -51,14 +52,14 @@ fn next_pass(pass: Pass, time: Duration, is_fitted: bool) -> Option<Pass> {
     }
 }
 
-/// Side of the squares after a pass of the side `step` that took `time`: a half, or 1 where the pass of every
-/// pixel is near, if it takes as long for each of them.
+/// Side of the squares after a pass with side `step` that took `time`. It is half of `step`, or 1 if the pass
+/// with every pixel is expected to be short at the same time per pixel.
 fn next_step(step: u32, time: Duration) -> u32 {
     let limit = if step > FINE { SEEN } else { AWAITED };
     if time * (step * step) <= limit { 1 } else { step / 2 }
 }
 
-/// Work on a pass.
+/// Pass of a wish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Work {
     /// Number of the wish.
@@ -68,29 +69,29 @@ pub(super) struct Work {
     pub(super) pass: Pass,
 }
 
-/// End of work.
+/// Result of a pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outcome {
-    /// The pass is done.
+    /// The pass is complete.
     Done,
-    /// Settings were found by pilot renders.
+    /// Pilot renders have found settings.
     Fitted {
-        /// True if the number of photons is another one.
+        /// True if the number of photons has changed.
         has_other_photons: bool,
     },
-    /// A newer wish has stopped it.
+    /// A newer wish has stopped the pass.
     Stopped,
     /// No card is left.
     NoCard,
-    /// The wish is not possible.
+    /// The wish is impossible.
     Refused,
 }
 
-/// Next thing to do.
+/// Next action of the painter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Next {
     Work(Work),
-    /// Nothing until a change, or at the latest until this time.
+    /// Wait for a change, or until this time.
     Wait(Option<Duration>),
 }
 
@@ -104,11 +105,11 @@ pub(super) struct Refinement {
     is_fitted: bool,
     is_refused: bool,
     running: Option<Work>,
-    /// Time at which the running work began, or last ended to prepare.
+    /// Time at which the running work started, or last ended its preparation.
     begun: Duration,
     /// True while the running work traces photons and builds the card image.
     is_preparing: bool,
-    /// False if the last first pass was stopped: the next one is done.
+    /// False if the last first pass was stopped, so that the next one must complete.
     may_stop_first: bool,
     moving_until: Duration,
     retry_at: Duration,
@@ -116,7 +117,7 @@ pub(super) struct Refinement {
 }
 
 impl Refinement {
-    /// Refinement of a first wish; `is_fitted` if pilot renders would find nothing.
+    /// Creates the state for a first wish. `is_fitted` is true if pilot renders would find nothing.
     pub(super) fn new(is_fitted: bool) -> Self {
         Self {
             version: 1,
@@ -144,13 +145,13 @@ impl Refinement {
         self.pass.is_none()
     }
 
-    /// Returns whether pilot renders have found their settings.
+    /// Returns whether the settings of pilot renders are known.
     #[cfg(test)]
     pub(super) fn is_fitted(&self) -> bool {
         self.is_fitted
     }
 
-    /// Takes a new wish; `is_edit` if scene or photons are others.
+    /// Starts a new wish. `is_edit` is true if its scene or photons differ.
     pub(super) fn wish(&mut self, is_edit: bool) {
         self.version += 1;
         self.edition += u32::from(is_edit);
@@ -158,17 +159,18 @@ impl Refinement {
         self.is_refused = false;
     }
 
-    /// Tells whether the camera goes on moving.
+    /// Records whether the camera is still moving.
     pub(super) fn moves(&mut self, is_moving: bool, now: Duration) {
         self.moving_until = if is_moving { now + REST } else { Duration::ZERO };
     }
 
-    /// Tells that the running work has begun or ended to trace photons and to build the card image.
+    /// Records that the running work starts or ends the preparation: tracing photons and building the card
+    /// image.
     pub(super) fn prepares(&mut self, is_preparing: bool, now: Duration) {
         (self.is_preparing, self.begun) = (is_preparing, now);
     }
 
-    /// Tells that a card can be reached again.
+    /// Records that a card is available again.
     pub(super) fn card_returns(&mut self) {
         (self.retry_at, self.pause) = (Duration::ZERO, FIRST_PAUSE);
     }
@@ -182,13 +184,13 @@ impl Refinement {
         work.pass != Pass::FIRST || self.may_stop_first
     }
 
-    /// Number of the wish whose work is running and need not stop: the newest one, or an older one that is
-    /// spared.
+    /// Number of the wish whose running work need not stop: the newest wish, or an older one whose first pass
+    /// must complete.
     pub(super) fn spares(&self) -> Option<u32> {
         self.running.filter(|_| !self.must_stop()).map(|work| work.version)
     }
 
-    /// Next thing to do.
+    /// Next action of the painter at time `now`.
     pub(super) fn next(&mut self, now: Duration) -> Next {
         let Some(pass) = self.pass.filter(|_| self.running.is_none() && !self.is_refused) else {
             return Next::Wait(None);
@@ -203,7 +205,7 @@ impl Refinement {
         Next::Work(work)
     }
 
-    /// Takes the end of the running work.
+    /// Records the result of the running work.
     pub(super) fn finish(&mut self, outcome: Outcome, now: Duration) {
         let Some(work) = self.running.take() else { return };
         let is_newest = work.version == self.version;
@@ -246,7 +248,7 @@ mod tests {
         }
     }
 
-    /// Does all work until the picture settles, 4096 pixels in `time`. Returns the passes.
+    /// Runs all passes until the picture settles. A pass takes `time` per 4096 pixels. Returns the passes.
     fn settle(refinement: &mut Refinement, time: Duration) -> Vec<Pass> {
         let mut passes = Vec::new();
         let mut now = NOW;
@@ -262,7 +264,7 @@ mod tests {
         passes
     }
 
-    /// Does the coarse passes, in no time.
+    /// Completes the coarse passes in no time.
     fn finish_coarse(refinement: &mut Refinement) {
         for step in [8, 1] {
             assert_eq!(work(refinement, NOW).pass, Pass::Coarse(step));
@@ -293,7 +295,7 @@ mod tests {
     }
 
     #[test]
-    fn photons_and_image_are_no_time_of_a_pass() {
+    fn preparation_does_not_count_for_the_time_of_a_pass() {
         let mut refinement = Refinement::new(true);
         work(&mut refinement, NOW);
         refinement.prepares(true, NOW);
@@ -333,7 +335,7 @@ mod tests {
     }
 
     #[test]
-    fn costly_passes_wait_for_rest() {
+    fn costly_passes_wait_until_the_camera_rests() {
         let mut refinement = Refinement::new(true);
         refinement.moves(true, NOW);
         finish_coarse(&mut refinement);
@@ -346,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn without_cards_the_same_pass_is_tried_again_later() {
+    fn a_pass_is_retried_later_when_all_cards_fail() {
         let mut refinement = Refinement::new(true);
         let mut pauses = Vec::new();
         let mut now = NOW;
@@ -367,7 +369,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wish_that_is_not_possible_waits_for_another() {
+    fn an_impossible_wish_waits_for_another() {
         let mut refinement = Refinement::new(true);
         work(&mut refinement, NOW);
         refinement.finish(Outcome::Refused, NOW);
@@ -377,7 +379,7 @@ mod tests {
     }
 
     #[test]
-    fn other_photons_of_a_fit_are_a_new_edition() {
+    fn a_fit_with_other_photons_starts_a_new_edition() {
         let mut refinement = Refinement::new(false);
         finish_coarse(&mut refinement);
         let fit = work(&mut refinement, NOW);

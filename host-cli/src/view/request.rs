@@ -1,4 +1,4 @@
-//! Messages of a page: JSON, of which every name and number is checked.
+//! Messages from pages: JSON in which every name and number is checked.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::layer::Layer;
@@ -11,16 +11,16 @@ use super::canvas::Shown;
 
 /// Maximum side of a picture, pixels.
 pub(super) const MAX_SIDE: u64 = 4096;
-/// Maximum number of pixels of a picture: the tiles of two pictures are held at most.
+/// Maximum number of pixels of a picture. A view holds the tiles of at most two pictures.
 pub(super) const MAX_PIXELS: u64 = 1 << 22;
-/// Maximum distance of a place from the origin along each axis, metres.
+/// Maximum coordinate of a position, metres.
 const MAX_PLACE: f64 = 1e15;
-/// Maximum of an exposure and of its negative, stops.
+/// Maximum absolute exposure, stops.
 const MAX_STOPS: f64 = 120.0;
 /// Maximum length of a name, bytes.
 const MAX_NAME: usize = 1024;
 
-/// A page's message.
+/// Message from a page.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Request {
     Camera {
@@ -40,38 +40,38 @@ pub(super) enum Request {
     Cursor(Option<[u32; 2]>),
     Pick([u32; 2]),
     Save(Saving),
-    /// Bytes of tiles that the page has received since it connected.
+    /// Total size of the tiles that the page has received since it connected, bytes.
     Shown(u64),
     Steer,
 }
 
-/// A picture that is to be saved.
+/// Request to save a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Saving {
     pub(super) name: String,
-    /// Tone mapping of a PNG.
+    /// Tone mapping for a PNG.
     pub(super) tone: ToneMapping,
 }
 
-/// A setting of the render.
+/// Setting of the render that a page can change.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Setting {
     Photons(usize),
     Samples(u32),
     GatherRays(u32),
     Order(GatherOrder),
-    /// Side of the tiles; 0 for the widest that cards have room for.
+    /// Side of the tiles, pixels; 0 for the widest that all cards can hold.
     Tile(u32),
     Cache(bool),
     Sampling(Sampling),
 }
 
-/// A message that cannot be used.
+/// Fault of a message.
 #[derive(Debug, PartialEq)]
 pub(super) enum Fault {
-    /// It is not of the protocol: the connection is to be closed.
+    /// The message violates the protocol, and the connection must be closed.
     Foreign,
-    /// The reason, for the page.
+    /// The message is refused. The text tells the page why.
     Refused(String),
 }
 
@@ -81,7 +81,7 @@ impl From<String> for Fault {
     }
 }
 
-/// Reads a message, and its number if it has one; both stay apart, as a refused message has a number too.
+/// Parses a message. Its number is returned separately, because refused messages may have one too.
 pub(super) fn parse(text: &str) -> (Result<Request, Fault>, Option<u64>) {
     let Ok(Value::Object(message)) = serde_json::from_str(text) else { return (Err(Fault::Foreign), None) };
     (request(&Fields(&message)), message.get("id").and_then(Value::as_u64))
@@ -131,12 +131,12 @@ fn setting(fields: &Fields) -> Result<Setting, String> {
     })
 }
 
-/// Returns whether a view shows pictures of a size.
+/// Returns whether a view supports pictures of this size.
 pub(super) fn is_size_of_view(width: u64, height: u64) -> bool {
     [width, height].iter().all(|side| (1..=MAX_SIDE).contains(side)) && width * height <= MAX_PIXELS
 }
 
-/// Fields of a message.
+/// Fields of a JSON message.
 struct Fields<'a>(&'a Map<String, Value>);
 
 impl Fields<'_> {
@@ -163,7 +163,7 @@ impl Fields<'_> {
         number.ok_or_else(|| format!("{name:?} is a whole number from 0 to {most}"))
     }
 
-    /// Numbers in the range of single precision: one, or those of a list.
+    /// Numbers of a field within the range of single precision: one number, or a list.
     fn values(&self, name: &str) -> Result<Vec<f64>, String> {
         let number = |value: &Value| value.as_f64().filter(|number| (*number as f32).is_finite());
         let values = match self.field(name)? {
@@ -173,7 +173,7 @@ impl Fields<'_> {
         values.ok_or_else(|| format!("{name:?} is a number, or a list of three"))
     }
 
-    /// Tone mapping; what is not stated is the default.
+    /// Tone mapping. Missing fields have their default.
     fn tone(&self) -> Result<ToneMapping, String> {
         let is_stated = |name: &str| self.0.get(name).is_some_and(|value| !value.is_null());
         let stops = || self.number("exposure", -MAX_STOPS, MAX_STOPS);
@@ -216,7 +216,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn messages_are_read() {
+    fn valid_messages_are_parsed() {
         for (text, request) in [
             (
                 r#"{"type":"camera","position":[1,2.5,-3],"look_at":[0,0,0],"fov":40,"moving":true}"#,
@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_message_is_foreign() {
+    fn text_that_is_no_message_is_foreign() {
         for text in ["", "hello", "[1]", "3", "null", "{", &"[".repeat(10_000)] {
             assert_eq!(parse(text), (Err(Fault::Foreign), None), "{text:.20}");
         }

@@ -1,4 +1,4 @@
-//! The thread that looks for lost cards: it greets each after a pause that doubles, until it answers.
+//! Thread that reconnects lost cards. It greets each after a pause that doubles, until it answers.
 
 use std::time::Duration;
 
@@ -6,9 +6,9 @@ use photoncard_driver::render::card_ping;
 
 use super::hub::Hub;
 
-/// Time between two looks at the list of lost cards.
+/// Time between two polls of the list of lost cards.
 const LOOK: Duration = Duration::from_millis(200);
-/// Time in which a card notices that a host has gone, and takes another one.
+/// Time that a card takes to notice that its host has gone, and to accept another one.
 const CHANGE_OF_HOSTS: Duration = Duration::from_millis(100);
 
 /// Greets lost cards until the view is over.

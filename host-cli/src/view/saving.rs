@@ -1,5 +1,4 @@
-//! Pictures that pages save: plain names in one folder, and never in place of a file that the view has not
-//! written.
+//! Pictures that pages save: plain names in one folder. A file that the view did not write is never replaced.
 
 use std::collections::BTreeMap;
 use std::fs::{self, Metadata};
@@ -10,23 +9,23 @@ use crate::arguments::PictureFormat;
 
 /// Maximum length of a name, bytes.
 const MAX_NAME: usize = 100;
-/// Names that devices have on Windows, with any ending.
+/// Names that Windows reserves for devices, with any suffix.
 const DEVICES: [&str; 6] = ["aux", "con", "nul", "prn", "conin$", "conout$"];
 
-/// The folder of saved pictures.
+/// Folder of saved pictures.
 pub(super) struct Folder {
     path: PathBuf,
-    /// Pictures that were saved, by their names.
+    /// Identities of the saved pictures, by name.
     saved: BTreeMap<String, Identity>,
 }
 
-/// Identity of a file with its content: a file that takes its place has another one, and so has one that
-/// others have written to.
+/// Identity of a file and its content. It differs for another file in the same place, and after writes of
+/// other programs.
 #[derive(PartialEq)]
 struct Identity {
     length: u64,
     modified: Option<SystemTime>,
-    /// Device and number of the file, where file systems have them.
+    /// Device and inode number of the file; `None` on file systems without them.
     number: Option<[u64; 2]>,
 }
 
@@ -48,7 +47,7 @@ fn number(_: &Metadata) -> Option<[u64; 2]> {
 }
 
 impl Folder {
-    /// A folder that exists.
+    /// Opens an existing folder.
     pub(super) fn new(path: &Path) -> std::io::Result<Self> {
         let path = fs::canonicalize(path)?;
         if !path.is_dir() {
@@ -61,10 +60,10 @@ impl Folder {
         &self.path
     }
 
-    /// Saves a picture by `write`, which writes it whole or not at all. Returns its path.
+    /// Saves a picture and returns its path. `write` must write it completely or not at all.
     ///
     /// # Errors
-    /// If the name is no plain name, there is another file of the name, or the picture cannot be written.
+    /// If the name is not plain, another file of the name exists, or the picture cannot be written.
     pub(super) fn save(
         &mut self,
         name: &str,
@@ -116,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn plain_names_are_saved_in_the_folder_and_again() {
+    fn plain_names_are_saved_repeatedly_in_the_folder() {
         let room = tempfile::tempdir().unwrap();
         let mut folder = Folder::new(room.path()).unwrap();
         for name in ["picture.exr", "A view 2.PNG", "picture.exr"] {
@@ -125,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn other_names_are_refused() {
+    fn names_that_are_not_plain_are_refused() {
         let room = tempfile::tempdir().unwrap();
         let mut folder = Folder::new(room.path()).unwrap();
         let long = format!("{}.exr", "a".repeat(100));
@@ -155,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn files_of_others_stay() {
+    fn files_of_other_programs_are_not_replaced() {
         let room = tempfile::tempdir().unwrap();
         let mut folder = Folder::new(room.path()).unwrap();
         fs::write(room.path().join("own.exr"), b"mine").unwrap();
@@ -170,7 +169,7 @@ mod tests {
         assert!(!room.path().join("elsewhere").exists());
     }
 
-    /// On file systems whose names have no case, both names are one.
+    /// Both names denote one file on case-insensitive file systems.
     #[test]
     fn a_file_whose_name_differs_in_case_stays() {
         let room = tempfile::tempdir().unwrap();

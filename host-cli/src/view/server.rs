@@ -1,9 +1,8 @@
-//! The server of a page: its files, and its sockets. Each connection has a thread of its own, and there are
-//! few.
+//! Server of the page: its files and WebSockets. Each connection has its own thread; their number is bounded.
 //!
-//! A connection is a stranger until the gate lets it in. Strangers have places of their own, and the oldest
-//! makes room for a new one: neither do those that say nothing keep a page out, nor do pages keep out the
-//! next.
+//! A connection is a stranger until the gate accepts it. Strangers have their own limit, and the oldest is
+//! closed for a new one. Silent strangers therefore cannot keep pages out, and pages cannot keep strangers
+//! out.
 
 use std::collections::VecDeque;
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -16,11 +15,11 @@ use super::http::{Head, Refusal, accept_socket, send_file};
 use super::hub::Hub;
 use super::socket;
 
-/// Maximum number of connections that the gate has let in.
+/// Maximum number of connections that the gate has accepted.
 const MAX_CONNECTIONS: usize = 16;
-/// Maximum number of others.
+/// Maximum number of connections that the gate has not accepted yet.
 const MAX_STRANGERS: usize = 16;
-/// Pause after an error of accepting a connection, as when the process has too many files open.
+/// Pause after an error of accepting a connection, such as too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// Serves connections until the process ends.
@@ -41,7 +40,7 @@ pub(super) fn serve(listener: &TcpListener, gate: &Arc<Gate>, hub: &Arc<Hub>) {
     }
 }
 
-/// Connections that the gate has not let in, from the oldest on.
+/// Connections that the gate has not accepted yet, the oldest first.
 #[derive(Clone, Default)]
 struct Strangers(Arc<Mutex<Waiting>>);
 
@@ -52,7 +51,7 @@ struct Waiting {
 }
 
 impl Strangers {
-    /// Adds a connection, and closes the oldest if there are too many.
+    /// Adds a connection, and closes the oldest one if there are too many.
     fn admit(&self, stream: &TcpStream) -> std::io::Result<Stranger> {
         let stream = stream.try_clone()?;
         let mut waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -69,7 +68,7 @@ impl Strangers {
     }
 }
 
-/// One of the strangers, until it is dropped.
+/// Membership of a connection among the strangers, until it is dropped.
 struct Stranger {
     number: u64,
     of: Strangers,
@@ -82,7 +81,7 @@ impl Drop for Stranger {
     }
 }
 
-/// One of the connections that there may be.
+/// Counted place of an accepted connection, until it is dropped.
 struct Place(Arc<AtomicUsize>);
 
 impl Place {

@@ -1,5 +1,4 @@
-//! A page's WebSocket: a thread that reads, and one that writes. Frames of either are written whole, under
-//! one lock.
+//! WebSocket of a page, with a reading thread and a writing thread. A lock keeps frames of both whole.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -18,12 +17,12 @@ use super::state::PageNumber;
 const MAX_MESSAGE: usize = 64 << 10;
 /// Time without a message after which a page is pinged.
 const PING: Duration = Duration::from_secs(10);
-/// Time without a byte after which a page is gone: it answers pings.
+/// Time without a byte after which a page is considered gone, because pages answer pings.
 const SILENCE: Duration = Duration::from_secs(40);
-/// Time without progress after which a page that does not read is gone.
+/// Time without progress of a write after which a page is considered gone.
 const STALLED: Duration = Duration::from_secs(20);
 
-/// Attends to a page until its connection ends.
+/// Serves a page until its connection ends.
 pub(super) fn attend(stream: TcpStream, hub: &Arc<Hub>) -> std::io::Result<()> {
     stream.set_read_timeout(Some(SILENCE))?;
     stream.set_write_timeout(Some(STALLED))?;
@@ -82,7 +81,7 @@ fn write(pipe: Pipe, page: PageNumber, hub: &Hub, is_open: &AtomicBool) -> Resul
     Ok(())
 }
 
-/// One end of a connection for two threads: each write is done as a whole.
+/// End of a connection that two threads share. Each write is done as a whole.
 #[derive(Clone)]
 struct Pipe {
     stream: Arc<TcpStream>,
@@ -96,7 +95,7 @@ impl Read for Pipe {
 }
 
 impl Write for Pipe {
-    /// Writes all bytes: the frames that are written at once.
+    /// Writes all bytes, which are whole frames.
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         let _whole = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
         (&*self.stream).write_all(bytes)?;

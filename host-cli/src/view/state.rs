@@ -1,5 +1,5 @@
-//! State of a view: wishes, their pictures, and pages. Without threads, clock or input and output, which are
-//! in [`super::hub`].
+//! State of a view: wishes, their pictures, and pages. Threads, clock, input and output are in
+//! [`super::hub`].
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -20,38 +20,38 @@ use super::request::{Fault, Request, Saving, parse};
 use super::wish::{Sketch, Wish};
 use crate::arguments::SceneOptions;
 
-/// Number of a page.
+/// Identifier of a connected page.
 pub(super) type PageNumber = u64;
 
-/// Parts of a view.
+/// Initial values of a view.
 pub(super) struct Start {
     pub(super) options: SceneOptions,
     pub(super) quality: Quality,
     pub(super) wish: Wish,
     pub(super) sketch: Sketch,
     pub(super) facts: SceneFacts,
-    /// Returns whether the size of the picture is stated, rather than left to the page's window.
+    /// True if the size of the picture is stated, false if it follows the page's window.
     pub(super) is_size_stated: bool,
-    /// Folder in which pages may save pictures.
+    /// Folder in which pages may save pictures; `None` if they may not.
     pub(super) out: Option<String>,
 }
 
-/// Work with all that it needs.
+/// Pass to render, with all that it needs.
 pub(super) struct Task {
     pub(super) work: Work,
     pub(super) wish: Wish,
-    /// Settings of the pass; of [`super::refinement::Pass::Fit`] those of the wish.
+    /// Settings of the pass. For [`super::refinement::Pass::Fit`] they are those of the wish.
     pub(super) settings: RenderSettings,
     pub(super) origin: Origin,
 }
 
-/// Work for the caller that a page's message asks for.
+/// Action that a message from a page requires of the caller.
 #[derive(Debug, PartialEq)]
 pub(super) enum Effect {
     Nothing,
-    /// The settled picture is to be saved by this name.
+    /// Save the settled picture.
     Save(Saving),
-    /// The connection is to be closed.
+    /// Close the connection.
     Close,
 }
 
@@ -59,37 +59,37 @@ pub(super) enum Effect {
 pub(super) struct View {
     pub(super) start: Start,
     pub(super) wish: Wish,
-    /// Materials and lights of the wish, and the file's cameras.
+    /// Scene with the file's cameras, and the materials and lights of the newest wish.
     scene: Scene,
-    /// Materials and lights of the first wish, to which `reset` returns.
+    /// Scene with the materials and lights of the first wish, to which `reset` returns.
     first: Scene,
     pub(super) refinement: Refinement,
-    /// Wish of the picture that settled last.
+    /// Wish of the last settled picture.
     pub(super) settled: Option<Wish>,
-    /// Reason for which the newest wish is not rendered.
+    /// Reason why the newest wish cannot be rendered.
     pub(super) refused: Option<String>,
     pub(super) canvas: Canvas,
-    /// Pass of the newest wish that was finished last.
+    /// Last complete pass of the newest wish.
     pub(super) done: Option<Origin>,
     pub(super) cost: Cost,
-    /// Number of the first wish of the picture's size.
+    /// Number of the first wish with the present size of the picture.
     of_size: u32,
-    /// Pixel that tiles near to are rendered first.
+    /// Pixel near which tiles are rendered first.
     pub(super) cursor: Option<[u32; 2]>,
     pub(super) cards: CardBoard,
     pages: BTreeMap<PageNumber, Page>,
     next_page: PageNumber,
     steering: Option<PageNumber>,
-    /// Number of the last message of the page that steers.
+    /// Number of the last message from the page that steers.
     message: u64,
     pub(super) revisions: Revisions,
 }
 
 impl View {
-    /// A view without pages.
+    /// Creates a view without pages.
     ///
     /// # Errors
-    /// If the first wish is not possible.
+    /// If the first wish is impossible.
     pub(super) fn new(start: Start) -> Result<Self, RenderError> {
         let wish = start.wish.clone();
         wish.check_cards()?;
@@ -116,7 +116,7 @@ impl View {
         })
     }
 
-    /// Takes a page in, which steers if no other does.
+    /// Adds a page. It steers if no other page does.
     pub(super) fn connect(&mut self) -> PageNumber {
         let number = self.next_page;
         self.next_page += 1;
@@ -130,12 +130,12 @@ impl View {
         number
     }
 
-    /// Returns whether a page is there.
+    /// Returns whether a page is connected.
     pub(super) fn has(&self, number: PageNumber) -> bool {
         self.pages.contains_key(&number)
     }
 
-    /// Lets a page go. If it steered, the one that has been there for the longest time does.
+    /// Removes a page. If it steered, the page that has been connected for the longest time steers.
     pub(super) fn disconnect(&mut self, number: PageNumber) {
         self.pages.remove(&number);
         if self.steering == Some(number) {
@@ -153,20 +153,20 @@ impl View {
         }
     }
 
-    /// Answers a page, if it is still there.
+    /// Sends an answer to a page, if it is still connected.
     pub(super) fn reply(&mut self, number: PageNumber, message: &Value) {
         if let Some(page) = self.pages.get_mut(&number) {
             page.reply(message.to_string());
         }
     }
 
-    /// Tells all pages of an error.
+    /// Sends an error to all pages.
     pub(super) fn tell_error(&mut self, text: &str) {
         let message = json!({"type": "error", "text": text}).to_string();
         self.pages.values_mut().for_each(|page| page.reply(message.clone()));
     }
 
-    /// Takes a message of a page.
+    /// Processes a message from a page.
     pub(super) fn receive(&mut self, number: PageNumber, text: &str, now: Duration) -> Effect {
         let (request, id) = parse(text);
         match request.and_then(|request| Ok(self.act(number, request, now)?)) {
@@ -182,7 +182,7 @@ impl View {
         }
     }
 
-    /// Notes the number of a message of the page that steers, which `state` tells.
+    /// Records the number of a message from the page that steers, which the state contains.
     fn note(&mut self, number: PageNumber, id: Option<u64>) {
         if let Some(id) = id.filter(|_| self.steering == Some(number)) {
             self.message = id;
@@ -212,7 +212,7 @@ impl View {
         Ok(Effect::Nothing)
     }
 
-    /// Follows the page that steers.
+    /// Processes a request from the page that steers.
     fn turn(&mut self, request: Request, now: Duration) -> Result<(), String> {
         let mut wish = self.wish.clone();
         let mut moves = None;
@@ -250,7 +250,7 @@ impl View {
         Ok(())
     }
 
-    /// Takes a new wish, if it is one.
+    /// Makes `wish` the newest wish, if it differs.
     pub(super) fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
         if wish == self.wish {
             // The page is told that its message was heard.
@@ -269,8 +269,8 @@ impl View {
         Ok(())
     }
 
-    /// Drops what no page should see any more. A first pass that is spared is seen until the newest wish has
-    /// a tile.
+    /// Drops tiles that no page should show any more. Tiles of an older first pass that must complete are
+    /// shown until the newest wish has a tile.
     pub(super) fn begin_picture(&mut self) {
         match self.spared() {
             Some(version) => self.canvas.keep_version(version),
@@ -280,7 +280,7 @@ impl View {
         self.revisions.state += 1;
     }
 
-    /// Number of the wish whose tiles are shown as they come.
+    /// Number of the wish whose tiles are shown as they arrive.
     pub(super) fn spared(&self) -> Option<u32> {
         self.refinement.spares().filter(|version| *version >= self.of_size)
     }
@@ -291,7 +291,7 @@ impl View {
         }
     }
 
-    /// Shows a page another layer; the chips' own take a picture with layers.
+    /// Selects the layer that a page shows. Layers of the chips require a picture with layers.
     fn show(&mut self, number: PageNumber, shown: Shown) -> Result<(), String> {
         let mut wish = self.wish.clone();
         if shown.is_of_chip() && wish.add_layers() {
@@ -305,7 +305,7 @@ impl View {
         Ok(())
     }
 
-    /// Tells a page the place that a pixel shows.
+    /// Sends a page the position that a pixel shows.
     fn pick(&mut self, number: PageNumber, at: [u32; 2]) -> Result<(), String> {
         let camera = self.wish.settings.camera(&self.scene).map_err(|error| error.to_string())?;
         let message = match self.canvas.depth(self.refinement.version(), at) {
@@ -325,14 +325,14 @@ impl View {
         Ok(())
     }
 
-    /// Notes that a lost card has answered.
+    /// Records that a lost card has answered.
     pub(super) fn card_returns(&mut self, number: usize) {
         self.cards.returns(number);
         self.refinement.card_returns();
         self.revisions.cards += 1;
     }
 
-    /// The next message to a page, as text or a tile.
+    /// Next message to a page: text or a tile.
     pub(super) fn take(&mut self, number: PageNumber) -> Option<Result<String, Outgoing>> {
         let is_settled = self.refinement.is_settled();
         let version = self.refinement.version();
@@ -346,7 +346,7 @@ impl View {
         })
     }
 
-    /// Materials and lights of a wish for a scene.
+    /// Applies the materials and lights of a wish to a scene.
     ///
     /// # Errors
     /// If an assignment is not possible, or no light is left.
@@ -354,12 +354,12 @@ impl View {
         self.start.sketch.apply(wish, scene)
     }
 
-    /// The command line that renders the settled picture.
+    /// Command line that renders the settled picture.
     pub(super) fn command(&self) -> Vec<String> {
         command_line::words(&self.start.options, self.start.quality, &self.wish)
     }
 
-    /// State for a page, to which the picture is settled once it has all tiles.
+    /// State for a page. It says that the picture is settled only if the page has all tiles.
     fn describe(&self, has_all: bool) -> Value {
         let settings = &self.wish.settings;
         // The camera was checked when it was wished for.
@@ -389,7 +389,7 @@ impl View {
         })
     }
 
-    /// The newest wish.
+    /// Newest wish.
     #[cfg(test)]
     pub(super) fn wish(&self) -> &Wish {
         &self.wish
@@ -401,7 +401,7 @@ impl View {
         self.refinement.is_settled()
     }
 
-    /// Number of tiles that are held.
+    /// Number of tiles held in memory.
     #[cfg(test)]
     pub(super) fn tiles_held(&self) -> usize {
         self.canvas.len()
@@ -413,7 +413,7 @@ impl View {
     }
 }
 
-/// Text of an error with its remedy.
+/// Text of an error, with its remedy.
 pub(super) fn with_remedy(error: &RenderError) -> String {
     let remedy = miette::Diagnostic::help(error).map_or(String::new(), |help| format!("; {help}"));
     format!("{error}{remedy}")

@@ -1,4 +1,4 @@
-//! Wishes: settings, camera and changes of the scene, as pages have asked for them.
+//! Wish: the settings, the camera and the changes of the scene that pages request.
 
 use std::collections::BTreeSet;
 
@@ -9,19 +9,19 @@ use photoncard_driver::scene::{Environment, Scene};
 
 use super::request::Setting;
 
-/// Error of interpolated irradiance where a quality states none.
+/// Default error of interpolated irradiance, for a quality that states none.
 const IRRADIANCE_ERROR: f32 = 0.1;
 
-/// Settings, camera and changes that pages have asked for.
+/// Settings, camera and changes of the scene that pages request.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Wish {
     /// Settings of the settled picture.
     pub(super) settings: RenderSettings,
-    /// Settings that the quality leaves as they are.
+    /// Flags of the settings that a quality must not change.
     stated: Stated,
-    /// Assignments of the command line.
+    /// Assignments from the command line.
     given: Vec<String>,
-    /// Names of properties with their values: changes by pages.
+    /// Changes by pages: names of properties with their values.
     edits: Vec<(String, Vec<f64>)>,
 }
 
@@ -30,7 +30,7 @@ impl Wish {
         Self { settings, stated, given, edits: Vec::new() }
     }
 
-    /// Returns whether the quality leaves all settings as they are.
+    /// Returns whether a quality may change no setting.
     pub(super) fn states_all(&self) -> bool {
         !self.stated.needs_fit()
     }
@@ -46,13 +46,13 @@ impl Wish {
         &self.edits
     }
 
-    /// Places the camera.
+    /// Sets position, target and field of view of the camera.
     pub(super) fn look(&mut self, position: [f64; 3], look_at: [f64; 3], fov: f32) {
         let picture = &mut self.settings.picture;
         (picture.camera_at, picture.look_at, picture.fov) = (Some(position), Some(look_at), Some(fov));
     }
 
-    /// Sets a property, at the place of an earlier value of it: what was possible after that one stays so.
+    /// Sets a property. A new value takes the place of an earlier one, so that later changes stay valid.
     pub(super) fn set(&mut self, name: String, value: Vec<f64>) {
         match self.edits.iter_mut().find(|(edited, _)| *edited == name) {
             Some((_, earlier)) => *earlier = value,
@@ -83,11 +83,11 @@ impl Wish {
         }
     }
 
-    /// Checks the settings against what emulated cards can hold; what others can is not known before they are
-    /// greeted.
+    /// Checks the settings against the capacities of emulated cards. Those of other cards are unknown until
+    /// they are greeted.
     ///
     /// # Errors
-    /// The first setting that is not possible on a card.
+    /// The first setting that exceeds the capacity of a card.
     pub(super) fn check_cards(&self) -> Result<(), RenderError> {
         self.settings.cards.addresses.iter().try_for_each(|address| match address {
             CardAddress::Emulated { kind, .. } => self.settings.check_budget(&kind.budget()),
@@ -95,14 +95,15 @@ impl Wish {
         })
     }
 
-    /// This wish by the settings of another one: camera, size, layers and changes of the scene stay.
+    /// Copy of this wish with the settings of another one. Camera, size, layers and changes of the scene are
+    /// kept.
     pub(super) fn by_settings_of(&self, other: &Self) -> Self {
         let picture = self.settings.picture.clone();
         let settings = RenderSettings { picture, ..other.settings.clone() };
         Self { settings, stated: other.stated, ..self.clone() }
     }
 
-    /// Asks for all layers that chips can render. Returns whether they were not.
+    /// Requests all layers that chips can render. Returns whether any was missing.
     pub(super) fn add_layers(&mut self) -> bool {
         let layers = &mut self.settings.picture.layers;
         !layers.are_of_chip() && {
@@ -111,28 +112,29 @@ impl Wish {
         }
     }
 
-    /// Takes over what pilot renders have found, except what is stated on the command line or by a page.
+    /// Applies the settings that pilot renders have found, except those stated on the command line or by a
+    /// page.
     pub(super) fn fit(&mut self, fit: &Fit) {
         fit.apply(&mut self.settings, self.stated);
     }
 
-    /// Returns whether photons or scene are others than those of another wish.
+    /// Returns whether photons or scene differ from those of another wish.
     pub(super) fn is_other_edition(&self, other: &Self) -> bool {
         let photons = |wish: &Self| (wish.settings.photons.clone(), wish.settings.integrator.seed);
         self.given != other.given || self.edits != other.edits || photons(self) != photons(other)
     }
 }
 
-/// Numbers as an option takes them; they parse to the same bits.
+/// Formats numbers for an option. They parse to the same bits.
 pub(super) fn numbers<T: ToString>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
 }
 
-/// A scene without its surfaces, against which wishes are checked at once.
+/// Scene with one triangle per material, against which wishes are checked quickly.
 pub(super) struct Sketch(Scene);
 
 impl Sketch {
-    /// Sketch of a scene before assignments: a triangle of each material that any triangle has, and the
+    /// Creates the sketch of a scene without assignments. It has a triangle of each material in use, and the
     /// brightest texel of the environment.
     pub(super) fn new(scene: &Scene) -> Self {
         let mut materials = BTreeSet::new();
@@ -153,10 +155,10 @@ impl Sketch {
         })
     }
 
-    /// The sketch after the assignments of a wish.
+    /// Sketch with the assignments of a wish applied.
     ///
     /// # Errors
-    /// If one is not possible, no light is left, or a setting or the camera is not possible.
+    /// If an assignment, a setting or the camera is not possible, or no light is left.
     pub(super) fn with(&self, wish: &Wish) -> Result<Scene, RenderError> {
         let mut scene = self.0.clone();
         self.apply(wish, &mut scene)?;
@@ -165,7 +167,7 @@ impl Sketch {
         Ok(scene)
     }
 
-    /// Gives a scene the materials and lights of a wish, whatever it had before.
+    /// Replaces the materials and lights of a scene by those of a wish.
     ///
     /// # Errors
     /// If an assignment is not possible, or no light is left.

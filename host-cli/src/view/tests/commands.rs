@@ -1,4 +1,4 @@
-//! The command line that a view shows renders the settled picture: it parses to equal settings.
+//! Checks that the command line shown by a view parses to the settings of the settled picture.
 
 use clap::Parser;
 use photoncard_driver::choice::Choice;
@@ -12,7 +12,7 @@ use crate::view::command_line::{quoted, words};
 use crate::view::request::Setting;
 use crate::view::wish::Wish;
 
-/// Options of a view by its command line.
+/// Parses the command line of a view.
 pub(super) fn view_options(arguments: &[String]) -> ViewOptions {
     let command = ["photoncard".to_owned(), "view".to_owned()];
     let parsed = Arguments::try_parse_from(command.iter().chain(arguments));
@@ -23,7 +23,7 @@ pub(super) fn view_options(arguments: &[String]) -> ViewOptions {
     }
 }
 
-/// Words of a line of a shell that has no quotes but single ones, and backslashes between them.
+/// Splits a shell command line whose only quotes are single ones, with backslashes between them.
 fn split(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let (mut is_quoted, mut is_escaped) = (false, false);
@@ -51,7 +51,7 @@ fn render_options(line: &str) -> RenderOptions {
     }
 }
 
-/// Some options of a view, at random.
+/// Random options of a view.
 fn options(random: &mut Random) -> Vec<String> {
     let quality = random.one(Quality::ALL).name();
     let mut options = vec![random.one(&["scene.gltf", "a b/it's.glb", "-x.gltf", "ä$(x).gltf"]).to_owned()];
@@ -94,7 +94,7 @@ fn options(random: &mut Random) -> Vec<String> {
     named
 }
 
-/// A wish after some messages of a page, at random.
+/// Wish after random messages from a page.
 fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
     let mut wish = Wish::new(options.settings(), options.stated(), options.scene.assignments.clone());
     for _ in 0..random.below(6) {

@@ -1,4 +1,4 @@
-//! Properties of a view's state, on random actions.
+//! Tests of a view's state with random actions.
 
 mod commands;
 mod random;

@@ -1,10 +1,10 @@
-//! Random numbers of a seed.
+//! Seeded pseudo-random numbers.
 
 /// `SplitMix64` (Steele, Lea, Flood, "Fast Splittable Pseudorandom Number Generators", 2014).
 pub(super) struct Random(pub(super) u64);
 
 impl Random {
-    /// A number below `bound`.
+    /// Pseudo-random number below `bound`.
     pub(super) fn below(&mut self, bound: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
         let mut bits = self.0;
@@ -13,12 +13,12 @@ impl Random {
         (bits ^ (bits >> 31)) % bound
     }
 
-    /// One of a list.
+    /// Pseudo-random element of a list.
     pub(super) fn one<T: Copy>(&mut self, list: &[T]) -> T {
         list[self.below(list.len() as u64) as usize]
     }
 
-    /// A number of single precision from -`reach` to `reach`, of many digits.
+    /// Pseudo-random single-precision number from -`reach` to `reach` with many digits.
     pub(super) fn number(&mut self, reach: f32) -> f32 {
         let share = self.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0;
         share * reach

@@ -1,5 +1,5 @@
-//! Random actions of pages and cards: the view is never stuck, holds bounded memory, and settles to the
-//! picture that was wished for last.
+//! Random actions of pages and cards. The view is never stuck, holds bounded memory, and settles to the
+//! picture of the last wish.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use super::world::World;
 
 const ACTIONS: usize = 10_000;
 
-/// A message of a page, sensible or not.
+/// Random message from a page, valid or not.
 fn message(random: &mut Random) -> Value {
     let place = |random: &mut Random| json!([(); 3].map(|()| random.number(2.0)));
     match random.below(16) {
@@ -65,7 +65,7 @@ fn act(world: &mut World, random: &mut Random) {
 }
 
 #[test]
-fn ten_thousand_random_actions_end_in_the_picture_that_was_wished_for_last() {
+fn ten_thousand_random_actions_end_in_the_picture_of_the_last_wish() {
     let mut random = Random(7);
     let mut world = World::new();
     world.connect();
@@ -80,9 +80,9 @@ fn ten_thousand_random_actions_end_in_the_picture_that_was_wished_for_last() {
     assert!(world.firsts > 100, "{} pictures", world.firsts);
 }
 
-/// Wishes that follow each other faster than a picture is rendered do not starve it.
+/// Wishes arrive faster than a picture is rendered.
 #[test]
-fn a_camera_that_never_rests_is_shown_and_settles_when_it_does() {
+fn a_moving_camera_is_shown_and_settles_once_it_rests() {
     for is_edit in [false, true] {
         let mut world = World::new();
         world.connect();
@@ -105,9 +105,9 @@ fn a_camera_that_never_rests_is_shown_and_settles_when_it_does() {
     }
 }
 
-/// A page that does not read takes no memory, and gets the newest picture when it does.
+/// A page that does not read uses no memory, and receives the newest picture once it reads.
 #[test]
-fn a_slow_page_gets_fewer_and_newer_tiles() {
+fn a_slow_page_receives_fewer_and_newer_tiles() {
     let mut world = World::new();
     world.connect();
     world.connect();
@@ -128,7 +128,7 @@ fn a_slow_page_gets_fewer_and_newer_tiles() {
 }
 
 #[test]
-fn a_reset_leaves_pages_the_layers_that_they_show() {
+fn a_reset_keeps_the_layers_that_pages_show() {
     let mut world = World::new();
     world.connect();
     for (layer, is_of_chip) in [("direct", true), ("N", false)] {
@@ -139,7 +139,7 @@ fn a_reset_leaves_pages_the_layers_that_they_show() {
     }
 }
 
-/// Tiles wait for acknowledgement beyond some megabytes.
+/// Tiles beyond some megabytes wait for acknowledgements.
 #[test]
 fn a_page_that_acknowledges_nothing_is_not_flooded() {
     let mut world = World::new();
@@ -156,9 +156,9 @@ fn a_page_that_acknowledges_nothing_is_not_flooded() {
     world.check_pictures();
 }
 
-/// The budget of a card on a link is known when it refuses. Camera and edits stay.
+/// The budget of a remote card is known only when the card refuses. Camera and edits are kept.
 #[test]
-fn settings_that_a_card_refuses_give_way_to_those_of_the_last_settled_picture() {
+fn settings_that_a_card_refuses_are_replaced_by_the_last_settled_ones() {
     let mut world = World::new();
     world.connect();
     world.settle();
@@ -175,7 +175,7 @@ fn settings_that_a_card_refuses_give_way_to_those_of_the_last_settled_picture() 
 }
 
 #[test]
-fn a_view_without_possible_settings_says_so_until_it_has_some() {
+fn a_view_without_possible_settings_reports_it_until_it_has_some() {
     let mut world = World::new();
     world.connect();
     world.max_rays = 0;

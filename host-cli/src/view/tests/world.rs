@@ -1,4 +1,4 @@
-//! A view, its pages, its cards and a painter of model pictures, in one thread and virtual time.
+//! Simulated view with its pages, cards and a painter of model pictures, in one thread and virtual time.
 
 use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
@@ -22,23 +22,23 @@ use crate::view::wish::{Sketch, Wish};
 /// Side of a model tile, pixels.
 const TILE: u32 = 16;
 
-/// A page as a browser has it.
+/// Model of a page in a browser.
 #[derive(Default)]
 pub(super) struct ModelPage {
-    /// Bits of radiance of each pixel.
+    /// Bits of the radiance of each pixel.
     pub(super) pixels: HashMap<(u32, u32), u32>,
     pub(super) received: u64,
     pub(super) state: Option<Value>,
     pub(super) errors: u64,
     version: u32,
-    /// Number of wishes of which the page has seen a tile.
+    /// Number of wishes of which the page has received a tile.
     pub(super) versions: u64,
 }
 
-/// A pass at work.
+/// Running pass.
 struct Job {
     task: Task,
-    /// Steps of tracing photons that are left.
+    /// Number of remaining steps of the preparation.
     preparing: u64,
     left: Vec<Tile>,
 }
@@ -48,16 +48,16 @@ pub(super) struct World {
     pub(super) pages: BTreeMap<PageNumber, ModelPage>,
     pub(super) now: Duration,
     pub(super) has_card: bool,
-    /// Gather rays that the card can hold.
+    /// Maximum number of gather rays that the card can hold.
     pub(super) max_rays: u32,
     job: Option<Job>,
-    /// Wish whose photons the card has.
+    /// Wish whose photons are on the card.
     prepared: Option<Wish>,
-    /// Number of first passes that were completed.
+    /// Number of completed first passes.
     pub(super) firsts: u64,
 }
 
-/// A floor under a lamp.
+/// Scene of a floor under a lamp.
 fn scene() -> Scene {
     use glam::Vec3;
     let triangle = |y: f32, material| {
@@ -82,7 +82,7 @@ fn scene() -> Scene {
     }
 }
 
-/// Bits of all pixels of a wish's picture.
+/// Bits of every pixel of a wish's picture.
 fn bits(wish: &Wish, step: u32) -> u32 {
     let hasher = BuildHasherDefault::<DefaultHasher>::default();
     // Any positive normal number.
@@ -131,7 +131,7 @@ impl World {
         self.view.receive(number, &message.to_string(), self.now)
     }
 
-    /// Lets the painter do a step: a tile, a part of the photons, or the end of a pass.
+    /// Performs one step of the painter: a tile, a part of the preparation, or the end of a pass.
     pub(super) fn paint(&mut self) {
         let Some(job) = &mut self.job else {
             self.job = self.view.next(self.now).ok().map(|task| self.begin(task));
@@ -198,7 +198,7 @@ impl World {
         self.view.finish(&task, outcome, None, self.now);
     }
 
-    /// Lets a page read a message. Returns whether there was one.
+    /// Delivers one message to a page. Returns whether there was one.
     pub(super) fn read(&mut self, number: PageNumber) -> bool {
         let Some(message) = self.view.take(number) else { return false };
         let Some(page) = self.pages.get_mut(&number) else { return false };
@@ -211,13 +211,13 @@ impl World {
         true
     }
 
-    /// Lets a page acknowledge what it has received.
+    /// Acknowledges what a page has received.
     pub(super) fn acknowledge(&mut self, number: PageNumber) {
         let bytes = self.pages[&number].received;
         self.send(number, &serde_json::json!({"type": "shown", "version": 1, "bytes": bytes}));
     }
 
-    /// Does everything that is left, with all cards and attentive pages. Panics if there is no end.
+    /// Performs all remaining work, with all cards and attentive pages. Panics if it does not end.
     pub(super) fn settle(&mut self) {
         self.has_card = true;
         for _ in 0..20_000 {
