@@ -1,6 +1,6 @@
-//! The chip's inner loops: photon gathers, rays, and one whole tile.
+//! Benchmarks of the chip's inner loops: photon gathers, rays, and one whole tile.
 //!
-//! `cargo bench -p photoncard-tests`; the item counts are gathers, rays and pixels.
+//! Run `cargo bench -p photoncard-tests`; the item counts are gathers, rays and pixels.
 
 use std::sync::LazyLock;
 
@@ -31,7 +31,7 @@ fn main() {
 const NEIGHBORS: u32 = 100;
 const PHOTONS: usize = 500_000;
 
-/// Scene with its card image.
+/// Scene with its packed card image.
 struct Prepared {
     scene: Scene,
     image: CardImage,
@@ -84,7 +84,7 @@ impl Prepared {
             .collect()
     }
 
-    /// Incoherent rays: from the positions of photons, cosine-weighted.
+    /// Incoherent rays that start at photons, with cosine-weighted directions.
     fn rays(&self, count: u32) -> Vec<Ray> {
         let (scene, mut memory) = self.image.view();
         let camera = self.scene.camera(None).expect("a camera");
@@ -157,7 +157,7 @@ fn tile_of_cornell(bencher: Bencher, order: &str) {
     render_tile(bencher, order, CORNELL.image.view().1);
 }
 
-/// The tile with its reads counted above and below the dissertation's caches.
+/// Renders the tile with its reads counted before and after the dissertation's caches.
 #[divan::bench(sample_count = 10, args = ["tiled", "dirbin", "hash", "sort"])]
 fn tile_of_cornell_counted(bencher: Bencher, order: &str) {
     render_tile(bencher, order, CacheSettings::default().over(CORNELL.image.view().1));
@@ -182,7 +182,7 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
     });
 }
 
-/// Tracing and building a map of a million photons, on all cores.
+/// Traces a million photons and builds their map, on all cores.
 #[divan::bench(sample_count = 3)]
 fn map_of_a_million_photons(bencher: Bencher) {
     let scene = load("cornell.gltf");

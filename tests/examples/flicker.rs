@@ -1,16 +1,16 @@
-//! Flicker of frames: the difference of each from the one before, at the same places of surfaces that stand
-//! still.
+//! Measures the flicker of frames: the difference between consecutive frames at equal positions of surfaces
+//! that do not move.
 //!
 //! ```text
 //! flicker [--within X0,Y0,Z0,X1,Y1,Z1] FRAME.exr[=OTHER.exr] ...
 //! ```
 //!
-//! A pixel of a frame is a place in the scene, by the frame's camera and its layer `Z`. The place is
-//! projected into the frame before, whose radiance there is interpolated between four pixels, all of which
-//! see the same surface by their depths. Printed is the root mean square of the relative difference `(b - a)
-//! / ((a + b) / 2)` of luminance: noise that stays on the surfaces, and does not crawl, is none. `--within`
-//! takes the places in a box alone, such as a strip of a wall. With `OTHER.exr` the radiance is that of
-//! another renderer's picture of the same view.
+//! The camera and the layer `Z` of a frame give the position that a pixel sees. It is projected into the
+//! previous frame, whose radiance is interpolated between four pixels; their depths must be those of the same
+//! surface. The program prints the root mean square of the relative difference `(b - a) / ((a + b) / 2)` of
+//! luminance. Noise that stays on the surfaces does not count. `--within` selects the positions in a box,
+//! such as a strip of a wall. `OTHER.exr`, another renderer's picture of the same view, supplies the radiance
+//! in place of `FRAME.exr`.
 
 use std::error::Error;
 
@@ -19,20 +19,20 @@ use glam::{DVec2, DVec3};
 use photoncard_driver::exr::{read_rgb, read_with_provenance};
 use serde_json::Value;
 
-/// Relative difference of depths up to which two pixels see one surface.
+/// Maximum relative difference between the depths of pixels that see one surface.
 const SAME_DEPTH: f64 = 0.01;
 
-/// Corners of the box of places.
+/// Lower and upper corner of the box that contains the positions.
 type Within = [DVec3; 2];
 
-/// A frame: its luminance and depths, and its camera.
+/// Luminance, depths and camera of a frame.
 struct Frame {
     name: String,
     size: [usize; 2],
     luminance: Vec<f64>,
     depths: Vec<f64>,
     at: DVec3,
-    /// Right, up and forward, the first two as long as half the picture at a distance of 1.
+    /// Right, up and forward vectors. The first two are as long as half the picture at a distance of 1.
     axes: [DVec3; 3],
 }
 
@@ -64,7 +64,7 @@ impl Frame {
         })
     }
 
-    /// Place that a pixel sees; `None` if there is no surface.
+    /// Position that a pixel sees; `None` if it sees no surface.
     fn place(&self, x: usize, y: usize) -> Option<DVec3> {
         let [width, height] = self.size;
         let depth = self.depths[y * width + x];
@@ -74,7 +74,7 @@ impl Frame {
         depth.is_finite().then(|| self.at + (forward + right * across + up * upwards) * depth)
     }
 
-    /// Luminance at a place; `None` if the frame does not see it.
+    /// Luminance at a position; `None` if the frame does not see it.
     fn luminance_at(&self, place: DVec3) -> Option<f64> {
         let [width, height] = self.size;
         let [right, up, forward] = self.axes;
@@ -110,7 +110,7 @@ fn luminance([red, green, blue]: &[f32; 3]) -> f64 {
     0.2126 * f64::from(*red) + 0.7152 * f64::from(*green) + 0.0722 * f64::from(*blue)
 }
 
-/// The layer `Z` of a picture.
+/// Reads the layer `Z` of a picture.
 fn depths(path: &str) -> Result<Vec<f64>, Box<dyn Error>> {
     let image = read().no_deep_data().largest_resolution_level().all_channels();
     let image = image.first_valid_layer().all_attributes().from_file(path)?;
@@ -120,7 +120,8 @@ fn depths(path: &str) -> Result<Vec<f64>, Box<dyn Error>> {
     Ok(depth.sample_data.values_as_f32().map(f64::from).collect())
 }
 
-/// Number of pixels that see a place of the frame before, and the mean square of the relative difference.
+/// Number of pixels whose position the previous frame sees as well, and the mean square of their relative
+/// difference.
 fn difference(before: &Frame, frame: &Frame, within: Option<Within>) -> (usize, f64) {
     let [width, height] = frame.size;
     let is_within =

@@ -4,11 +4,11 @@
 //! [--first N] [--seconds N] [--folder PATH]`
 //!
 //! The targets are `frames`, `messages`, `session`, `image`, `gltf`, `meshopt`, `draco`, `textures`,
-//! `environments` and `exr`. The profile `dev` keeps every check of overflows; `release` is what users run.
-//! An input is a function of target, seed and number: `--first N --inputs 1` replays the one that failed. Its
-//! bytes are written into the folder, by default `photoncard-fuzz` among the temporary files. Several runs at
-//! once, each with a `--first` of its own, share the work. A run that is ended by the system leaves the
-//! number of its input in a file `*.at`.
+//! `environments` and `exr`. The profile `dev` checks for arithmetic overflow; `release` is that of users'
+//! programs. An input is a function of target, seed and number: `--first N --inputs 1` repeats a single one.
+//! The bytes of an input that failed are written into the folder, by default `photoncard-fuzz` in the
+//! system's temporary folder. Several runs with different `--first` can share the work. If the system ends a
+//! run, a file `*.at` contains the number of its input.
 
 use std::error::Error;
 use std::process::ExitCode;

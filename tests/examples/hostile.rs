@@ -4,12 +4,12 @@
 //! [--inputs N] [--seed N] [--first N] [--batch N] [--command PHOTONCARD] [--every N] [--kilobytes N]
 //! [--folder PATH]`
 //!
-//! An input that ends a process by a panic, an abort or a signal, or takes more than 20 s, is a finding: it
-//! is written into the folder, and `--first N --inputs 1` replays it. The command that `--command` names
-//! reads every 50th input, or as `--every` says. It alone reads the last four kinds, files that it keeps, in
-//! half of the inputs damaged while it works: a replay of these may need some repetitions. Another picture
-//! than that of undamaged files is a finding there too. `tests/hostile_files.sh` builds all and runs 100,000
-//! images, 20,000 scenes and 50,000 kept files.
+//! An input that ends a process by a panic, an abort or a signal, or takes more than 20 s, is a finding. It
+//! is written into the folder, and `--first N --inputs 1` repeats it. The program that `--command` names
+//! reads every 50th input as well; `--every` changes the interval. The last four kinds are files that this
+//! program keeps, and only it reads them. Half of them are damaged while it works, so that a finding may
+//! occur only in some repetitions. A picture that differs from that of undamaged files is a finding as well.
+//! `tests/hostile_files.sh` builds everything, and runs 100,000 images, 20,000 scenes and 50,000 kept files.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ fn defaults(kind: Kind) -> Settings {
     }
 }
 
-/// Arguments of a reader process: kind, seed, first, inputs and folder.
+/// Runs the reader process. Its arguments are kind, seed, first, inputs and folder.
 fn read(arguments: &[String]) -> Result<(), Box<dyn Error>> {
     let [kind, seed, first, inputs, folder] = arguments else { return Err("five arguments".into()) };
     let kind = Kind::of(kind).ok_or("no such kind")?;

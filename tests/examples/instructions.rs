@@ -1,9 +1,9 @@
-//! The host's part of `tests/instructions.sh`, which counts the instructions of a gather.
+//! Host's part of `tests/instructions.sh`, which counts the instructions of a gather.
 //!
-//! `instructions write FILE` writes what a board's memory is to hold: the image of the Cornell box with its
-//! photons, and the frame's parameters in the line behind it. `instructions render FILE WORK` does the work
-//! `Eye`, `Rays` or `Gathers` of one tile as a board does, in the function `measured`, and prints what it
-//! counted.
+//! `instructions write FILE` writes the contents of a board's memory: the card image of the Cornell box with
+//! photons, and the frame's parameters in the following line. `instructions render FILE WORK` renders one
+//! tile as a board does, and prints its counters. `WORK` is `Eye`, `Rays` or `Gathers`; the work is done in
+//! the function `measured`.
 
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
@@ -44,7 +44,7 @@ fn memory() -> Vec<u8> {
     mapped.image.lines().iter().map(|line| line.0).chain([behind]).flatten().collect()
 }
 
-/// The function in which Callgrind counts.
+/// Renders the tile. Callgrind counts in this function only.
 #[inline(never)]
 fn measured(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
     render(chip, lines, work)

@@ -1,10 +1,11 @@
-//! Savings and errors of the irradiance cache, against a picture with many rays and without interpolation.
+//! Measures savings and errors of the irradiance cache, compared to a picture with many rays and without
+//! interpolation.
 //!
 //! `cargo run --release -p photoncard-tests --example irradiance_cache [SCENE [camera=NAME]
 //! [crop=X0,X1,Y0,Y1]]`
 //!
-//! The picture has 512x512 pixels, of which the crop is rendered. The reference has equal eye and shadow
-//! rays, so that only the indirect light differs.
+//! The picture has 512x512 pixels; only the crop is rendered. The reference has equal eye and shadow rays, so
+//! that only the indirect light differs.
 
 use glam::Vec3;
 use photoncard_driver::film::Window;

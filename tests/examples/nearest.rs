@@ -1,4 +1,4 @@
-//! Measures the search for the nearest photons in isolation: a million on the faces of a cube.
+//! Measures the search for the nearest photons in isolation, among a million on the faces of a cube.
 //!
 //! `cargo run --release -p photoncard-tests --example nearest -- [--write FOLDER] [--repeat N]`
 //!
@@ -24,11 +24,11 @@ const POINTS: u32 = 1_000_000;
 const QUERIES: u32 = 100_000;
 const NEIGHBORS: u32 = 100;
 const MAX_DISTANCE: f32 = 0.025;
-/// One in this number of points lies in a cluster.
+/// Inverse of the fraction of points in a cluster.
 const CLUSTER_SHARE: u32 = 5;
 const CLUSTER_RADIUS: f32 = 0.05;
 
-/// Processor time of this thread, seconds; other processes do not count.
+/// Processor time of this thread, seconds. It excludes other processes.
 fn cpu_seconds() -> f64 {
     let taken = clock_gettime(ClockId::ThreadCPUTime);
     taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
@@ -38,7 +38,8 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Point on a face of the cube of side 1 around the origin; some lie near the middle of one of two faces.
+/// Point on a face of the cube with side 1 around the origin. Some points are clustered at the middle of one
+/// of two faces.
 fn point(index: u32) -> [f32; 3] {
     let in_cluster = index.is_multiple_of(CLUSTER_SHARE);
     let face = hash(index ^ 0x5555) % if in_cluster { 2 } else { 6 };

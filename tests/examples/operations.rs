@@ -1,8 +1,8 @@
-//! The floating-point operations of the firmware: `tests/operations.sh`.
+//! Counts the floating-point operations of the firmware, for `tests/operations.sh`.
 //!
 //! `operations table` prints `driver/render/src/cost_model/arithmetic/table.rs`: the operations of each step,
-//! counted in tiles of several scenes. `operations report` prints the operations of each unit for a ray and
-//! for a gather, counted and by the table.
+//! as counted in tiles of several scenes. `operations report` prints the operations of each unit per ray and
+//! per gather, both counted and computed from the table.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::arithmetic::{Operations, Step, Unit};
@@ -12,7 +12,7 @@ use photoncard_driver::scheduler::GatherOrder;
 use photoncard_tests::operations::Instrument;
 use photoncard_tests::operations::run::{Run, means};
 
-/// Scenes, and the number of tiles of each.
+/// Scenes, each with the number of tiles to render.
 const SCENES: [(&str, usize); 6] = [
     ("cornell.gltf", 4),
     ("cornell-glossy.gltf", 4),
@@ -22,8 +22,8 @@ const SCENES: [(&str, usize); 6] = [
     ("roughness.glb", 2),
 ];
 
-/// Settings of the dissertation's frame, without techniques or with all; in a smaller picture and with fewer
-/// photons, on which no step depends.
+/// Settings of the dissertation's frame, without techniques or with all. The picture is smaller and has fewer
+/// photons, which changes no step.
 fn settings(has_all: bool) -> RenderSettings {
     let plain = RenderSettings {
         picture: Picture { width: 256, height: 256, ..Picture::default() },
@@ -63,7 +63,7 @@ fn runs(instrument: &Instrument) -> Vec<(String, Run)> {
     SCENES.into_iter().flat_map(of).collect()
 }
 
-/// A number with four digits; a whole one as it is.
+/// Formats a number with four digits; integers are exact.
 fn number(value: f64) -> String {
     if value == 0.0 || (value - value.round()).abs() < 1e-9 {
         return format!("{:.1}", value.round());
@@ -100,7 +100,7 @@ fn print_operations(name: &str, counted: &Operations, modelled: &Operations, pie
     );
 }
 
-/// Prints a run: operations of each unit for a ray or a gather.
+/// Prints the operations of each unit per ray or gather in a run.
 fn print_run(name: &str, run: &Run) {
     let counters = &run.counters;
     let rays = counters.eye_rays

@@ -1,13 +1,13 @@
-//! Prints checksums of pictures and of counted work, to compare two builds of the command:
+//! Prints checksums of pictures and of counted work, by which two builds of the command can be compared:
 //!
 //! ```text
 //! cargo run --release -p photoncard-tests --example pixels -- PHOTONCARD [--card ADDRESS] [ONLY]
 //! ```
 //!
-//! A line for each shipped scene and technique: the CRC-64 of the picture's samples, all layers included, the
-//! CRC-64 of the counters of `--stats --counters`, and the options. Attributes of the EXR file, times and the
-//! bytes of links are left out, so that builds of different versions can be compared. With `--card` the
-//! pictures are rendered there, and no work is counted.
+//! A line for each shipped scene and technique contains the CRC-64 of the samples of all layers, the CRC-64
+//! of the counters of `--stats --counters`, and the options. Attributes of the EXR file, times and bytes on
+//! links are excluded, so that builds of different versions can be compared. `--card` states the card that
+//! renders; no work is counted then.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -15,7 +15,7 @@ use std::process::{Command, ExitCode};
 use crc::{CRC_64_XZ, Crc};
 use serde_json::Value;
 
-/// Scene files, and the options that all their pictures take.
+/// Scene files, each with the options that all its pictures have.
 const SCENES: [(&str, &[&str]); 10] = [
     ("cornell.gltf", &[]),
     ("cornell-glossy.gltf", &["--camera", "floor"]),
@@ -29,7 +29,7 @@ const SCENES: [(&str, &[&str]); 10] = [
     ("roughness.glb", &["--shadow-rays", "3"]),
 ];
 
-/// Options of each technique, alone and together.
+/// Options of each technique, alone and in combination.
 const TECHNIQUES: [&[&str]; 10] = [
     &["--order", "naive", "--sampling", "brdf", "--photon-map", "jensen"],
     &["--order", "tiled", "--sampling", "photon"],
@@ -43,10 +43,10 @@ const TECHNIQUES: [&[&str]; 10] = [
     &["--card", "emulated-micro:2", "--neighbors", "50", "--tile", "8"],
 ];
 
-/// Small enough for a minute or two, large enough for queues that fill.
+/// Options of a picture that is small enough for a minute or two, and large enough to fill queues.
 const SIZE: [&str; 8] = ["--size", "48x48", "--photons", "20000", "--gather-rays", "20", "--aov", "all"];
 
-/// Statistics that count work, which no machine and no link changes.
+/// Names of statistics that count work. They do not depend on machines or links.
 const COUNTED: [&str; 14] = [
     "rays",
     "lost_paths",
@@ -112,7 +112,7 @@ fn is_for_any_card(technique: &[&str]) -> bool {
 }
 
 impl Build {
-    /// Checksums of a picture's samples and of its work.
+    /// Checksums of a picture's samples and of its counters.
     fn checksums(
         &self,
         scene: &str,
@@ -137,7 +137,7 @@ impl Build {
     }
 }
 
-/// Options with values, of which a later one replaces an earlier one of its name.
+/// Options with values. A later option replaces an earlier one with the same name.
 fn with_last_of_each<'a>(lists: &[&[&'a str]]) -> Vec<&'a str> {
     let mut options: Vec<(&str, &str)> = Vec::new();
     for pair in lists.iter().flat_map(|list| list.chunks_exact(2)) {
@@ -147,7 +147,7 @@ fn with_last_of_each<'a>(lists: &[&[&'a str]]) -> Vec<&'a str> {
     options.into_iter().flat_map(|(name, value)| [name, value]).collect()
 }
 
-/// Checksum of all channels' samples, by name.
+/// Checksum of the samples of all channels with their names.
 fn samples(path: &Path) -> Result<u64, exr::error::Error> {
     use exr::prelude::{ReadChannels, ReadLayers, read};
     let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();

@@ -1,4 +1,4 @@
-//! Prints the corners of all triangles of a glTF scene at a moment of its animations, a triangle a line:
+//! Prints the corners of all triangles of a glTF scene at a time of its animations, one triangle per line:
 //!
 //! ```text
 //! poses SCENE SECONDS [ANIMATION ...]

@@ -1,13 +1,13 @@
-//! Measures the ray caster in isolation: rays from surfaces that a camera sees, cosine-weighted.
+//! Measures the ray caster in isolation, with cosine-weighted rays from surfaces that a camera sees.
 //!
 //! `cargo run --release -p photoncard-tests --example rays -- SCENE [--bundle 16] [--write FOLDER] [--rays N]
 //! [--repeat N]`
 //!
-//! Prints rays per second of one thread, to the first triangle and to any, the number of rays that meet one,
-//! the sum of the distances, and the lines that a ray reads. By default each ray has a place of its own. With
-//! `--bundle 16` sixteen rays have a place and one of 32 cells of the hemisphere in common, and are cast
-//! alone and in bundles. `--write` stores triangles and rays as little-endian `f32`, so that other libraries
-//! can cast the same rays: `tests/peers/rays.sh`.
+//! Prints the rays per second of one thread, the number of hits, the sum of the hit distances, and the lines
+//! that a ray reads. It measures closest-hit and any-hit queries. By default each ray has its own origin.
+//! With `--bundle 16` sixteen rays share their origin and one of 32 cells of the hemisphere, and are cast
+//! both singly and in bundles. `--write` stores triangles and rays as little-endian `f32`, so that other
+//! libraries can cast the same rays: `tests/peers/rays.sh`.
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ use photoncard_shared::address::Structure;
 use photoncard_shared::image::SectionKind;
 use rustix::time::{ClockId, clock_gettime};
 
-/// Processor time of this thread, seconds; other processes do not count.
+/// Processor time of this thread, seconds. It excludes other processes.
 fn cpu_seconds() -> f64 {
     let taken = clock_gettime(ClockId::ThreadCPUTime);
     taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
@@ -35,11 +35,12 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Numbers of cells along the axes of the unit square; the directions of a place are in one cell.
+/// Number of cells along each axis of the unit square of random numbers. The directions from one origin are
+/// in one cell.
 const CELLS: [f32; 2] = [8.0, 4.0];
 
-/// Rays from the surfaces that the camera sees, in sampled directions of reflection: `bundle` from each
-/// place, in one cell.
+/// Rays from the surfaces that the camera sees, in sampled directions of reflection: `bundle` rays from each
+/// origin, in one cell.
 fn bounces(scene: &Scene, packed: &PackedScene, count: u32, bundle: u32) -> Vec<Ray> {
     let (image, mut memory) = packed.view();
     let camera = scene.camera(None).expect("a scene has a camera");
@@ -62,7 +63,7 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32, bundle: u32) -> Vec<
     (0..count * 10).filter_map(&mut bounce).flatten().take(count as usize).collect()
 }
 
-/// Number of rays that meet a triangle, and the sum of their distances.
+/// Number of rays that hit a triangle, and the sum of their distances.
 fn cast_all(
     image: &SceneImage,
     memory: &mut impl MemoryPort,

@@ -1,4 +1,4 @@
-//! Small scene with every feature of a scene.
+//! Small scene that contains every feature of a scene.
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{
@@ -25,11 +25,11 @@ const BUMPS: u32 = 12;
 const DENTS: u32 = 13;
 const WINDOW: u32 = 14;
 
-/// A room with a lamp, a point light, a spot and a directional light, a sky through its open front, walls
-/// with textures of both sets of coordinates, a mirror ball, a glass ball, a lattice with cut-outs, an
-/// emissive screen, a veil of partial coverage with sheen and diffuse transmission, a varnished board, a
-/// rough pane and a rough block of glass, normal maps on a glossy and on a Lambertian sheet, and under the
-/// lamps a shelf of tinted glass and a coated window with textures.
+/// Creates a room with every feature. It has a lamp, a point, a spot and a directional light, a sky through
+/// its open front, and walls with textures of both sets of coordinates. In it are a mirror ball, a glass
+/// ball, a lattice with cut-outs, an emissive screen, a veil of partial coverage with sheen and diffuse
+/// transmission, a varnished board, a rough pane and a rough block of glass, and normal maps on a glossy and
+/// on a Lambertian sheet. Under the lamps are a shelf of tinted glass and a coated window with textures.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);

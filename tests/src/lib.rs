@@ -15,12 +15,12 @@ use photoncard_driver::film::Film;
 use photoncard_driver::render::{RenderSettings, Rendering, Unobserved, render};
 use photoncard_driver::scene::{Camera, Material, Reflection, Scene, Transmission, Triangle};
 
-/// A grey, one-sided Lambertian material of an albedo that does not emit.
+/// Creates a grey, one-sided Lambertian material that does not emit.
 pub fn lambertian(name: &str, albedo: f32) -> Material {
     Material::lambertian(name, Vec3::splat(albedo))
 }
 
-/// Smooth clear glass of a base colour and an index of refraction of 1.5.
+/// Creates smooth clear glass with this base colour and the index of refraction 1.5.
 pub fn glass(name: &str, base_colour: Vec3, is_volume: bool) -> Material {
     let transmission = Transmission { factor: 1.0, ior: 1.5, is_volume, absorption: Vec3::ZERO };
     let reflection = Reflection::MetallicRoughness {
@@ -34,13 +34,13 @@ pub fn glass(name: &str, base_colour: Vec3, is_volume: bool) -> Material {
     Material::new(name, reflection)
 }
 
-/// The two triangles of a quadrilateral with corners in counter-clockwise order, seen from its front.
+/// Two triangles of a quadrilateral. `corners` are counter-clockwise seen from its front.
 pub fn quad(corners: [Vec3; 4], material: u32) -> [Triangle; 2] {
     let [a, b, c, d] = corners;
     [Triangle::new([a, b, c], material), Triangle::new([a, c, d], material)]
 }
 
-/// The six inner walls of the cube from -1 to 1, each of its own material: -x, +x, -y, +y, -z, +z.
+/// Six inner walls of the cube from -1 to 1, in the order -x, +x, -y, +y, -z, +z, each with its own material.
 pub fn room(materials: [u32; 6]) -> Vec<Triangle> {
     let axes = [Vec3::X, Vec3::Y, Vec3::Z];
     let mut triangles = Vec::new();
@@ -55,7 +55,7 @@ pub fn room(materials: [u32; 6]) -> Vec<Triangle> {
     triangles
 }
 
-/// A camera that looks along a direction with a field of view of 90 degrees.
+/// Creates a camera with a field of view of 90 degrees.
 pub fn camera(origin: Vec3, forward: Vec3) -> Camera {
     let forward = forward.normalize();
     let right = forward.cross(Vec3::Y).normalize();
@@ -70,7 +70,7 @@ pub fn camera(origin: Vec3, forward: Vec3) -> Camera {
     }
 }
 
-/// A scene of triangles, materials and one camera.
+/// Creates a scene of triangles, materials and one camera.
 pub fn scene(triangles: Vec<Triangle>, materials: Vec<Material>, camera: Camera) -> Scene {
     Scene { triangles, materials, cameras: vec![camera], ..Scene::default() }
 }
@@ -83,18 +83,18 @@ pub fn render_or_panic(scene: &Scene, settings: &RenderSettings) -> Rendering {
     render(scene, settings, &Unobserved).unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// Radiances of a film's pixels, row by row, W/(sr m^2).
+/// Radiance of each pixel of a film, row by row, W/(sr m^2).
 pub fn radiances(film: &Film) -> Vec<[f32; 3]> {
     film.pixels().map(|pixel| pixel.radiance).collect()
 }
 
-/// Mean of radiances over pixels and channels.
+/// Mean over all pixels and channels.
 pub fn mean(radiances: &[[f32; 3]]) -> f64 {
     let sum: f64 = radiances.as_flattened().iter().map(|&channel| channel as f64).sum();
     sum / (3 * radiances.len()) as f64
 }
 
-/// Does some work on a thread whose stack has room for a card's buffers, which are built there.
+/// Runs `work` on a thread whose stack has room for a card's buffers, because they are built on the stack.
 ///
 /// # Panics
 /// If the work panics, or the thread cannot be started.

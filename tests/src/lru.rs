@@ -1,23 +1,23 @@
-//! Set-associative LRU cache in its simplest form: the oracle for the firmware's caches.
+//! Set-associative LRU cache in its simplest form, the oracle for the firmware's caches.
 
-/// A set-associative cache with least-recently-used replacement: for every set its blocks, the last used at
-/// the end.
+/// Set-associative cache with least-recently-used replacement. The blocks of a set are listed with the last
+/// used at the end.
 pub struct LruOracle {
     sets: Vec<Vec<u32>>,
     ways: usize,
     lines: u32,
-    /// Function from a block to its set.
+    /// Maps a block to its set.
     set: Box<dyn Fn(u32) -> u32>,
 }
 
 impl LruOracle {
-    /// An empty cache of `ways` blocks per set, each of `lines` lines of card memory, in the set that `set`
-    /// gives.
+    /// Creates an empty cache with `ways` blocks per set. A block has `lines` lines of card memory; `set`
+    /// maps it to its set.
     pub fn new(sets: u32, ways: u32, lines: u32, set: impl Fn(u32) -> u32 + 'static) -> Self {
         Self { sets: vec![Vec::new(); sets as usize], ways: ways as usize, lines, set: Box::new(set) }
     }
 
-    /// Reads a line: returns whether it hits, and brings its block into the cache if it misses.
+    /// Reads a line and returns whether it hits. On a miss its block enters the cache.
     ///
     /// # Panics
     /// If `set` gives no valid set.

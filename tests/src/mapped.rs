@@ -1,4 +1,4 @@
-//! Scenes with one photon map for several frames, so that frames differ in the gather alone.
+//! Scenes whose photon map is shared by several frames, so that frames differ only in the gather.
 
 use glam::Vec3;
 use photoncard_driver::emulator::direct::render_tile;
@@ -21,7 +21,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{CausticGather, FrameParameters, Sampling, Tile};
 use rayon::prelude::*;
 
-/// A scene with its card image and photon map.
+/// Scene with its card image and photon map.
 pub struct MappedScene {
     scene: Scene,
     image: CardImage,
@@ -29,7 +29,7 @@ pub struct MappedScene {
     caustics: Option<CausticGather>,
 }
 
-/// A rendered frame: the pixels of its window, and counts of the work.
+/// Rendered frame: the pixels of its window, and the counted work.
 pub struct Frame {
     /// Radiance of the pixels, row by row, W/(sr m^2).
     pub radiance: Vec<Vec3>,
@@ -38,7 +38,7 @@ pub struct Frame {
 }
 
 impl MappedScene {
-    /// Traces photons and packs the card image, like a render with these settings.
+    /// Traces photons and packs the card image, as a render with these settings does.
     ///
     /// # Panics
     /// If the scene cannot be packed, or its photons cannot be traced.
@@ -81,16 +81,16 @@ impl MappedScene {
     }
 }
 
-/// Indirect light of single surface points, gathered without a render of a picture.
+/// Indirect light of single surface points, gathered without rendering a picture.
 pub struct IndirectLight<'a> {
     mapped: &'a MappedScene,
     frame: FrameParameters,
-    /// The points, spread evenly over the picture, without points of black reflection.
+    /// Surface points spread evenly over the picture; points whose reflection is black are left out.
     pub points: Vec<Surface>,
 }
 
 impl<'a> IndirectLight<'a> {
-    /// The points that a camera sees at the centres of `side * side` cells of the picture.
+    /// Finds the points that a camera sees at the centres of `side * side` cells of the picture.
     ///
     /// # Panics
     /// If the scene has no camera of the settings' name, or the card image is malformed.
@@ -111,8 +111,8 @@ impl<'a> IndirectLight<'a> {
         Self { mapped, frame, points }
     }
 
-    /// Radiance of indirect light that each point reflects towards the eye, W/(sr m^2), by `rays` gather rays
-    /// of a sampling.
+    /// Radiance of indirect light that each point reflects towards the eye, W/(sr m^2), estimated by `rays`
+    /// gather rays of a sampling.
     ///
     /// # Panics
     /// If the card image is malformed.

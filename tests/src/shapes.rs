@@ -1,11 +1,11 @@
-//! Shapes for scenes of tests.
+//! Shapes for the scenes of tests.
 
 use glam::{Vec2, Vec3, Vec4};
 use photoncard_driver::scene::{Scene, Triangle, VertexAttributes};
 
 use crate::{quad, room};
 
-/// An axis-aligned box that faces outwards, of half sides `half`.
+/// Axis-aligned box that faces outwards; `half` is half its size.
 pub fn cuboid(centre: Vec3, half: Vec3, material: u32) -> Vec<Triangle> {
     // The room's walls, with their fronts turned outwards.
     let mut walls = room([material; 6]);
@@ -16,7 +16,7 @@ pub fn cuboid(centre: Vec3, half: Vec3, material: u32) -> Vec<Triangle> {
     walls
 }
 
-/// Adds a ball of `steps` by `2 steps` quadrilaterals with smooth vertex normals to a scene.
+/// Adds a ball with smooth vertex normals to a scene. It has `steps` by `2 steps` quadrilaterals.
 pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, material: u32) {
     let normal = |row: u32, column: u32| {
         let pole = std::f32::consts::PI * row as f32 / steps as f32;
@@ -48,8 +48,8 @@ pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, materi
     }
 }
 
-/// Adds a quadrilateral with texture coordinates of the first set to a scene; corners counter-clockwise seen
-/// from the front.
+/// Adds a quadrilateral with texture coordinates of set 0 to a scene. Corners are counter-clockwise seen from
+/// the front.
 pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f32; 2]; 4], material: u32) {
     let [a, b, c, d] = coordinates.map(Vec2::from);
     for (triangle, coordinates) in quad(corners, material).into_iter().zip([[a, b, c], [a, c, d]]) {
@@ -60,7 +60,8 @@ pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f
     }
 }
 
-/// Gives the textured triangles of a material tangents: a direction, with the sign of the bitangent in w.
+/// Adds equal tangents to the textured triangles of a material: a direction, with the sign of the bitangent
+/// in w.
 pub fn add_tangents(scene: &mut Scene, material: u32, tangent: Vec4) {
     for triangle in scene.triangles.iter().filter(|triangle| triangle.material == material) {
         scene.attributes[triangle.attributes as usize].tangents = scene.tangents.len() as u32;

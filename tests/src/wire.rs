@@ -1,4 +1,4 @@
-//! A card on a lossless link, driven command by command.
+//! Card on a lossless link that a test drives command by command.
 
 use photoncard_firmware::card::Card;
 use photoncard_firmware::kind::{FixedKind, Micro};
@@ -11,17 +11,17 @@ use photoncard_shared::message::{
 };
 use photoncard_shared::transport::Transport;
 
-/// A card, and the host's end of its link, through which a test gives commands.
+/// Card, and the host's end of its link, by which a test sends commands.
 pub struct Wire<'a, K: FixedKind = Micro> {
     /// The card.
     pub card: Box<Card<K, Dram<'a>>>,
     host: Transport,
     session: u32,
-    /// True if the last frame begun has layers.
+    /// True if the last frame that was started has layers.
     layers: bool,
 }
 
-/// A [`Reply`] with owned data, as far as tests need it.
+/// Owned summary of a [`Reply`] with what tests need.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
     /// [`Reply::Hello`]: number of written lines, and the firmware's use of on-chip memory.
@@ -45,20 +45,20 @@ pub enum Answer {
 }
 
 impl<'a> Wire<'a> {
-    /// A micro card that was just switched on, with `memory` for its DRAM.
+    /// Creates a micro card after power-on whose DRAM is `memory`.
     pub fn new(memory: &'a mut [Line]) -> Self {
         Self::of_kind(memory)
     }
 }
 
 impl<'a, K: FixedKind> Wire<'a, K> {
-    /// A card of a kind that was just switched on, with `memory` for its DRAM.
+    /// Creates a card of kind `K` after power-on whose DRAM is `memory`.
     pub fn of_kind(memory: &'a mut [Line]) -> Self {
         let card = Box::new(Card::new(Dram::new(memory)));
         Self { card, host: Transport::host(), session: 0, layers: false }
     }
 
-    /// Sends a command and lets the card work until it is idle. Returns its answers.
+    /// Sends a command and runs the card until it is idle. Returns its answers.
     ///
     /// # Panics
     /// If the card sends anything but replies.
@@ -66,11 +66,11 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         self.say_all(std::slice::from_ref(command))
     }
 
-    /// Sends commands without waiting for answers in between, and lets the card work until it is idle.
-    /// Returns its answers.
+    /// Sends commands without waiting for answers in between, and runs the card until it is idle. Returns its
+    /// answers.
     ///
     /// # Panics
-    /// If there are more than the link's window holds, or the card sends anything but replies.
+    /// If there are more commands than the link's window holds, or the card sends anything but replies.
     pub fn say_all(&mut self, commands: &[Command]) -> Vec<Answer> {
         for command in commands {
             if let Command::BeginFrame(frame) = command {
@@ -81,7 +81,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         self.work()
     }
 
-    /// Sends a raw message, which need not be a command, and lets the card work until it is idle. Returns its
+    /// Sends a raw message, which need not be a command, and runs the card until it is idle. Returns its
     /// answers.
     ///
     /// # Panics
@@ -94,7 +94,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         self.work()
     }
 
-    /// Lets the card work until it is idle. Returns its answers.
+    /// Runs the card until it is idle. Returns its answers.
     ///
     /// # Panics
     /// If the card sends anything but replies.
@@ -125,7 +125,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         }
     }
 
-    /// Begins a session. Returns the number of lines that are written in the card's memory.
+    /// Starts a session. Returns the number of lines written in the card's memory.
     ///
     /// # Panics
     /// If the card does not say hello.
@@ -138,8 +138,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         }
     }
 
-    /// Loads an image in reverse order of its writes, from the last lines to the first. Returns the card's
-    /// answers.
+    /// Loads an image, its last lines first. Returns the card's answers.
     pub fn load(&mut self, lines: &[Line]) -> Vec<Answer> {
         let begin = Command::BeginImage { lines: lines.len() as u32, checksum: image_checksum(lines) };
         let mut answers = self.say(&begin);

@@ -1,21 +1,23 @@
-//! The operations themselves: what a processor without floating-point instructions calls, each counted by its
-//! kind and the place of the call. They use the instructions of SSE2, which the rest of the program does
-//! without, and so round as every processor does.
+//! Software floating-point operations, which a processor without floating-point instructions calls. Each is
+//! counted by its kind and the position of the call. They are implemented by SSE2 instructions, which the
+//! rest of the program does not use, and therefore round as on every processor.
 
 use core::arch::global_asm;
 
-/// Kinds of operations, in the order of their tables: additions and subtractions, multiplications, divisions,
-/// square roots, comparisons, conversions, roundings to whole numbers, calls of libm's other functions.
+/// Number of kinds of operations. In the order of their tables they are: additions and subtractions,
+/// multiplications, divisions, square roots, comparisons, conversions, roundings to integers, and calls of
+/// libm's other functions.
 pub(crate) const KINDS: usize = 8;
 
-/// Size of the program's code that a table has room for, bytes.
+/// Maximum size of the program's code for which tables have room, bytes.
 pub(crate) const CODE_BYTES: usize = 4 << 20;
 
-/// Counts of each kind for each place in the code.
+/// Counts of each kind at each position in the code.
 #[unsafe(no_mangle)]
 pub(crate) static mut OPERATION_COUNTS: [[u64; CODE_BYTES]; KINDS] = [[0; CODE_BYTES]; KINDS];
 
-/// Place of the call of a function of libm that is being computed: its operations count there; 0 outside.
+/// Position of the call of the libm function that is being computed, where its operations are counted; 0
+/// outside such functions.
 #[unsafe(no_mangle)]
 static mut OPERATION_PLACE: u64 = 0;
 

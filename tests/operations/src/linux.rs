@@ -1,4 +1,4 @@
-//! What the program needs of Linux.
+//! System calls of Linux that the program needs.
 
 use core::arch::{asm, global_asm};
 
@@ -11,15 +11,15 @@ unsafe extern "C" {
     static __executable_start: u8;
 }
 
-/// Address of a place, which is counted from the start of the program.
+/// Address of a position that is relative to the start of the program.
 pub(crate) fn address(place: usize) -> u64 {
     ((&raw const __executable_start).addr() + place) as u64
 }
 
-/// A system call with up to six arguments.
+/// Makes a system call with up to six arguments.
 ///
 /// # Safety
-/// As the call's.
+/// The requirements of the system call apply.
 unsafe fn call(number: usize, arguments: [usize; 6]) -> isize {
     let [a, b, c, d, e, f] = arguments;
     let result;
@@ -31,7 +31,7 @@ unsafe fn call(number: usize, arguments: [usize; 6]) -> isize {
     result
 }
 
-/// The file of standard input, mapped into memory; `None` for anything but a file of whole lines.
+/// Maps the file of standard input into memory; `None` unless it is a file of whole lines.
 pub(crate) fn standard_input() -> Option<&'static [Line]> {
     const SEEK_END: usize = 2;
     const PROT_READ: usize = 1;

@@ -1,11 +1,11 @@
-//! The firmware of a reference chip, compiled without floating-point instructions: every operation is a call,
-//! which is counted by its kind and its place in the code (`counters`). A program of Linux on x86-64 without
-//! libraries.
+//! Firmware of a reference chip, compiled without floating-point instructions. Every operation is a call that
+//! is counted by its kind and its position in the code (`counters`). The program is for Linux on x86-64,
+//! without libraries.
 //!
-//! Standard input is a file of lines: a card image, the frame's parameters, and tiles, each of the last two
-//! as a byte of length and a message. Standard output is, for each tile, its counters in such a line; and
-//! behind them three numbers of eight bytes for each place that did something: the kind, the address behind
-//! the call, the count.
+//! Standard input is a file of lines: a card image, the frame's parameters, and tiles. Parameters and tiles
+//! are each a length byte followed by a message. Standard output has such a line with the counters of each
+//! tile. Three numbers of eight bytes follow for each position with operations: the kind, the return address
+//! of the call, and the count.
 #![no_std]
 #![no_main]
 
@@ -25,7 +25,7 @@ use self::counters::{CODE_BYTES, KINDS, OPERATION_COUNTS};
 
 static mut CHIP: ReferenceChip = ReferenceChip::new();
 
-/// A message in a line, behind its length.
+/// Message in a line, after its length.
 fn message<'a, T: serde::Deserialize<'a>>(line: &'a Line) -> Option<T> {
     let (&length, bytes) = line.0.split_first()?;
     message::decode(bytes.get(..length.into())?)

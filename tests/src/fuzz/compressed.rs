@@ -17,18 +17,18 @@ const MESHOPT: [&[u8]; 2] = [
     include_bytes!("../../../driver/scene/tests/it/compressed/meshopt-1.glb"),
 ];
 
-/// Scenes with a primitive of every attribute, by both encoders of Draco.
+/// Scenes with a primitive that has every attribute, compressed by both encoders of Draco.
 const DRACO: [&[u8]; 2] = [
     include_bytes!("../../../driver/scene/tests/it/compressed/draco-edgebreaker.glb"),
     include_bytes!("../../../driver/scene/tests/it/compressed/draco-sequential.glb"),
 ];
 
-/// Target of compressed contents. An input is a scene.
+/// Target for compressed contents. An input is a scene.
 pub(super) struct Streams {
     name: &'static str,
-    /// Maximum number of bytes that a byte of a stream stands for.
+    /// Maximum number of decoded bytes per byte of a stream.
     expansion: usize,
-    /// JSON and streams of each scene.
+    /// JSON and binary chunk of each scene.
     scenes: Vec<(Vec<u8>, Vec<u8>)>,
     streams: Vec<Vec<u8>>,
     folder: TempDir,

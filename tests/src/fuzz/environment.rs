@@ -1,4 +1,4 @@
-//! Fuzzing of environments in Radiance pictures. Those in `OpenEXR` are covered by `picture`.
+//! Fuzzing of environment maps in Radiance format. Those in `OpenEXR` are covered by `picture`.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,13 +10,13 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
 
-/// Target of environments.
+/// Target for environment maps.
 pub(super) struct Environments {
     seeds: Vec<Vec<u8>>,
     folder: TempDir,
 }
 
-/// Columns of the run-length encoded picture.
+/// Width of the run-length encoded picture, pixels.
 const WIDTH: u8 = 12;
 
 /// Pictures with plain and with run-length encoded rows.

@@ -13,22 +13,22 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
 
-/// Maximum number of triangles of a scene that is packed; larger ones are loaded only.
+/// Maximum number of triangles of a scene that is packed. Larger ones are only loaded.
 const MAX_PACKED: usize = 2000;
 
-/// Target of scenes.
+/// Target for scenes.
 pub(super) struct Scenes {
     texts: Vec<Vec<u8>>,
-    /// JSON and binary chunk of scenes in GLB.
+    /// JSON and binary chunk of each scene in GLB.
     binaries: Vec<(Vec<u8>, Vec<u8>)>,
     /// All scenes as files.
     files: Vec<Vec<u8>>,
     folder: TempDir,
 }
 
-/// Scene with every feature that the loader reads: a hierarchy, sparse positions, normals, coordinates,
-/// colours, a skin, instances, a strip, textures, a lobe, glass, a converted material, variants, lights, an
-/// orthographic camera, animations, morph targets.
+/// Scene with every feature that the loader reads: a node hierarchy, sparse positions, normals, texture
+/// coordinates, colours, a skin, instances, a strip, textures, a Phong lobe, glass, a specular-glossiness
+/// material, variants, lights, an orthographic camera, animations, morph targets.
 const RICH: &[u8] = include_bytes!("../../fuzz/rich.gltf");
 const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/furnace.gltf"),
@@ -36,11 +36,11 @@ const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/cornell-glossy.gltf"),
 ];
 
-/// Images, each at a multiple of four bytes, after the triangle's data.
+/// Image files. They follow the triangle's data in the buffer, aligned to four bytes.
 const PNG: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/texel.png");
 const JPEG: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/grey.jpg");
 
-/// Bytes of a triangle: vertices, indices, an index and a position of a sparse accessor, coordinates,
+/// Buffer of a triangle: vertices, indices, an index and a position of a sparse accessor, coordinates,
 /// colours, joints, weights, a matrix, images, and times, rotations and weights of keyframes.
 fn triangle_bytes() -> Vec<u8> {
     let vertices = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
@@ -75,7 +75,7 @@ fn triangle_bytes() -> Vec<u8> {
     bytes
 }
 
-/// Scene whose bytes are in its text.
+/// Scene as text whose buffer is a data URI.
 fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let data: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
     let text = String::from_utf8_lossy(text);
@@ -84,7 +84,7 @@ fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     text.replace(&stated, &format!("{stated}, \"uri\": \"data:,{data}\"")).into_bytes()
 }
 
-/// GLB of JSON and bytes, with correct lengths in its headers.
+/// GLB with correct lengths in its headers.
 pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let mut text = text.to_vec();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -100,7 +100,7 @@ pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     file
 }
 
-/// JSON and bytes of a GLB of two chunks.
+/// Splits a GLB of two chunks into JSON and bytes.
 pub(crate) fn split_glb(file: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     let chunk = |at: usize| {
         let length = u32::from_le_bytes(*file.get(at..)?.first_chunk()?) as usize;
@@ -131,14 +131,14 @@ impl Scenes {
     }
 }
 
-/// Makes few edits: most single ones are rejected already.
+/// Makes few edits, because most single ones already make a scene invalid.
 fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     for _ in 0..1 + random.edits() / 3 {
         mutation::edit_json(text, random);
     }
 }
 
-/// The scene at rest, after it was placed at a moment of its animations.
+/// Loads a scene, evaluates it at a time of its animations, and returns it at rest.
 pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
     let file = SceneFile::open(path, &LoadSettings::default())?;
     let scene = file.at_rest()?;

@@ -1,5 +1,5 @@
-//! Fuzzing of files with headings: parts of pictures, and prepared scenes. Their checksums are made anew in
-//! half of the inputs, as somebody would who means harm.
+//! Fuzzing of files with a head: parts of pictures and prepared scenes. In half of the inputs the checksums
+//! are recomputed, as an attacker would.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,15 +17,15 @@ use super::random::Random;
 use super::target::Target;
 use crate::everything::everything;
 
-/// Maximum number of bytes that a file may have allocated: patches of the largest picture, of which the file
-/// has next to none.
+/// Maximum number of bytes that a file may allocate: the patches of the largest picture, although the file
+/// contains almost none of them.
 const BOUND: usize = 256 << 20;
-/// Multiple of bytes at which the lines of a prepared scene begin.
+/// Alignment of the lines in a prepared scene, bytes.
 const PAGE: usize = 4096;
-/// Beginning of the record of a tile in a part.
+/// First bytes of a tile's record in a part.
 const TILE: &[u8] = b"\x89TILE";
 
-/// Target of a kind of files.
+/// Target for one kind of files.
 pub(super) struct Files {
     name: &'static str,
     seeds: Vec<Vec<u8>>,
@@ -34,7 +34,7 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Parts of a picture: all of it, and one of three.
+    /// Creates the target for parts: one that is the whole picture, and one of three.
     pub(super) fn parts() -> Self {
         let folder = tempfile::tempdir().expect("there is room for a folder");
         let settings = settings();
@@ -55,7 +55,7 @@ impl Files {
         Self { name: "parts", seeds, folder, read: read_part }
     }
 
-    /// A prepared scene with every kind of section.
+    /// Creates the target for a prepared scene with every kind of section.
     pub(super) fn prepared() -> Self {
         let folder = tempfile::tempdir().expect("there is room for a folder");
         let RenderSettings { photons, integrator, .. } = settings();
@@ -115,7 +115,7 @@ fn read_prepared(path: &Path) -> bool {
     true
 }
 
-/// A file of a head that was edited, with a checksum of its own, and tiles that are bound to it.
+/// File with an edited head and a recomputed checksum, to which its tiles are bound.
 fn resigned(file: &[u8], page: usize, random: &mut Random) -> Vec<u8> {
     let mut lines = file.splitn(3, |&byte| byte == b'\n');
     let [title, head, rest] = [(); 3].map(|()| lines.next().unwrap_or_default().to_vec());
@@ -132,7 +132,7 @@ fn resigned(file: &[u8], page: usize, random: &mut Random) -> Vec<u8> {
     [bytes, body].concat()
 }
 
-/// Makes the checksums of tiles anew, which begin with that of the head.
+/// Recomputes the checksums of tiles, which include that of the head.
 fn bind_tiles(body: &mut [u8], head: [u8; 4]) {
     let starts: Vec<usize> = (0..body.len()).filter(|&place| body[place..].starts_with(TILE)).collect();
     let ends: Vec<usize> = starts.iter().skip(1).copied().chain([body.len()]).collect();

@@ -1,4 +1,4 @@
-//! Fuzzing of card images: a card that loads one renders a tile of it, or answers with a fault.
+//! Fuzzing of card images. A card that loads one must render a tile or answer with a fault.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -21,16 +21,16 @@ use crate::{camera, lambertian, room, scene};
 
 /// Number of lines of the card's memory.
 const DRAM_LINES: usize = 1024;
-/// Tile in the middle of the picture, which sees several walls.
+/// Tile in the middle of the picture that sees several walls.
 const TILE: Tile = Tile { id: 7, x: 2, y: 2, width: 4, height: 4 };
 
-/// Target of card images. An input is a byte that selects the techniques, and an image.
+/// Target for card images. An input is a byte that selects the techniques, followed by an image.
 pub(super) struct Image {
     seeds: Vec<Vec<u8>>,
 }
 
-/// Images of a lit room with a few photons, in both layouts of the photon map, with irradiance points; and of
-/// a scene with every feature, with a caustic map.
+/// Card images of two scenes. The lit room has a few photons in both layouts of the photon map, with
+/// irradiance points. The scene with every feature has a caustic map.
 fn images() -> [CardImage; 3] {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;
@@ -54,7 +54,7 @@ fn images() -> [CardImage; 3] {
     [tree, leaves, mapped.image]
 }
 
-/// Frame whose techniques a byte selects.
+/// Frame with the techniques that a byte selects.
 fn frame(choice: u8) -> FrameParameters {
     let settings = RenderSettings {
         picture: Picture { width: 8, height: 8, ..Picture::default() },
@@ -87,7 +87,7 @@ impl Image {
     }
 }
 
-/// Makes one edit of an image that mostly keeps the positions of lines.
+/// Makes one edit of an image. Most edits keep the positions of lines.
 fn edit(image: &mut Vec<u8>, seeds: &[Vec<u8>], random: &mut Random) {
     let lines = image.len() / LINE_BYTES;
     if lines == 0 {
@@ -171,7 +171,7 @@ impl Target for Image {
     }
 }
 
-/// Number of pixels received.
+/// Number of pixels in the answers.
 fn pixels(answers: &[Answer]) -> usize {
     let count = |answer: &Answer| if let Answer::Pixels(count) = answer { *count } else { 0 };
     answers.iter().map(count).sum()

@@ -1,4 +1,4 @@
-//! Fuzzing of messages: payloads of frames that are commands, replies, or neither.
+//! Fuzzing of messages: payloads of frames that may be commands, replies, or neither.
 
 use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
@@ -12,12 +12,12 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
 
-/// Target of messages.
+/// Target for messages.
 pub(super) struct Messages {
     seeds: Vec<Vec<u8>>,
 }
 
-/// Frame that any chip renders.
+/// Frame that every chip can render.
 pub(super) fn frame() -> FrameParameters {
     let camera = Camera {
         origin: [0.0, 1.0, 5.0],
@@ -52,7 +52,7 @@ pub(super) fn frame() -> FrameParameters {
     }
 }
 
-/// One of each command.
+/// One encoded command of each kind.
 pub(super) fn commands() -> Vec<Vec<u8>> {
     let data = [0x5a; 256];
     let commands = [
@@ -70,7 +70,7 @@ pub(super) fn commands() -> Vec<Vec<u8>> {
     commands.iter().map(|command| written(MAX_PAYLOAD, |bytes| message::encode(command, bytes))).collect()
 }
 
-/// One of each reply.
+/// One encoded reply of each kind.
 pub(super) fn replies() -> Vec<Vec<u8>> {
     let data = [0x5a; 400];
     let hello = |budget, memory_use| Reply::Hello {
@@ -120,13 +120,13 @@ impl Messages {
     }
 }
 
-/// Decodes and encodes a command; the result must not be longer.
+/// Decodes and re-encodes a command. The result must not be longer.
 fn rewritten_command(input: &[u8]) -> Option<Vec<u8>> {
     let command = message::decode::<Command>(input)?;
     Some(written(input.len(), |bytes| message::encode(&command, bytes)))
 }
 
-/// Decodes and encodes a reply; the result must not be longer.
+/// Decodes and re-encodes a reply. The result must not be longer.
 fn rewritten_reply(input: &[u8]) -> Option<Vec<u8>> {
     let reply = message::decode::<Reply>(input)?;
     Some(written(input.len(), |bytes| message::encode(&reply, bytes)))

@@ -1,8 +1,8 @@
-//! Fuzzing of all readers of foreign bytes: mutated inputs, each a function of its target, a seed and a
-//! number.
+//! Fuzzing of all readers of foreign bytes. Inputs are mutated; each is a function of its target, a seed and
+//! a number.
 //!
 //! No input may panic, take longer than some seconds, or allocate more than a bound. A coverage-guided fuzzer
-//! would do more, but needs another compiler; here a failing input is replayed by its number.
+//! would do more, but needs another compiler. A failing input is repeated by its number.
 
 mod compressed;
 pub(crate) mod environment;
@@ -42,7 +42,7 @@ pub const NAMES: [&str; 12] = [
     "prepared",
 ];
 
-/// Target with the name `name`.
+/// Target with this name; `None` if there is none.
 pub fn target(name: &str) -> Option<Arc<dyn Target>> {
     match name {
         "frames" => Some(Arc::new(transport::Frames::new())),

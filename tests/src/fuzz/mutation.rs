@@ -1,4 +1,4 @@
-//! Mutations of bytes, and of the tokens of JSON text.
+//! Mutations of bytes and of JSON tokens.
 
 use std::ops::Range;
 
@@ -37,7 +37,7 @@ const WORDS: [u64; 24] = [
     u64::MAX,
 ];
 
-/// Floats at the limits of arithmetic.
+/// Floating-point numbers at the limits of arithmetic.
 const FLOATS: [f32; 14] = [
     0.0,
     -0.0,
@@ -62,7 +62,7 @@ fn chunk(bytes: usize, random: &mut Random) -> Range<usize> {
     start..start + random.below(most + 1)
 }
 
-/// Overwrites the bytes from `place` on by a word of 1, 2, 4 or 8 bytes at the limits of integer fields.
+/// Overwrites the bytes at `place` with a word of [`WORDS`], of 1, 2, 4 or 8 bytes.
 pub(crate) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
     let word = if random.once_in(3) {
         u64::from(random.pick(&FLOATS).to_bits())
@@ -81,7 +81,7 @@ pub(crate) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
     }
 }
 
-/// Makes one edit of arbitrary bytes; inserted chunks come from the bytes themselves and from `others`.
+/// Makes one edit of arbitrary bytes. Inserted chunks come from the bytes themselves and from `others`.
 pub(crate) fn edit_bytes(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
     if bytes.is_empty() {
         bytes.push(random.next() as u8);
@@ -175,7 +175,7 @@ const STRINGS: [&str; 14] = [
     "0",
 ];
 
-/// Ranges of numbers, or of strings with their quotes.
+/// Ranges of the numbers in a text or, if `strings`, of its strings with their quotes.
 fn tokens(text: &[u8], strings: bool) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut at = 0;
@@ -203,7 +203,7 @@ fn tokens(text: &[u8], strings: bool) -> Vec<Range<usize>> {
     found
 }
 
-/// End of the value that begins at `start`: the comma or bracket after it.
+/// End of the value that begins at `start`: the position of the comma or bracket after it.
 fn value_end(text: &[u8], start: usize) -> usize {
     let (mut depth, mut is_string) = (0, false);
     for (offset, &byte) in text[start..].iter().enumerate() {

@@ -17,12 +17,12 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound};
 
-/// Columns and rows of the pictures.
+/// Width and height of the pictures, pixels.
 const SIZE: [usize; 2] = [20, 36];
-/// Maximum number of pixels of a picture that is compared; larger ones are read only.
+/// Maximum number of pixels of a picture that is compared. Larger ones are only read.
 const MAX_COMPARED: usize = 1 << 16;
 
-/// Target of pictures.
+/// Target for pictures.
 pub(super) struct Pictures {
     seeds: Vec<Vec<u8>>,
     folder: TempDir,
@@ -47,7 +47,7 @@ fn picture(compression: Compression, blocks: Blocks, is_half: bool) -> Option<Ve
     Some(bytes.into_inner())
 }
 
-/// Pictures of each compression that is written, in scanlines and in tiles.
+/// Pictures with each compression that the encoder supports, in scanlines and in tiles.
 pub(crate) fn pictures() -> Vec<Vec<u8>> {
     let compressions = [
         Compression::Uncompressed,

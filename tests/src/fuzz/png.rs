@@ -12,8 +12,8 @@ type Chunk = ([u8; 4], Vec<u8>);
 const TYPES: [&[u8; 4]; 9] =
     [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"gAMA", b"iCCP", b"acTL", b"fcTL"];
 
-/// Makes one edit of the chunks of a file: of one chunk's data, or of their list. Bytes after the chunks are
-/// lost.
+/// Makes one edit of a file's chunks: of the data of one chunk, or of the list of chunks. Bytes after the
+/// last chunk are lost.
 pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     let mut chunks = split(file);
     if chunks.is_empty() {
@@ -39,7 +39,7 @@ pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     *file = join(&chunks);
 }
 
-/// Corrects the checksums of chunks, and changes nothing else.
+/// Corrects the checksums of chunks without other changes.
 pub(crate) fn mend_checksums(file: &mut [u8]) {
     let mut at = MAGIC.len();
     while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk::<4>()) {
@@ -100,7 +100,8 @@ mod tests {
         assert_eq!(damaged, FILE);
     }
 
-    /// The edits include palettes whose length is no multiple of three, for which a decoder has panicked.
+    /// Checks that edits include palettes whose length is no multiple of three, for which a decoder has
+    /// panicked.
     #[test]
     fn palettes_of_odd_lengths_are_reached() {
         let odd = |number| {

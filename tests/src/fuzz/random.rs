@@ -1,12 +1,13 @@
-//! Random numbers as a function of target, seed and input number: `SplitMix64` (Steele, Lea, Flood 2014).
+//! Pseudo-random numbers as a function of target, seed and input number: `SplitMix64` (Steele, Lea, Flood
+//! 2014).
 
-/// Sequence of random numbers.
+/// Sequence of pseudo-random numbers.
 pub struct Random(u64);
 
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 impl Random {
-    /// Sequence of input `number` of a target.
+    /// Creates the sequence for input `number` of a target.
     pub fn new(target: &str, seed: u64, number: u64) -> Self {
         let mut random = Self(0);
         for part in target.bytes().map(u64::from).chain([seed, number]) {
@@ -16,7 +17,7 @@ impl Random {
         random
     }
 
-    /// Next number.
+    /// Next number of the sequence.
     #[expect(clippy::should_implement_trait, reason = "a sequence without an end")]
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(STEP);
@@ -26,7 +27,7 @@ impl Random {
         value ^ value >> 31
     }
 
-    /// Random number below `limit`; 0 for a limit of 0.
+    /// Pseudo-random number below `limit`; 0 for a limit of 0.
     pub fn below(&mut self, limit: usize) -> usize {
         (self.next() % (limit.max(1) as u64)) as usize
     }
@@ -36,12 +37,13 @@ impl Random {
         self.below(n) == 0
     }
 
-    /// Random item of a non-empty list.
+    /// Pseudo-random item of a non-empty list.
     pub fn pick<'a, T>(&mut self, items: &'a [T]) -> &'a T {
         &items[self.below(items.len())]
     }
 
-    /// Number of edits, geometrically distributed: 1 with probability 1/2, each further one half as likely.
+    /// Number of edits with a geometric distribution: 1 with probability 1/2, each further one half as
+    /// likely.
     pub fn edits(&mut self) -> u32 {
         1 + self.next().trailing_zeros().min(7)
     }

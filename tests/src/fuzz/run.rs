@@ -1,4 +1,4 @@
-//! Runs inputs on a thread of their own, and detects panics, hangs and excessive allocations.
+//! Runs inputs on a separate thread, and detects panics, hangs and excessive allocations.
 
 use std::cell::RefCell;
 use std::fmt::Write as _;
@@ -17,9 +17,9 @@ use peak_alloc::PeakAlloc;
 use super::random::Random;
 use super::target::Target;
 
-/// Name of the worker thread, whose panics are findings.
+/// Name of the worker thread, in which panics are findings.
 const WORKER: &str = "fuzz";
-/// Stack size: a card's buffers are built on the stack.
+/// Stack size, bytes. It is large because a card's buffers are built on the stack.
 const STACK: usize = 16 << 20;
 /// Interval at which the watchdog polls.
 const GLANCE: Duration = Duration::from_millis(100);
@@ -35,11 +35,11 @@ pub struct Settings {
     pub first: u64,
     /// Number of inputs.
     pub inputs: u64,
-    /// Time after which the run ends, even before the last input.
+    /// Time after which the run ends even if inputs are left.
     pub time: Option<Duration>,
     /// Time limit of one input.
     pub patience: Duration,
-    /// Folder for failing inputs, and for the number of the present one.
+    /// Folder for failing inputs, and for the number of the current one.
     pub folder: PathBuf,
 }
 
@@ -57,10 +57,10 @@ pub struct Failure {
 pub struct Report {
     /// Number of inputs that were read.
     pub inputs: u64,
-    /// Number of inputs that were valid.
+    /// Number of valid inputs.
     pub sound: u64,
-    /// Maximum number of bytes that one input had allocated at once, with the input's number; 0 if
-    /// [`PeakAlloc`] is not the allocator.
+    /// Maximum number of bytes allocated at once by one input, with the input's number; 0 if [`PeakAlloc`] is
+    /// not the allocator.
     pub peak: (usize, u64),
     /// Maximum time of an input, with the input's number.
     pub slowest: (Duration, u64),
@@ -74,8 +74,8 @@ thread_local! {
     static LAST_PANIC: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Installs a hook that stores the message of a worker's panic instead of printing it: some panics are caught
-/// by the tested code.
+/// Installs a panic hook that stores the message of a worker's panic instead of printing it, because the
+/// tested code catches some panics.
 fn keep_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -90,7 +90,7 @@ fn keep_panics() {
     });
 }
 
-/// Runs inputs of a target.
+/// Runs inputs of a target and reports failures.
 ///
 /// # Panics
 /// If the system cannot start a thread.
@@ -118,8 +118,8 @@ pub fn fuzz(target: &Arc<dyn Target>, settings: &Settings) -> Report {
     report
 }
 
-/// Waits for the worker's report, or for an input that takes too long. As a thread cannot be killed, it keeps
-/// running.
+/// Waits for the worker's report, or until an input exceeds `patience`. The thread of such an input
+/// continues, because it cannot be killed.
 fn watch(reports: &Receiver<Report>, at: &AtomicU64, patience: Duration) -> Report {
     let (mut last, mut since) = (at.load(Ordering::Relaxed), Instant::now());
     loop {
@@ -179,7 +179,7 @@ fn run(target: &dyn Target, settings: &Settings, at: &AtomicU64) -> Report {
     report
 }
 
-/// Hexadecimal dump, which `xxd -r -p` converts back.
+/// Hexadecimal dump for `xxd -r -p`.
 fn hex(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len() * 2 + bytes.len() / 32 + 1);
     for row in bytes.chunks(32) {

@@ -1,4 +1,4 @@
-//! Fuzzing of a host's session by a hostile card: mutated replies in any order, without a request, and
+//! Fuzzing of a host's session by a hostile card: mutated replies in any order, unrequested replies, and
 //! resets.
 
 use std::sync::{Arc, Mutex};
@@ -24,32 +24,32 @@ use super::random::Random;
 use super::target::{Target, bound};
 use super::{messages, mutation};
 
-/// Number of lines of the image: several chunks and a part of one.
+/// Number of lines of the image: several chunks and a partial one.
 const LINES: u32 = 200;
-/// Side of a tile; the picture has two tiles.
+/// Side of a tile, pixels. The picture has two tiles.
 const SIDE: u32 = 6;
-/// Time of a step.
+/// Simulated time per step.
 const STEP: Duration = Duration::from_millis(50);
-/// Maximum number of frames that the ends exchange in a step.
+/// Maximum number of frames exchanged per step.
 const MAX_FRAMES: usize = 64;
-/// Number of steps after which a session with a silent card has failed.
+/// Number of steps after which a session with a silent card must have failed.
 const MAX_STEPS: usize = 400;
 
-/// Action of the card in a step: the first byte of each record of an input. Other values send the reply that
-/// follows. The first byte of the input determines whether the frame has layers.
+/// First byte of a record in an input: an action of the card. Other values send the reply that follows. The
+/// first byte of the input states whether the frame has layers.
 const RESET: u8 = 0xff;
 const WAIT: u8 = 0xfe;
 
-/// Target of sessions.
+/// Target for sessions.
 pub(super) struct Sessions {
-    /// Replies of a valid session in order: without layers, and with layers.
+    /// Replies of a valid session in order, without and with layers.
     replies: [Vec<Vec<u8>>; 2],
     others: Vec<Vec<u8>>,
     upload: Arc<Upload>,
     frames: [FrameParameters; 2],
 }
 
-/// Replies of a valid session in order.
+/// Replies of a valid session, in order.
 fn sound_replies(hello: Reply, layers: bool) -> Vec<Vec<u8>> {
     let tile_pixels = vec![0; (SIDE * SIDE) as usize * record_bytes(layers)];
     let pixels_of_reply = PIXELS_BYTES / record_bytes(layers);
@@ -94,7 +94,7 @@ impl Sessions {
         }
     }
 
-    /// Reply of a card that may be hostile.
+    /// Mutated or valid reply of a hostile card.
     fn reply(&self, replies: &[Vec<u8>], sound: &[u8], random: &mut Random) -> Vec<u8> {
         let mut bytes = match random.below(16) {
             0 => random.pick(&self.others).clone(),
@@ -134,7 +134,7 @@ struct Ends<'a> {
 }
 
 impl Ends<'_> {
-    /// Exchanges all pending frames, and advances the time.
+    /// Exchanges all pending frames, and advances the time by a step.
     fn step(&mut self, is_silent: bool) -> Result<(), SessionError> {
         for _ in 0..MAX_FRAMES {
             self.dispatcher.supply(0, &mut self.session, self.now);
@@ -161,7 +161,7 @@ impl Ends<'_> {
         self.session.tick(self.dispatcher.scheduler().slowest(0), self.now)
     }
 
-    /// Handles an error like a render. Returns whether the session continues.
+    /// Handles an error as a render does. Returns whether the session continues.
     fn goes_on(&mut self, result: &Result<(), SessionError>) -> bool {
         let may_pass = result.as_ref().err().is_some_and(SessionError::may_pass);
         if may_pass {

@@ -2,15 +2,15 @@
 
 use super::random::Random;
 
-/// Reader of foreign bytes.
+/// Reader of foreign bytes that is fuzzed.
 pub trait Target: Send + Sync {
     /// Name on the command line.
     fn name(&self) -> &'static str;
 
-    /// Maximum number of bytes that an input of `input` bytes may have allocated at once.
+    /// Maximum number of bytes that an input of `input` bytes may allocate at once.
     fn allocation_bound(&self, input: usize) -> usize;
 
-    /// Makes an input.
+    /// Generates an input.
     fn input(&self, random: &mut Random) -> Vec<u8>;
 
     /// Reads an input. Returns whether it is valid.
@@ -20,7 +20,7 @@ pub trait Target: Send + Sync {
     fn read(&self, input: &[u8]) -> bool;
 }
 
-/// Bound of allocations, bytes: 64 MiB, and `for_each` for each byte of the input.
+/// Bound of allocations, bytes: 64 MiB plus `for_each` per byte of the input.
 pub(super) const fn bound(input: usize, for_each: usize) -> usize {
     (64 << 20) + input * for_each
 }

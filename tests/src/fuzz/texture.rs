@@ -11,13 +11,13 @@ use super::random::Random;
 use super::target::{Target, bound};
 use super::{mutation, png};
 
-/// Target of textures. An input is an image file.
+/// Target for textures. An input is an image file.
 pub(super) struct Textures {
     seeds: Vec<Vec<u8>>,
     folder: TempDir,
 }
 
-/// Images of all colour types of PNG: no edit of a byte adds a palette.
+/// Images of all colour types of PNG, because no edit of a byte adds a palette.
 const SEEDS: [&[u8]; 14] = [
     include_bytes!("../../../driver/scene/tests/it/images/texel.png"),
     include_bytes!("../../../driver/scene/tests/it/images/palette.png"),
@@ -36,10 +36,10 @@ const SEEDS: [&[u8]; 14] = [
 ];
 
 /// Memory of the card, bytes. It bounds the texels of WebP and of ETC1S in KTX2, which may take no bytes of
-/// the file at all.
+/// the file.
 const DRAM_BYTES: u32 = 2 << 20;
 
-/// Scene whose second buffer view, of `image_bytes` bytes, is the base colour of its only triangle.
+/// Scene with one triangle. Its base colour is the second buffer view, of `image_bytes` bytes.
 fn scene(image_bytes: usize) -> String {
     let length = TRIANGLE_BYTES + image_bytes;
     format!(
@@ -57,7 +57,7 @@ fn scene(image_bytes: usize) -> String {
 
 const TRIANGLE_BYTES: usize = 36;
 
-/// Scene of a triangle with an image file as its base colour.
+/// Scene of a triangle whose base colour is an image file.
 pub(crate) fn textured(image: &[u8]) -> Vec<u8> {
     let triangle = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let bytes = [triangle.as_flattened(), image].concat();

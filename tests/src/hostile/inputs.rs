@@ -1,4 +1,4 @@
-//! Inputs: damaged files.
+//! Generates inputs: damaged copies of real files.
 
 use std::fs;
 use std::path::Path;
@@ -6,16 +6,16 @@ use std::path::Path;
 use super::Kind;
 use crate::fuzz::{Random, environment, gltf, mutation, picture, png, texture};
 
-/// Maximum length of the part of a file that is edited at once.
+/// Maximum length of the part of a file that one edit changes, bytes.
 const WINDOW: usize = 1 << 12;
 
-/// A file before it is damaged.
+/// Undamaged file.
 struct Seed {
     extension: String,
     bytes: Vec<u8>,
 }
 
-/// Files of one kind.
+/// Files of one kind, from which inputs are made.
 pub struct Inputs {
     kind: Kind,
     seeds: Vec<Seed>,
@@ -60,7 +60,7 @@ const IMAGES: [&str; 18] = [
 ];
 
 impl Inputs {
-    /// Files of a kind that ship with the project, and generated pictures; none of kept files.
+    /// Reads the files of a kind that ship with the project, and generates pictures. Kept files have none.
     ///
     /// # Panics
     /// If a file is missing.
@@ -88,7 +88,7 @@ impl Inputs {
         Self { kind, seeds }
     }
 
-    /// Input `number`: the extension of its file, and its bytes.
+    /// Input `number`: the suffix of its file, and its bytes.
     pub fn make(&self, seed: u64, number: u64) -> (&str, Vec<u8>) {
         let mut random = Random::new(self.kind.name(), seed, number);
         let chosen = random.pick(&self.seeds);
@@ -99,7 +99,7 @@ impl Inputs {
         (&chosen.extension, bytes)
     }
 
-    /// Makes one edit, in half of the cases one that respects the format.
+    /// Makes one edit. Half of the edits respect the format.
     fn edit(&self, bytes: &mut Vec<u8>, extension: &str, random: &mut Random) {
         match (random.below(8), extension) {
             (0..=3, "png") => png::edit_chunks(bytes, random),
@@ -127,7 +127,7 @@ impl Inputs {
     }
 }
 
-/// File to read for an input, with its extension: for a texture the scene around it.
+/// File to read for an input, with its suffix. A texture is embedded in a scene.
 pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
     match extension {
         "png" | "jpg" | "webp" | "ktx2" => ("glb", texture::textured(&bytes)),
@@ -135,7 +135,7 @@ pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
     }
 }
 
-/// Edits a part of a file; its length may change.
+/// Edits a part of a file, whose length may change.
 pub(super) fn edit_window(bytes: &mut Vec<u8>, random: &mut Random) {
     let start = random.below(bytes.len());
     let end = (start + WINDOW).min(bytes.len());

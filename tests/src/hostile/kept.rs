@@ -1,8 +1,8 @@
-//! Files that the command keeps and reads again, damaged before it starts or while it works.
+//! Files that the command keeps and reads again, damaged before it starts or while it runs.
 //!
-//! Works are done with small scenes, so that an input takes some hundredths of a second. The command must end
-//! with the picture of undamaged files, or with an error that says something and without a picture. A damage
-//! that forges checksums makes another valid file, and is not tried here.
+//! Scenes are small, so that an input takes some hundredths of a second. The command must end with the
+//! picture of undamaged files, or with an error message and without a picture. Damage that forges checksums
+//! would make another valid file, and is not tested here.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -19,37 +19,37 @@ use super::supervisor::{ended, limited};
 use super::{Finding, Kept, Kind, Report, Settings};
 use crate::fuzz::{Random, mutation};
 
-/// Beginning of the record of a tile, in parts and partial renders.
+/// First bytes of a tile's record, in parts and partial renders.
 const RECORD: &[u8] = b"\x89TILE";
 /// Settings of photons and rays that take some milliseconds.
 const LIGHT: &str = "--photons 200 --neighbors 10 --caustic-photons 0 --gather-rays 2 --shadow-rays 1 --spp 1 --adaptive off \
                      --irradiance-cache off";
-/// Settings of a picture of four tiles.
+/// Settings of a picture with four tiles.
 const PICTURE: &str = "--size 8x8 --tile 4 --card emulated:1 --threads 1 --quiet";
 
-/// Files of a folder, by name.
+/// Contents of a folder by file name.
 type Files = BTreeMap<String, Vec<u8>>;
 
 /// Command line that reads kept files.
 struct Work {
     arguments: String,
     kept: Files,
-    /// Time without damage.
+    /// Duration without damage.
     usual: Duration,
 }
 
-/// Works of one kind, and the folder where they are done.
+/// Command lines for one kind of files, and the folder in which they run.
 struct Bench<'s> {
     settings: &'s Settings,
     program: &'s Path,
     folder: PathBuf,
     works: Vec<Work>,
-    /// Pictures by each of the command lines of undamaged files, and of none.
+    /// Pictures that each command line renders from undamaged files, and without the files.
     right: Vec<Files>,
 }
 
 impl Kept {
-    /// Endings of the names of the files that may be damaged.
+    /// Suffixes of the files that may be damaged.
     fn endings(self) -> &'static [&'static str] {
         match self {
             Self::Cards => &[".card"],
@@ -59,7 +59,7 @@ impl Kept {
         }
     }
 
-    /// Command lines of which the last reads what the others have written.
+    /// Command lines. The last one reads the files that the others have written.
     fn commands(self, seed: u32) -> Vec<String> {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes");
         let scene = format!("{root}/furnace.gltf");
@@ -99,7 +99,8 @@ impl Kept {
 /// Runs the command on damaged files.
 ///
 /// # Errors
-/// If no command is named, it cannot be started, it fails without damage, or a file cannot be written.
+/// If the settings name no command, it cannot be started, it fails without damage, or a file cannot be
+/// written.
 pub fn supervise(settings: &Settings, kind: Kept, tell: &dyn Fn(&Report)) -> io::Result<Report> {
     fs::create_dir_all(&settings.folder)?;
     let bench = Bench::new(settings, kind)?;
@@ -145,7 +146,7 @@ impl<'s> Bench<'s> {
         Ok(this)
     }
 
-    /// Makes the files of a work.
+    /// Creates the files for a command line.
     fn add(&mut self, kind: Kept, seed: u32) -> io::Result<()> {
         self.fill(&Files::new())?;
         let mut commands = kind.commands(seed);
@@ -162,7 +163,7 @@ impl<'s> Bench<'s> {
         Ok(())
     }
 
-    /// Runs a command that must succeed.
+    /// Runs a command, which must succeed.
     fn done(&self, arguments: &str) -> io::Result<()> {
         let status = self.finish(self.start(arguments)?)?;
         let failed = || io::Error::other(format!("{arguments}: {status:?} {}", self.said()));
@@ -179,13 +180,13 @@ impl<'s> Bench<'s> {
         ended(&mut child, self.settings.patience)
     }
 
-    /// What the last command has said.
+    /// Messages of the last command.
     fn said(&self) -> String {
         fs::read(self.settings.folder.join("said"))
             .map_or(String::new(), |text| String::from_utf8_lossy(&text).into_owned())
     }
 
-    /// Makes the folder hold these files alone.
+    /// Replaces the contents of the folder by these files.
     fn fill(&self, files: &Files) -> io::Result<()> {
         self.files()?.keys().try_for_each(|name| fs::remove_file(self.folder.join(name)))?;
         files.iter().try_for_each(|(name, bytes)| fs::write(self.folder.join(name), bytes))
@@ -205,7 +206,7 @@ impl<'s> Bench<'s> {
         Ok(files)
     }
 
-    /// Runs the command of an input. Returns its exit status, or what is wrong.
+    /// Runs the command on an input. Returns its exit status, or a description of the failure.
     fn run(&self, number: u64) -> io::Result<Result<usize, String>> {
         let mut random = Random::new(self.settings.kind.name(), self.settings.seed, number);
         let work = random.pick(&self.works);
@@ -241,7 +242,7 @@ impl<'s> Bench<'s> {
         Ok(judged.map_err(|what| format!("{:?} damaged {when} {}: {what}", damaged.keys(), work.arguments)))
     }
 
-    /// One or two files of a work, damaged.
+    /// One or two damaged files for a command line.
     fn damaged(&self, work: &Work, random: &mut Random) -> Files {
         let names: Vec<&String> = work.kept.keys().collect();
         let chosen = (0..=random.below(2)).map(|_| *random.pick(&names)).collect::<Vec<_>>();
@@ -262,7 +263,7 @@ impl<'s> Bench<'s> {
         chosen.into_iter().map(damage).collect()
     }
 
-    /// Writes files over those that are there, as `cp` or `rsync --inplace` does.
+    /// Overwrites files in place, as `cp` and `rsync --inplace` do.
     fn write_over(&self, files: &Files, random: &mut Random) -> io::Result<()> {
         for (name, bytes) in files {
             let is_cut = random.once_in(2);
@@ -304,8 +305,7 @@ impl<'s> Bench<'s> {
     }
 }
 
-/// Damages a file as copying, disks and memory do. `donors` are files that may have been written over a part
-/// of it.
+/// Damages a file as copies, disks and memory do. Parts of `donors` may overwrite a part of it.
 fn damage(bytes: &mut Vec<u8>, donors: &[&[u8]], random: &mut Random) {
     let length = bytes.len();
     match random.below(12) {
@@ -341,14 +341,14 @@ fn edit_head(bytes: &mut Vec<u8>, random: &mut Random) {
     bytes.splice(..end, head);
 }
 
-/// A block of a file: of a disk, or smaller.
+/// Random block of a file: of the size of a disk's block, or smaller.
 fn block(length: usize, random: &mut Random) -> Range<usize> {
     let size = *random.pick(&[16, 512, 4096]);
     let start = random.below(length.div_ceil(size)) * size;
     start.min(length)..(start + size).min(length)
 }
 
-/// A place where one file may end and another go on: a block's, or a record's.
+/// Random boundary of a block or of a record, at which one file may end and another continue.
 fn boundary(bytes: &[u8], random: &mut Random) -> usize {
     let records: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place..].starts_with(RECORD)).collect();
     if records.is_empty() || random.once_in(2) {

@@ -1,10 +1,10 @@
-//! Damaged real files: scenes and images that ship are mutated and read in processes of limited memory.
+//! Reads damaged copies of shipped scenes and images in processes of limited memory.
 //!
-//! Files that the command keeps, such as parts of pictures, are mutated while it works as well, and its
-//! pictures are compared.
+//! Files that the command keeps, such as parts of pictures, are also damaged while it runs, and its pictures
+//! are compared.
 //!
-//! The fuzz targets catch panics in their own process and start from small generated files. Here a process
-//! reads a batch of inputs, and its end is the result: an exit status, a signal, or a time-out. Every input
+//! Fuzz targets catch panics in their own process, and start from small generated files. Here a process reads
+//! a batch of inputs, and the way it ends is the result: an exit status, a signal, or a time-out. Every input
 //! is a function of its kind, a seed and a number.
 
 mod inputs;
@@ -23,21 +23,21 @@ pub use self::supervisor::{Finding, Report, supervise};
 /// Kind of files to damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// PNG, JPEG, WebP and KTX2 as textures, Radiance and `OpenEXR` pictures as environments; the latter are
-    /// compared as well.
+    /// PNG, JPEG, WebP and KTX2 as textures, and Radiance and `OpenEXR` pictures as environments. `OpenEXR`
+    /// pictures are also compared.
     Images,
-    /// glTF as text and as GLB, loaded, packed, and rendered with few photons and rays.
+    /// glTF as text and as GLB, which is loaded, packed, and rendered with few photons and rays.
     Scenes,
-    /// Files that the command keeps and reads again; the command alone reads them.
+    /// Files that the command keeps and reads again. Only the command reads them.
     Kept(Kept),
 }
 
-/// Kind of files that are damaged before or while the command reads them.
+/// Kind of files that are damaged before the command starts or while it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kept {
     /// Prepared scenes.
     Cards,
-    /// Parts of a picture, which are merged.
+    /// Parts of a picture that is merged.
     Parts,
     /// Finished tiles of a render that is resumed.
     Partials,
@@ -56,7 +56,7 @@ impl Kind {
         Self::Kept(Kept::Frames),
     ];
 
-    /// Kind with the name `name` on the command line.
+    /// Kind with this name on the command line; `None` if there is none.
     pub fn of(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|kind| kind.name() == name)
     }
@@ -89,12 +89,11 @@ pub struct Settings {
     pub batch: u64,
     /// Time limit of one input.
     pub patience: Duration,
-    /// Address space of a process, kilobytes.
+    /// Size of a process's address space, kilobytes.
     pub kilobytes: u64,
-    /// Command `photoncard`, which reads every [`Settings::every`]th image or scene as well, and all kept
-    /// files.
+    /// Program `photoncard`. It reads every [`Settings::every`]th image or scene as well, and all kept files.
     pub command: Option<PathBuf>,
-    /// Interval of inputs that [`Settings::command`] reads.
+    /// Interval of the inputs that [`Settings::command`] reads.
     pub every: u64,
     /// Folder for failing inputs.
     pub folder: PathBuf,

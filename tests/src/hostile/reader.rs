@@ -14,15 +14,14 @@ use super::inputs::as_file;
 use super::{Inputs, Settings};
 use crate::fuzz::gltf::load;
 
-/// Maximum number of triangles of a scene that is always rendered; larger ones are only loaded and packed,
-/// with rare exceptions.
+/// Maximum number of triangles of a scene that is always rendered. Larger ones are rendered rarely, but
+/// loaded and packed.
 const MAX_RENDERED: usize = 3000;
 
-/// Maximum number of pixels of a picture that is compared; larger ones are read only.
+/// Maximum number of pixels of a picture that is compared. Larger ones are only read.
 const MAX_COMPARED: usize = 1 << 18;
 
-/// Reads inputs, and reports each on standard output: its number before reading, and whether it was valid
-/// afterwards.
+/// Reads inputs. Prints the number of each before it is read, and afterwards whether it was valid.
 ///
 /// # Panics
 /// If the tested reader panics, which is a finding.
@@ -36,13 +35,13 @@ pub fn read_batch(settings: &Settings) {
     }
 }
 
-/// Prints a line; errors are ignored, as the supervisor may be gone.
+/// Prints a line. Errors are ignored, because the supervisor may have ended.
 fn say(line: std::fmt::Arguments) {
     let mut out = stdout().lock();
     let _ = writeln!(out, "{line}").and_then(|()| out.flush());
 }
 
-/// Reads an input as the format of its extension. Returns whether it is valid.
+/// Reads an input in the format of its suffix. Returns whether it is valid.
 fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
     let (kind, file) = as_file(extension, bytes);
     let path = folder.join(format!("input.{kind}"));
@@ -64,7 +63,7 @@ fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
     }
 }
 
-/// Result without its error; the error is formatted, which must not panic either.
+/// Value of a result. An error is formatted as well, because that must not panic either.
 fn told<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
     result.inspect_err(|error| drop(error.to_string())).ok()
 }

@@ -1,4 +1,4 @@
-//! Process that starts readers, and observes their ends.
+//! Process that starts readers and observes how they end.
 
 use std::fs;
 use std::io::{self, BufRead, BufReader};
@@ -15,7 +15,7 @@ use super::{Inputs, Kind, Settings};
 /// Interval at which a running command is polled.
 const GLANCE: Duration = Duration::from_millis(2);
 
-/// Input that is not read correctly.
+/// Input on which a reader or the command failed.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// Number of the input.
@@ -29,18 +29,18 @@ pub struct Finding {
 pub struct Report {
     /// Number of inputs that were read.
     pub inputs: u64,
-    /// Number of inputs that were valid; of kept files, of which the undamaged picture came.
+    /// Number of valid inputs; of kept files, of those that gave the undamaged picture.
     pub sound: u64,
     /// Number of exits of the command with status 0, 1 and 2.
     pub statuses: [u64; 3],
     /// Maximum time of an input, with the input's number.
     pub slowest: (Duration, u64),
-    /// Inputs that ended a process or took too long.
+    /// Inputs that ended a process or exceeded the time limit.
     pub findings: Vec<Finding>,
 }
 
-/// Reads inputs in processes of limited memory. `reader` is the program that calls
-/// [`read_batch`](super::read_batch) for the arguments `read KIND SEED FIRST INPUTS FOLDER`; it reads no
+/// Reads inputs in processes of limited memory. `reader` is a program that calls
+/// [`read_batch`](super::read_batch) for the arguments `read KIND SEED FIRST INPUTS FOLDER`. It does not read
 /// [kept](super::supervise_kept) files.
 ///
 /// # Errors
@@ -77,8 +77,8 @@ pub(super) fn limited(settings: &Settings, program: &Path) -> Command {
     command
 }
 
-/// Starts a process that reads inputs until the last one or its end. Returns the number of inputs that are
-/// done.
+/// Starts a process that reads inputs until the last one, or until it ends. Returns the number of finished
+/// inputs.
 fn read_some(
     reader: &Path,
     settings: &Settings,
@@ -122,7 +122,7 @@ fn read_some(
     Ok(number + 1 - first)
 }
 
-/// Lines of a process's output.
+/// Receives the lines of a process's output.
 fn lines(child: &mut Child) -> Receiver<String> {
     let (sender, receiver) = channel();
     if let Some(output) = child.stdout.take() {
@@ -134,7 +134,7 @@ fn lines(child: &mut Child) -> Receiver<String> {
     receiver
 }
 
-/// Runs the command on an input, as a user would.
+/// Runs the command on an input as a user would.
 fn run_command(settings: &Settings, inputs: &Inputs, number: u64, report: &mut Report) -> io::Result<()> {
     let Some(program) = &settings.command else { return Ok(()) };
     let (extension, bytes) = inputs.make(settings.seed, number);
@@ -175,7 +175,7 @@ fn render<'c>(command: &'c mut Command, scene: &Path, folder: &Path) -> &'c mut 
     command.arg("render").arg(scene).arg("-o").arg(folder.join("out.exr")).args(options.split(' '))
 }
 
-/// Exit status of a process, which is killed if it exceeds the time.
+/// Exit status of a process; `None` if it exceeds `patience`, after which it is killed.
 pub(super) fn ended(child: &mut Child, patience: Duration) -> io::Result<Option<ExitStatus>> {
     let begun = Instant::now();
     while begun.elapsed() < patience {

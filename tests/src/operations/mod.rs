@@ -1,5 +1,5 @@
-//! Counts of floating-point operations: tiles rendered by the firmware of `tests/operations`, whose every
-//! operation is a call that is counted by its kind and its place in the code.
+//! Counts floating-point operations of rendered tiles. The firmware in `tests/operations` is compiled so that
+//! every operation is a call, which is counted by its kind and its position in the code.
 
 pub mod run;
 mod steps;
@@ -19,21 +19,21 @@ use photoncard_shared::message::{self, FrameParameters, Tile};
 
 use self::steps::{Place, step_of};
 
-/// The target without floating-point instructions.
+/// Compilation target without floating-point instructions.
 pub const TARGET: &str = "x86_64-unknown-none";
 /// Number of steps.
 pub const STEPS: usize = Step::ALL.len();
 
-/// Operations of some tiles.
+/// Counted operations of some tiles.
 pub struct Counted {
-    /// Counters of each tile, which are those of any other processor.
+    /// Counters of each tile, which are equal on every processor.
     pub counters: Vec<Counters>,
     /// Operations of all tiles in each step, in the order of [`Step::ALL`].
     pub steps: [Operations; STEPS],
 }
 
 impl Counted {
-    /// Operations of all steps.
+    /// Sum of the operations of all steps.
     pub fn total(&self) -> Operations {
         let mut total = Operations::default();
         self.steps.iter().for_each(|operations| total.add(operations));
@@ -41,17 +41,19 @@ impl Counted {
     }
 }
 
-/// The program that counts.
+/// Program that counts operations.
 pub struct Instrument {
     program: PathBuf,
 }
 
 impl Instrument {
-    /// Builds the program. `Err` with the reason if this machine cannot: it is for Linux on x86-64, and its
-    /// target has to be installed.
+    /// Builds the program. It requires Linux on x86-64, and an installed compilation target.
+    ///
+    /// # Errors
+    /// The reason, if this machine cannot build the program.
     ///
     /// # Panics
-    /// If the program does not build on a machine that has all that it takes.
+    /// If the build fails on a machine that meets the requirements.
     pub fn build() -> Result<Self, String> {
         if !cfg!(all(target_os = "linux", target_arch = "x86_64")) {
             return Err("the operations are counted on Linux and x86-64 alone".to_owned());
@@ -75,10 +77,10 @@ impl Instrument {
         Ok(Self { program: target.join(TARGET).join("release/photoncard-operations") })
     }
 
-    /// Renders tiles, and counts.
+    /// Renders tiles and counts their operations.
     ///
     /// # Panics
-    /// If the program fails, or an operation is in no step.
+    /// If the program fails, or an operation belongs to no step.
     pub fn count(&self, image: &CardImage, frame: &FrameParameters, tiles: &[Tile]) -> Counted {
         let input = input(image, frame, tiles).expect("a temporary file is written");
         let output =
@@ -92,7 +94,7 @@ impl Instrument {
         Counted { counters: counters.collect(), steps: self.by_step(places) }
     }
 
-    /// Sums the counts of all places by step.
+    /// Sums the counts of all positions in the code by step.
     fn by_step(&self, places: &[u8]) -> [Operations; STEPS] {
         let symbols = addr2line::Loader::new(&self.program).expect("the program has its symbols");
         let mut steps = [Operations::default(); STEPS];
@@ -120,7 +122,7 @@ impl Instrument {
 const COMPARE: u64 = 4;
 const CONVERT: u64 = 5;
 
-/// One operation of a kind, in the order of the program's tables.
+/// One operation of a kind, whose number is that of the program's tables.
 fn operation(kind: u64) -> Operations {
     let none = Operations::default();
     match kind {
@@ -136,7 +138,7 @@ fn operation(kind: u64) -> Operations {
     }
 }
 
-/// The program's input: image, frame and tiles, in lines.
+/// Input of the program: image, frame and tiles, in lines.
 fn input(image: &CardImage, frame: &FrameParameters, tiles: &[Tile]) -> std::io::Result<File> {
     let mut bytes: Vec<u8> = image.lines().iter().flat_map(|line| line.0).collect();
     bytes.extend(line(frame));
@@ -147,7 +149,7 @@ fn input(image: &CardImage, frame: &FrameParameters, tiles: &[Tile]) -> std::io:
     Ok(file)
 }
 
-/// A message in a line, behind its length.
+/// Message in a line, after its length.
 fn line<T: serde::Serialize>(message: &T) -> [u8; LINE_BYTES] {
     let mut line = [0; LINE_BYTES];
     let (length, bytes) = line.split_first_mut().expect("a line has bytes");

@@ -1,4 +1,4 @@
-//! Tiles of a scene, whose operations are counted and computed from their steps.
+//! Operations of a scene's tiles, both counted and computed by the cost model.
 
 use std::path::Path;
 
@@ -18,19 +18,19 @@ use photoncard_shared::counters::Counters;
 
 use super::{Instrument, STEPS};
 
-/// Operations of some tiles of a scene, and the work that they took.
+/// Operations of some tiles of a scene, with their work.
 pub struct Run {
     /// Counters of all tiles.
     pub counters: Counters,
     /// Work of all tiles.
     pub work: Work,
-    /// Operations that were counted in each step, in the order of [`Step::ALL`].
+    /// Counted operations of each step, in the order of [`Step::ALL`].
     pub steps: [Operations; STEPS],
 }
 
 impl Run {
-    /// Renders `count` tiles of a scene that ships, spread over the picture: where operations are counted,
-    /// and on an emulated chip.
+    /// Renders `count` tiles of a shipped scene, spread over the picture, with the program that counts
+    /// operations and on an emulated chip.
     ///
     /// # Panics
     /// If the scene cannot be rendered, or the two do not count equal work.
@@ -63,7 +63,7 @@ impl Run {
         Self { counters, work, steps }
     }
 
-    /// Operations of a unit, as they were counted.
+    /// Counted operations of a unit.
     pub fn counted(&self, unit: Unit) -> Operations {
         let mut sum = Operations::default();
         let of_unit = Step::ALL.iter().zip(&self.steps).filter(|(step, _)| step.unit() == unit);
@@ -71,13 +71,13 @@ impl Run {
         sum
     }
 
-    /// Operations of all units by the cost model.
+    /// Operations of all units according to the cost model.
     pub fn modelled(&self) -> Arithmetic {
         Arithmetic::of(&self.work)
     }
 }
 
-/// Mean operations of each step over some runs; what [`OPERATIONS`] says of steps that none has taken.
+/// Mean operations of each step over some runs. Steps that occur in no run have the values of [`OPERATIONS`].
 pub fn means(runs: &[Run]) -> [Operations; STEPS] {
     let mut means = OPERATIONS;
     for (index, (step, mean)) in Step::ALL.iter().zip(&mut means).enumerate() {

@@ -1,9 +1,9 @@
-//! Steps of the places in the code: the functions of the firmware that an operation was compiled into.
+//! Assigns positions in the code to steps, by the firmware's functions into which an operation was compiled.
 
 use photoncard_driver::cost_model::arithmetic::Step;
 
-/// Place of an operation: the functions of the firmware around it, the innermost first; and the line and
-/// column of each.
+/// Position of an operation: the functions that contain it, the innermost first, with the line and column in
+/// each.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Place(Vec<Frame>);
 
@@ -17,7 +17,7 @@ struct Frame {
 }
 
 impl Place {
-    /// The place of a call that returns to an address.
+    /// Position of the call that returns to `address`.
     pub(super) fn new(symbols: &addr2line::Loader, address: u64) -> Self {
         let mut frames = symbols.find_frames(address - 1).expect("the symbols are sound");
         let mut place = Self(Vec::new());
@@ -39,19 +39,19 @@ impl Place {
         place
     }
 
-    /// True if one of the functions is in a file, or a file of a folder.
+    /// Returns whether one of the functions is in a file, or in a folder.
     fn is_in(&self, path: &str) -> bool {
         self.0.iter().any(|frame| frame.file.starts_with(path))
     }
 
-    /// True if one of the functions is `function` of `file`.
+    /// Returns whether one of the functions is `function` of `file`.
     fn is_of(&self, file: &str, function: &str) -> bool {
         self.0.iter().any(|frame| frame.file == file && frame.function == function)
     }
 }
 
-/// Step that an operation belongs to. The innermost function that says it decides; what is compiled into no
-/// other function, such as codes of directions, belongs to the gathers, which need it most.
+/// Step to which an operation belongs, decided by the innermost function that belongs to one. Other
+/// operations, such as codes of directions, belong to the gathers, which need them most.
 pub(super) fn step_of(place: &Place) -> Step {
     ray_caster(place)
         .or_else(|| photons(place))
@@ -80,7 +80,7 @@ fn ray_caster(place: &Place) -> Option<Step> {
     })
 }
 
-/// Steps of searches and of the density estimate.
+/// Steps of photon searches and of the density estimate.
 fn photons(place: &Place) -> Option<Step> {
     Some(if place.is_in("photon/select.rs") {
         Step::Selected
@@ -112,7 +112,7 @@ fn photons(place: &Place) -> Option<Step> {
     })
 }
 
-/// Steps of tables of directions, and of the irradiance cache.
+/// Steps of direction tables and of the irradiance cache.
 fn directions(place: &Place) -> Option<Step> {
     Some(if place.is_in("irradiance_cache/survey.rs") {
         Step::SurveyRay
@@ -131,14 +131,14 @@ fn directions(place: &Place) -> Option<Step> {
     })
 }
 
-/// Steps of surfaces that are read, for whatever ray.
+/// Steps of evaluated surfaces, for any kind of ray.
 fn surfaces(place: &Place) -> Option<Step> {
     let inner = &place.0.iter().find(|frame| !HELPERS.contains(&frame.file.as_str()))?.file;
     let is_surface = inner.strip_prefix("scene/").is_some_and(|file| SURFACES.contains(&file));
     (is_surface && !place.is_in("scene/light/")).then_some(Step::Surface)
 }
 
-/// Files of surfaces, below `scene`.
+/// Files about surfaces, below `scene`.
 const SURFACES: [&str; 7] = [
     "surface.rs",
     "shading_normal.rs",
@@ -149,7 +149,7 @@ const SURFACES: [&str; 7] = [
     "mod.rs",
 ];
 
-/// Files whose functions serve all others.
+/// Files whose functions are used everywhere.
 const HELPERS: [&str; 2] = ["vector.rs", "fixed_point.rs"];
 
 /// Steps of lights and pixels.

@@ -1,4 +1,4 @@
-//! Functions of libm that count their calls; `counters.rs` of the program has their other half.
+//! Functions of libm that count their calls. Their other half is `counters.rs` of the program.
 #![no_std]
 
 pub use real;
@@ -8,7 +8,7 @@ macro_rules! counted {
     ($($name:ident($($argument:ident),+) = $counted:ident;)+) => {
         unsafe extern "C" { $(fn $counted($($argument: f32),+) -> f32;)+ }
         $(
-            /// The function of libm, counted where it is called.
+            /// Function of libm, counted at its call.
             #[inline(always)]
             pub fn $name($($argument: f32),+) -> f32 {
                 // SAFETY: the program defines the function, which computes what libm's does.
@@ -29,7 +29,7 @@ counted! {
     atan2f(y, x) = counted_atan2f;
 }
 
-/// Sine and cosine, counted as two functions.
+/// Sine and cosine, counted as two calls.
 #[inline(always)]
 pub fn sincosf(x: f32) -> (f32, f32) {
     (sinf(x), cosf(x))

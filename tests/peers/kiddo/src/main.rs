@@ -1,5 +1,5 @@
-//! The search for the nearest photons, as kiddo does it: `kiddo FOLDER [REPEAT]`, where the folder holds what
-//! `cargo run --release -p photoncard-tests --example nearest -- --write FOLDER` has left.
+//! Search for the nearest photons by kiddo: `kiddo FOLDER [REPEAT]`. The folder contains the output of `cargo
+//! run --release -p photoncard-tests --example nearest -- --write FOLDER`.
 
 use std::error::Error;
 use std::num::NonZero;
@@ -11,7 +11,7 @@ use rustix::time::{ClockId, clock_gettime};
 const NEIGHBORS: NonZero<usize> = NonZero::new(100).unwrap();
 const MAX_DISTANCE: f32 = 0.025;
 
-/// Processor time of this thread, seconds; other processes do not count.
+/// Processor time of this thread, seconds. It excludes other processes.
 fn cpu_seconds() -> f64 {
     let taken = clock_gettime(ClockId::ThreadCPUTime);
     taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
