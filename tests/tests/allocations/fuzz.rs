@@ -1,4 +1,5 @@
-//! Some thousands of mutated inputs of all readers of foreign bytes. The example `fuzz` runs any number.
+//! Fuzzes all readers of foreign bytes with some thousands of mutated inputs. The example `fuzz` runs any
+//! number.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -29,8 +30,8 @@ fn check(name: &str, inputs: u64) {
     assert!(report.sound * 20 > inputs && report.sound < inputs, "{report:?}");
 }
 
-/// A test for each target, of so many inputs: some seconds each, so that a busy machine has time for any of
-/// them.
+/// Defines a test for each target, with the number of inputs that takes some seconds, so that a busy machine
+/// has time for every test.
 macro_rules! tests_of_targets {
     ($($name:ident: $inputs:literal,)*) => {
         $(#[test]
@@ -62,7 +63,7 @@ mod no_input_panics_hangs_or_takes_much_memory {
     }
 }
 
-/// Target that fails in every way, at the number in its input.
+/// Target that fails in every way. The number in its input selects the way.
 struct Faulty;
 
 impl Target for Faulty {

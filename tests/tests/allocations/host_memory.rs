@@ -1,4 +1,4 @@
-//! Memory of the host: for a photon map under construction, and for an image that emulated cards share.
+//! Memory of the host for a photon map under construction, and for an image that emulated cards share.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -50,7 +50,7 @@ impl Observer for WhileRendering {
     }
 }
 
-/// Maximum bytes in use while a picture is rendered on `chips` chips, and bytes of the image.
+/// Maximum number of bytes in use while `chips` chips render a picture, and the size of the image, bytes.
 fn rendering(scene: &Scene, chips: usize) -> (usize, usize) {
     let observer = WhileRendering::default();
     let before = MEMORY.current_usage();
@@ -60,7 +60,7 @@ fn rendering(scene: &Scene, chips: usize) -> (usize, usize) {
 
 // A single test: allocations of another at the same time would count.
 #[test]
-fn a_photon_takes_forty_bytes_at_the_most_and_cards_share_the_image() {
+fn a_photon_takes_at_most_forty_bytes_and_cards_share_the_image() {
     let _alone = ALONE.lock();
     let scene = cornell();
     let packed = PackedScene::new(&scene).expect("packs");

@@ -1,4 +1,4 @@
-//! Limits of what is allocated.
+//! Limits of memory allocations.
 
 use std::sync::Mutex;
 
@@ -11,5 +11,5 @@ mod tangent_memory;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// Lock that runs one test at a time, so that no allocations of another are counted.
+/// Lock that runs one test at a time, so that only its own allocations are counted.
 static ALONE: Mutex<()> = Mutex::new(());

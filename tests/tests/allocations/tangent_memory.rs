@@ -1,4 +1,4 @@
-//! Memory of computing tangents: at most what is requested from the system before.
+//! Memory for computing tangents does not exceed what is reserved before.
 
 use std::fs;
 
@@ -9,11 +9,11 @@ use crate::{ALONE, MEMORY};
 
 const SIDE: u32 = 200;
 const TRIANGLES: usize = (2 * SIDE * SIDE) as usize;
-/// `BYTES_OF_A_TRIANGLE` of `driver::scene::gltf::mikktspace`.
+/// Copy of `BYTES_OF_A_TRIANGLE` of `driver::scene::gltf::mikktspace`.
 const BYTES_A_TRIANGLE: usize = 1600;
 const TEXEL: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/texel.png");
 
-/// A hilly square of triangles that share no vertex index.
+/// Buffer of a hilly square of triangles without shared vertices, and its number of vertices.
 fn mesh() -> (Vec<u8>, usize) {
     let corners = (0..SIDE * SIDE).flat_map(|cell| {
         let (x, y) = (cell % SIDE, cell / SIDE);

@@ -1,11 +1,11 @@
-//! Adaptive sampling: noise falls where samples differ, and the expected picture stays.
+//! Adaptive sampling reduces the noise where samples differ, and keeps the expected picture.
 
 use photoncard_driver::render::{Filter, Integrator, PhotonMaps, Picture, RenderSettings, Rendering};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_tests::render_or_panic;
 
 const SEEDS: u32 = 160;
-/// Samples of a pixel: the four probes, and one by their choice.
+/// Samples per pixel: the four probes, and one whose number of paths they determine.
 const SAMPLES: u32 = 5;
 
 fn room() -> Scene {
@@ -29,7 +29,7 @@ fn settings(seed: u32, adaptive_threshold: Option<f32>, gather_rays: u32) -> Ren
     }
 }
 
-/// Mean over the seeds of the picture's mean, its standard error, and the mean variance of a pixel.
+/// Mean over seeds of the picture's mean, its standard error, and the mean variance of a pixel.
 fn moments(threshold: Option<f32>, gather_rays: u32) -> [f64; 3] {
     let scene = room();
     let radiances = |seed| -> Vec<f64> {
@@ -58,15 +58,15 @@ fn mean_and_variance(values: &[f64]) -> [f64; 3] {
     [number, mean, values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (number - 1.0)]
 }
 
-/// Checks that two means are equal within four standard errors, which are small.
+/// Checks that two means are equal within four standard errors, and that these are small.
 fn check_means([even, even_error, _]: [f64; 3], [adaptive, error, _]: [f64; 3]) {
     let allowed = 4.0 * even_error.hypot(error);
     assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");
     assert!(allowed < 0.08 * even, "the comparison tells little apart: {allowed} of {even}");
 }
 
-/// Most pixels see an edge of the lamp, of a box or of a shadow. A mean over all paths, of which the probes
-/// choose the number, would be too dark: bright probes bring more paths, and count less.
+/// Most pixels see an edge of the lamp, of a box or of a shadow. A plain mean over all paths would be too
+/// dark, because the probes determine their number: bright probes add more paths, and so count less.
 #[test]
 fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
     let [even, adaptive] = [None, Some(0.02)].map(|threshold| moments(threshold, 0));
@@ -75,15 +75,15 @@ fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
     assert!(variance < 0.75 * even_variance, "{variance} of {even_variance}");
 }
 
-/// Paths of a Lambertian surface share the gather rays of their sample: with sixteen each has one, with one
-/// all sixteen.
+/// The paths of a sample share its gather rays on a Lambertian surface. Of sixteen rays each path has one; of
+/// one ray each has it.
 #[test]
 fn paths_that_share_gather_rays_have_the_mean_of_samples_with_rays_of_their_own() {
     check_means(moments(None, 16), moments(Some(0.005), 16));
 }
 
-/// Gather rays of a picture of Lambertian surfaces are as many with several paths a sample as with one, but
-/// for one of each path at least.
+/// The number of gather rays on Lambertian surfaces does not grow with the paths per sample, except that each
+/// path has at least one.
 #[test]
 fn paths_divide_the_gather_rays_of_their_sample() {
     let scene = room();
@@ -93,7 +93,7 @@ fn paths_divide_the_gather_rays_of_their_sample() {
     assert!(adaptive.gather < even.gather * 5 / 4, "{adaptive:?} {even:?}");
 }
 
-/// Light of equal samples has no noise: every sample has one path.
+/// A sample has one path if all samples have equal light.
 #[test]
 fn pixels_without_noise_have_one_path_a_sample() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/furnace.gltf");

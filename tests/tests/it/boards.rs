@@ -1,5 +1,5 @@
-//! Processor-independent parts of boards: the ring between a UART's interrupt and the port; and the page that
-//! states their sizes.
+//! Processor-independent parts of boards: the ring between a UART's interrupt and the port, and the sizes in
+//! the document on boards.
 
 #[path = "../../../firmware/boards/common/ring.rs"]
 mod ring;
@@ -8,7 +8,7 @@ use photoncard_firmware::kind::MICRO;
 
 use self::ring::Ring;
 
-/// Sizes that the page on boards states are those of the budget.
+/// The document on boards states the sizes of the budget.
 #[test]
 fn the_page_states_the_budget() {
     let page = include_str!("../../../docs/bring-up.md");

@@ -1,4 +1,4 @@
-//! Line caches: they hit and miss like an LRU oracle, and return the contents of memory.
+//! Line caches hit and miss like an LRU oracle, and return the contents of memory.
 
 use std::ops::Range;
 
@@ -27,7 +27,7 @@ fn cache(shape: CacheShape) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
     LineCache::new(shape, entries, vec![Line::ZERO; shape.lines()]).expect("buffers of its size")
 }
 
-/// Shapes of all kinds: number of sets and ways, lines of card memory per cache line, set index.
+/// Cache shapes: number of sets and ways, lines of card memory per cache line, and set index.
 fn shapes() -> impl Strategy<Value = (u32, u32, u32, SetIndex)> {
     let sets = prop_oneof![Just(1), Just(4), 1_u32..14];
     let ways = prop_oneof![Just(1), Just(4), 1_u32..10];
@@ -81,9 +81,9 @@ proptest! {
         }
     }
 
-    /// Any sequence of reads returns the right line inside the memory, and a fault outside.
+    /// Reads in any order return the right line inside the memory, and a fault outside.
     #[test]
-    fn a_cache_has_no_line_that_its_memory_has_not(
+    fn a_cache_returns_only_lines_of_its_memory(
         (sets, ways, lines, index) in shapes(),
         count in 1_u32..60,
         addresses in addresses(80),
@@ -109,7 +109,7 @@ fn hashed_sets_are_used_evenly() {
 }
 
 #[test]
-fn what_is_written_is_read_and_not_what_was_cached() {
+fn a_read_after_a_write_returns_the_written_line() {
     let mut lines = vec![Line::ZERO; 8];
     let shape = CacheShape::new(1024, 512, 2, SetIndex::Modulo).unwrap();
     let mut memory = LineCaches::new(Dram::new(&mut lines), cache(shape), cache(shape));
@@ -148,7 +148,7 @@ fn a_write_and_a_kept_record_take_the_place_of_no_other_line() {
     assert_eq!(fetched(&memory), 10);
 }
 
-/// A memory that has the lines that were written.
+/// Memory of the lines that were written.
 struct Growing(Vec<Line>);
 
 impl MemoryPort for Growing {
@@ -164,7 +164,7 @@ impl MemoryPort for Growing {
 }
 
 #[test]
-fn lines_that_a_memory_grows_by_are_read() {
+fn lines_are_read_from_a_memory_that_grows() {
     let shape = CacheShape::new(1024, 512, 2, SetIndex::Modulo).unwrap();
     let mut memory = LineCaches::unified(Growing(Vec::new()), cache(shape));
     for value in 0..20 {

@@ -20,7 +20,7 @@ use proptest::prelude::*;
 
 const DRAM_LINES: usize = 4096;
 
-/// A lit room with a few photons.
+/// Card image of a lit room with a few photons.
 fn image() -> CardImage {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;
@@ -43,7 +43,7 @@ fn frame() -> FrameParameters {
 
 const TILE: Tile = Tile { id: 7, x: 0, y: 0, width: 8, height: 8 };
 
-/// Answers to a tile of 64 pixels, 16 of which fit a reply.
+/// Answers to a tile of 64 pixels. A reply holds 16.
 fn tile_of_64_pixels(id: u32) -> [Answer; 5] {
     let pixels = || Answer::Pixels(16);
     [pixels(), pixels(), pixels(), pixels(), Answer::TileDone(id)]
@@ -58,7 +58,7 @@ fn renders_a_tile(wire: &mut Wire, image: &CardImage) {
 }
 
 #[test]
-fn commands_out_of_order_are_faults_and_the_card_goes_on() {
+fn commands_out_of_order_are_faults_and_the_card_continues() {
     with_room_for_a_card(|| {
         let mut memory = vec![Line::ZERO; DRAM_LINES];
         let mut wire = Wire::new(&mut memory);
@@ -85,7 +85,7 @@ fn commands_out_of_order_are_faults_and_the_card_goes_on() {
     });
 }
 
-/// Gathers of a tile wait for those of the next, unless none follows.
+/// Gathers of a tile wait for those of the next tile or for a flush.
 #[test]
 fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
     with_room_for_a_card(|| {
@@ -126,8 +126,8 @@ fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
     });
 }
 
-/// With layers a pixel takes four sums of the buffer: the micro chip has room for 64 pixels, and 8 fit a
-/// reply.
+/// A pixel with layers takes four sums in the buffer. The micro chip has room for 64 such pixels, and a reply
+/// for 8.
 #[test]
 fn a_tile_with_layers_has_a_fourth_of_the_pixels() {
     with_room_for_a_card(|| {
@@ -189,7 +189,7 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
     });
 }
 
-/// Copy of the image with another root node of `children` children, whose boxes are unbounded.
+/// Copy of the image whose root node has `children` children with unbounded boxes.
 fn with_root(image: &CardImage, children: usize, links: Links) -> Vec<Line> {
     let mut lines = image.lines().to_vec();
     let root =
@@ -223,7 +223,7 @@ fn unsound_images_end_in_faults_and_not_in_a_hang() {
 }
 
 #[test]
-fn a_card_tells_what_it_has_of_an_image_and_keeps_it_over_sessions() {
+fn a_card_reports_the_lines_of_an_image_and_keeps_them_over_sessions() {
     with_room_for_a_card(|| {
         let image = image();
         let mut memory = vec![Line::ZERO; DRAM_LINES];
@@ -252,7 +252,7 @@ fn a_card_tells_what_it_has_of_an_image_and_keeps_it_over_sessions() {
 }
 
 #[test]
-fn a_card_tells_what_its_board_measures_of_its_memory() {
+fn a_card_reports_the_memory_use_that_its_board_measures() {
     with_room_for_a_card(|| {
         let hello = Command::Hello { protocol: PROTOCOL_VERSION, layout: 1 };
         let mut memory = vec![Line::ZERO; 1];
@@ -265,7 +265,7 @@ fn a_card_tells_what_its_board_measures_of_its_memory() {
     });
 }
 
-/// A self-test takes the scene's place, at any time; the next image is loaded as a whole.
+/// A memory test overwrites the scene at any time, and the next image is loaded completely.
 #[test]
 fn a_memory_test_drops_the_scene_and_the_next_load_works() {
     with_room_for_a_card(|| {
@@ -292,7 +292,7 @@ fn a_memory_test_drops_the_scene_and_the_next_load_works() {
 }
 
 #[test]
-fn a_card_computes_between_other_work_alone() {
+fn a_card_computes_only_without_other_work() {
     with_room_for_a_card(|| {
         let mut memory = vec![Line::ZERO; DRAM_LINES];
         let mut wire = Wire::new(&mut memory);
@@ -316,7 +316,7 @@ fn a_card_computes_between_other_work_alone() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// Whole messages of arbitrary content.
+    /// Sends complete messages of arbitrary content.
     #[test]
     fn no_messages_stop_a_card(
         messages in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..200), 0..40),
@@ -342,7 +342,7 @@ proptest! {
         });
     }
 
-    /// An image with a damaged line renders, or ends in a fault: never in a panic or a hang.
+    /// A card with a damaged line in its image renders or reports a fault. It never panics or hangs.
     #[test]
     fn no_damaged_image_stops_a_card(
         line in any::<prop::sample::Index>(),

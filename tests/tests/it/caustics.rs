@@ -18,8 +18,8 @@ fn smooth(name: &str, metallic: f32, transmission: Option<Transmission>) -> Mate
     Material::new(name, reflection)
 }
 
-/// Room with a light above two balls: one of glass, which focuses it on the floor, and one of metal, which
-/// scatters it over the walls. The camera sees a part of the ceiling.
+/// Room with a light above two balls. A glass one focuses it on the floor, and a metal one scatters it over
+/// the walls. The camera sees a part of the ceiling.
 fn two_balls() -> Scene {
     let glass = Transmission { factor: 1.0, ior: 1.5, is_volume: true, absorption: Vec3::ZERO };
     let materials =
@@ -34,7 +34,7 @@ fn two_balls() -> Scene {
     scene
 }
 
-/// Radiances of a picture of caustics alone.
+/// Radiance of each pixel of a picture with caustics only.
 fn caustics(scene: &Scene, photons: usize, seed: u32) -> Vec<[f32; 3]> {
     let settings = RenderSettings {
         picture: Picture { width: 24, height: 24, ..Picture::default() },
@@ -50,7 +50,7 @@ fn caustics(scene: &Scene, photons: usize, seed: u32) -> Vec<[f32; 3]> {
 }
 
 #[test]
-fn sparse_light_beside_a_focus_is_smooth_and_of_the_mean_of_many_photons() {
+fn sparse_light_beside_a_focus_is_smooth_with_the_mean_of_many_photons() {
     let scene = two_balls();
     let [first, second] = [1, 2].map(|seed| caustics(&scene, 20_000, seed));
     let expected = mean(&caustics(&scene, 500_000, 3));

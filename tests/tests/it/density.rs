@@ -1,4 +1,4 @@
-//! The corrected density estimate is right at edges, in corners and on thin walls.
+//! The boundary-corrected density estimate is unbiased at edges, in corners and on thin walls.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -17,7 +17,7 @@ use photoncard_tests::{camera, lambertian, quad, room, scene};
 const NEIGHBORS: u32 = 100;
 const ALBEDO: f32 = 0.5;
 
-/// Photon map that gathers radiance.
+/// Photon map from which radiance is gathered.
 struct Map {
     image: CardImage,
     max_distance: f32,
@@ -48,13 +48,12 @@ impl Map {
         Self { image, max_distance, radius }
     }
 
-    /// Radiance that a Lambertian surface reflects at a point, W/(sr m^2); it must be equal for all
-    /// instruction sets.
+    /// Radiance that a Lambertian surface reflects at a point, W/(sr m^2). All instruction sets must agree.
     fn radiance(&self, position: Vec3, normal: Vec3) -> f64 {
         self.radiance_after(f32::INFINITY, position, normal)
     }
 
-    /// [`Self::radiance`] where a gather ray of a length ends, metres.
+    /// [`Self::radiance`] at the end of a gather ray of length `length`, metres.
     fn radiance_after(&self, length: f32, position: Vec3, normal: Vec3) -> f64 {
         let (scene, mut memory) = self.image.view();
         let mut buffer = CandidateBuffer::<512>::new();
@@ -88,8 +87,8 @@ impl Map {
         f64::from(radiance.x)
     }
 
-    /// Mean radiance of a horizontal surface along the four sides of a square: their distance from its
-    /// middle, and half their length.
+    /// Mean radiance of a horizontal surface along the four sides of a square. `distance` is that of the
+    /// sides from its centre, `half` is half their length.
     fn mean_around(&self, y: f32, distance: f32, half: f32) -> f64 {
         let sides = [-distance, distance].map(|side| {
             let along_z = [-half, half].map(|z| Vec3::new(side, y, z));
@@ -99,14 +98,14 @@ impl Map {
         sides.as_flattened().iter().sum::<f64>() / 4.0
     }
 
-    /// Mean radiance of a hundred points along a line.
+    /// Mean radiance at a hundred points along a line.
     fn mean_along(&self, from: Vec3, to: Vec3, normal: Vec3) -> f64 {
         let places = (0..100).map(|i| from.lerp(to, (i as f32 + 0.5) / 100.0));
         places.map(|place| self.radiance(place, normal)).sum::<f64>() / 100.0
     }
 }
 
-/// Furnace whose walls emit 1: every point reflects rho / (1 - rho) = 1.
+/// Furnace whose walls emit 1, so that every point reflects rho / (1 - rho) = 1.
 fn furnace() -> Scene {
     cluttered_furnace(Vec::new(), glowing())
 }
@@ -115,14 +114,14 @@ fn glowing() -> Material {
     Material { emission: Vec3::ONE, ..lambertian("wall", ALBEDO) }
 }
 
-/// Furnace with other objects in it, of one material.
+/// Furnace with other objects of one material in it.
 fn cluttered_furnace(things: Vec<Triangle>, finish: Material) -> Scene {
     let mut triangles = room([0; 6]);
     triangles.extend(things.into_iter().map(|triangle| Triangle { material: 1, ..triangle }));
     scene(triangles, vec![glowing(), finish], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// Closed box of size `size` from its lower corner.
+/// Closed box of size `size` whose lower corner is `lower`.
 fn closed_box(lower: Vec3, size: Vec3) -> impl Iterator<Item = Triangle> {
     room([0; 6]).into_iter().map(move |mut triangle| {
         triangle.vertices = triangle.vertices.map(|corner| lower + size * (0.5 + 0.5 * corner));
@@ -146,7 +145,7 @@ fn the_radiance_of_a_wall_is_the_same_up_to_its_edges() {
 }
 
 #[test]
-fn the_mean_radiance_around_a_corner_is_that_of_the_wall() {
+fn the_mean_radiance_around_a_corner_equals_that_of_the_wall() {
     let map = Map::new(&furnace(), 300_000);
     let mut sum = 0.0;
     for corner in 0..4 {
@@ -162,10 +161,10 @@ fn the_mean_radiance_around_a_corner_is_that_of_the_wall() {
     assert!((mean - 1.0).abs() < 0.05, "around the corners it is {mean}");
 }
 
-/// Shelves closer than a gather's radius: a search finds photons of several. Boards reflect on one side,
-/// sheets on both.
+/// The shelves are closer than the radius of a gather, so that a search finds photons of several. Boards
+/// reflect on one side, sheets on both.
 #[test]
-fn the_radiance_of_shelves_above_one_another_is_that_of_the_wall() {
+fn the_radiance_of_stacked_shelves_equals_that_of_the_wall() {
     let top = |shelf: u32| -0.5 + 0.02 * shelf as f32;
     let boards = (0..12).flat_map(|shelf| {
         closed_box(Vec3::new(-0.25, top(shelf) - 0.005, -0.25), Vec3::new(0.5, 0.005, 0.5))
@@ -189,9 +188,9 @@ fn the_radiance_of_shelves_above_one_another_is_that_of_the_wall() {
     }
 }
 
-/// A lattice of a texture, with holes narrower than a gather's radius.
+/// The holes of the textured lattice are narrower than the radius of a gather.
 #[test]
-fn the_radiance_of_a_lattice_is_that_of_the_wall() {
+fn the_radiance_of_a_lattice_equals_that_of_the_wall() {
     let lattice =
         Material { alpha_cutoff: Some(0.5), base_texture: Some(0), double_sided: true, ..glowing() };
     let mut furnace = cluttered_furnace(Vec::new(), lattice);
@@ -213,10 +212,11 @@ fn the_radiance_of_a_lattice_is_that_of_the_wall() {
     assert!((mean - 1.0).abs() < 0.04, "{mean}");
 }
 
-/// Bars narrower than a gather's radius, close above a floor, with gaps of their width: a search on the floor
-/// finds their tops, and vice versa. Their end faces may be double-sided: inside them it is dark.
+/// The bars and the gaps between them are narrower than the radius of a gather. They are close above the
+/// floor, so that a search on the floor finds photons on their tops, and vice versa. Double-sided end faces
+/// do not matter, because it is dark inside the bars.
 #[test]
-fn the_radiance_of_bars_and_of_the_floor_between_them_is_that_of_the_wall() {
+fn the_radiance_of_bars_and_of_the_floor_between_them_equals_that_of_the_wall() {
     let bars = (0..40).flat_map(|bar| {
         closed_box(Vec3::new(-0.4 + 0.02 * bar as f32, -0.998, -0.4), Vec3::new(0.01, 0.015, 0.8))
     });
@@ -261,7 +261,7 @@ fn light_on_one_side_of_a_thin_wall_does_not_show_on_the_other() {
     assert_eq!(lower, 0.0);
 }
 
-/// A board behind a lit wall: its back faces as the lit side does, and has the wall between.
+/// The back of the board faces in the direction of the wall's lit side, and the wall is between them.
 #[test]
 fn light_on_a_wall_does_not_show_on_the_back_of_furniture_behind_it() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
@@ -283,8 +283,8 @@ fn light_on_a_wall_does_not_show_on_the_back_of_furniture_behind_it() {
     }
 }
 
-/// Five boxes around the cube from -1 to 1, without a ceiling. They touch along its edges, or the floor goes
-/// on below the walls.
+/// Five boxes around the cube from -1 to 1, without a ceiling. They touch along its edges, or the floor
+/// continues below the walls.
 fn walls_of_boxes(thickness: f32, overlap: bool) -> Vec<Triangle> {
     let wall = |side: usize| {
         let axis = side / 2;
@@ -297,7 +297,7 @@ fn walls_of_boxes(thickness: f32, overlap: bool) -> Vec<Triangle> {
     [0, 1, 2, 4, 5].into_iter().flat_map(wall).collect()
 }
 
-/// Furnace of a glowing ceiling above white things.
+/// Furnace with a glowing ceiling above white objects.
 fn white_furnace(white: Vec<Triangle>, double_sided: bool) -> Scene {
     let corner = |x: f32, z: f32| Vec3::new(x, 1.0, z);
     let ceiling = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 0);
@@ -307,7 +307,7 @@ fn white_furnace(white: Vec<Triangle>, double_sided: bool) -> Scene {
     scene(triangles, vec![glowing(), white], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// Meshes that touch share edges: what one of them encloses is dark all the same.
+/// Meshes that touch share edges. The space that one of them encloses must stay dark.
 #[test]
 fn a_room_of_boxes_that_touch_is_as_bright_as_one_of_sheets() {
     for thickness in [0.0001, 0.001, 0.05, 0.2] {
@@ -325,7 +325,7 @@ fn a_room_of_boxes_that_touch_is_as_bright_as_one_of_sheets() {
     }
 }
 
-/// A floor through two rooms, of which one is a furnace and the other has no light.
+/// A floor continues from a furnace into a room without light.
 #[test]
 fn no_photon_counts_through_a_wall_on_the_floor() {
     for thickness in [0.001_f32, 0.02, 0.1] {
@@ -350,7 +350,8 @@ fn no_photon_counts_through_a_wall_on_the_floor() {
     }
 }
 
-/// A frame on a wall, a carpet on a floor: what a sheet covers has no light, though its mesh is open.
+/// A frame on a wall or a carpet on a floor covers an area, which has no light although the sheet is an open
+/// mesh.
 #[test]
 fn a_sheet_close_before_a_wall_is_as_bright_as_the_wall() {
     for gap in [0.0005, 0.005, 0.02, 0.05] {
@@ -368,7 +369,7 @@ fn a_sheet_close_before_a_wall_is_as_bright_as_the_wall() {
     }
 }
 
-/// A path between two white sheets meets them hundreds of times: its photons alone are no density.
+/// A path between two white sheets hits them hundreds of times, so that its photons alone give no density.
 #[test]
 fn sheets_that_nearly_touch_have_no_bright_spot() {
     const GAP: f32 = 0.001;

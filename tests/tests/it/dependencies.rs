@@ -1,5 +1,5 @@
-//! Licences and sources of dependencies are allowed by `deny.toml`. `cargo deny` checks advisories as well;
-//! this test needs only cargo.
+//! Licences and sources of dependencies are allowed by `deny.toml`. `cargo deny` also checks advisories; this
+//! test needs only cargo.
 
 use std::process::Command;
 
@@ -14,7 +14,7 @@ fn licences() -> toml::Table {
     file["licenses"].as_table().expect("a table").clone()
 }
 
-/// Licences of a list in `deny.toml`.
+/// Licences in a list of `deny.toml`.
 fn names(list: &toml::Value) -> Vec<&str> {
     list.as_array().expect("a list").iter().map(|name| name.as_str().expect("a licence")).collect()
 }
@@ -26,8 +26,8 @@ fn allowed<'a>(licences: &'a toml::Table, package: &str) -> Vec<&'a str> {
     of_package.flat_map(|exception| names(&exception["allow"])).chain(names(&licences["allow"])).collect()
 }
 
-/// Returns whether allowed licences satisfy an SPDX expression; `None` if it is invalid. A slash between
-/// alternatives predates SPDX.
+/// Returns whether the allowed licences satisfy an SPDX expression; `None` if it is invalid. A slash
+/// separates alternatives in the notation before SPDX.
 fn is_satisfied(expression: &str, allowed: &[&str]) -> Option<bool> {
     let expression = Expression::parse_mode(expression, ParseMode::LAX).ok()?;
     Some(expression.evaluate(|requirement| allowed.contains(&requirement.to_string().as_str())))
@@ -46,7 +46,7 @@ fn packages() -> Vec<Value> {
 }
 
 #[test]
-fn a_licence_is_allowed_for_all_or_for_one_crate() {
+fn a_licence_is_allowed_for_all_crates_or_for_one() {
     let licences = licences();
     assert!(!allowed(&licences, "serde").contains(&"MPL-2.0"));
     assert!(allowed(&licences, "serialport").contains(&"MPL-2.0"));

@@ -1,4 +1,4 @@
-//! Energy of the photon pass: the emission of every kind of light arrives.
+//! Energy of the photon pass: stored power equals the power that every kind of light emits towards surfaces.
 
 use std::f64::consts::PI;
 
@@ -13,7 +13,7 @@ use photoncard_firmware::scene::light::{environment_direction, environment_radia
 use photoncard_tests::{camera, lambertian, quad, room, scene};
 
 const PHOTONS: usize = 200_000;
-/// Albedo of nearly black surfaces, on which photons are still stored.
+/// Albedo of nearly black surfaces, which still store photons.
 const BLACK: f32 = 0.001;
 
 /// Stored power per channel, watts.
@@ -33,7 +33,7 @@ fn check(scene: &Scene, expected: [f64; 3], what: &str) {
     }
 }
 
-/// A closed black room.
+/// Closed black room.
 fn inside() -> Scene {
     scene(room([0; 6]), vec![lambertian("wall", BLACK)], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
@@ -58,7 +58,7 @@ fn times(colour: [f32; 3], factor: f64) -> [f64; 3] {
 }
 
 #[test]
-fn points_and_spots_emit_their_intensity_over_their_directions() {
+fn point_and_spot_lights_emit_their_intensity_over_their_directions() {
     let position = Vec3::new(0.2, 0.1, -0.3);
     let mut room = inside();
     room.lights = vec![light(PunctualKind::Point { position }, COLOUR)];
@@ -86,7 +86,7 @@ fn points_and_spots_emit_their_intensity_over_their_directions() {
 }
 
 #[test]
-fn a_directional_light_brings_its_irradiance_to_all_that_faces_it() {
+fn a_directional_light_gives_its_irradiance_to_surfaces_that_face_it() {
     for direction in [Vec3::NEG_Y, Vec3::new(1.0, -2.0, 0.5)] {
         let direction = direction.normalize();
         let mut cube = outside();
@@ -97,7 +97,7 @@ fn a_directional_light_brings_its_irradiance_to_all_that_faces_it() {
 }
 
 #[test]
-fn an_environment_brings_its_radiance_to_all_sides() {
+fn an_environment_gives_its_radiance_to_all_sides() {
     let mut cube = outside();
     cube.environment = Some(Environment::constant(COLOUR.into()));
     check(&cube, times(COLOUR, PI * 24.0), "constant");
@@ -159,9 +159,9 @@ fn a_panel_with_a_texture_emits_its_mean_and_all_lights_together_their_sum() {
     check(&all, times(COLOUR, panel + 4.0 * PI), "panel and point");
 }
 
-/// Distance of two small cubes from the middle between them, metres.
+/// Distance of two small cubes from the point midway between them, metres.
 const AFAR: f32 = 5.0;
-/// Half of a small cube's side, metres.
+/// Half the side of a small cube, metres.
 const HALF: f32 = 0.05;
 
 /// Two small black cubes, far from each other.
@@ -178,8 +178,8 @@ fn far_cubes() -> Scene {
     cubes
 }
 
-/// Integral over the surfaces of both cubes of the irradiance by a light at a point: `toward(way)` is its
-/// radiant intensity along the vector to the surface, W/sr.
+/// Irradiance by a light at the point `from`, integrated over the surfaces of both cubes. `toward(way)` is
+/// the radiant intensity along the vector to the surface, W/sr.
 fn received_from(from: Vec3, toward: impl Fn(Vec3) -> f32) -> f64 {
     const STEPS: i32 = 8;
     let middle = |i: i32| ((i as f32 + 0.5) / STEPS as f32 * 2.0 - 1.0) * HALF;
@@ -249,8 +249,8 @@ fn photons_of_panels_are_aimed() {
     }
 }
 
-/// A mirror of 10 m on the ground, under a slanting sun, and above it a black plate of 1 m: one path in
-/// hundreds that meet the mirror meets the plate. A spot lights the plate with `lamp` times the sun's
+/// Mirror of 10 m on the ground under a slanting sun, with a black plate of 1 m above it. One in hundreds of
+/// paths that hit the mirror hits the plate. A spot light illuminates the plate with `lamp` times the sun's
 /// intensity.
 fn sun_over_a_mirror(lamp: f32) -> Scene {
     let smooth = Reflection::MetallicRoughness {
@@ -280,10 +280,10 @@ fn sun_over_a_mirror(lamp: f32) -> Scene {
     Scene { lights: vec![sun, spot], ..scene(triangles, materials, camera(Vec3::Y, Vec3::Y)) }
 }
 
-/// Where caustics bring next to none of the light, few paths are traced for them, and the photons have the
-/// power all the same.
+/// Few paths are traced for caustics that contribute almost no light. The stored photons still have the power
+/// of the caustics.
 #[test]
-fn rare_caustics_take_paths_by_their_share_of_the_light_and_keep_their_power() {
+fn rare_caustics_have_few_paths_and_their_full_power() {
     const SEEDS: u32 = 16;
     let [much, little] = [0.0, 100.0].map(|lamp| {
         let packed = PackedScene::new(&sun_over_a_mirror(lamp)).unwrap();

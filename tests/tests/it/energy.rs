@@ -1,4 +1,4 @@
-//! Energy balance of the photon pass: emitted power arrives, and arrives again as often as it is reflected.
+//! Energy balance of the photon pass: stored power is the emitted power plus that of every reflection.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -21,7 +21,7 @@ fn stored_power(pass: &PhotonPass) -> [f64; 3] {
     })
 }
 
-/// A closed room with a lamp in its middle that shines up and down.
+/// Closed room with a lamp in its middle that emits upwards and downwards.
 fn lit_room(walls: Material, emission: Vec3) -> Scene {
     let lamp = Material { emission, double_sided: true, ..walls.clone() };
     let mut triangles = room([0; 6]);
@@ -30,7 +30,7 @@ fn lit_room(walls: Material, emission: Vec3) -> Scene {
     scene(triangles, vec![walls, lamp], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// Power of the lamp per unit of radiance, W: pi times its area, on both sides.
+/// Power of the lamp per unit of radiance, W: pi times the area of both sides.
 const LAMP: f64 = std::f64::consts::PI * 0.64 * 2.0;
 
 #[test]
@@ -49,7 +49,7 @@ fn a_closed_room_stores_the_emitted_power_over_one_minus_the_albedo() {
 }
 
 #[test]
-fn a_room_of_black_walls_but_one_stores_that_walls_share() {
+fn a_room_with_one_reflecting_wall_stores_its_share() {
     // The lamp in a form factor: a parallel square of side 2 at distance 0.7, seen from a square of side 0.8.
     let mut scene = lit_room(lambertian("black", 0.0), Vec3::ONE);
     scene.materials.push(lambertian("floor", 0.001));
@@ -82,7 +82,7 @@ fn form_factor(a: f64, b: f64, distance: f64) -> f64 {
 }
 
 #[test]
-fn exactly_the_asked_number_is_stored_and_the_same_on_any_threads() {
+fn the_requested_number_of_photons_is_stored_equally_on_any_threads() {
     let scene = lit_room(lambertian("wall", 0.5), Vec3::ONE);
     let packed = PackedScene::new(&scene).unwrap();
     for count in [1, 17, 10_001] {

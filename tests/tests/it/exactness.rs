@@ -1,4 +1,4 @@
-//! Exactness: renders that differ only in ordering, tile size, chips or threads have identical pixels.
+//! Renders that differ only in ordering, tile size, chips or threads have identical pixels.
 
 use photoncard_driver::film::{Film, LayerSums, PixelSums, Window};
 use photoncard_driver::layer::Layers;
@@ -34,12 +34,12 @@ fn card(text: &str) -> CardAddress {
     text.parse().unwrap()
 }
 
-/// Sums of a film without its layers.
+/// Pixel sums of a film without those of its layers.
 fn sums(film: &Film) -> Vec<PixelSums> {
     film.sums().map(|sums| PixelSums { layers: None, ..sums }).collect()
 }
 
-/// Settings that no pixel may depend on.
+/// Settings on which no pixel may depend.
 fn variants() -> Vec<RenderSettings> {
     use GatherOrder::{DirectionBins, Hash, Hilbert, Naive, Sort, Tiled};
     let tile = 16;
@@ -101,7 +101,7 @@ fn check_variants(sampling: Sampling) {
     check_variants_of(&glossy(), &settings().with(|s| s.integrator.sampling = sampling));
 }
 
-/// Checks all variants with the sampling and the estimate of radiance of `settings_of`.
+/// Checks that pixels of all variants equal those with `settings_of`.
 fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
     let PhotonMaps { radiance, caustic_photons, .. } = settings_of.photons;
     let Picture { width, height, .. } = settings_of.picture;
@@ -126,20 +126,20 @@ fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
     }
 }
 
-/// Sums of a film's layers; zero in a film without layers.
+/// Layer sums of a film; zero in a film without layers.
 fn layer_sums(film: &Film) -> Vec<LayerSums> {
     film.sums().map(|sums| sums.layers.unwrap_or_default()).collect()
 }
 
-/// Orders of chips; `hilbert` is the host's.
+/// Gather orders of chips, without `hilbert` of the host.
 const CHIPS_ORDERS: [GatherOrder; 5] = {
     use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
     [Naive, Tiled, DirectionBins, Hash, Sort]
 };
 
-/// A tile of 64x64 pixels has more gather points than a chip keeps: its rays are cast in two stripes.
+/// A tile of 64x64 pixels has more gather points than a chip keeps, so that its rays are cast in two stripes.
 #[test]
-fn tiles_with_more_pixels_than_gather_points_are_the_same() {
+fn tiles_with_more_pixels_than_gather_points_are_exact() {
     const { assert!(64 * 64 > <Reference as ChipKind>::Points::ENTRIES, "one stripe") };
     for irradiance_error in [None, Some(1e-3)] {
         let picture = |tile, order, cards| {
@@ -166,10 +166,9 @@ fn tiles_with_more_pixels_than_gather_points_are_the_same() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
 
-    /// Any number of tiles in flight, on chips of any kind, in any order, with a queue of any size: gathers
-    /// wait across tiles.
+    /// Gathers wait across tiles, for any number of tiles in flight, kind of chip, order and size of queue.
     #[test]
-    fn tiles_in_flight_do_not_change_a_bit(
+    fn pixels_do_not_depend_on_tiles_in_flight(
         tile in 2_u32..9,
         order in prop::sample::select(&CHIPS_ORDERS[..]),
         queue in prop_oneof![Just(None), (1_u32..40).prop_map(Some), (40_u32..700).prop_map(Some)],
@@ -206,22 +205,22 @@ proptest! {
 }
 
 #[test]
-fn order_tiles_chips_and_kind_of_chip_do_not_change_a_bit() {
+fn pixels_do_not_depend_on_order_tiles_or_chips() {
     check_variants(Sampling::Reflection);
 }
 
 #[test]
-fn rays_by_photons_are_exact() {
+fn photon_sampling_is_exact() {
     check_variants(Sampling::Photon);
 }
 
 #[test]
-fn rays_by_the_product_are_exact() {
+fn product_sampling_is_exact() {
     check_variants(Sampling::Product);
 }
 
 #[test]
-fn rays_by_the_mixture_are_exact() {
+fn mixture_sampling_is_exact() {
     check_variants(Sampling::Mixture);
 }
 
@@ -296,8 +295,8 @@ fn more_records_than_a_chip_has_room_for_are_exact() {
     }
 }
 
-/// Far to the right a position in the picture has few bits below the pixel: it may be rounded to the next
-/// pixel's border.
+/// Positions far to the right of the picture have few bits below the pixel, and may be rounded to the border
+/// of the next pixel.
 #[test]
 fn samples_rounded_to_the_next_pixel_are_exact() {
     let scene = glossy();
@@ -329,7 +328,7 @@ fn a_frame_along_one_curve_is_for_emulated_reference_chips_alone() {
 }
 
 #[test]
-fn the_threads_of_the_host_do_not_change_a_bit() {
+fn pixels_do_not_depend_on_threads_of_the_host() {
     let scene = glossy();
     let expected = sums(&render_or_panic(&scene, &settings()).film);
     for threads in [1, 2, 5] {

@@ -1,5 +1,5 @@
-//! Scenes and settings at the limits of their ranges: large, tilted, bright, saturated, with rays of one kind
-//! alone.
+//! Scenes and settings at the limits of their ranges: large, tilted, bright or saturated, or with one kind of
+//! rays only.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -24,7 +24,7 @@ fn emitting(name: &str, albedo: f32, radiance: Vec3) -> Material {
     Material { emission: radiance, ..lambertian(name, albedo) }
 }
 
-/// Floor tilted about two axes under a parallel lamp, scaled, and seen from near.
+/// Floor of half side `half_side` that is tilted about two axes under a parallel lamp and seen from near.
 fn tilted_floor(half_side: f32) -> Scene {
     let (u, v) = (Vec3::new(0.8, 0.3, 0.2).normalize(), Vec3::new(-0.2, 0.5, -0.9));
     let v = (v - u * u.dot(v)).normalize();
@@ -42,7 +42,7 @@ fn tilted_floor(half_side: f32) -> Scene {
 }
 
 #[test]
-fn the_size_of_a_tilted_floor_does_not_darken_what_is_seen_of_it() {
+fn a_large_tilted_floor_is_not_darker_than_a_small_one() {
     let settings = settings().with(|s| {
         s.integrator.gather_rays = 0;
         s.integrator.shadow_rays = 16;
@@ -85,7 +85,7 @@ fn many_samples_next_to_a_dazzling_lamp_do_not_overflow() {
 }
 
 #[test]
-fn direct_light_is_the_same_by_shadow_rays_by_gather_rays_and_by_both() {
+fn direct_light_by_shadow_rays_by_gather_rays_and_by_both_is_equal() {
     // Black except for the floor: all light there is direct.
     let materials =
         vec![lambertian("black", 0.0), lambertian("floor", 0.6), emitting("lamp", 0.0, Vec3::ONE)];
@@ -128,7 +128,7 @@ fn the_stored_power_of_coloured_light_is_right_in_every_channel() {
     }
 }
 
-/// The Cornell box, whose blocks are rotated, and one distant triangle.
+/// Cornell box, whose blocks are rotated, with one distant triangle.
 fn box_and_far_triangle(distance: f32) -> Scene {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
     let mut scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
@@ -137,9 +137,9 @@ fn box_and_far_triangle(distance: f32) -> Scene {
     scene
 }
 
-/// Photon positions lie on a grid over the whole scene: a distant triangle must not coarsen it visibly.
+/// Photon positions lie on a grid over the whole scene. A distant triangle must not coarsen it visibly.
 #[test]
-fn a_far_triangle_changes_no_picture() {
+fn a_far_triangle_does_not_change_the_picture() {
     let settings = RenderSettings {
         picture: Picture { width: 32, height: 32, ..Picture::default() },
         photons: PhotonMaps { count: 100_000, max_distance: Some(0.1), ..PhotonMaps::default() },
@@ -154,9 +154,9 @@ fn a_far_triangle_changes_no_picture() {
     assert!(error.is_input() && error.to_string().contains("too wide"), "{error}");
 }
 
-/// Without gather rays nothing bounds the contribution of a shadow ray from very near.
+/// Without gather rays nothing bounds the contribution of a shadow ray from close by.
 #[test]
-fn shadow_rays_beside_a_small_lamp_bring_no_darkness() {
+fn shadow_rays_beside_a_small_lamp_do_not_darken() {
     let vertical = |x: f32, side: f32| {
         [
             Vec3::new(x, 0.0, -side),

@@ -1,4 +1,4 @@
-//! A render over bad lines gives the same picture, and reports the repairs.
+//! A render over bad lines gives an equal picture, and reports the repairs.
 
 use photoncard_driver::film::PixelValue;
 use photoncard_driver::render::{CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Statistics};
@@ -30,7 +30,7 @@ fn render(faults: Option<&str>) -> (Vec<PixelValue>, Statistics) {
 }
 
 #[test]
-fn bad_lines_render_the_same_picture() {
+fn bad_lines_do_not_change_the_picture() {
     let (expected, sound) = render(None);
     assert_eq!((sound.link.damaged_frames, sound.link.resets), (0, 0));
     for faults in [

@@ -1,4 +1,5 @@
-//! Flat glass, thin walls and panes: light that passes it is direct light, and what it reflects is a caustic.
+//! Flat glass (thin walls, slabs and panes): the light that it transmits is direct light, and the light that
+//! it reflects is a caustic.
 
 use std::f64::consts::PI;
 
@@ -17,7 +18,7 @@ const ALBEDO: f32 = 0.02;
 const FLOOR: u32 = 0;
 const LAMP: u32 = 1;
 const PANE: u32 = 2;
-/// Height of the panes over the floor, metres.
+/// Height of the panes above the floor, metres.
 const HEIGHT: f32 = 0.5;
 /// Half the thickness of slabs, metres.
 const HALF: f32 = 0.002;
@@ -31,13 +32,13 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// A horizontal square; upwards, or downwards if `sign` is -1.
+/// Horizontal square that faces up, or down if `sign` is -1.
 fn square(half: f32, y: f32, sign: f32, material: u32) -> [Triangle; 2] {
     let corner = |x: f32, z: f32| Vec3::new(x * half, y, -z * half * sign);
     quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], material)
 }
 
-/// A floor, which a camera sees from below the panes, and panes.
+/// Floor below panes, seen by a camera that is also below them.
 fn floor(pane: Material, panes: &[Triangle]) -> Scene {
     let mut view = camera(Vec3::new(0.0, 0.3, 0.4), Vec3::new(0.0, -0.3, -0.4));
     view.vertical_fov = 0.02;
@@ -46,7 +47,7 @@ fn floor(pane: Material, panes: &[Triangle]) -> Scene {
     scene(triangles, vec![lambertian("floor", ALBEDO), lamp, pane], view)
 }
 
-/// A sheet without thickness.
+/// Horizontal pane without thickness.
 fn sheet() -> Vec<Triangle> {
     square(40.0, HEIGHT, 1.0, PANE).to_vec()
 }
@@ -55,7 +56,7 @@ fn slab(y: f32) -> Vec<Triangle> {
     cuboid(Vec3::Y * y, Vec3::new(40.0, HALF, 40.0), PANE)
 }
 
-/// Means of the layers over the picture, as irradiances of the floor.
+/// Mean of each layer over the picture, as an irradiance of the floor.
 fn irradiances(scene: &Scene, settings: &RenderSettings) -> [[f64; 3]; 3] {
     let rendering = render_or_panic(scene, settings);
     let layers: Vec<PixelLayers> = rendering.film.all().map(|all| all.layers).collect();
@@ -68,7 +69,7 @@ fn irradiances(scene: &Scene, settings: &RenderSettings) -> [[f64; 3]; 3] {
     [mean(|layers| layers.direct), mean(|layers| layers.indirect), mean(|layers| layers.caustic)]
 }
 
-/// Reflectance of a face of glass at a cosine, and the cosine inside.
+/// Reflectance of a glass surface at the cosine of incidence, and the cosine inside the glass.
 fn face(cosine: f64) -> (f64, f64) {
     let inside = (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
     let [parallel, perpendicular] = [
@@ -78,26 +79,26 @@ fn face(cosine: f64) -> (f64, f64) {
     (0.5 * (parallel * parallel + perpendicular * perpendicular), inside)
 }
 
-/// Transmittance of clear glass at a cosine.
+/// Transmittance of clear glass at the cosine of incidence.
 fn clear(cosine: f64) -> f64 {
     let (reflectance, _) = face(cosine);
     (1.0 - reflectance) / (1.0 + reflectance)
 }
 
-/// Transmittance of a slab of an optical depth at a cosine.
+/// Transmittance of a slab with optical depth `depth` at the cosine of incidence.
 fn absorbing(cosine: f64, depth: f64) -> f64 {
     let (reflectance, inside) = face(cosine);
     let once = (-depth / inside).exp();
     (1.0 - reflectance).powi(2) * once / (1.0 - (reflectance * once).powi(2))
 }
 
-/// Irradiance of the floor below glass of a transmittance by the cosine.
+/// Irradiance of the floor below glass with a given transmittance as a function of the cosine.
 type Irradiance = Box<dyn Fn(&dyn Fn(f64) -> f64) -> f64>;
 
-/// Name of a light, its addition to a scene, and its irradiance.
+/// Light: its name, a function that adds it to a scene, and its irradiance.
 type Light = (&'static str, fn(&mut Scene), Irradiance);
 
-/// The lights of the tests.
+/// Lights with which transmission is tested.
 fn lights() -> Vec<Light> {
     vec![
         (
@@ -184,7 +185,7 @@ fn set_absorption(material: &mut Material, coefficient: Vec3) {
     }
 }
 
-/// Direct light alone: what two panes reflect to and fro is a caustic.
+/// Only direct light counts. Light that two panes reflect between them is a caustic.
 #[test]
 fn light_through_double_glazing_is_direct_light() {
     let panes = [slab(HEIGHT), slab(HEIGHT + 0.02)].concat();
@@ -216,7 +217,7 @@ fn light_through_double_glazing_is_direct_light() {
 }
 
 #[test]
-fn textures_layers_and_coverage_of_a_sheet_count() {
+fn textures_layers_and_coverage_dim_the_light_through_a_sheet() {
     let covered = Material { blends: true, alpha: 0.5, ..glass("covered", Vec3::ONE, false) };
     check("covered", &covered, &sheet(), [&|cosine| 0.5 + 0.5 * clear(cosine); 3]);
     let mut milky = glass("milky", Vec3::ONE, false);
@@ -252,8 +253,8 @@ fn a_texture_of_a_sheet_tints_the_light() {
     assert_eq!(caustic, [0.0; 3]);
 }
 
-/// Gather rays and shadow rays share the light of a lamp or a sky by weights that add up to 1, with records
-/// and without.
+/// Gather rays and shadow rays share the light of a lamp or a sky by weights with a sum of 1, with and
+/// without irradiance records.
 #[test]
 fn gather_rays_and_shadow_rays_agree_on_light_through_panes() {
     for panes in [sheet(), slab(HEIGHT)] {
@@ -281,9 +282,9 @@ fn gather_rays_and_shadow_rays_agree_on_light_through_panes() {
     }
 }
 
-/// A wall of glass beside the floor sends light of the sun to it.
+/// A glass wall beside the floor reflects sunlight to it.
 #[test]
-fn what_a_pane_reflects_is_a_caustic() {
+fn light_reflected_by_a_pane_is_a_caustic() {
     for thickness in [0.0, 0.02] {
         let wall =
             cuboid(Vec3::new(1.0 + 0.5 * thickness, 1.0, 0.0), Vec3::new(0.5 * thickness, 1.0, 1.0), PANE);
@@ -308,7 +309,7 @@ fn what_a_pane_reflects_is_a_caustic() {
 
 /// Panes without loss are invisible in a room of uniform radiance.
 #[test]
-fn panes_do_not_show_in_a_furnace() {
+fn panes_are_invisible_in_a_furnace() {
     let view = camera(Vec3::new(0.1, 0.05, 0.9), Vec3::new(-0.1, -0.05, -1.0));
     let wall = Material { emission: Vec3::splat(0.5), ..lambertian("wall", 0.5) };
     let materials = vec![wall, glass("solid", Vec3::ONE, true), glass("sheet", Vec3::ONE, false)];

@@ -1,4 +1,4 @@
-//! Known radiance: a closed room of albedo rho whose walls emit L shows L / (1 - rho) everywhere.
+//! White furnace: a closed room of albedo rho whose walls emit L shows L / (1 - rho) everywhere.
 
 use glam::Vec3;
 use photoncard_driver::render::{
@@ -27,7 +27,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Checks the mean over the picture, and over each of its 8x8 blocks.
+/// Checks the mean over the picture and over each block of 8x8 pixels.
 fn check(scene: &Scene, expected: f64, tolerance: f64) {
     check_with(scene, &settings(), expected, tolerance);
 }
@@ -49,14 +49,14 @@ fn check_with(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance
 }
 
 #[test]
-fn a_diffuse_furnace_glows_evenly() {
+fn a_diffuse_furnace_has_uniform_radiance() {
     for albedo in [0.2, 0.5, 0.8] {
         check(&furnace(lambertian("wall", albedo)), EMISSION as f64 / (1.0 - albedo as f64), 0.02);
     }
 }
 
 #[test]
-fn a_diffuse_furnace_glows_evenly_by_precomputed_irradiance() {
+fn a_diffuse_furnace_has_uniform_radiance_by_precomputed_irradiance() {
     let settings = settings().with(|s| s.photons.radiance = Radiance::Precomputed);
     for albedo in [0.2, 0.8] {
         let expected = EMISSION as f64 / (1.0 - albedo as f64);
@@ -64,7 +64,7 @@ fn a_diffuse_furnace_glows_evenly_by_precomputed_irradiance() {
     }
 }
 
-/// A Phong lobe reflects less at grazing angles. A small wall with one, in a room of uniform radiance, shows
+/// A Phong lobe reflects less at grazing angles. A small wall with a lobe in a room of uniform radiance shows
 /// its directional albedo.
 #[test]
 fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
@@ -99,7 +99,7 @@ fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
     }
 }
 
-/// The integral of `ks (n + 2) / (2 pi) cos(alpha)^n cos(theta)` over the hemisphere, for a view at `angle`.
+/// Integral of `ks (n + 2) / (2 pi) cos(alpha)^n cos(theta)` over the hemisphere, for a view at `angle`.
 fn lobe_albedo(specular: f64, exponent: f64, angle: f64) -> f64 {
     let steps = 1000;
     let (sin, cos) = angle.sin_cos();
@@ -116,10 +116,10 @@ fn lobe_albedo(specular: f64, exponent: f64, angle: f64) -> f64 {
     specular * (exponent + 2.0) / std::f64::consts::TAU * sum * std::f64::consts::TAU / (steps * steps) as f64
 }
 
-/// A room whose walls all have a lobe is no uniform furnace. The expected radiance comes from an oracle: a
-/// plain path tracer of this room, in double precision.
+/// A room whose walls all have a lobe has no uniform radiance. The expected radiance is computed by a plain
+/// path tracer of this room in double precision.
 #[test]
-fn a_phong_furnace_shows_what_a_path_tracer_finds() {
+fn the_radiance_of_a_phong_furnace_equals_that_of_a_path_tracer() {
     let (diffuse, specular, exponent) = (0.25, 0.35, 12.0);
     let material = Material::phong("wall", Vec3::splat(diffuse), Vec3::splat(specular), exponent);
     let scene = furnace(material);
@@ -132,8 +132,8 @@ fn a_phong_furnace_shows_what_a_path_tracer_finds() {
 }
 
 mod oracle {
-    //! A path tracer of the cube from -1 to 1 with walls of one reflection and radiance 1: no light sampling,
-    //! no photons, uniform directions over the hemisphere.
+    //! Path tracer of the cube from -1 to 1, whose walls have one reflection and emit 1. It samples
+    //! directions uniformly over the hemisphere, without light sampling or photons.
 
     use glam::DVec3;
     use photoncard_driver::scene::Camera;
@@ -144,7 +144,7 @@ mod oracle {
         pub(super) exponent: f64,
     }
 
-    /// Generator of Steele, Lea and Flood 2014 (`SplitMix64`).
+    /// Pseudo-random generator `SplitMix64` (Steele, Lea, Flood 2014).
     struct Random(u64);
 
     impl Random {
@@ -158,7 +158,7 @@ mod oracle {
     }
 
     impl PhongRoom {
-        /// Mean radiance that a camera of 90 degrees sees in a square picture.
+        /// Mean radiance in a square picture of a camera with 90 degrees.
         pub(super) fn mean_radiance(&self, camera: &Camera, paths: u32) -> f64 {
             let mut random = Random(7);
             let [forward, right, up] = [camera.forward, camera.right, camera.up].map(glam::Vec3::as_dvec3);

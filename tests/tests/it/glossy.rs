@@ -1,4 +1,4 @@
-//! glTF's metallic-roughness model of known radiance: plates, balls and grooves under a sky of uniform
+//! Metallic-roughness surfaces with known radiance: plates, balls and grooves under a sky of uniform
 //! radiance.
 
 use glam::Vec3;
@@ -29,7 +29,7 @@ fn surface(base: f32, metallic: f32, roughness: f32) -> Material {
     Material::new("surface", reflection)
 }
 
-/// A camera at a distance with a field of view of 2 degrees, looking at the origin.
+/// Distant camera with a field of view of 2 degrees that looks at the origin.
 fn far_camera(direction: Vec3) -> Camera {
     let origin = direction.normalize() * 20.0;
     Camera { vertical_fov: 2.0_f32.to_radians(), ..camera(origin, -origin) }
@@ -39,7 +39,7 @@ fn under_a_white_sky(scene: Scene) -> Scene {
     Scene { environment: Some(Environment::constant(Vec3::ONE)), ..scene }
 }
 
-/// A horizontal plate, seen at a cosine to its normal.
+/// Horizontal plate, seen at the given cosine to its normal.
 fn plate(material: Material, cosine: f32) -> Scene {
     let corner = |x: f32, z: f32| Vec3::new(40.0 * x, 0.0, 40.0 * z);
     let quad = quad([corner(-1., 1.), corner(1., 1.), corner(1., -1.), corner(-1., -1.)], 0);
@@ -47,8 +47,8 @@ fn plate(material: Material, cosine: f32) -> Scene {
     under_a_white_sky(scene(quad.to_vec(), vec![material], far_camera(Vec3::new(sine, cosine, 0.01))))
 }
 
-/// Directional albedos by quadrature over half vectors: roughness, cosine, a metal of base 0.8, a black
-/// dielectric.
+/// Directional albedos by quadrature over half vectors: roughness, cosine, albedo of a metal with base colour
+/// 0.8, albedo of a black dielectric.
 const ALBEDOS: [(f32, f32, f64, f64); 10] = [
     (0.1, 0.15, 0.8854, 0.4608),
     (0.1, 0.98, 0.8, 0.04),
@@ -75,7 +75,7 @@ fn plates_in_a_white_furnace_show_their_albedo() {
     }
 }
 
-/// Two plates of metal at a right angle that reach a distance of `far` in each axis, seen from above.
+/// Two metal plates at a right angle that extend to `far` along each axis, seen from above.
 fn groove(roughness: f32, far: f32) -> Scene {
     let side = |x: f32| {
         let corner = |s: f32, z: f32| Vec3::new(x * s * far, s * far, z * far);
@@ -89,8 +89,8 @@ fn groove(roughness: f32, far: f32) -> Scene {
     scene(triangles, vec![surface(0.9, 1.0, roughness)], far_camera(Vec3::new(0.01, 1.0, 0.02)))
 }
 
-/// Two plates at a right angle reflect most light twice: F0^2 at low roughness. The values are means of paths
-/// that are traced by the Monte Carlo method, with standard errors below 0.0002.
+/// Two plates at a right angle reflect most light twice: F0^2 at low roughness. Expected values are Monte
+/// Carlo estimates by traced paths, with standard errors below 0.0002.
 #[test]
 fn a_groove_of_glossy_metal_is_not_black() {
     for (roughness, expected) in [(0.05, 0.8104), (0.1, 0.8102), (0.3, 0.7849)] {
@@ -103,8 +103,9 @@ fn a_groove_of_glossy_metal_is_not_black() {
     }
 }
 
-/// A light without extent is seen by way of two plates: no ray meets it, the caustic map brings it, and blurs
-/// it at the edge between them. The values are means of traced paths, with standard errors below 0.2 %.
+/// A punctual light is seen by reflection at two plates. No ray hits it, so that the caustic map supplies the
+/// light and blurs it at the edge between the plates. Expected values are estimates by traced paths, with
+/// standard errors below 0.2 %.
 #[test]
 fn a_groove_of_glossy_metal_reflects_a_distant_light() {
     for (roughness, expected) in [(0.3, 1.4976), (0.45, 0.6705)] {

@@ -1,4 +1,4 @@
-//! Irradiance cache: interpolated light is right, other light is gathered, and fewer rays are cast.
+//! Irradiance cache: interpolated light is correct, other light is gathered, and fewer rays are cast.
 
 use glam::Vec3;
 use photoncard_driver::film::Window;
@@ -12,7 +12,7 @@ fn load(name: &str) -> Scene {
     gltf::load(path.as_ref()).expect("a shipped scene loads")
 }
 
-/// The middle of the Cornell box, as in a large picture.
+/// Settings for the middle of the Cornell box, as in a large picture.
 fn settings() -> RenderSettings {
     RenderSettings {
         picture: Picture {
@@ -52,7 +52,7 @@ fn most_pixels_of_the_cornell_box_are_interpolated_at_no_greater_error() {
 }
 
 #[test]
-fn a_lesser_error_is_interpolated_from_more_records() {
+fn a_smaller_error_takes_more_records() {
     let mapped = MappedScene::new(load("cornell.gltf"), &settings());
     let counters = [1e-4, 0.003, 0.03, 0.3].map(|error| {
         mapped
@@ -88,10 +88,10 @@ fn furnace(albedo: f32) -> Scene {
     scene(room([0; 6]), vec![wall], camera(Vec3::new(0.2, -0.1, 0.6), Vec3::new(0.1, 0.2, -1.0)))
 }
 
-/// Every wall of a furnace emits 1 and reflects `albedo`: every pixel is `1 / (1 - albedo)`. Direct light of
-/// walls so near and large is divided between shadow rays and records.
+/// Every wall of the furnace emits 1 and reflects `albedo`, so that every pixel is `1 / (1 - albedo)`. Shadow
+/// rays and irradiance records share the direct light, because the walls are near and large.
 #[test]
-fn a_furnace_is_even_with_records_of_any_sampling() {
+fn a_furnace_is_uniform_with_records_of_any_sampling() {
     for (albedo, sampling) in [
         (0.2, Sampling::Reflection),
         (0.5, Sampling::Photon),
@@ -118,7 +118,7 @@ fn a_furnace_is_even_with_records_of_any_sampling() {
     }
 }
 
-/// Mean difference across the borders of 16x16 cells, over the mean difference across other columns.
+/// Ratio of the mean difference across borders of 16x16 cells to that across other columns.
 #[test]
 fn no_seam_shows_at_the_borders_of_tiles() {
     let mapped = MappedScene::new(load("cornell.gltf"), &settings());

@@ -1,5 +1,5 @@
-//! Irradiance records that a chip keeps from one frame of a picture to the next: they are gathered once, as
-//! far as there is room, and no pixel depends on that.
+//! Irradiance records that a chip keeps between the frames of a picture. They are gathered once while there
+//! is room, and no pixel depends on it.
 
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tiles};
@@ -19,12 +19,12 @@ use photoncard_shared::message::{Fault, FrameParameters, PixelSums, Tile};
 use photoncard_tests::everything::everything;
 use photoncard_tests::with_room_for_a_card;
 
-/// Lines of the directory of kept records.
+/// Number of lines of the directory of kept records.
 const DIRECTORY: usize = 128;
-/// Lines that suffice for all records of the picture.
+/// Number of lines that suffices for all records of the picture.
 const PLENTY: usize = 4000;
 
-/// A card's image, and the frames and tiles of a picture.
+/// Card image, with the frames and tiles of a picture.
 struct World {
     scene: SceneImage,
     image: Vec<Line>,
@@ -32,7 +32,7 @@ struct World {
     tiles: Vec<Tile>,
 }
 
-/// Sums of the pixels of all tiles, and the work.
+/// Sums of all pixels, and the work.
 type Picture = (Vec<PixelSums>, Counters);
 
 impl World {
@@ -56,7 +56,7 @@ impl World {
         Self { scene, image: image.lines().to_vec(), frame, tiles }
     }
 
-    /// Card memory with the image, and lines beyond it.
+    /// Card memory with the image and `room` lines after it.
     fn memory(&self, room: usize) -> Vec<Line> {
         let mut lines = self.image.clone();
         lines.resize(self.image.len() + room, Line([0xa5; 128]));
@@ -67,7 +67,7 @@ impl World {
         FrameParameters { first_sample, samples, ..self.frame }
     }
 
-    /// Renders a frame on a chip of a card with `room` lines beyond the image.
+    /// Renders a frame on the chip of a card with `room` lines after the image.
     fn render<K: ChipKind>(
         &self,
         chip: &mut Chip<K>,
@@ -92,7 +92,7 @@ impl World {
         Ok((parts.iter().flat_map(sums).collect(), counters))
     }
 
-    /// The frame on a new chip that keeps nothing.
+    /// Renders the frame on a new chip that keeps no records.
     fn alone(&self, frame: &FrameParameters) -> Picture {
         let mut lines = self.memory(0);
         let frame = FrameParameters { keep_records: false, ..*frame };
@@ -100,7 +100,7 @@ impl World {
     }
 }
 
-/// Two passes on one new chip, for each room beyond the image.
+/// Renders two passes on one new chip for each amount of room after the image, and checks pixels and work.
 fn check_passes<K: ChipKind>(world: &World, new_chip: impl Fn() -> Box<Chip<K>>) {
     let passes = [world.samples(0, 2), world.samples(2, 1)];
     let alone = passes.map(|frame| world.alone(&frame));
@@ -124,7 +124,7 @@ fn check_passes<K: ChipKind>(world: &World, new_chip: impl Fn() -> Box<Chip<K>>)
 }
 
 #[test]
-fn a_chip_keeps_as_many_records_as_have_room_and_gathers_the_others_again() {
+fn a_chip_keeps_records_while_there_is_room_and_gathers_others_again() {
     with_room_for_a_card(|| {
         let world = World::new();
         check_passes(&world, || Box::new(MicroChip::new()));
@@ -198,7 +198,7 @@ fn records_of_another_frame_are_not_used() {
 }
 
 #[test]
-fn a_frame_of_its_own_writes_nothing_and_reads_and_writes_of_passes_are_counted() {
+fn a_single_frame_writes_nothing_and_accesses_of_passes_are_counted() {
     with_room_for_a_card(|| {
         let world = World::new();
         let mut chip = Box::new(MicroChip::new());
@@ -220,9 +220,9 @@ fn a_frame_of_its_own_writes_nothing_and_reads_and_writes_of_passes_are_counted(
     });
 }
 
-/// Kept records are lines of a memory that may fail: whatever they hold, a frame ends.
+/// Kept records are in a memory that may fail. Whatever they contain, a frame ends.
 #[test]
-fn damaged_records_end_no_chip() {
+fn damaged_records_do_not_stop_a_chip() {
     with_room_for_a_card(|| {
         let world = World::new();
         let mut chip = Box::new(MicroChip::new());

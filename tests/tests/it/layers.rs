@@ -1,5 +1,5 @@
-//! Layers of materials of known radiance: coat, sheen, diffuse transmission, rough glass, textures of the
-//! reflectance.
+//! Material layers with known radiance: coat, sheen, diffuse transmission, rough glass, textures of the
+//! specular reflectance.
 
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
@@ -19,7 +19,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// A dielectric of a base colour and an F0, as glTF's, with layers.
+/// Dielectric material of glTF with a base colour, an F0 and layers.
 fn dielectric(base: f32, f0: f32, layers: Layers) -> Material {
     let reflection = Reflection::MetallicRoughness {
         base_colour: Vec3::splat(base),
@@ -55,7 +55,7 @@ fn leaf(factor: f32, colour: f32) -> Layers {
     Layers { diffuse_transmission: Some(part), ..none() }
 }
 
-/// Radiance of a horizontal plate under a white sky, seen from afar at a cosine to its normal.
+/// Radiance of a horizontal plate under a white sky, seen from afar at the given cosine to its normal.
 fn plate(material: Material, cosine: f32) -> f64 {
     shown(&plate_of(material, cosine))
 }
@@ -100,7 +100,7 @@ fn a_coat_reflects_its_albedo_and_leaves_the_rest_to_the_base() {
 }
 
 #[test]
-fn a_smooth_coat_reflects_as_schlick_says() {
+fn a_smooth_coat_reflects_by_schlicks_formula() {
     for cosine in [0.15_f32, 0.98] {
         let schlick = f64::from(0.04 + 0.96 * (1.0 - cosine).powi(5));
         let found = plate(dielectric(0.5, 0.0, coat(1.0, 0.0)), cosine);
@@ -127,14 +127,14 @@ fn a_sheen_reflects_its_albedo_and_leaves_the_rest_to_the_base() {
 }
 
 #[test]
-fn a_leaf_shows_what_both_of_its_sides_receive() {
+fn a_leaf_shows_the_light_on_both_of_its_sides() {
     let found = plate(dielectric(0.6, 0.0, leaf(0.25, 0.8)), 0.9);
     let expected = 0.75 * 0.6 + 0.25 * 0.8;
     assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}");
 }
 
-/// A plate of a black dielectric of roughness 0.1 seen from above shows its F0. The code 188 is 0.5029 of
-/// white, 128 is half an alpha.
+/// A plate of black dielectric with roughness 0.1 shows its F0 when seen from above. The sRGB code 188 is
+/// 0.5029; an alpha of 128 is 0.5.
 #[test]
 fn textures_of_the_reflectance_multiply_it_before_its_limit() {
     for (specular, texel, expected) in [
@@ -174,7 +174,7 @@ fn textures_of_the_reflectance_multiply_it_before_its_limit() {
 const EMISSION: f32 = 1.0;
 const ALBEDO: f32 = 0.5;
 
-/// Radiances of a closed room of uniform radiance 1 with an object in it.
+/// Radiance of each pixel in a closed room of uniform radiance 1 with an object in it.
 fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Vec<[f32; 3]> {
     let wall = Material { emission: Vec3::splat(EMISSION * (1.0 - ALBEDO)), ..lambertian("wall", ALBEDO) };
     let view = camera(Vec3::new(0.1, 0.05, 0.9), Vec3::new(-0.1, -0.05, -1.0));
@@ -190,7 +190,7 @@ fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Vec<[f32; 3]> {
     radiances(&render_or_panic(&scene, &settings).film)
 }
 
-/// Checks the mean over the picture and over each of its blocks of 8x8.
+/// Checks the mean over the picture and over each block of 8x8 pixels.
 fn does_not_show(all: &[[f32; 3]], tolerance: f64) {
     let error = mean(all) - 1.0;
     assert!(error.abs() < 0.4 * tolerance, "the mean is off by {error}");
@@ -220,8 +220,8 @@ fn glass(roughness: f32, is_volume: bool) -> Material {
     Material::new("glass", reflection)
 }
 
-/// Sun through a pane is a caustic on the floor below it. A coat takes its share of the light, and photons
-/// are stored once.
+/// Sunlight through a pane is a caustic on the floor below. A coat on the floor takes its share of the light,
+/// and photons are stored once.
 #[test]
 fn a_caustic_below_a_coat_is_dimmed_by_the_coat() {
     let look = |floor: Material| {
@@ -248,21 +248,21 @@ fn a_caustic_below_a_coat_is_dimmed_by_the_coat() {
 }
 
 #[test]
-fn a_white_leaf_does_not_show_in_a_furnace() {
+fn a_white_leaf_is_invisible_in_a_furnace() {
     for factor in [0.5, 0.9] {
         does_not_show(&furnace_with(dielectric(1.0, 0.0, leaf(factor, 1.0)), sheet), 0.03);
     }
 }
 
 #[test]
-fn rough_glass_does_not_show_in_a_furnace() {
+fn rough_glass_is_invisible_in_a_furnace() {
     let ball = |scene: &mut Scene| add_ball(scene, Vec3::new(-0.2, -0.1, 0.0), 0.4, 24, 1);
     does_not_show(&furnace_with(glass(0.2, false), sheet), 0.03);
     does_not_show(&furnace_with(glass(0.1, true), ball), 0.04);
 }
 
 #[test]
-fn a_coat_on_white_does_not_show_in_a_furnace() {
+fn a_coat_on_white_is_invisible_in_a_furnace() {
     does_not_show(&furnace_with(dielectric(1.0, 0.0, coat(1.0, 0.2)), sheet), 0.03);
     does_not_show(&furnace_with(dielectric(1.0, 0.0, sheen(0.8, 0.8)), sheet), 0.04);
 }

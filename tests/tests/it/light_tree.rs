@@ -1,4 +1,4 @@
-//! Light tree: sampling and density agree, no light is missed, and many lights add little noise.
+//! Light tree: sampling and its density agree, every light is sampled, and many lights add little noise.
 
 use std::ops::Range;
 
@@ -25,7 +25,7 @@ fn place(index: u32, dimension: u32) -> Vec3 {
     Vec3::new(random(index, dimension), random(index, dimension + 1), random(index, dimension + 2)) - 0.5
 }
 
-/// Small emissive triangles, turned every way, spread over a hall of ten metres; and some points and spots.
+/// Hall of ten metres with small emissive triangles in all orientations, and some point and spot lights.
 fn hall(triangles: u32) -> Scene {
     let triangle = |i: u32| {
         let middle = place(i, 0) * 10.0;
@@ -105,7 +105,7 @@ fn sampling_and_its_probability_agree_to_the_bit() {
 }
 
 #[test]
-fn the_probabilities_of_all_emitters_sum_to_that_of_finding_one() {
+fn the_probabilities_of_all_emitters_sum_to_that_of_any() {
     let packed = PackedScene::new(&hall(300)).unwrap();
     let (image, mut memory) = packed.view();
     for index in 0..30 {
@@ -129,7 +129,7 @@ fn the_probabilities_of_all_emitters_sum_to_that_of_finding_one() {
     }
 }
 
-/// Unshadowed light of one random number on a receiver, W/m^2.
+/// Unshadowed irradiance of a receiver by one light sample, W/m^2.
 fn estimate(image: &SceneImage, memory: &mut impl MemoryPort, receiver: &Receiver, index: u32) -> f64 {
     let point = [random(index, 50), random(index, 51)];
     let mut choices = LightChoices::new(*receiver);
@@ -137,7 +137,7 @@ fn estimate(image: &SceneImage, memory: &mut impl MemoryPort, receiver: &Receive
     light.map_or(0.0, |light| f64::from(light.irradiance.x * light.direction.dot(receiver.normal).max(0.0)))
 }
 
-/// Unshadowed light of each emitter on a receiver, by an equal share of the samples each.
+/// Unshadowed irradiance of a receiver by each emitter, each sampled equally often.
 fn by_each(scene: &Scene, receiver: &Receiver) -> Vec<f64> {
     scene
         .triangles
@@ -157,7 +157,7 @@ fn by_each(scene: &Scene, receiver: &Receiver) -> Vec<f64> {
 }
 
 #[test]
-fn ten_thousand_emitters_are_less_noisy_than_by_power_at_a_cost_of_the_trees_depth() {
+fn the_tree_samples_ten_thousand_emitters_with_less_noise_than_by_power() {
     let mut scene = hall(10_000);
     scene.lights.clear();
     let packed = PackedScene::new(&scene).unwrap();
@@ -194,7 +194,7 @@ fn ten_thousand_emitters_are_less_noisy_than_by_power_at_a_cost_of_the_trees_dep
 }
 
 #[test]
-fn the_environments_samples_have_the_density_that_it_tells() {
+fn samples_of_the_environment_have_its_stated_density() {
     let mut texels = vec![[0.1; 3]; 64 * 32];
     texels[5 * 64 + 7] = [500.0; 3];
     let environment = Some(Environment { width: 64, height: 32, texels, strength: 1.0 });
@@ -229,7 +229,7 @@ fn the_environments_samples_have_the_density_that_it_tells() {
 }
 
 #[test]
-fn an_unsound_tree_is_a_fault_and_never_the_end() {
+fn an_invalid_tree_is_a_fault_and_never_a_panic() {
     let packed = PackedScene::new(&hall(100)).unwrap();
     let (image, Lines(sound)) = packed.view();
     let nodes = image.header.section(SectionKind::LightNodes);

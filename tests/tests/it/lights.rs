@@ -1,4 +1,4 @@
-//! Lights of every kind: known radiance on a floor, by any kind of rays.
+//! Lights of every kind give a floor the known radiance, by every kind of rays.
 
 use std::f64::consts::PI;
 
@@ -12,13 +12,13 @@ use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_pani
 
 const ALBEDO: f32 = 0.5;
 
-/// A floor at y = 0 that faces up, `half` metres to each side.
+/// Floor at y = 0 that faces up, with half side `half`, metres.
 fn floor(half: f32, material: u32) -> [Triangle; 2] {
     let at = |x: f32, z: f32| Vec3::new(x * half, 0.0, z * half);
     quad([at(-1.0, 1.0), at(1.0, 1.0), at(1.0, -1.0), at(-1.0, -1.0)], material)
 }
 
-/// Camera that sees a small area of the floor.
+/// Camera that sees a small area of the floor at `place`.
 fn view(place: Vec3) -> Camera {
     let origin = place + Vec3::new(0.3, 1.0, 0.2);
     Camera { vertical_fov: 0.01, ..camera(origin, place - origin) }
@@ -57,7 +57,7 @@ fn check(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64
     assert!(error.abs() <= tolerance, "{found} instead of {expected}: off by {error}");
 }
 
-/// Radiance that a floor reflects of an irradiance.
+/// Radiance that the floor reflects for an irradiance.
 fn reflected(irradiance: f64) -> f64 {
     f64::from(ALBEDO) / PI * irradiance
 }
@@ -96,7 +96,7 @@ fn a_spot_falls_off_between_its_cones() {
 }
 
 #[test]
-fn a_directional_light_lights_by_the_cosine_everywhere_alike() {
+fn a_directional_light_lights_by_the_cosine_at_every_point() {
     for direction in [Vec3::NEG_Y, Vec3::new(1.0, -1.0, 0.5), Vec3::new(-3.0, -0.5, 0.0)] {
         let direction = direction.normalize();
         let kind = PunctualKind::Directional { direction };
@@ -108,7 +108,7 @@ fn a_directional_light_lights_by_the_cosine_everywhere_alike() {
 }
 
 #[test]
-fn a_floor_under_a_constant_environment_shows_its_albedo_of_it() {
+fn a_floor_under_a_constant_environment_shows_its_albedo() {
     let environment = Some(Environment::constant(Vec3::splat(3.0)));
     let scene = Scene { environment, ..bare_floor(Vec3::ZERO) };
     let expected = 3.0 * f64::from(ALBEDO);
@@ -118,7 +118,7 @@ fn a_floor_under_a_constant_environment_shows_its_albedo_of_it() {
     check(&scene, &settings(32, 32), expected, 0.01);
 }
 
-/// A sky of one bright quarter and a dim rest, 8 by 4 texels.
+/// Sky of 8 by 4 texels with one bright quarter.
 fn sky() -> Environment {
     let mut texels = vec![[0.25, 0.5, 1.0]; 32];
     texels[9..11].fill([30.0, 20.0, 10.0]);
@@ -161,7 +161,7 @@ fn lamps_and_sky() -> Scene {
 }
 
 #[test]
-fn shadow_rays_gather_rays_and_both_bring_the_same_light() {
+fn shadow_rays_gather_rays_and_both_give_equal_light() {
     let scene = lamps_and_sky();
     let many =
         |shadow_rays, gather_rays| settings(shadow_rays, gather_rays).with(|s| s.integrator.samples = 64);
@@ -174,7 +174,7 @@ fn shadow_rays_gather_rays_and_both_bring_the_same_light() {
     }
 }
 
-/// A panel above the floor, with the texture of an image if there is one.
+/// Panel above the floor, whose emission has the texture `image` if there is one.
 fn panel(emission: f32, image: Option<Image>) -> Scene {
     let at = |x: f32, z: f32| Vec3::new(x, 1.0, z);
     let mut scene = bare_floor(Vec3::new(0.2, 0.0, 0.1));
@@ -197,7 +197,7 @@ fn panel(emission: f32, image: Option<Image>) -> Scene {
 }
 
 #[test]
-fn a_panel_with_a_fine_texture_lights_as_its_mean_does() {
+fn a_panel_with_a_fine_texture_lights_by_its_mean() {
     let texel = |i: u32| if (i / 32 + i % 32).is_multiple_of(4) { [255; 4] } else { [0, 0, 0, 255] };
     let texels = (0..32 * 32).map(texel).collect();
     let image = Image { name: "grid".into(), width: 32, height: 32, texels, encoding: Encoding::Srgb };

@@ -1,4 +1,4 @@
-//! Paths of many specular bounces: none is cut off, in pictures of known radiance.
+//! Paths of many specular bounces are not truncated, in pictures of known radiance.
 
 use glam::Vec3;
 use photoncard_driver::render::{
@@ -32,7 +32,7 @@ fn mirror(reflectance: f32) -> Material {
     Material::new("mirror", reflection)
 }
 
-/// A surface of both sides that emits what it does not reflect of a radiance of 1.
+/// Double-sided material that reflects `albedo` and emits the rest of a radiance of 1.
 fn part_of_furnace(albedo: f32) -> Material {
     Material {
         emission: Vec3::splat(1.0 - albedo),
@@ -46,10 +46,10 @@ fn rendered(scene: &Scene, settings: &RenderSettings) -> (f64, Rendering) {
     (mean(&radiances(&rendering.film)), rendering)
 }
 
-/// Light of a lamp at the end of a corridor between two mirrors arrives after a number of reflections that
-/// the angle determines.
+/// The lamp is at the end of a corridor between two mirrors. The angle determines the number of reflections
+/// after which its light arrives.
 #[test]
-fn a_lamp_is_seen_by_way_of_any_number_of_reflections_between_mirrors() {
+fn a_lamp_is_seen_after_any_number_of_reflections() {
     for (bounces, reflectance) in [(10_u16, 0.95_f32), (40, 0.95), (40, 0.99), (150, 0.99)] {
         let end = 0.5 * f32::from(bounces);
         let plane = |y: f32, up: f32| {
@@ -73,8 +73,8 @@ fn a_lamp_is_seen_by_way_of_any_number_of_reflections_between_mirrors() {
     }
 }
 
-/// A closed room of lossless mirrors with a small lamp and a small Lambertian plate. No walls are parallel:
-/// between parallel ones some paths miss lamp and plate forever.
+/// Closed room of lossless mirrors with a small lamp and a small Lambertian plate. No walls are parallel,
+/// because between parallel ones some paths would never hit lamp or plate.
 fn mirror_room(forward: Vec3) -> Scene {
     let plate = |centre: Vec3, material: u32| -> [Triangle; 2] {
         let corner = |x: f32, z: f32| centre + Vec3::new(0.4 * x, 0.0, -0.3 * z);
@@ -90,8 +90,7 @@ fn mirror_room(forward: Vec3) -> Scene {
     scene(triangles, materials, camera(Vec3::new(0.31, 0.17, 0.67), forward))
 }
 
-/// Everything shows the radiance of the lamp, however many mirrors a path meets on its way: eye paths, gather
-/// rays, and photons.
+/// All pixels show the radiance of the lamp, however many mirrors an eye path, gather ray or photon hits.
 #[test]
 fn a_room_of_mirrors_shows_the_radiance_of_its_lamp_everywhere() {
     let gathering = |caustic_photons| {

@@ -1,18 +1,18 @@
-//! Tables of measurements in documents: their rows follow from the CSV files beside them. `UPDATE_DOCS=1
-//! cargo test -p photoncard-tests --test it measured_tables` writes them.
+//! Tables of measurements in documents follow from the CSV files beside them. `UPDATE_DOCS=1 cargo test -p
+//! photoncard-tests --test it measured_tables` writes them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A line of `docs/quality.csv`: a scene by some settings, or by a peer.
+/// Line of `docs/quality.csv`: a scene with some settings, or rendered by another renderer.
 struct Row {
     scene: String,
     settings: String,
     /// CPU time, s.
     seconds: f64,
-    /// Relative error, %.
+    /// Relative RMSE, %.
     error: f64,
-    /// Mean, median and 95th percentile of the errors of blocks, as written.
+    /// Mean, median and 95th percentile of the errors of blocks, as text of the file.
     others: [String; 3],
 }
 
@@ -38,7 +38,7 @@ impl Row {
     }
 }
 
-/// The lines of the table of `docs/quality.md`.
+/// Lines of the table in `docs/quality.md`.
 fn quality_table(csv: &str) -> Vec<String> {
     let rows: Vec<Row> = csv.lines().skip(1).filter_map(Row::new).collect();
     assert_eq!(rows.len(), csv.lines().count() - 1, "each line of the CSV is a row");
@@ -63,7 +63,7 @@ fn documents() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
 }
 
-/// The first row of the table under a heading row, and the row behind it.
+/// Indices of the first line of the table below a heading row, and of the line after the table.
 fn table_of(document: &str, heading: &str) -> (usize, usize) {
     let lines: Vec<&str> = document.lines().collect();
     let first = lines.iter().position(|line| *line == heading).expect("the document has the table") + 2;
@@ -71,8 +71,8 @@ fn table_of(document: &str, heading: &str) -> (usize, usize) {
     (first, first + length)
 }
 
-/// The lines of the table of `docs/memory.md`: bytes of whole frames, and how many times less than in the
-/// naive order, with the program that was measured.
+/// Lines of the table in `docs/memory.md`: bytes per frame, the factor by which they are fewer than in the
+/// naive order, and the measured program.
 fn memory_table(csv: &str) -> Vec<String> {
     let rows = csv.lines().skip(1).map(|line| {
         let fields = <[&str; 7]>::try_from(line.split(',').collect::<Vec<_>>()).expect("seven fields");
@@ -95,7 +95,7 @@ fn memory_table(csv: &str) -> Vec<String> {
         .collect()
 }
 
-/// Compares the table under a heading row with its lines, or writes them.
+/// Compares the table below a heading row with the expected lines, or writes these.
 fn check_table(name: &str, heading: &str, expected: &[String]) {
     let path = documents().join(name);
     let document = fs::read_to_string(&path).expect("the document can be read");
@@ -115,20 +115,20 @@ fn csv(name: &str) -> String {
 }
 
 #[test]
-fn the_table_of_qualities_is_that_of_its_csv() {
+fn the_table_of_qualities_follows_from_its_csv() {
     const HEADING: &str = "| scene | quality | CPU s | error, % | mean | median, % | p95, % | Mitsuba, times | Cycles, times | best, times |";
     check_table("quality.md", HEADING, &quality_table(&csv("quality.csv")));
 }
 
 #[test]
-fn the_table_of_memory_is_that_of_its_csv() {
+fn the_table_of_memory_follows_from_its_csv() {
     const HEADING: &str =
         "| scene, gather rays | `--card` | photon map, MB | scene, MB | times less | program |";
     check_table("memory.md", HEADING, &memory_table(&csv("memory.csv")));
 }
 
 #[test]
-fn ratios_are_those_of_time_times_squared_error() {
+fn ratios_compare_time_times_squared_error() {
     let csv = "scene,settings\nbox,--quality good,2.00,1,0,3.00,1.0001,0.4,2.0\nbox,\"Mitsuba, 64 samples\",1.00,1,0,12.00,1.0,0.5,2.5\nbox,--spp 2 --photons 3,1.00,1,0,3.00,1.0,0.4,2.0";
     assert_eq!(quality_table(csv), ["| box | `good` | 2.0 | 3.00 | 1.0001 | 0.4 | 2.0 | 8.0 |  | 2.0 |"]);
 }

@@ -43,11 +43,11 @@ fn caches(text: &str) -> CacheSettings {
     text.parse().unwrap()
 }
 
-/// Caches small enough to miss often.
+/// Caches that are small enough to miss often.
 const SPLIT: &str = "photon=16K/128/4,scene=16K/128/4";
 const UNIFIED: &str = "unified=9K/384/3,index=hash";
 
-/// Image of a scene, and the tiles of a frame of it.
+/// Card image of a scene, and the tiles of a frame.
 struct Frame {
     mapped: MappedImage,
     frame: photoncard_shared::message::FrameParameters,
@@ -77,7 +77,7 @@ impl Frame {
     }
 }
 
-/// Memory that records the lines a tile reads, and compares them with the image's.
+/// Memory that records the lines that a tile reads, and compares them with those of the image.
 struct Recorder<'a, M> {
     memory: M,
     image: &'a [Line],
@@ -114,7 +114,7 @@ impl<M: MeasuredMemory> MeasuredMemory for Recorder<'_, M> {
 }
 
 #[test]
-fn a_tile_hits_and_misses_as_the_definition_of_its_caches_says() {
+fn a_tile_hits_and_misses_by_the_definition_of_its_caches() {
     with_room_for_a_card(|| {
         let mut chip = EmulatedKind::Reference.emulated().chip();
         let split = |_| LruOracle::new(32, 4, 1, |block| block % 32);
@@ -148,9 +148,9 @@ fn a_tile_hits_and_misses_as_the_definition_of_its_caches_says() {
     });
 }
 
-/// A board's caches are stored in arrays.
+/// Boards store their caches in arrays, emulated chips in vectors.
 #[test]
-fn a_cache_in_arrays_is_the_cache_in_vectors() {
+fn caches_in_arrays_and_in_vectors_are_equal() {
     with_room_for_a_card(|| {
         let mut chip = EmulatedKind::Reference.emulated().chip();
         let frame = Frame::new(&settings());
@@ -218,7 +218,7 @@ fn measured(settings: &RenderSettings) -> (MemoryStatistics, Statistics) {
 }
 
 #[test]
-fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
+fn counts_do_not_depend_on_the_assignment_of_tiles() {
     let irradiance_cache = (Some(0.05), GatherOrder::Sort);
     for (irradiance_error, order) in [(None, GatherOrder::Sort), (None, GatherOrder::Naive), irradiance_cache]
     {
@@ -254,7 +254,7 @@ fn what_is_counted_does_not_depend_on_how_tiles_are_dealt() {
 }
 
 #[test]
-fn tiles_in_flight_request_as_much_and_fetch_less_of_the_photon_map() {
+fn tiles_in_flight_fetch_less_of_the_photon_map_for_equal_requests() {
     let with = |cards: &str, in_flight| {
         measured(&settings().with(|s| {
             s.integrator.irradiance_error = Some(0.05);

@@ -11,8 +11,8 @@ use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};
 use photoncard_tests::{camera, lambertian, room, scene};
 use proptest::prelude::*;
 
-/// Images of an empty room with a photon at each position, in both layouts. Photons at one position differ in
-/// their contents.
+/// Card images of an empty room with a photon at each position, in both layouts. Photons at one position
+/// differ in their contents.
 fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
     let photons = (0_u16..).zip(places).map(|(index, &position)| Photon {
@@ -30,10 +30,10 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     [to_kd_tree(image()).unwrap(), image()]
 }
 
-/// Part of a photon by which tests distinguish it.
+/// Bits of the squared distance, and direction code, of a photon, by which tests distinguish photons.
 type Found = (u32, [u8; 2]);
 
-/// Distances and directions of the chip's search, nearest first; all instruction sets must agree.
+/// Photons that the chip's search finds, the nearest first. All instruction sets must agree.
 fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let (scene, mut memory) = image.view();
@@ -58,7 +58,7 @@ fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> V
     first.1
 }
 
-/// Result of [`found`] by brute force.
+/// Expected result of [`found`], by brute force.
 fn expected(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
     let (scene, mut memory) = image.view();
     let photons = scene.header.section(SectionKind::Photons).records;
@@ -132,7 +132,7 @@ proptest! {
 }
 
 #[test]
-fn photons_in_one_place_are_told_apart_by_what_they_carry() {
+fn photons_at_one_position_are_ordered_by_their_contents() {
     check(&[[0.5; 3]; 300], &[[0.5; 3], [0.6, 0.5, 0.5]], 100, 1.0);
 }
 

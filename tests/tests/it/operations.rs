@@ -1,6 +1,5 @@
-//! The cost model's operations of a step are those of the firmware: counted again, and equal to what the
-//! model computes, but for rays and photons of visible regions and rays that look for covers, which it has no
-//! steps for.
+//! The cost model's operations per step equal those counted in the firmware. Rays and photons of visible
+//! regions, and rays that search for covers, are excepted, because the model has no steps for them.
 
 use std::io::Write;
 
@@ -12,11 +11,12 @@ use photoncard_driver::scheduler::GatherOrder;
 use photoncard_tests::operations::Instrument;
 use photoncard_tests::operations::run::Run;
 
-/// Maximum relative difference by visible regions and covers: of rays by theirs, of photons by the test of
-/// their sectors. The few photons of these renders have gathers of a large radius, and many rays are shorter.
+/// Maximum relative difference that visible regions and covers cause: their rays, and the tests of photons
+/// against sectors. It is large because these renders have few photons, so that gathers have a large radius
+/// and many rays are short.
 const OF_REGIONS: f64 = 0.18;
 
-/// Steps with equal lanes, whatever the data. Rays of a bundle share parts of a node's decoding.
+/// Steps whose operations do not depend on the data. Rays of a bundle share parts of a node's decoding.
 const FIXED: [Step; 6] = [Step::Ray, Step::Box, Step::Vertex, Step::Triangle, Step::PhotonBox, Step::Photon];
 
 fn settings(layout: PhotonLayout, sampling: Sampling, irradiance_error: Option<f32>) -> RenderSettings {
@@ -68,7 +68,7 @@ fn check(name: &str, run: &Run) {
 }
 
 #[test]
-fn the_model_computes_the_operations_that_the_firmware_does() {
+fn the_models_operations_equal_those_of_the_firmware() {
     let instrument = match Instrument::build() {
         Ok(instrument) => instrument,
         Err(reason) => {

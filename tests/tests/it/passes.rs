@@ -1,5 +1,5 @@
-//! Passes: the samples of a picture rendered in any division, each pass on other cards and in another order,
-//! are to the bit those of one render.
+//! A picture whose samples are divided into passes, each on other cards and in another order, equals that of
+//! one render bit for bit.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -31,7 +31,7 @@ fn cards(text: &str) -> Vec<CardAddress> {
     text.split('+').map(|card| card.parse().expect("a card")).collect()
 }
 
-/// Renders up to `samples` samples, by adding to a picture if there is one.
+/// Renders until the picture has `samples` samples, starting from `before` if given.
 fn pass(
     renderer: &mut Renderer,
     scene: &FixedScene,
@@ -62,10 +62,10 @@ fn technique() -> impl Strategy<Value = RenderSettings> {
     )
 }
 
-/// Number of samples, order of gathers and cards of a pass.
+/// Number of samples, gather order and cards of a pass.
 type Pass = (u32, GatherOrder, &'static str);
 
-/// Passes on cards that stay open, or each on others.
+/// Sequences of passes, on cards that stay open or on other cards each time.
 fn passes() -> impl Strategy<Value = Vec<Pass>> {
     use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
     let order = || prop::sample::select(vec![Naive, Tiled, DirectionBins, Hash, Sort]);
@@ -89,7 +89,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn passes_of_any_division_are_one_render(technique in technique(), passes in passes()) {
+    fn passes_of_any_division_equal_one_render(technique in technique(), passes in passes()) {
         let scene = everything();
         let scene = FixedScene::from(&scene);
         let mut renderer = Renderer::default();
@@ -185,7 +185,7 @@ fn records_are_gathered_again_on_other_cards_and_for_another_camera() {
 }
 
 #[test]
-fn gathers_of_a_whole_frame_are_of_the_pass() {
+fn gathers_of_a_whole_frame_may_be_done_in_a_pass() {
     let scene = everything();
     let scene = FixedScene::from(&scene);
     let along_curve = settings().with(|s| s.schedule.order = GatherOrder::Hilbert);
@@ -197,7 +197,7 @@ fn gathers_of_a_whole_frame_are_of_the_pass() {
 }
 
 #[test]
-fn a_picture_with_kept_samples_goes_on_to_more_even_after_a_stop() {
+fn a_picture_with_kept_samples_continues_even_after_a_stop() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr.partial");
     let with = |samples: u32, resume: bool| {
@@ -239,7 +239,7 @@ fn a_picture_with_kept_samples_goes_on_to_more_even_after_a_stop() {
 }
 
 #[test]
-fn a_picture_is_refined_by_more_of_its_own_samples_alone() {
+fn a_picture_is_refined_only_by_samples_of_equal_settings() {
     let scene = everything();
     let scene = FixedScene::from(&scene);
     let mut renderer = Renderer::default();
@@ -256,7 +256,7 @@ fn a_picture_is_refined_by_more_of_its_own_samples_alone() {
 }
 
 #[test]
-fn passes_until_an_aim_are_the_render_of_their_samples() {
+fn passes_until_an_aim_equal_a_render_of_their_samples() {
     let scene = everything();
     let scene = FixedScene::from(&scene);
     for (aim, is_cached) in [

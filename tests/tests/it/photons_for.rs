@@ -1,4 +1,4 @@
-//! Photons for a camera: the picture's mean is that by photons for any camera.
+//! Photons guided to a camera give the picture the mean of photons guided to the scene.
 
 use glam::Vec3;
 use photoncard_driver::photon_map::PhotonsFor;
@@ -6,11 +6,11 @@ use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Pi
 use photoncard_driver::scene::{Material, Scene, Triangle};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
 
-/// Cells of a winding corridor, of sides of 1 m, from the lit end to the dark one.
+/// Cells of a winding corridor, each 1 m wide, from the lit end to the dark one.
 const CORRIDOR: [[i32; 2]; 10] =
     [[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [3, 2], [4, 2], [4, 1], [4, 0], [5, 0]];
 
-/// Corridor of grey walls with a lamp on the first wall, seen from its dark end.
+/// Grey corridor with a lamp on the first wall, seen from its dark end.
 fn corridor(albedo: f32) -> Scene {
     let mut triangles: Vec<Triangle> = Vec::new();
     for [x, z] in CORRIDOR {
@@ -35,7 +35,7 @@ fn corridor(albedo: f32) -> Scene {
     scene(triangles, vec![lambertian("wall", albedo), lamp], view)
 }
 
-/// Photons of the corridor: few, so that those of its dark end are far from each other.
+/// Number of photons. They are few, so that those of the dark end are far apart.
 const PHOTONS: usize = 20_000;
 
 fn settings(photons_for: PhotonsFor, seed: u32) -> RenderSettings {
@@ -51,7 +51,7 @@ fn settings(photons_for: PhotonsFor, seed: u32) -> RenderSettings {
     }
 }
 
-/// Pictures of different seeds: the mean of their means, and its standard error.
+/// Mean of the means of pictures with different seeds, and its standard error.
 struct Pictures {
     mean: f64,
     error: f64,
@@ -70,10 +70,10 @@ impl Pictures {
     }
 }
 
-/// At the dark end photons are few, and a gather that reached for fifty of them would find those in the light
-/// around the corner.
+/// Photons are sparse at the dark end. A gather that extended to fifty of them would include those in the
+/// light around the corner.
 #[test]
-fn a_corridor_seen_from_its_dark_end_has_one_mean_by_photons_for_any_camera_and_for_its_own() {
+fn photons_for_the_scene_and_for_the_camera_give_a_dark_corridor_equal_means() {
     let scene = corridor(0.8);
     let [of_scene, of_camera] =
         [PhotonsFor::Scene, PhotonsFor::Camera].map(|photons_for| Pictures::new(&scene, photons_for, 16));

@@ -1,5 +1,5 @@
-//! Precomputed irradiance: it equals the chip's own density estimate at a photon, searches find the same
-//! points as brute force, and the mean over positions is right.
+//! Precomputed irradiance equals the chip's density estimate at a photon, searches find the same points as
+//! brute force, and the mean over positions is unbiased.
 
 use core::f32::consts::PI;
 
@@ -24,7 +24,7 @@ use proptest::prelude::*;
 /// Position of a photon, and the code of its normal.
 type Placed = ([f32; 3], u8);
 
-/// Images of an empty room with photons of power 1, in both layouts, with irradiance points.
+/// Card images of an empty room with photons of power 1, in both layouts, with irradiance points.
 fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
     let photons = photons.iter().map(|&(position, normal)| Photon {
@@ -43,7 +43,7 @@ fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 
         .map(|image| precompute_irradiance(image, neighbors, max_distance, &|| true).unwrap())
 }
 
-/// All irradiance points: positions and contents.
+/// Positions and contents of all irradiance points.
 fn points(image: &CardImage) -> Vec<(Vec3, [u8; PHOTON_CONTENT_BYTES])> {
     let (scene, mut memory) = image.view();
     let kind = SectionKind::IrradianceLeaves;
@@ -56,7 +56,7 @@ fn points(image: &CardImage) -> Vec<(Vec3, [u8; PHOTON_CONTENT_BYTES])> {
     points
 }
 
-/// Irradiance that the chip's search finds; all instruction sets must agree.
+/// Irradiance that the chip's search finds. All instruction sets must agree.
 fn found(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Vec3 {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let (scene, mut memory) = image.view();
@@ -68,7 +68,7 @@ fn found(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Ve
     first.irradiance
 }
 
-/// Result of [`found`] by brute force.
+/// Expected result of [`found`], by brute force.
 fn expected(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Vec3 {
     let unit = |code: u8| Vec3::from(decode_normal(code)).normalize();
     let nearest = points(image)
@@ -119,7 +119,7 @@ fn photons() -> impl Strategy<Value = Vec<Placed>> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 150, ..ProptestConfig::default() })]
     #[test]
-    fn the_nearest_point_of_the_surface_is_that_of_brute_force(
+    fn the_nearest_point_of_a_surface_equals_that_of_brute_force(
         photons in photons(),
         queries in proptest::collection::vec(place(1.2), 6),
         other in any::<u8>(),
@@ -140,7 +140,7 @@ fn up() -> u8 {
 }
 
 #[test]
-fn no_photons_one_photon_and_photons_in_one_place_have_as_many_points() {
+fn photons_at_one_position_have_one_point() {
     let place = [0.5, -1.0, 0.25];
     check(&[], &[(place, up())], 10, 1.0);
     check(&[(place, up())], &[(place, up()), ([0.9, -1.0, 0.25], up()), (place, !up())], 10, 0.5);
@@ -156,16 +156,16 @@ fn no_photons_one_photon_and_photons_in_one_place_have_as_many_points() {
     assert_eq!(found(&image, Vec3::new(-0.1, -1.0, 0.25), up(), 0.5), Vec3::ZERO);
 }
 
-/// Pseudorandom positions on the floor, within `half_side` of its centre.
+/// Pseudo-random positions on the floor within `half_side` of its centre.
 fn floor(count: u32, seed: u32, half_side: f32) -> Vec<[f32; 3]> {
     let coordinate = |i: u32| (hash(hash(seed) ^ i) >> 8) as f32 / 8_388_608.0 - 1.0;
     (0..count).map(|i| [half_side * coordinate(2 * i), -1.0, half_side * coordinate(2 * i + 1)]).collect()
 }
 
-/// At a photon a density estimate of k - 1 photons is too high by about 1 / (k - 2); at the photon nearest to
-/// a position it is not.
+/// At the positions of photons a density estimate of k - 1 photons is too high by about 1 / (k - 2). At the
+/// photon nearest to a random position it is not.
 #[test]
-fn the_mean_over_places_is_right_though_that_over_photons_is_not() {
+fn the_mean_over_positions_is_unbiased_unlike_that_over_photons() {
     let neighbors = 12;
     let (mut over_places, mut over_points, mut queries) = (0.0, 0.0, 0.0);
     for seed in 0..8 {
@@ -191,9 +191,9 @@ fn the_mean_over_places_is_right_though_that_over_photons_is_not() {
     assert!((over_points / too_high - 1.0).abs() < 0.015, "{over_points}");
 }
 
-/// Regions where a gather finds at most two or three photons must have the mean light.
+/// Regions where a gather finds at most two or three photons must have the right mean.
 #[test]
-fn little_light_is_lost_or_won_where_photons_are_few() {
+fn little_light_is_lost_or_gained_where_photons_are_few() {
     for (count, max_distance) in [(500, 0.05), (500, 0.08), (2000, 0.06)] {
         let (mut sum, mut queries) = (0.0, 0.0);
         for seed in 0..12 {
@@ -212,10 +212,10 @@ fn little_light_is_lost_or_won_where_photons_are_few() {
     }
 }
 
-/// An irradiance point equals the gather's estimate at its position from all photons that count, except for
-/// its 16-bit mantissa.
+/// An irradiance point equals the gather's estimate at its position from all photons on its surface, except
+/// for its 16-bit mantissa.
 #[test]
-fn a_point_is_the_density_of_the_photons_around_it() {
+fn a_point_has_the_density_of_the_photons_around_it() {
     let neighbors = 30;
     let photons: Vec<Placed> = floor(3000, 3, 1.0).into_iter().map(|place| (place, up())).collect();
     let [_, image] = images(&photons, neighbors, 0.3);

@@ -1,4 +1,4 @@
-//! The firmware's images on machines that QEMU emulates render the same bits as the emulated card.
+//! Firmware images on machines that QEMU emulates render the same bits as the emulated card.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -20,9 +20,9 @@ use photoncard_firmware::memory::Dram;
 use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
 
-/// Time limit of building and starting a machine.
+/// Time limit for building an image and starting a machine.
 const START: Duration = Duration::from_secs(600);
-/// Prints a line that is visible although the test passes.
+/// Prints a line even if the test passes.
 fn say(line: &str) {
     // The test goes on if standard error is closed.
     let _ = writeln!(std::io::stderr(), "{line}");
@@ -31,11 +31,11 @@ fn say(line: &str) {
 /// Running machine with its image.
 struct Machine {
     process: Child,
-    /// Output of QEMU and of the image.
+    /// Output lines of QEMU and of the image.
     lines: Receiver<String>,
 }
 
-/// Forwards the lines of a stream.
+/// Sends the lines of a stream to a channel.
 fn forward(stream: impl Read + Send + 'static, sender: Sender<String>) {
     std::thread::spawn(move || {
         for line in BufReader::new(stream).lines().map_while(Result::ok) {
@@ -94,7 +94,7 @@ impl Drop for Machine {
     }
 }
 
-/// The Cornell box as a small frame, with `PHOTONCARD_QEMU_GATHER_RAYS` gather rays.
+/// Settings of the Cornell box as a small frame, with `PHOTONCARD_QEMU_GATHER_RAYS` gather rays.
 fn settings() -> RenderSettings {
     let gather_rays = std::env::var("PHOTONCARD_QEMU_GATHER_RAYS").map(|text| text.parse());
     RenderSettings {
@@ -110,7 +110,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Bad lines to test: those in `PHOTONCARD_QEMU_FAULTS`, separated by blanks.
+/// Faults of lines to test, from `PHOTONCARD_QEMU_FAULTS`, separated by blanks.
 fn faults() -> Vec<LineFaults> {
     let asked = std::env::var("PHOTONCARD_QEMU_FAULTS");
     let asked = asked.as_deref().unwrap_or("flips=1e-4,drops=1e-5,repeats=1e-5,delays=1e-4,seed=1");
@@ -169,8 +169,8 @@ fn renders_as_the_emulated_card(name: &str) {
     drop(machine);
 }
 
-/// The machine computes as the host does, and has all of its memory. The scene after the test is loaded as a
-/// whole.
+/// Runs the self-test: the machine computes as the host does, and has all of its memory. The scene after the
+/// test is loaded completely.
 fn passes_the_self_test(name: &str, address: &CardAddress) {
     let test = card_self_test(address, &Unobserved).expect("the card answers");
     for PatternTest { pattern, write, check, .. } in &test.patterns {
@@ -179,7 +179,7 @@ fn passes_the_self_test(name: &str, address: &CardAddress) {
     assert!(test.is_passed(), "{test:?}");
 }
 
-/// Textures, cut-outs, mirrors, glass and lights of every kind.
+/// Renders textures, cut-outs, mirrors, glass and lights of every kind.
 fn renders_everything(name: &str, address: &CardAddress) {
     let scene = everything();
     let settings = settings().with(|s| {
@@ -198,7 +198,7 @@ fn renders_everything(name: &str, address: &CardAddress) {
     }
 }
 
-/// Two passes, of which the first gathers all irradiance records.
+/// Renders two passes, of which the first gathers all irradiance records.
 fn keeps_irradiance_records(name: &str, address: &CardAddress) {
     let scene = everything();
     let settings = settings().with(|s| {
@@ -236,8 +236,8 @@ fn stays_within_the_budget(name: &str, address: &CardAddress) {
     assert!(static_bytes + stack_bytes + caches <= MICRO.sram_bytes);
 }
 
-/// Checks a figure of `docs/bring-up.md` that the test measures, in a row of the table of machines: other
-/// compilers give others, within a tenth.
+/// Checks a figure in the table of machines in `docs/bring-up.md`, within a tenth, because other compilers
+/// give other figures.
 fn check_page(row: &str, name: &str, measured: u32) {
     let page = include_str!("../../../docs/bring-up.md");
     let cells = |start: &str| {
@@ -254,11 +254,11 @@ fn check_page(row: &str, name: &str, measured: u32) {
 }
 
 #[test]
-fn an_arm_board_renders_the_same_picture() {
+fn an_arm_board_renders_the_picture_of_the_emulated_card() {
     renders_as_the_emulated_card("mps2-an386");
 }
 
 #[test]
-fn a_risc_v_board_renders_the_same_picture() {
+fn a_risc_v_board_renders_the_picture_of_the_emulated_card() {
     renders_as_the_emulated_card("virt");
 }

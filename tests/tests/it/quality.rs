@@ -9,7 +9,7 @@ use photoncard_driver::scene::gltf;
 use photoncard_driver::scene::{Material, PunctualKind, PunctualLight, Reflection, Scene};
 use photoncard_tests::{camera, lambertian, room, scene};
 
-/// Settings of the quality `good` for a small picture.
+/// Settings of a small picture with the quality `good`.
 fn small() -> RenderSettings {
     Quality::Good.settings().with(|settings| {
         (settings.picture.width, settings.picture.height) = (64, 48);
@@ -27,14 +27,14 @@ fn shipped(name: &str) -> Scene {
     gltf::load(path.as_ref()).expect("a shipped scene loads")
 }
 
-/// A room with white walls of which one emits.
+/// Room with white walls, one of which emits.
 fn lit_room() -> Scene {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
     let materials = vec![lambertian("wall", 0.5), lamp];
     scene(room([0, 0, 0, 1, 0, 0]), materials, camera(Vec3::new(0.0, 0.0, 0.9), Vec3::NEG_Z))
 }
 
-/// The room with a light in its middle instead.
+/// Room with a point light in its middle.
 fn room_with_a_point() -> Scene {
     let mut scene =
         scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::new(0.0, 0.0, 0.9), Vec3::NEG_Z));
@@ -44,7 +44,7 @@ fn room_with_a_point() -> Scene {
 }
 
 #[test]
-fn they_depend_neither_on_threads_nor_on_the_crop_window() {
+fn found_settings_depend_neither_on_threads_nor_on_the_crop_window() {
     let scene = shipped("cornell.gltf");
     let settings = small();
     let expected = fit(&scene, &settings);
@@ -56,15 +56,14 @@ fn they_depend_neither_on_threads_nor_on_the_crop_window() {
     }
 }
 
-/// Light of a point is one value, and the parts of a lamp are at different distances, angles and behind
-/// different things.
+/// A point light has one direction and distance. The parts of a lamp differ in distance, angle and occlusion.
 #[test]
-fn a_point_takes_one_shadow_ray_and_a_lamp_more() {
+fn a_point_light_takes_one_shadow_ray_and_a_lamp_more() {
     assert_eq!(fit(&room_with_a_point(), &small()).shadow_rays, 1);
     assert!(fit(&shipped("cornell.gltf"), &small()).shadow_rays > 1);
 }
 
-/// Textures and edges are seen by more samples, not by more rays.
+/// More samples resolve textures and edges; more rays do not.
 #[test]
 fn a_textured_room_takes_more_samples_than_one_of_plain_walls() {
     let [plain, textured] = ["cornell.gltf", "room.glb"].map(|name| fit(&shipped(name), &small()));
@@ -72,7 +71,7 @@ fn a_textured_room_takes_more_samples_than_one_of_plain_walls() {
     assert!(textured.measured.place > plain.measured.place, "{textured:?} {plain:?}");
 }
 
-/// In a larger picture records lie farther apart, in pixels.
+/// Irradiance records of a larger picture are farther apart, in pixels.
 #[test]
 fn a_pixel_of_a_larger_picture_has_a_smaller_share_in_the_gather_rays_of_records() {
     let scene = shipped("cornell.gltf");
@@ -81,16 +80,16 @@ fn a_pixel_of_a_larger_picture_has_a_smaller_share_in_the_gather_rays_of_records
     assert!(large < 0.7 * small, "{large} {small}");
 }
 
-/// Pictures of two seeds, of which the difference is noise, have equal settings.
+/// Pilot renders with two seeds differ by noise, but must choose equal settings.
 #[test]
-fn they_do_not_depend_on_the_seed() {
+fn found_settings_do_not_depend_on_the_seed() {
     let seeded = |seed| fit(&lit_room(), &small().with(|s| s.integrator.seed = seed));
     assert_eq!(seeded(0), seeded(7));
 }
 
 /// Pictures of a few pixels are as noisy as large ones.
 #[test]
-fn they_are_found_for_pictures_of_a_pixel() {
+fn settings_are_found_for_pictures_of_a_pixel() {
     let scene = shipped("cornell.gltf");
     let of_size = |side| fit(&scene, &small().with(|s| (s.picture.width, s.picture.height) = (side, side)));
     let expected = of_size(32);
@@ -102,7 +101,7 @@ fn they_are_found_for_pictures_of_a_pixel() {
 
 /// Metal has no Lambertian part.
 #[test]
-fn nothing_is_interpolated_where_hardly_any_surface_is_lambertian() {
+fn irradiance_is_not_interpolated_in_a_scene_of_metal() {
     let mut scene = lit_room();
     scene.materials[0].reflection = Reflection::MetallicRoughness {
         base_colour: Vec3::splat(0.5),
@@ -116,8 +115,8 @@ fn nothing_is_interpolated_where_hardly_any_surface_is_lambertian() {
     assert!(fit(&lit_room(), &small()).interpolates);
 }
 
-/// Light that comes over many surfaces from one spot takes more gather rays and photons than light from a
-/// lamp in view.
+/// Light that reaches many surfaces from one spot takes more gather rays and photons than light from a
+/// visible lamp.
 #[test]
 fn indirect_light_from_a_spot_takes_more_rays_and_photons() {
     let [lamp, spot] = ["cornell.gltf", "cornell-uplight.gltf"].map(|name| fit(&shipped(name), &small()));

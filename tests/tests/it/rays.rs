@@ -1,5 +1,5 @@
-//! The ray caster agrees with brute force, has equal bits on every processor and in bundles, and loses no ray
-//! at an edge.
+//! The ray caster agrees with brute force, gives equal bits on every processor and in bundles, and loses no
+//! ray at an edge.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -21,7 +21,7 @@ fn packed(triangles: Vec<Triangle>) -> PackedScene {
     PackedScene::new(&scene).expect("packs")
 }
 
-/// Pseudorandom number in [0, 1].
+/// Pseudo-random number in [0, 1].
 fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
 }
@@ -30,7 +30,7 @@ fn random_point(index: u32, dimension: u32) -> Vec3 {
     Vec3::from([0, 1, 2].map(|axis| random(index, dimension + axis))) * 2.0 - 1.0
 }
 
-/// Closed surface: a sphere with dents, of about `2 rings^2` triangles.
+/// Closed surface: a dented sphere of about `2 rings^2` triangles.
 fn dented_sphere(center: Vec3, radius: f32, rings: u32) -> Vec<Triangle> {
     let segments = 2 * rings;
     let point = |ring: u32, segment: u32| {
@@ -71,7 +71,7 @@ fn boards() -> Vec<Triangle> {
         .collect()
 }
 
-/// Random rays, along axes, in the planes of triangles, at vertices and edges, and from far away.
+/// Random rays, rays along axes, in the planes of triangles, at vertices and edges, and from far away.
 fn rays(triangles: &[Triangle], count: u32) -> Vec<Ray> {
     let unit = |v: Vec3| v.normalize_or(Vec3::X);
     (0..count)
@@ -95,7 +95,7 @@ fn rays(triangles: &[Triangle], count: u32) -> Vec<Ray> {
         .collect()
 }
 
-/// First hit of all triangles, by distance and then by index.
+/// First hit among all triangles, by distance and then by index.
 fn brute_force(image: &SceneImage, memory: &mut Lines, ray: &Ray) -> Option<Hit> {
     let frame = RayFrame::new(ray);
     let mut nearest: Option<Hit> = None;
@@ -116,7 +116,7 @@ fn brute_force(image: &SceneImage, memory: &mut Lines, ray: &Ray) -> Option<Hit>
 }
 
 #[test]
-fn every_processor_finds_what_brute_force_finds() {
+fn hits_on_every_processor_equal_those_of_brute_force() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf");
     let cornell = gltf::load(path.as_ref()).expect("a shipped scene loads").triangles;
     let cornell = cornell.into_iter().map(|triangle| Triangle { material: 0, ..triangle }).collect();
@@ -177,8 +177,8 @@ fn no_ray_leaves_a_closed_surface() {
     }
 }
 
-/// Rays as a chip casts them together: those of neighbouring pixels, from one point to a light or all around,
-/// or without order.
+/// Rays as a chip casts them together: of neighbouring pixels, from one point to a light or in all
+/// directions, or unordered.
 fn bundle(scene: &Scene, triangles: &[Triangle], index: u32) -> Vec<Ray> {
     let count = 1 + index % BUNDLE_RAYS as u32;
     let of = |ray: u32| index * BUNDLE_RAYS as u32 + ray;
@@ -209,7 +209,7 @@ fn bundle(scene: &Scene, triangles: &[Triangle], index: u32) -> Vec<Ray> {
 }
 
 #[test]
-fn rays_of_a_bundle_hit_what_each_hits_alone_in_every_shipped_scene() {
+fn rays_of_a_bundle_hit_as_single_rays_do_in_every_shipped_scene() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes");
     let paths =
         std::fs::read_dir(folder).expect("there are scenes").map(|entry| entry.expect("a file").path());
@@ -262,7 +262,7 @@ fn rays_of_a_bundle_hit_what_each_hits_alone_in_every_shipped_scene() {
 }
 
 #[test]
-fn shadow_rays_request_in_bundles_what_they_request_alone() {
+fn shadow_rays_in_bundles_make_the_requests_of_single_ones() {
     let scene = gltf::load(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf").as_ref())
         .expect("a shipped scene loads");
     let packed = PackedScene::new(&scene).expect("packs");

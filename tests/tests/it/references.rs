@@ -1,7 +1,7 @@
-//! Pictures against path-traced references, by block means.
+//! Pictures agree with path-traced references in their block means.
 //!
-//! A render has a fourth of its reference's pixels along each axis: a block of 16x16 pixels of the reference
-//! is one of 4x4 pixels of the render, as both have a box filter.
+//! A render has a fourth of its reference's pixels along each axis. A block of 16x16 pixels of the reference
+//! corresponds to one of 4x4 pixels of the render, because both use a box filter.
 
 use std::path::PathBuf;
 
@@ -15,16 +15,16 @@ use photoncard_tests::render_or_panic;
 
 /// Side of a block of a reference, pixels.
 const BLOCK: usize = 16;
-/// Ratio of the reference's side to the render's.
+/// Ratio of the reference's width to that of the render.
 const SHRUNK: usize = 4;
-/// Radiance above which a block of the reference sees an emitter and is left out.
+/// Radiance above which a block of the reference is considered to see an emitter, and is excluded.
 const EMITTER: f32 = 5.0;
 
 fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// Mean of each block over pixels and channels, and its maximum channel.
+/// Mean over pixels and channels of each block, and its maximum channel.
 fn blocks(pixels: &[[f32; 3]], width: usize, block: usize) -> Vec<(f64, f32)> {
     let across = width / block;
     let block_of = |index: usize| (index / width / block) * across + (index % width) / block;
@@ -37,7 +37,8 @@ fn blocks(pixels: &[[f32; 3]], width: usize, block: usize) -> Vec<(f64, f32)> {
     blocks
 }
 
-/// Checks the mean of the picture, and the median and 95th percentile of the blocks' errors.
+/// Checks the error of the picture's mean, and the median and 95th percentile of the blocks' errors against
+/// `most`.
 fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     let image: Vec<[f32; 3]> = film.pixels().map(|pixel| pixel.radiance).collect();
     let pairs: Vec<(f64, f64)> = blocks(&image, film.width() as usize, BLOCK / SHRUNK)
@@ -116,26 +117,26 @@ fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>) {
 }
 
 #[test]
-fn the_cornell_box_is_right() {
+fn the_cornell_box_agrees_with_its_reference() {
     check("cornell.gltf", "cornell.exr");
 }
 
 #[test]
-fn the_glossy_cornell_box_is_right() {
+fn the_glossy_cornell_box_agrees_with_its_reference() {
     check("cornell-glossy.gltf", "cornell-glossy-032.exr");
 }
 
 #[test]
-fn a_mirror_and_a_glass_ball_with_their_caustics_are_right() {
+fn mirror_and_glass_balls_with_caustics_agree_with_their_reference() {
     check_light_paths("cornell-spheres.glb", "cornell-spheres.exr", None);
 }
 
 #[test]
-fn a_room_full_of_textures_is_right() {
+fn a_room_full_of_textures_agrees_with_its_reference() {
     check_light_paths("room.glb", "room.exr", None);
 }
 
 #[test]
-fn a_court_under_a_sky_is_right() {
+fn a_court_under_a_sky_agrees_with_its_reference() {
     check_light_paths("atrium-open.glb", "atrium-sky.exr", Some("sky.exr"));
 }

@@ -22,7 +22,7 @@ use photoncard_shared::message::{self, Command, Fault, FrameParameters, PROTOCOL
 use photoncard_shared::transport::Transport;
 use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
 
-/// Memory that holds an image and counts reads.
+/// Memory that contains an image and counts reads.
 struct CountingMemory<'a> {
     lines: Vec<Line>,
     reads: &'a Cell<u64>,
@@ -87,7 +87,7 @@ impl Port for HostPort<'_> {
     }
 }
 
-/// Maximum number of lines that a card reads between two polls of its link, while it renders a tile of a lit
+/// Maximum number of lines that a card reads between two polls of its link while it renders a tile of a lit
 /// room.
 fn most_reads(frame: &FrameParameters) -> u64 {
     let mut lamp = lambertian("lamp", 0.5);
@@ -115,7 +115,7 @@ fn most_reads(frame: &FrameParameters) -> u64 {
 }
 
 #[test]
-fn a_card_looks_at_its_link_however_many_samples_a_pixel_has() {
+fn a_card_polls_its_link_however_many_samples_a_pixel_has() {
     with_room_for_a_card(|| {
         let settings = RenderSettings {
             picture: Picture { width: 8, height: 8, ..Picture::default() },

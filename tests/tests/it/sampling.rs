@@ -1,11 +1,11 @@
-//! Every sampling of the gather rays converges to the same picture.
+//! Every sampling of gather rays converges to the same picture.
 
 use glam::{DVec3, Vec3};
 use photoncard_driver::render::{PhotonMaps, Picture, RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_tests::mapped::{IndirectLight, MappedScene};
 
-/// Checks the mean of many seeds against a gather of 10,000 rays, within the standard error of both.
+/// Checks the mean over many seeds against a gather of 10,000 rays, within the standard error of both.
 fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
     with_light_of(scene, camera, assignments, |light| {
         let reference = light.radiance(Sampling::Reflection, 10_000, 1);
@@ -60,24 +60,24 @@ fn check_sampling(light: &IndirectLight, sampling: Sampling, reference: &[DVec3]
 }
 
 #[test]
-fn indirect_light_of_the_cornell_box_is_the_same_by_every_sampling() {
+fn indirect_light_of_the_cornell_box_is_equal_by_every_sampling() {
     check("cornell.gltf", None, &[]);
 }
 
 #[test]
-fn indirect_light_from_a_spot_is_the_same_by_every_sampling() {
+fn indirect_light_from_a_spot_is_equal_by_every_sampling() {
     check("cornell-uplight.gltf", None, &[]);
 }
 
 #[test]
-fn indirect_light_of_glossy_floors_is_the_same_by_every_sampling() {
+fn indirect_light_of_glossy_floors_is_equal_by_every_sampling() {
     for exponent in ["1", "8", "32", "128"] {
         check("cornell-glossy.gltf", Some("floor"), &[&format!("floor.exponent={exponent}")]);
     }
 }
 
 #[test]
-fn indirect_light_of_the_atrium_is_the_same_by_every_sampling() {
+fn indirect_light_of_the_atrium_is_equal_by_every_sampling() {
     check("atrium.glb", None, &[]);
 }
 

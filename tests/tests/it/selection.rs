@@ -1,4 +1,4 @@
-//! Selection: the first k candidates equal those of sorting, for all kinds of candidates.
+//! The first k selected candidates equal those of sorting, for all kinds of candidates.
 
 use photoncard_firmware::photon::{Candidate, CandidateBuffer, Selection};
 use photoncard_firmware::simd::Level;
@@ -9,7 +9,7 @@ fn candidate(distance: f32, content: u8) -> Candidate {
     Candidate::new(distance, [content, 0, 0, 0, content / 2, 0, content / 4, 0])
 }
 
-/// Distances as on a surface, and distributions that no guess or pivot divides well.
+/// Candidates with distances as on a surface, and with distributions that no guess or pivot divides well.
 fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
     let distance = prop_oneof![
         4 => 0.0_f32..1.0,
@@ -37,7 +37,7 @@ fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
         .prop_map(|pairs| pairs.into_iter().map(|(distance, content)| candidate(distance, content)).collect())
 }
 
-/// The last of the first `count` candidates, and the selected ones; all instruction sets must agree.
+/// Last of the first `count` candidates, and all selected ones. All instruction sets must agree.
 fn select(candidates: &[Candidate], count: usize) -> (Option<Candidate>, Vec<Candidate>) {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let mut buffer = CandidateBuffer::<600>::new();
@@ -60,7 +60,7 @@ fn sorted(candidates: &[Candidate]) -> Vec<Candidate> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 2000, ..ProptestConfig::default() })]
     #[test]
-    fn the_first_are_selected(candidates in candidates(), share in 0.0_f32..=1.0) {
+    fn the_nearest_candidates_are_selected(candidates in candidates(), share in 0.0_f32..=1.0) {
         let count = (candidates.len() as f32 * share) as usize;
         let (last, selected) = select(&candidates, count);
         let all = sorted(&candidates);
@@ -70,16 +70,17 @@ proptest! {
 }
 
 #[test]
-fn more_than_there_are_cannot_be_selected() {
+fn more_candidates_than_there_are_cannot_be_selected() {
     let candidates = [candidate(1.0, 1), candidate(0.5, 2)];
     for count in [0, 3] {
         assert_eq!(select(&candidates, count), (None, sorted(&candidates)));
     }
 }
 
-/// Order in which the median of three medians is nearly the minimum at first: many pivots, then bits.
+/// The median of three medians is nearly the minimum at first in this order, so that many pivots are needed
+/// before bits decide.
 #[test]
-fn a_bad_order_is_selected_too() {
+fn candidates_in_the_worst_order_are_selected() {
     for length in [300, 512] {
         let mut candidates: Vec<Candidate> = (0..length).map(|i| candidate(f32::from_bits(i), 0)).collect();
         for round in 0..length as usize / 9 {

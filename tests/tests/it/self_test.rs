@@ -1,4 +1,4 @@
-//! The self-test of a card over its link: sound cards pass on good and bad lines, and what is wrong is named.
+//! Self-test of a card over its link: sound cards pass on good and bad lines, and defects are named.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -74,28 +74,28 @@ fn a_sound_card_passes_on_any_line() {
 }
 
 #[test]
-fn a_memory_that_is_smaller_than_the_budgets_does_not_pass() {
+fn a_memory_smaller_than_that_of_the_budget_fails() {
     let test = tested(100, "seed=1");
     assert!(test.lacks_memory() && !test.is_passed());
     assert!(test.patterns.iter().all(|pattern| pattern.wrong.count == 0));
 }
 
-/// Arithmetic of a chip.
+/// Arithmetic of a chip: the results for a triple of operands.
 type Arithmetic = fn([f32; 3]) -> [u32; RESULTS];
 
-/// Card on a port without a thread, with some arithmetic, and with replies to the test of its memory in place
-/// of a memory.
+/// Card with the given arithmetic, on a port without a thread. Prepared replies stand for a test of its
+/// memory.
 struct Chip {
     transport: Transport,
     arithmetic: Arithmetic,
     /// Replies to the test of the memory.
     memory: VecDeque<Reply<'static>>,
     is_testing: bool,
-    /// Number of commands after which the card is reset, if it ever is.
+    /// Number of commands after which the card is reset; `None` for never.
     reset_after: Option<u32>,
 }
 
-/// Progress at the end of a pattern, of a memory as large as the budget's.
+/// Progress at the end of a pattern, for a memory of the budget's size.
 fn end(pattern: MemoryPattern) -> MemoryTest {
     let lines = MICRO.dram_bytes / LINE_BYTES as u32;
     MemoryTest { lines, pattern, written: lines, checked: lines, wrong: WrongWords::default() }
@@ -170,7 +170,7 @@ fn test_of(mut chip: Chip) -> Result<SelfTest, RenderError> {
     self_test_on(&mut chip, "card 0", &Unobserved)
 }
 
-/// Expressions with wrong results of a chip, and the likely cause of the first.
+/// Expressions with wrong results of a chip, each with the likely cause of the first error.
 fn wrong_results(arithmetic: Arithmetic) -> Vec<(&'static str, Option<&'static str>)> {
     let test = test_of(Chip::new(arithmetic)).unwrap();
     assert_eq!(test.is_passed(), test.arithmetic.wrong.is_empty());
@@ -216,7 +216,7 @@ fn flushed_denormal_numbers_are_named() {
 }
 
 #[test]
-fn another_rounding_is_named() {
+fn a_wrong_rounding_mode_is_named() {
     let found = wrong_results(|operands| {
         let mut results = compute(operands);
         // Towards zero: the sum of two f32 as f64 is above it if the f32 sum was rounded up.
@@ -229,7 +229,7 @@ fn another_rounding_is_named() {
     assert_eq!(found, [("a + b", Some("results are rounded in another direction"))]);
 }
 
-/// Every result is compared: one wrong bit in any of them, once, is found.
+/// Inverts each bit of each result once; every inversion must be found.
 #[test]
 fn a_wrong_bit_is_found_in_any_result() {
     for (place, expression) in EXPRESSIONS.into_iter().enumerate() {
@@ -243,11 +243,11 @@ fn a_wrong_bit_is_found_in_any_result() {
 }
 
 thread_local! {
-    /// Result in which [`flip`] inverts a bit.
+    /// Index of the result in which [`flip`] inverts a bit.
     static PLACE: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Arithmetic with one wrong bit, for one triple of operands.
+/// Arithmetic with one wrong bit for one triple of operands.
 fn flip(operands: [f32; 3]) -> [u32; RESULTS] {
     let mut results = compute(operands);
     if operands == [1.0, 3.0, -1.0 / 3.0] {
@@ -263,7 +263,7 @@ fn card_error(chip: Chip) -> CardError {
     }
 }
 
-/// At the first results, in between, and at the test of the memory, which is its 34th command.
+/// Resets the card at the first results, in between, and at the memory test, which is its 34th command.
 #[test]
 fn a_card_that_is_reset_fails() {
     for after in [2, 20, 34] {
@@ -279,7 +279,7 @@ fn a_fault_ends_the_test() {
     assert!(matches!(error, CardError::Session(SessionError::Fault(found)) if found == fault), "{error}");
 }
 
-/// Reports that contradict themselves, the one before or the pattern.
+/// Tries reports that contradict themselves, the previous report or the pattern.
 #[test]
 fn impossible_reports_are_refused() {
     let [ones, zeros, ..] = MemoryPattern::ALL;
@@ -315,7 +315,7 @@ fn impossible_reports_are_refused() {
 }
 
 #[test]
-fn wrong_words_of_any_pattern_fail_the_card() {
+fn wrong_words_in_any_pattern_fail_the_card() {
     let wrong = WrongWords { count: 1, bits: 1, first: Some(WrongWord { index: 3, expected: 8, found: 9 }) };
     for place in 0..MemoryPattern::ALL.len() {
         let mut reports = MemoryPattern::ALL.map(end);
@@ -327,7 +327,7 @@ fn wrong_words_of_any_pattern_fail_the_card() {
     }
 }
 
-/// Observer that stops the test at a number of bytes.
+/// Observer that stops the test after a number of bytes.
 struct Stop(u64, AtomicBool);
 
 impl Observer for Stop {
@@ -352,9 +352,9 @@ fn an_observer_stops_the_test() {
 }
 
 proptest! {
-    /// The expected results are IEEE 754's: a double holds sums, products, quotients and roots of floats with
-    /// so many digits that the second rounding, to a float, gives the correctly rounded result (Figueroa
-    /// 1995).
+    /// The expected results are those of IEEE 754. Sums, products, quotients and roots of floats are computed
+    /// in double precision, which has so many digits that the second rounding, to a float, gives the
+    /// correctly rounded result (Figueroa 1995).
     #[test]
     fn the_hosts_results_are_correctly_rounded(bits in any::<[u32; 3]>()) {
         let operands = bits.map(f32::from_bits);
@@ -368,9 +368,9 @@ proptest! {
     }
 }
 
-/// Bits that every processor must give.
+/// Compares bits that every processor must compute.
 #[test]
-fn golden_results() {
+fn results_equal_the_recorded_bits() {
     let tiny = f32::MIN_POSITIVE;
     let half = 1.0 + 2.0_f32.powi(-12);
     let fused = compute([half, half, -(1.0 + 2.0_f32.powi(-11))]);

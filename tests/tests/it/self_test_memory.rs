@@ -1,5 +1,5 @@
 //! The test of card memory finds faults of data lines, address lines, byte lanes and cells, names the first
-//! wrong word and counts all.
+//! wrong word, and counts all wrong words.
 
 use std::ops::Range;
 
@@ -11,60 +11,59 @@ use photoncard_shared::message::{
 };
 use proptest::prelude::*;
 
-/// Lines of the memory under test: several steps of the tester, the last one incomplete.
+/// Number of lines of the memory under test: several steps of the tester, the last one incomplete.
 const LINES: u32 = 1000;
 const WORDS: u32 = LINES * WORDS_PER_LINE;
 
-/// Fault of a memory.
+/// Defect of a memory.
 #[derive(Clone, Copy, Debug)]
 enum Defect {
     None,
-    /// A data line has always this value.
+    /// A data line is stuck at this value.
     DataLine {
         bit: u32,
         value: bool,
     },
-    /// Two data lines are connected: both carry the conjunction.
+    /// Two data lines are shorted: both carry the conjunction.
     DataShort {
         bits: [u32; 2],
     },
-    /// A line of the words' address has always this value.
+    /// An address line is stuck at this value.
     AddressLine {
         bit: u32,
         value: bool,
     },
-    /// Two lines of the words' address are connected: both carry the conjunction.
+    /// Two address lines are shorted: both carry the conjunction.
     AddressShort {
         bits: [u32; 2],
     },
-    /// The memory has this number of words, and repeats.
+    /// The memory has only this number of words, and repeats.
     Mirror {
         words: u32,
     },
-    /// One bit of one word has always this value.
+    /// One bit of one word is stuck at this value.
     Cell {
         word: u32,
         bit: u32,
         value: bool,
     },
-    /// A store of a byte is one of the whole word, whose bytes are all that byte, as the processor drives all
-    /// lanes.
+    /// Byte lanes are missing: a store of a byte writes the whole word, of which each byte is that byte,
+    /// because the processor drives all lanes.
     NoByteLanes,
 }
 
-/// `word` with one bit set to a value.
+/// Sets one bit of `word` to a value.
 fn with_bit(word: u32, bit: u32, value: bool) -> u32 {
     word & !(1 << bit) | u32::from(value) << bit
 }
 
-/// `word` whose two bits have the value of their conjunction.
+/// Sets two bits of `word` to their conjunction.
 fn with_conjunction(word: u32, [a, b]: [u32; 2]) -> u32 {
     let both = word >> a & word >> b & 1 == 1;
     with_bit(with_bit(word, a, both), b, both)
 }
 
-/// Memory with a defect. Its words are stored where the defect puts them, and shown at all addresses at which
-/// it has them.
+/// Memory with a defect. The defect decides where a word is stored, and at which addresses it is visible.
 struct DefectiveMemory {
     lines: Vec<Line>,
     shown: Vec<Line>,
@@ -79,7 +78,7 @@ impl DefectiveMemory {
         Self { shown: lines.clone(), lines, defect, writes: 0 }
     }
 
-    /// The word that an address selects.
+    /// Index of the word that an address selects.
     fn selected(&self, index: u32) -> u32 {
         match self.defect {
             Defect::AddressLine { bit, value } => with_bit(index, bit, value) % WORDS,
@@ -100,7 +99,7 @@ impl DefectiveMemory {
         put(&mut self.lines, place, value);
     }
 
-    /// Brings [`Self::shown`] up to date: after each step, since a write may change any number of addresses.
+    /// Updates [`Self::shown`]. Call it after each step, because a write may change any number of addresses.
     fn show(&mut self) {
         for index in 0..WORDS {
             let value = get(&self.lines, self.selected(index));
@@ -178,7 +177,7 @@ fn tested(defect: Defect) -> Vec<WrongWords> {
     found
 }
 
-/// Wrong words by pattern, computed from the defect: what each address shows after all writes in order.
+/// Expected wrong words by pattern, from the words that each address shows after all writes in order.
 fn foreseen(defect: Defect) -> Vec<WrongWords> {
     let mut memory = DefectiveMemory::new(defect);
     MemoryPattern::ALL
@@ -226,7 +225,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 96, ..ProptestConfig::default() })]
 
     #[test]
-    fn every_defect_is_found_where_it_shows(defect in defects()) {
+    fn every_defect_is_found_at_its_addresses(defect in defects()) {
         let found = tested(defect);
         prop_assert!(found.iter().any(|wrong| wrong.count > 0), "{:?} is not found", defect);
         prop_assert_eq!(found, foreseen(defect));
@@ -238,9 +237,9 @@ fn a_sound_memory_passes() {
     assert_eq!(tested(Defect::None), vec![WrongWords::default(); MemoryPattern::ALL.len()]);
 }
 
-/// The first wrong word and the bits that differ name the line.
+/// The first wrong word and its wrong bits identify the defective line.
 #[test]
-fn a_report_names_the_line() {
+fn a_report_identifies_the_defective_line() {
     let [ones, zeros, address, complement, lanes] = tested(Defect::DataLine { bit: 9, value: true })[..]
     else {
         panic!("five patterns");
@@ -274,7 +273,7 @@ fn a_report_names_the_line() {
     assert!(found[4].count > WORDS / 2);
 }
 
-/// A memory that has fewer lines than it says, or none.
+/// The memory has fewer lines than it reports, or none.
 #[test]
 fn a_memory_without_its_lines_is_a_fault() {
     struct Short(Vec<Line>, u32);

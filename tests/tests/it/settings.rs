@@ -1,4 +1,4 @@
-//! Settings: pixels depend on the settings that a picture's provenance names, and on no others.
+//! Pixels depend on the settings in a picture's provenance, and on no others.
 
 use std::path::Path;
 
@@ -55,7 +55,7 @@ enum Dependence {
     Nothing,
 }
 
-/// List of one change per field, by name. A list that lacks a field does not compile.
+/// Lists one change per field, by name. The list does not compile if it lacks a field.
 macro_rules! changes {
     ($($group:ident: $type:ident { $($field:ident: $dependence:ident = $value:expr),+ $(,)? })+) => {{
         let RenderSettings { $($group: $type { $($field: _),+ }),+ } = settings();
@@ -199,7 +199,7 @@ fn a_setting_is_in_the_key_of_a_point_exactly_if_its_result_depends_on_it() {
 }
 
 #[test]
-fn settings_of_a_caustic_map_that_a_scene_has_not_are_not_in_the_identity() {
+fn settings_of_the_caustic_map_are_not_in_the_identity_of_a_scene_without() {
     let view = camera(glam::Vec3::Z, -glam::Vec3::Z);
     let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| glam::Vec3::new(x, y, 0.0));
     let dull = scene(quad(corners, 0).into(), vec![lambertian("wall", 0.5)], view);

@@ -1,4 +1,4 @@
-//! Mirrors and glass of known radiance, on every path of light: seen by eye rays, by gather rays, and as
+//! Mirrors and glass of known radiance, on every light path: seen by eye rays, by gather rays, and as
 //! caustics.
 
 use glam::Vec3;
@@ -67,7 +67,7 @@ fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Scene {
     scene
 }
 
-/// Checks the mean over the picture, and over each of its 8x8 blocks.
+/// Checks the mean over the picture and over each block of 8x8 pixels.
 fn shows(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64) {
     let all = radiances(&render_or_panic(scene, settings).film);
     let error = mean(&all) / expected - 1.0;
@@ -80,10 +80,10 @@ fn shows(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64
     }
 }
 
-/// An object without loss is invisible in a room of uniform radiance, and the walls, which receive light
-/// through it, are neither darker nor brighter.
+/// An object without loss is invisible in a room of uniform radiance. The walls that receive light through it
+/// are neither darker nor brighter.
 #[test]
-fn nothing_that_loses_no_light_shows_in_a_furnace() {
+fn lossless_objects_are_invisible_in_a_furnace() {
     let ball = |scene: &mut Scene| add_ball(scene, Vec3::new(-0.2, -0.1, 0.0), 0.4, 24, 1);
     let block = |scene: &mut Scene| scene.triangles.extend(cuboid(Vec3::ZERO, Vec3::splat(0.35), 1));
     shows(&furnace_with(mirror(1.0), block), &settings(), FURNACE, 0.03);
@@ -95,7 +95,7 @@ fn nothing_that_loses_no_light_shows_in_a_furnace() {
     shows(&furnace_with(glass(true, 0.0), ball), &without_map, FURNACE, 0.04);
 }
 
-/// Mean of a picture of a small area in front of the camera, at the origin, from distance 1.
+/// Mean of a picture of a small area at the origin, seen from distance 1.
 fn glance(triangles: Vec<photoncard_driver::scene::Triangle>, materials: Vec<Material>, from: Vec3) -> f64 {
     let mut view = camera(from, -from);
     view.vertical_fov = 0.02;
@@ -109,7 +109,7 @@ fn glance(triangles: Vec<photoncard_driver::scene::Triangle>, materials: Vec<Mat
     mean(&radiances(&render_or_panic(&scene, &settings).film))
 }
 
-/// Emitting wall in the plane z = `z`, facing +z; or -z, if `sign` is -1.
+/// Emissive wall in the plane z = `z` that faces +z, or -z if `sign` is -1.
 fn lamp(z: f32, sign: f32) -> [photoncard_driver::scene::Triangle; 2] {
     let corner = |x: f32, y: f32| Vec3::new(x * sign, y, z);
     quad([corner(-9., -9.), corner(9., -9.), corner(9., 9.), corner(-9., 9.)], 0)
@@ -120,7 +120,7 @@ fn black_lamp() -> Material {
 }
 
 #[test]
-fn a_slab_of_glass_lets_through_what_its_faces_and_its_absorption_leave() {
+fn a_slab_of_glass_transmits_by_its_faces_and_its_absorption() {
     for (absorption, thickness) in [(0.0_f32, 0.1_f32), (3.0, 0.1), (3.0, 0.3)] {
         let mut triangles = cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 0.5 * thickness), 1);
         triangles.extend(lamp(-2.0, 1.0));
@@ -144,7 +144,7 @@ fn a_thin_wall_of_glass_is_a_slab_without_thickness() {
 }
 
 #[test]
-fn a_mirror_shows_its_reflectance_at_the_angle_it_is_seen_at() {
+fn a_mirror_shows_its_reflectance_at_the_viewing_angle() {
     for (reflectance, angle) in [(0.5_f32, 0.0_f32), (0.5, 1.2), (1.0, 0.7)] {
         let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
         let pane = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 1);
@@ -156,9 +156,10 @@ fn a_mirror_shows_its_reflectance_at_the_angle_it_is_seen_at() {
     }
 }
 
-/// From within glass a surface has its radiance outside times the square of the index of refraction.
+/// Radiance inside glass is that outside times the square of the index of refraction. Seen from outside, a
+/// surface inside shows its radiance divided by that square.
 #[test]
-fn what_is_inside_of_glass_shows_its_radiance_over_the_square_of_the_index() {
+fn surfaces_inside_glass_show_their_radiance_over_the_square_of_the_index() {
     let mut triangles = cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 0.2), 1);
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
     triangles.extend(quad([corner(-0.5, -0.5), corner(0.5, -0.5), corner(0.5, 0.5), corner(-0.5, 0.5)], 0));
@@ -167,10 +168,10 @@ fn what_is_inside_of_glass_shows_its_radiance_over_the_square_of_the_index() {
     assert!((seen / expected - 1.0).abs() < 0.01, "{seen} instead of {expected}");
 }
 
-/// A coat or a mirror alone casts no caustic on any surface: it shows the sky, and its base's reflection of
-/// the sky.
+/// A coat or a mirror alone has no surface on which to cast a caustic. It shows the sky, and its base's
+/// reflection of the sky.
 #[test]
-fn specular_things_alone_under_a_sky_show_it() {
+fn specular_surfaces_alone_show_the_sky() {
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
     let pane = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 0);
     let coat = Reflection::MetallicRoughness {
@@ -197,9 +198,9 @@ fn specular_things_alone_under_a_sky_show_it() {
     }
 }
 
-/// A texture may turn a metal by its factors into glass.
+/// A texture may make glass of a material whose factor is that of a metal.
 #[test]
-fn where_a_texture_says_that_there_is_no_metal_glass_lets_light_through() {
+fn a_texture_without_metal_makes_glass_of_a_metallic_factor() {
     let texel = |blue: u8| {
         let Reflection::MetallicRoughness {
             base_colour, roughness, dielectric, grazing, transmission, ..

@@ -1,6 +1,6 @@
-//! Figures of studies in `docs/studies.md`: those of `docs/studies.csv`, the `figures.csv` of a run of
-//! `photoncard study all`, which is of this program. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test
-//! study_figures` writes them into the document.
+//! Figures in `docs/studies.md` equal those of `docs/studies.csv`, the `figures.csv` of a run of `photoncard
+//! study all` by this program. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test study_figures` writes
+//! them into the document.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -10,7 +10,7 @@ use photoncard_driver::study::report::{Figure, human};
 use photoncard_driver::study::{Laboratory, StudyObserver, check};
 use serde::Deserialize;
 
-/// A line of the CSV.
+/// Line of the CSV.
 #[derive(Debug, Deserialize, PartialEq)]
 struct Line {
     name: String,
@@ -35,8 +35,8 @@ fn figures(csv: &str) -> Figures {
     figures
 }
 
-/// Text of a figure for a kind of marker: `=` for its value, `~` for its confidence interval; numbers with
-/// three significant digits.
+/// Text of a figure for a marker: `=` is its value, `~` its confidence interval; numbers have three
+/// significant digits.
 fn text(figure: &Line, kind: char) -> String {
     let number = |value: f64| human(value, 3);
     match (kind, figure.lower, figure.upper) {
@@ -48,17 +48,17 @@ fn text(figure: &Line, kind: char) -> String {
 
 const END: &str = "<!--/-->";
 
-/// Text of a figure of a study that the run did not have, and of the interval of a figure without one.
+/// Text of a figure that the run did not measure, and of the interval of a figure without one.
 const NOT_MEASURED: &str = "–";
 
-/// True if some figure is of the same study: of a name with an equal part before the first dot.
+/// Returns whether any figure is of the same study: its name has the same part before the first dot.
 fn has_study(figures: &Figures, name: &str) -> bool {
     let study = |name: &str| name.split('.').next().map(str::to_owned);
     figures.keys().any(|(other, _)| study(other) == study(name))
 }
 
-/// The document with the text between each marker `<!--=NAME@SCENE-->` or `<!--~NAME@SCENE-->` and the next
-/// `<!--/-->` replaced by the figure.
+/// Document with updated figures: the text between each marker `<!--=NAME@SCENE-->` or `<!--~NAME@SCENE-->`
+/// and the next `<!--/-->` is replaced.
 fn filled(document: &str, figures: &Figures) -> Result<String, String> {
     let mut filled = String::new();
     let mut rest = document;
@@ -89,7 +89,7 @@ fn read(name: &str) -> String {
 }
 
 #[test]
-fn the_figures_of_the_document_are_those_of_its_csv() {
+fn the_figures_of_the_document_equal_those_of_its_csv() {
     let document = read("studies.md");
     let expected = filled(&document, &figures(&read("studies.csv"))).expect("each marker names a figure");
     if document == expected {
@@ -110,10 +110,10 @@ impl StudyObserver for Silent {
     }
 }
 
-/// Program, card image layout and the bytes of two small renders: a change of any of them makes all other
-/// figures old.
+/// Compares program version, card image layout and the bytes of two small renders. If any of them changes,
+/// all figures are outdated.
 #[test]
-fn the_csv_is_of_this_program_and_no_trial() {
+fn the_csv_is_of_this_program_and_of_a_full_run() {
     let committed = figures(&read("studies.csv"));
     assert!(!committed.contains_key(&("trial".to_owned(), String::new())));
     let folder = tempfile::tempdir().expect("a folder");
@@ -135,7 +135,7 @@ fn the_csv_is_of_this_program_and_no_trial() {
 }
 
 #[test]
-fn markers_take_values_and_intervals_and_are_filled_again() {
+fn markers_are_filled_repeatedly_with_values_and_intervals() {
     let csv = "name,scene,value,unit,lower,upper\r\nfactor,atrium,12345.6,times,0.25,2\r\nword,,\"pays, much\",,,\r\n";
     let figures = figures(csv);
     let document =

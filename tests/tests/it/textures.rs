@@ -31,8 +31,8 @@ fn with_texture(mut scene: Scene, image: Image, texture: Texture) -> Scene {
     scene
 }
 
-/// Square of side 2 in the plane z = 0 that faces the camera and fills the picture, with texture coordinates
-/// of 0 to 1 from the upper left corner.
+/// Square of side 2 in the plane z = 0 that faces the camera and fills the picture. Texture coordinates are 0
+/// to 1 from the upper left corner.
 fn canvas(material: Material) -> Scene {
     let mut view = camera(Vec3::Z, Vec3::NEG_Z);
     view.vertical_fov = std::f32::consts::FRAC_PI_2;
@@ -76,7 +76,7 @@ fn an_emissive_texture_glows_texel_by_texel() {
 }
 
 #[test]
-fn between_two_texels_there_is_their_mean_of_light() {
+fn an_emissive_texture_is_interpolated_between_texels() {
     let texels = vec![[0, 0, 0, 255], [255, 255, 255, 255]];
     let clamped = Texture { wrap: [Wrap::Clamp; 2], ..Texture::new(0) };
     let scene = with_texture(canvas(glowing(0)), image(2, Encoding::Srgb, texels), clamped);
@@ -89,7 +89,7 @@ fn between_two_texels_there_is_their_mean_of_light() {
     assert_eq!((row[0], row[47]), (0.0, 2.0));
 }
 
-/// A closed room whose walls have texture coordinates.
+/// Closed room whose walls have texture coordinates.
 fn textured_room(wall: Material) -> Scene {
     let view = camera(Vec3::new(0.1, 0.05, 0.6), Vec3::new(-0.3, -0.2, -1.0));
     let mut scene = scene(Vec::new(), vec![wall], view);
@@ -117,7 +117,7 @@ fn furnace(albedo: f32, texel: u8, colour: f32) -> Scene {
 }
 
 #[test]
-fn a_textured_furnace_glows_evenly() {
+fn a_textured_furnace_has_uniform_radiance() {
     for (albedo, texel, colour) in [(1.0, 128, 1.0), (0.8, 255, 0.5), (0.9, 204, 0.75)] {
         let scene = furnace(albedo, texel, colour);
         let reflected = f64::from(albedo) * f64::from(texel) / 255.0 * f64::from(colour);
@@ -126,7 +126,7 @@ fn a_textured_furnace_glows_evenly() {
     }
 }
 
-/// A texture's green and blue are roughness and metalness: metal of roughness 0.3 in one half, a rough
+/// The texture's green and blue are roughness and metalness: metal of roughness 0.3 in one half, a rough
 /// dielectric in the other.
 #[test]
 fn roughness_and_metalness_follow_their_texture() {
@@ -155,10 +155,10 @@ fn roughness_and_metalness_follow_their_texture() {
     assert!((albedo(37) - dull).abs().max_element() < 0.005, "{}", albedo(37));
 }
 
-/// A mirror by its factors whose texture makes it a dielectric is Lambertian: photons are stored on it, and
-/// their disc fractions measured. One whose texture leaves it a metal is a mirror.
+/// A texture may make a dielectric of a material whose factors are those of a mirror. Photons are then stored
+/// on it, and their disc fractions are measured. With a texture that leaves it a metal, it is a mirror.
 #[test]
-fn a_texture_decides_what_a_mirror_is() {
+fn a_texture_decides_where_a_material_is_a_mirror() {
     let film = |metallic, texture: Option<u8>| {
         let reflection = Reflection::MetallicRoughness {
             base_colour: Vec3::splat(0.8),
@@ -185,9 +185,9 @@ fn a_texture_decides_what_a_mirror_is() {
     assert_eq!(film(1.0, Some(255)), film(1.0, None), "all metal is left");
 }
 
-/// A lattice before a lamp: eye rays, shadow rays, gather rays and photons pass where it is cut out.
+/// Eye rays, shadow rays, gather rays and photons pass through the holes of a lattice before a lamp.
 #[test]
-fn where_alpha_cuts_out_there_is_nothing() {
+fn cut_outs_let_light_through() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
     let lattice = Material {
         alpha_cutoff: Some(0.5),
@@ -219,10 +219,10 @@ fn where_alpha_cuts_out_there_is_nothing() {
     assert!(half > 0.15 * open && half < 0.5 * open, "{half} of {open}");
 }
 
-/// A sheet of partial coverage before a lamp: eye rays, shadow rays, gather rays and photons pass it in the
-/// share that is not there.
+/// Eye rays, shadow rays, gather rays and photons pass through a sheet of partial coverage in the share 1 -
+/// alpha.
 #[test]
-fn where_alpha_is_a_half_half_of_the_light_passes() {
+fn an_alpha_of_a_half_lets_half_of_the_light_through() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
     let sheet = |alpha| Material { blends: true, alpha, double_sided: true, ..lambertian("sheet", 0.0) };
     let light = |alpha: f32| {
@@ -242,9 +242,9 @@ fn where_alpha_is_a_half_half_of_the_light_passes() {
     }
 }
 
-/// Radiance of a black sheet of partial coverage before a lamp, and of the lamp through it.
+/// Radiance of a black sheet of partial coverage, and of the lamp that is seen through it.
 #[test]
-fn a_sheet_shows_itself_by_its_alpha_and_what_is_behind_by_the_rest() {
+fn a_sheet_shows_alpha_of_itself_and_the_rest_of_the_background() {
     let sheet = Material {
         blends: true,
         alpha: 0.3,
@@ -266,9 +266,9 @@ fn a_sheet_shows_itself_by_its_alpha_and_what_is_behind_by_the_rest() {
     assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}");
 }
 
-/// glTF culls backs: of a one-sided sheet of partial coverage rays and photons pass it.
+/// glTF culls back faces: rays and photons pass through the back of a one-sided sheet of partial coverage.
 #[test]
-fn the_back_of_a_one_sided_sheet_of_partial_coverage_is_not_there() {
+fn the_back_of_a_one_sided_sheet_of_partial_coverage_is_culled() {
     let sheet = Material { blends: true, alpha: 0.9, ..lambertian("sheet", 0.0) };
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
     for (sign, expected) in [(1.0, 0.1), (-1.0, 1.0)] {
@@ -282,10 +282,10 @@ fn the_back_of_a_one_sided_sheet_of_partial_coverage_is_not_there() {
     }
 }
 
-/// A sheet that returns as much light as it takes does not show in a furnace: photons are stored on it as
-/// often as gathers ask.
+/// A sheet that returns all light is invisible in a furnace, because photons are stored on it as often as
+/// gathers search for them.
 #[test]
-fn a_sheet_of_partial_coverage_does_not_show_in_a_furnace() {
+fn a_sheet_of_partial_coverage_is_invisible_in_a_furnace() {
     let wall = Material { emission: Vec3::splat(0.5), ..lambertian("wall", 0.5) };
     let sheet = Material { blends: true, alpha: 0.4, double_sided: true, ..lambertian("sheet", 1.0) };
     let view = camera(Vec3::new(0.1, 0.05, 0.9), Vec3::new(-0.1, -0.05, -1.0));
@@ -298,7 +298,7 @@ fn a_sheet_of_partial_coverage_does_not_show_in_a_furnace() {
     assert!(error.abs() < 0.012, "{error}");
 }
 
-/// Interpolated normals equal the ball's, however few its faces are.
+/// Interpolated normals equal those of the ball, however few faces it has.
 #[test]
 fn smooth_normals_are_interpolated_between_corners() {
     let mut ball = scene(Vec::new(), vec![Material { emission: Vec3::ONE, ..lambertian("ball", 0.0) }], {

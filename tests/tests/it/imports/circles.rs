@@ -1,12 +1,12 @@
-//! Circles of a graph of files.
+//! Circles in the graph of files.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
-/// Files that each file imports, each with a path that does so.
+/// Imports of each file, each with a path that makes the import.
 pub(crate) type Imports = BTreeMap<PathBuf, BTreeMap<PathBuf, String>>;
 
-/// Circles of the graph, without files in common, each as lines of its imports.
+/// Disjoint circles of the graph, each as lines about its imports.
 pub(crate) fn circles(imports: &Imports, folder: &Path) -> Vec<String> {
     let mut known = BTreeSet::new();
     let mut circles = Vec::new();
@@ -22,7 +22,7 @@ pub(crate) fn circles(imports: &Imports, folder: &Path) -> Vec<String> {
     circles
 }
 
-/// Shortest way from a file back to itself, the file first; by breadth-first search.
+/// Shortest path from a file back to itself, by breadth-first search. The file comes first.
 fn shortest_circle<'i>(imports: &'i Imports, start: &'i PathBuf) -> Option<Vec<&'i PathBuf>> {
     let mut importers: BTreeMap<&PathBuf, &PathBuf> = BTreeMap::new();
     let mut waiting = VecDeque::from([start]);

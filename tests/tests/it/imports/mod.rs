@@ -1,13 +1,14 @@
-//! No file imports one that imports it back, directly or around: each can be read without its users.
+//! No file imports another that directly or indirectly imports it, so that each can be read without its
+//! users.
 //!
-//! Read are all files of all targets of the workspace. A file imports another if a path in it, of a `use` or
-//! of an expression, names an item that the other defines, whichever module hands the item on by `pub use`.
-//! Neither a `mod` declaration nor a `pub use` of a name that the file itself does not use is an import.
+//! The test reads all files of all targets of the workspace. A file imports another if a path in it, of a
+//! `use` or of an expression, names an item that the other defines, whichever module re-exports the item by
+//! `pub use`. Neither a `mod` declaration nor a `pub use` of a name that the file itself does not use is an
+//! import.
 //!
-//! No types are resolved, so that two uses of another file remain unseen: a method or a field of a value
-//! whose type the file does not name, such as an inherent method that another file defines for a type; and
-//! paths in the body of a `macro_rules!`, or in arguments of a macro that are no expressions with commas
-//! between them.
+//! Types are not resolved, so that some uses of another file are missed: methods and fields of a value whose
+//! type the file does not name, such as inherent methods that another file defines; paths in the body of a
+//! `macro_rules!`; and paths in macro arguments that are not comma-separated expressions.
 
 mod circles;
 mod modules;
@@ -79,7 +80,7 @@ fn no_file_imports_one_that_imports_it_back() {
     assert!(circles.is_empty(), "{} circles:\n{}", circles.len(), circles.join("\n"));
 }
 
-/// The circles of a crate that is made of these files, the first of them its root.
+/// Circles of a crate that consists of these files, of which the first is the root.
 fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in files {
@@ -131,7 +132,7 @@ fn circles_are_found_however_they_are_written() {
 }
 
 #[test]
-fn what_is_no_circle_is_none() {
+fn imports_without_a_circle_are_accepted() {
     let cases: [&[(&str, &str)]; 4] = [
         // Declarations, and re-exports of a parent.
         &[
@@ -167,7 +168,7 @@ fn what_is_no_circle_is_none() {
 }
 
 #[test]
-fn modules_are_found_where_the_language_has_them() {
+fn modules_are_found_by_the_rules_of_the_language() {
     let files = [
         ("main.rs", "#[path = \"common/mod.rs\"] mod common; mod inline { mod deep; } mod file;"),
         ("common/mod.rs", "mod port; pub struct Common;"),

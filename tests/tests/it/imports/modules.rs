@@ -1,4 +1,4 @@
-//! Modules of a crate: the file of each, its names, and its paths.
+//! Modules of a crate: their files, names and paths.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -11,14 +11,15 @@ use super::paths::{Names, PathText, Paths, names_and_paths};
 /// Index of a module in its crate.
 type ModuleIndex = usize;
 
-/// Names that were looked up for a path, with their modules: modules may re-export each other's names.
+/// Names that were looked up for a path, with their modules. They end circular look-ups, because modules may
+/// re-export each other's names.
 type Asked = BTreeSet<(ModuleIndex, String)>;
 
-/// Module, inline or in a file of its own.
+/// Inline module, or module in its own file.
 struct Module {
     file: PathBuf,
     parent: Option<ModuleIndex>,
-    /// Child modules by name; a name may be declared several times for several systems.
+    /// Child modules by name. A name may be declared several times for different systems.
     children: BTreeMap<String, Vec<ModuleIndex>>,
     names: Names,
     paths: Paths,
@@ -29,7 +30,7 @@ pub(crate) struct Crate {
     modules: Vec<Module>,
 }
 
-/// Target of a path.
+/// Item to which a path resolves.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Resolved {
     /// A module itself.
@@ -42,7 +43,7 @@ impl Crate {
     /// Reads a target from its root file.
     ///
     /// # Panics
-    /// If a file is missing, or is no Rust.
+    /// If a file is missing or is not Rust.
     pub(crate) fn read(root: &Path) -> Self {
         let mut modules = Self { modules: Vec::new() };
         modules.read_file(root, None, root.parent().expect("a root is in a folder"));
@@ -123,7 +124,7 @@ impl Crate {
         }
     }
 
-    /// Targets of a path in a module; none in another crate.
+    /// Items to which a path in a module resolves; none if they are in another crate.
     fn resolve(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
         let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         match (first.as_str(), self.modules[module].parent) {
@@ -134,15 +135,15 @@ impl Crate {
         }
     }
 
-    /// Targets of the rest of a path from a module. A name that is not found in it, such as one that a macro
-    /// defines, counts as its own.
+    /// Items to which the rest of a path resolves, starting in a module. An unknown name, such as one that a
+    /// macro defines, counts as an item of the module.
     fn walk(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
         let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         let found = self.look_up(module, first, rest, asked);
         if found.is_empty() { vec![Resolved::ItemOf(module)] } else { found }
     }
 
-    /// Targets of a name that a module declares, defines or imports, and of the path that follows it.
+    /// Items of a name that a module declares, defines or imports, followed along the rest of the path.
     fn look_up(&self, module: ModuleIndex, name: &str, rest: &[String], asked: &mut Asked) -> Vec<Resolved> {
         if !asked.insert((module, name.to_owned())) {
             return Vec::new();

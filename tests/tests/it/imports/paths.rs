@@ -10,7 +10,7 @@ use syn::{Expr, Item, ItemMod, ItemUse, Macro, Path, Token, UseTree, VisRestrict
 /// Segments of a path.
 pub(crate) type PathText = Vec<String>;
 
-/// Names of a module, except for the modules that it declares.
+/// Names of a module, except those of modules that it declares.
 #[derive(Default)]
 pub(crate) struct Names {
     pub(crate) defined: BTreeSet<String>,
@@ -20,10 +20,10 @@ pub(crate) struct Names {
     pub(crate) globs: Vec<PathText>,
 }
 
-/// Paths of a module.
+/// Paths that a module contains.
 #[derive(Default)]
 pub(crate) struct Paths {
-    /// Paths of `use`, and all other paths of at least two segments: a single name is imported or defined by
+    /// Paths of `use`, and all other paths of at least two segments. A single name is imported or defined by
     /// the module, or is a variable.
     pub(crate) imports: Vec<PathText>,
     /// Paths of `pub use`, by name.
@@ -63,7 +63,7 @@ fn defined_name(item: &Item) -> Option<String> {
     Some(name.to_string())
 }
 
-/// Adds the names that a `use` imports. `self` stands for the last segment before it.
+/// Adds the names that a `use` imports. `self` stands for the last segment of `before`.
 fn add_imported(tree: &UseTree, before: &[String], names: &mut Names) {
     match tree {
         UseTree::Path(path) => add_imported(&path.tree, &with(before, &path.ident), names),
@@ -86,7 +86,7 @@ fn with(before: &[String], name: &syn::Ident) -> PathText {
 }
 
 impl<'ast> Visit<'ast> for Paths {
-    /// Child modules have paths of their own.
+    /// Skips child modules, because they are visited separately.
     fn visit_item_mod(&mut self, _: &'ast ItemMod) {}
 
     fn visit_item_use(&mut self, item: &'ast ItemUse) {
@@ -99,7 +99,7 @@ impl<'ast> Visit<'ast> for Paths {
         }
     }
 
-    /// A visibility is no import.
+    /// Skips visibilities, because they are no imports.
     fn visit_vis_restricted(&mut self, _: &'ast VisRestricted) {}
 
     fn visit_path(&mut self, path: &'ast Path) {

@@ -1,4 +1,4 @@
-//! The adjoint of photons at a wall with a normal map: they bring what paths find.
+//! Adjoint of photons at a wall with a normal map: they transport as much power as paths do.
 
 use std::f64::consts::PI;
 
@@ -20,19 +20,19 @@ use rayon::prelude::*;
 
 use super::{bumps, directional, film, mapped, metal, normal_texture, plastic, plate, settings, tilted};
 
-/// Pseudorandom number in [0, 1).
+/// Pseudo-random number in [0, 1).
 fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
 }
 
-/// Point of a sequence that is even in four dimensions: multiples of the powers of the root of `g^5 = g + 1`
-/// (Roberts 2018).
+/// Point of a low-discrepancy sequence in four dimensions: multiples of the powers of the root of `g^5 = g +
+/// 1` (Roberts 2018).
 fn place(index: u32) -> [f32; 4] {
     const G: f64 = 1.167_303_978_261_418_7;
     [1, 2, 3, 4].map(|power| (0.5 + f64::from(index) / G.powi(power)).fract() as f32)
 }
 
-/// A floor, and beside it a glossy wall with bumps that a lamp shines at.
+/// Floor beside a glossy wall with bumps that a lamp illuminates.
 fn wall_and_floor(normals: &[DVec3], roughness: f32) -> Scene {
     let lamp = Material { emission: Vec3::splat(10.0), ..lambertian("lamp", 0.0) };
     // Black would store no photons.
@@ -52,7 +52,7 @@ fn wall_and_floor(normals: &[DVec3], roughness: f32) -> Scene {
     scene
 }
 
-/// Power that photons bring to the floor by way of the wall, W.
+/// Power that photons transport to the floor by reflection at the wall, W.
 fn brought(packed: &PackedScene) -> f64 {
     let pass = trace(packed, 1, 600_000, &|_| true).unwrap();
     let unit = f64::from(pass.photons.power_unit());
@@ -62,7 +62,7 @@ fn brought(packed: &PackedScene) -> f64 {
     on_the_floor.filter(is_by_the_wall).map(|photon| f64::from(photon.power.decode()[0]) * unit).sum()
 }
 
-/// Power that paths from the floor find by way of the wall, W.
+/// Power that paths from the floor find by reflection at the wall, W.
 fn found(packed: &PackedScene, view: &Camera) -> f64 {
     const PATHS: u32 = 700_000;
     const OF_A_TASK: u32 = 10_000;
@@ -79,7 +79,7 @@ fn found(packed: &PackedScene, view: &Camera) -> f64 {
     sums.iter().sum::<f64>() / f64::from(PATHS) * 4.0 * PI / 2.0
 }
 
-/// Radiance that path `index` finds from the floor to the wall's side.
+/// Radiance that path `index` finds from the floor towards the wall.
 fn path_to_the_lamp<M: MemoryPort>(context: &mut Context<M>, index: u32) -> f64 {
     let [x, z, u, v] = place(index);
     let origin = Vec3::new(2.0 * x - 1.0, 1e-5, 2.0 * z - 1.0);
@@ -99,7 +99,7 @@ fn path_to_the_lamp<M: MemoryPort>(context: &mut Context<M>, index: u32) -> f64 
 }
 
 #[test]
-fn photons_bring_by_a_bumpy_wall_what_paths_find_there() {
+fn photons_and_paths_transport_equal_power_over_a_bumpy_wall() {
     let gentle: Vec<_> = (0..16).map(|k| tilted(f64::from(k % 4) * 6.0, 97.0 * f64::from(k))).collect();
     for (name, normals, roughness, tolerance) in [
         ("tilted", vec![tilted(15.0, 180.0)], 0.3, 0.01),
@@ -115,7 +115,7 @@ fn photons_bring_by_a_bumpy_wall_what_paths_find_there() {
     }
 }
 
-/// A pane of glass, without thickness.
+/// Glass of a pane without thickness.
 fn pane() -> Material {
     let transmission = Transmission { factor: 1.0, ior: 1.5, is_volume: false, absorption: Vec3::ZERO };
     let Material { reflection, .. } = plastic(0.0);
@@ -134,9 +134,8 @@ fn pane() -> Material {
     Material::new("pane", reflection)
 }
 
-/// Sun through a pane lights a floor by the caustic map: by what the pane transmits less than without it,
-/// though the lobe and the base of the floor are parts with normals of their own, for one of which photons
-/// are stored.
+/// Sunlight through a pane reaches a floor by the caustic map, reduced by the transmittance of the pane. The
+/// lobe and the base of the floor have normals of their own; photons are stored for only one of them.
 #[test]
 fn photons_light_a_floor_of_two_parts_once() {
     let normals = [tilted(50.0, 180.0), tilted(50.0, 0.0), tilted(20.0, 90.0)];

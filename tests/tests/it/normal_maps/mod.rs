@@ -33,7 +33,7 @@ fn film(scene: &Scene, settings: &RenderSettings) -> Film {
     render_or_panic(scene, settings).film
 }
 
-/// A normal texture of nearest texels, side by side.
+/// Adds a normal texture whose texels are these normals side by side, not interpolated.
 fn normal_texture(scene: &mut Scene, normals: &[DVec3]) {
     let texel = |normal: &DVec3| {
         let [red, green, blue] = ((*normal * 0.5 + 0.5) * 255.0).round().to_array().map(|value| value as u8);
@@ -49,7 +49,7 @@ fn normal_texture(scene: &mut Scene, normals: &[DVec3]) {
     scene.textures = vec![Texture { nearest: normals.len() > 1, ..Texture::new(0) }];
 }
 
-/// A unit vector of a normal texture after its rounding to 8 bits.
+/// Unit normal after rounding to 8 bits in a normal texture.
 fn rounded(normal: DVec3, scale: f64) -> DVec3 {
     let texel = ((normal * 0.5 + 0.5) * 255.0).round() / 255.0 * 2.0 - 1.0;
     (texel * DVec3::new(scale, scale, 1.0)).normalize()
@@ -77,7 +77,7 @@ fn metal(roughness: f32) -> Material {
     Material::new("metal", reflection)
 }
 
-/// A square of side 2 in the plane z = 0 that faces +z, with u to the right and v downwards, from 0 to 1.
+/// Square of side 2 in the plane z = 0 that faces +z, with u from 0 to 1 to the right and v downwards.
 fn plate(material: Material, normals: &[DVec3], tangent: Vec4, view: Camera) -> Scene {
     let mut scene = scene(Vec::new(), vec![material], view);
     let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x, y, 0.0));
@@ -87,7 +87,7 @@ fn plate(material: Material, normals: &[DVec3], tangent: Vec4, view: Camera) -> 
     scene
 }
 
-/// Camera far along a direction that sees a square of 1.8 m at the origin.
+/// Distant camera that sees a square of 1.8 m at the origin.
 fn far_camera(direction: Vec3) -> Camera {
     let origin = direction.normalize() * 50.0;
     // Straight up, the camera's upper edge is along y.
@@ -103,7 +103,7 @@ fn directional(direction: DVec3, irradiance: f32) -> PunctualLight {
     }
 }
 
-/// A lone plane does not light itself: rays of irradiance records stay above the triangle, whatever the
+/// A lone plane does not illuminate itself. Rays of irradiance records stay above the triangle, whatever the
 /// normal of the map.
 #[test]
 fn irradiance_records_of_a_lone_bumpy_plate_gather_nothing() {
@@ -160,7 +160,7 @@ fn a_tilted_plate_is_lit_by_the_cosine_to_its_mapped_normal() {
 }
 
 #[test]
-fn a_scale_of_zero_and_a_tangent_of_zero_are_no_map() {
+fn a_scale_or_tangent_of_zero_disables_the_map() {
     let light = directional(DVec3::new(0.3, 0.5, 0.8).normalize(), 3.0);
     let seen = |scale: f32, tangent: Vec4| {
         let material = mapped(lambertian("plate", ALBEDO), scale);
@@ -176,7 +176,7 @@ fn a_scale_of_zero_and_a_tangent_of_zero_are_no_map() {
     assert!((tilted / plain - 1.0).abs() > 0.1, "{tilted} {plain}");
 }
 
-/// Normals in all directions: light from behind the plate reaches none.
+/// Normals point in all directions. Light from behind the plate must reach none of them.
 #[test]
 fn a_bumpy_plate_leaks_no_light_from_behind() {
     let normals: Vec<_> = (0..16).map(|k| tilted(70.0, 22.5 * f64::from(k))).collect();
@@ -192,7 +192,7 @@ fn a_bumpy_plate_leaks_no_light_from_behind() {
     }
 }
 
-/// GGX's `f cos` of a metal: height-correlated Smith masking, Schlick's Fresnel reflectance.
+/// GGX reflection `f cos` of a metal: height-correlated Smith masking, Schlick's Fresnel reflectance.
 fn metal_times_cosine(normal: DVec3, outgoing: DVec3, incident: DVec3, roughness: f64) -> f64 {
     let squared = roughness.powi(4);
     let half = (outgoing + incident).normalize();
@@ -208,7 +208,7 @@ fn metal_times_cosine(normal: DVec3, outgoing: DVec3, incident: DVec3, roughness
     distribution * visibility * fresnel * i
 }
 
-/// The normal nearest to `normal`, in its plane with z, whose mirror direction is not below the plate: by
+/// Normal nearest to `normal`, in its plane with z, whose mirror direction is not below the plate; by
 /// bisection.
 fn bent(normal: DVec3, outgoing: DVec3) -> DVec3 {
     let least = (0.9 * outgoing.z).min(0.01);
@@ -224,7 +224,7 @@ fn bent(normal: DVec3, outgoing: DVec3) -> DVec3 {
     good
 }
 
-/// The integral of a function over the directions above the plate, by midpoints in cosine and azimuth.
+/// Integral of a function over the directions above the plate, by midpoints in cosine and azimuth.
 fn over_the_sky(value: impl Fn(DVec3) -> f64) -> f64 {
     const SIDE: u32 = 250;
     let mut sum = 0.0;
@@ -239,13 +239,13 @@ fn over_the_sky(value: impl Fn(DVec3) -> f64) -> f64 {
     sum * 2.0 * PI / f64::from(2 * SIDE * SIDE)
 }
 
-/// Bumps of up to 40 degrees, seen at an angle.
+/// Normals that are tilted by up to 40 degrees.
 fn bumps() -> Vec<DVec3> {
     (0..16).map(|k| tilted(f64::from(k % 4 + 1) * 10.0, 97.0 * f64::from(k))).collect()
 }
 
-/// Albedo of a bumpy plate, mean over its texels: [`bent`] or not, or of the same texels above their own
-/// horizons alone.
+/// Mean albedos of a bumpy plate over its texels: with [`bent`] normals, with unbent ones, and with unbent
+/// ones over each texel's own hemisphere.
 fn albedos(outgoing: DVec3, roughness: Option<f64>) -> [f64; 3] {
     let count = bumps().len() as f64;
     let mut sums = [0.0; 3];
@@ -311,7 +311,7 @@ fn bumpy_plates_in_a_white_furnace_lose_little() {
     }
 }
 
-/// Cosine-weighted mean over the hemisphere of Schlick's reflectance of a dielectric of F0 0.04.
+/// Cosine-weighted mean over the hemisphere of Schlick's reflectance of a dielectric with F0 0.04.
 fn mean_fresnel(outgoing: DVec3) -> f64 {
     over_the_sky(|direction| schlick(0.04, outgoing, direction) * direction.z / PI)
 }
@@ -320,8 +320,8 @@ fn schlick(f0: f64, outgoing: DVec3, incident: DVec3) -> f64 {
     f0 + (1.0 - f0) * (1.0 - (outgoing + incident).normalize().dot(outgoing)).powi(5)
 }
 
-/// Albedo of a bumpy plate of plastic, mean over its texels: the lobe by the normal that is [`bent`], above
-/// it the share of light that it leaves to the Lambertian base, by the texel's own normal.
+/// Mean albedo of a bumpy plastic plate over its texels. The lobe uses the [`bent`] normal, the Lambertian
+/// base the texel's own. The base receives the light that the lobe does not reflect.
 fn plastic_albedo(outgoing: DVec3, roughness: f64) -> f64 {
     let base = f64::from(ALBEDO);
     let lobe = |normal: DVec3, outgoing: DVec3| {
@@ -355,10 +355,9 @@ fn plastic(roughness: f32) -> Material {
     Material::new("plastic", reflection)
 }
 
-/// Texels that are seen at a grazing angle reflect by the bent normal, and their base must have the light
-/// that is left there.
+/// Texels at grazing angles reflect by the bent normal. Their base must receive the remaining light.
 #[test]
-fn bumpy_plates_of_plastic_lose_no_light_where_the_normal_of_the_lobe_is_bent() {
+fn bumpy_plastic_plates_lose_no_light_where_normals_are_bent() {
     for (degrees, roughness) in [(0.0, 0.3), (60.0, 0.3), (75.0, 0.3), (75.0, 0.45)] {
         let direction = tilted(degrees, 20.0);
         let expected = plastic_albedo(direction, roughness);
@@ -368,9 +367,9 @@ fn bumpy_plates_of_plastic_lose_no_light_where_the_normal_of_the_lobe_is_bent() 
     }
 }
 
-/// A sheen has no mirror direction, and the layer's normal alone: each sample shows it.
+/// A sheen has no mirror direction and uses the normal of its layer only, so that every sample shows it.
 #[test]
-fn a_sheen_over_a_tilted_normal_is_even() {
+fn a_sheen_over_a_tilted_normal_is_uniform() {
     let sheen = Sheen { colour: Vec3::ONE, roughness: 0.5, colour_texture: None, roughness_texture: None };
     let normal = Some(NormalMap { texture: 0, scale: 1.0 });
     let layers = Layers { normal, sheen: Some(sheen), ..Layers::none(Vec3::ZERO) };
@@ -387,7 +386,7 @@ fn a_sheen_over_a_tilted_normal_is_even() {
     }
 }
 
-/// Smooth normals that no lobe has to bend change nothing: the middle of a fine ball is as bright as a plate.
+/// Smooth normals that no lobe has to bend have no effect: the middle of a fine ball is as bright as a plate.
 #[test]
 fn a_smooth_ball_of_plastic_is_as_bright_as_a_plate() {
     let sky = |mut scene: Scene| {
@@ -403,8 +402,8 @@ fn a_smooth_ball_of_plastic_is_as_bright_as_a_plate() {
     assert!((round / flat - 1.0).abs() < 0.005, "{round} {flat}");
 }
 
-/// A coarse ball, whose smooth normals deviate from its facets, with bumps: its silhouette included, it
-/// reflects a white sky.
+/// A coarse ball with bumps, whose smooth normals deviate from its facets, reflects a white sky even at its
+/// silhouette.
 #[test]
 fn glossy_bumpy_balls_have_neither_black_nor_bright_fringes() {
     for roughness in [0.0, 0.1, 0.3] {
