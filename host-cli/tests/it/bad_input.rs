@@ -1,11 +1,12 @@
-//! Invalid arguments and unreadable input: status 2, an error with location and remedy, and unchanged files.
+//! Invalid arguments and unreadable input give status 2, an error with location and remedy, and unchanged
+//! files.
 
 use std::fs;
 
 use crate::support::{Outcome, Room, scene, scene_bytes, scene_of, shipped};
 use serde_json::{Value, json};
 
-/// Checks that a command is rejected with these words in its message, and nothing on standard output.
+/// Checks that a command is refused with these words in its message, and with an empty standard output.
 fn check_refused(outcome: &Outcome, words: &[&str], case: &str) {
     let Outcome { status, stdout, stderr } = outcome;
     assert_eq!(*status, Some(2), "{case}: {stderr}");
@@ -15,7 +16,8 @@ fn check_refused(outcome: &Outcome, words: &[&str], case: &str) {
     }
 }
 
-/// Checks that a render is rejected, that its old picture is unchanged and that no other file appears.
+/// Checks that a render is refused with these words, that an old picture is unchanged, and that no other file
+/// appears.
 fn refused(room: &Room, scene: &str, options: &[&str], words: &[&str]) {
     let case = format!("{scene} {options:?}");
     room.write("out.exr", "old picture");
@@ -32,7 +34,7 @@ fn refused(room: &Room, scene: &str, options: &[&str], words: &[&str]) {
     assert_eq!(room.read("out.exr"), b"old picture", "{case}");
 }
 
-/// Checks that a scene is rejected.
+/// Checks that a render of a scene is refused with these words.
 fn refused_scene(scene: &Value, words: &[&str]) {
     let room = Room::new();
     room.write_scene("scene.gltf", scene);
@@ -40,7 +42,7 @@ fn refused_scene(scene: &Value, words: &[&str]) {
 }
 
 #[test]
-fn files_that_are_no_scene() {
+fn files_that_are_no_scene_are_refused() {
     let room = Room::new();
     let atrium = fs::read(shipped("atrium.glb")).unwrap();
     room.write("cut.glb", &atrium[..atrium.len() / 2]);
@@ -67,7 +69,7 @@ fn files_that_are_no_scene() {
 }
 
 #[test]
-fn scenes_that_break_a_rule() {
+fn scenes_that_violate_gltf_are_refused() {
     let changed = |change: &dyn Fn(&mut Value)| {
         let mut scene = scene();
         change(&mut scene);
@@ -87,7 +89,7 @@ fn scenes_that_break_a_rule() {
 }
 
 #[test]
-fn scenes_that_show_nothing() {
+fn scenes_without_geometry_or_light_are_refused() {
     let changed = |change: &dyn Fn(&mut Value)| {
         let mut scene = scene();
         change(&mut scene);
@@ -113,7 +115,7 @@ fn scenes_that_show_nothing() {
 }
 
 #[test]
-fn numbers_out_of_range() {
+fn numbers_out_of_range_are_refused() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     for (option, value, words) in [
@@ -158,7 +160,7 @@ fn numbers_out_of_range() {
 }
 
 #[test]
-fn names_that_do_not_exist() {
+fn unknown_names_are_refused() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     for (option, value, words) in [
@@ -185,7 +187,7 @@ fn names_that_do_not_exist() {
 }
 
 #[test]
-fn environments_that_are_none() {
+fn files_that_are_no_environment_are_refused() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     room.write("text.hdr", "no picture");
@@ -202,7 +204,7 @@ fn environments_that_are_none() {
 }
 
 #[test]
-fn options_for_emulated_cards_alone() {
+fn options_for_emulated_cards_are_refused_for_others() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     for card in ["serial:/dev/absent", "tcp:127.0.0.1:1", "unix:absent"] {
@@ -218,7 +220,7 @@ fn options_for_emulated_cards_alone() {
 }
 
 #[test]
-fn settings_that_no_card_can_take_are_refused_before_one_is_reached() {
+fn settings_beyond_every_card_are_refused_before_one_is_reached() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     for (option, value) in [
@@ -238,7 +240,7 @@ fn settings_that_no_card_can_take_are_refused_before_one_is_reached() {
 }
 
 #[test]
-fn photons_of_several_frames_for_one_camera() {
+fn photons_for_one_camera_are_refused_for_several_frames() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let words = ["--photons-for", "--frames"];
@@ -246,7 +248,7 @@ fn photons_of_several_frames_for_one_camera() {
 }
 
 #[test]
-fn nothing_to_listen_on() {
+fn invalid_arguments_of_an_emulator_are_refused() {
     let room = Room::new();
     for (options, words) in [
         (&[][..], ["--listen", "required"]),
@@ -264,7 +266,7 @@ fn nothing_to_listen_on() {
 }
 
 #[test]
-fn an_image_larger_than_the_card() {
+fn an_image_larger_than_the_card_is_refused() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let options = ["--card", "emulated-micro:1", "--photons", "5000000"];
@@ -273,7 +275,7 @@ fn an_image_larger_than_the_card() {
 }
 
 #[test]
-fn outputs_that_cannot_be_written() {
+fn outputs_that_cannot_be_written_are_refused() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     fs::create_dir(room.path("folder.exr")).unwrap();
@@ -297,9 +299,9 @@ fn outputs_that_cannot_be_written() {
     }
 }
 
-/// The format of a picture is its ending; before a card is reached, or a file is read.
+/// The suffix states the format. It is checked before a card is reached or a file is read.
 #[test]
-fn outputs_of_no_known_format() {
+fn outputs_of_an_unknown_format_are_refused() {
     let room = Room::new();
     let unread = ["--card", "tcp:127.0.0.1:1"];
     for name in ["out", ".", ".exr", "out.exr.partial"] {
@@ -321,11 +323,11 @@ fn outputs_of_no_known_format() {
     assert!(room.names().is_empty());
 }
 
-/// No output is written to a name that is no regular file: a pipe would block, a device or a link would be
-/// replaced.
+/// Outputs to names that are no regular files are refused: a pipe would block, and a device or a link would
+/// be replaced.
 #[cfg(unix)]
 #[test]
-fn outputs_that_are_no_files() {
+fn outputs_that_are_no_regular_files_are_refused() {
     use std::os::unix::fs::symlink;
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
@@ -346,7 +348,7 @@ fn outputs_that_are_no_files() {
 }
 
 #[test]
-fn pictures_that_cannot_be_compared() {
+fn pictures_that_cannot_be_compared_are_refused() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     room.rendered("scene.gltf", &["-o", "a.exr"]);

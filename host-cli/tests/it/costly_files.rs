@@ -1,15 +1,16 @@
-//! Small files with costly contents: each is rejected with a remedy, or takes little, within 4 GB of address
-//! space and some seconds (docs/architecture.md, "What a file may cost").
+//! Small files with costly contents are rejected with a remedy or take little, within 4 GB of address space
+//! and some seconds (docs/architecture.md, "What a file may cost").
 #![cfg(unix)]
 
 use crate::support::{Outcome, Room, glb, scene};
 use serde_json::{Value, json};
 
-/// Limit of processor time, seconds: far more than any of these files takes.
+/// Limit of processor time, seconds. None of these files takes nearly as long.
 const SECONDS: u32 = 100;
 const KILOBYTES: u32 = 4_000_000;
 
-/// Runs the command with limited memory and time. The time limit ends it by a signal, which is no status.
+/// Runs the command with limited memory and time. When the time is over a signal ends it, so that it has no
+/// exit status.
 fn limited(room: &Room, arguments: &[&str]) -> Outcome {
     let mut shell = std::process::Command::new("sh");
     let script = format!("ulimit -v {KILOBYTES} && ulimit -t {SECONDS} && exec \"$0\" \"$@\"");
@@ -18,7 +19,7 @@ fn limited(room: &Room, arguments: &[&str]) -> Outcome {
     Outcome::of(&shell.output().unwrap())
 }
 
-/// Checks that a render of a scene is rejected with these words.
+/// Checks that a render of the scene is refused with these words.
 fn refused(room: &Room, words: &[&str]) {
     let outcome =
         limited(room, &["render", "scene.glb", "-o", "out.exr", "--size", "8x8", "--photons", "100"]);
@@ -35,7 +36,7 @@ fn refused_scene(json: &Value, bytes: &[u8], words: &[&str]) {
     refused(&room, words);
 }
 
-/// Checks that a scene with `count` nearly empty elements in a list is rejected.
+/// Checks that a scene is refused whose `list` has `count` nearly empty elements.
 fn refused_list(list: &str, element: &str, count: usize) {
     let room = Room::new();
     let mut elements = vec![element; count - 1].join(",");
@@ -44,7 +45,8 @@ fn refused_list(list: &str, element: &str, count: usize) {
     refused(&room, &["of JSON would take more than", "leave out what is empty"]);
 }
 
-/// Mesh that emits light, of primitives with one accessor of positions each, and of indices if there are any.
+/// Emissive mesh whose primitives each have one accessor of positions, and one of indices if `indices` is
+/// given.
 fn meshes(primitives: usize, indices: Option<usize>) -> Value {
     let mut primitive = json!({"attributes": {"POSITION": 0}, "material": 0});
     if let Some(indices) = indices {
@@ -59,7 +61,7 @@ fn meshes(primitives: usize, indices: Option<usize>) -> Value {
     })
 }
 
-/// Vertices at pairwise different positions.
+/// Bytes of vertices at pairwise different positions.
 fn places(count: u32) -> Vec<u8> {
     let scattered = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
     (0..3 * count).flat_map(|i| scattered(i).to_le_bytes()).collect()
@@ -109,7 +111,7 @@ fn primitives_that_share_their_indices_are_not_packed_beyond_memory() {
 }
 
 #[test]
-fn lists_of_next_to_nothing_are_not_parsed() {
+fn lists_of_nearly_empty_elements_are_not_parsed() {
     refused_list("materials", "{}", 6_000_000);
     refused_list("nodes", "{}", 16_000_000);
 }

@@ -1,4 +1,4 @@
-//! Modelled memory: counters add up, the trace holds the counted reads, and the picture does not change.
+//! Modelled memory: counters add up, the trace contains the counted reads, and the picture does not change.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -13,13 +13,13 @@ fn statistics(room: &Room, name: &str) -> Value {
     serde_json::from_slice(&room.read(name)).unwrap()
 }
 
-/// A counter below `memory`.
+/// Value of a counter below `memory` in the statistics.
 fn count(statistics: &Value, pointer: &str, key: &str) -> u64 {
     let count = statistics.pointer(&format!("/memory/{pointer}/{key}")).and_then(Value::as_u64);
     count.unwrap_or_else(|| panic!("no memory/{pointer}/{key} in {statistics:#}"))
 }
 
-/// Sum of a counter over some parts.
+/// Sum of a counter over several parts.
 fn sum(statistics: &Value, part: &str, names: &[&str], key: &str) -> u64 {
     names.iter().map(|name| count(statistics, &format!("{part}/{name}"), key)).sum()
 }
@@ -92,9 +92,9 @@ fn counters_add_up_and_change_no_picture() {
     }
 }
 
-/// The first row of `docs/memory.csv` is a picture that takes a second.
+/// Renders the picture of the first row of `docs/memory.csv`, which takes a second.
 #[test]
-fn the_figures_of_the_memory_page_are_of_this_program() {
+fn the_figures_of_the_document_on_memory_are_of_this_program() {
     let csv = include_str!("../../../docs/memory.csv");
     let row: Vec<&str> = csv.lines().nth(1).expect("a row").split(',').collect();
     let [scene, rays, "emulated", "48", photon_map, geometry, program] = row[..] else { panic!("{row:?}") };
@@ -141,7 +141,7 @@ fn a_trace_has_a_line_for_every_request_and_every_tile() {
     }
 }
 
-/// Requests and bytes by the label at `column` of the lines of a trace.
+/// Requests and bytes, summed by the label in column `column` of a trace's lines.
 fn sums_by_label(text: &str, column: usize) -> BTreeMap<&str, [u64; 2]> {
     let mut sums: BTreeMap<_, [u64; 2]> = BTreeMap::new();
     for line in text.lines().filter(|line| line.starts_with("0 ")) {
@@ -214,7 +214,7 @@ fn a_trace_of_the_dram_has_a_line_for_every_line_that_was_fetched() {
 }
 
 #[test]
-fn a_trace_is_of_one_chip() {
+fn a_trace_of_several_chips_is_refused() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let before = room.names();
@@ -240,7 +240,7 @@ fn a_trace_is_of_one_chip() {
 }
 
 #[test]
-fn what_is_no_cache_is_refused_with_what_is() {
+fn invalid_caches_are_refused_with_the_valid_form() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     for (cache, words) in [
@@ -257,7 +257,7 @@ fn what_is_no_cache_is_refused_with_what_is() {
     }
 }
 
-/// A shell that limits the size of files: the trace is the first to exceed it.
+/// A shell limits the size of files, which the trace exceeds first.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_trace_that_cannot_be_written_ends_the_render() {

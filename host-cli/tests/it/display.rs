@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use crate::support::{Room, scene};
 use photoncard_driver::exr::read_rgb;
 
-/// Image of a viewer, from packets alone.
+/// Image of a viewer, built from received packets.
 #[derive(Default)]
 struct Viewed {
     name: String,
@@ -16,7 +16,7 @@ struct Viewed {
     channels: Vec<String>,
     /// Values of each channel, row by row.
     values: Vec<Vec<f32>>,
-    /// Number of packets that updated it.
+    /// Number of packets that updated the image.
     updates: usize,
 }
 
@@ -96,7 +96,7 @@ impl Viewed {
     }
 }
 
-/// Viewer that serves one connection until it ends.
+/// Starts a viewer that serves one connection. Its thread returns the final image.
 fn viewer() -> (SocketAddr, JoinHandle<Viewed>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
@@ -117,7 +117,7 @@ fn viewer() -> (SocketAddr, JoinHandle<Viewed>) {
 }
 
 #[test]
-fn a_viewer_has_the_picture_of_the_file() {
+fn a_viewer_receives_the_picture_of_the_file() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     for options in [
@@ -149,7 +149,7 @@ fn a_viewer_has_the_picture_of_the_file() {
 }
 
 #[test]
-fn a_display_that_is_not_there_is_told_of_once() {
+fn a_missing_display_is_reported_once() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let address = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();

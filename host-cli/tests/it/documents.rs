@@ -2,14 +2,14 @@
 
 use crate::support::Room;
 
-/// Options that `text` has at the beginning of its lines.
+/// Options at the beginnings of the lines of `text`.
 fn options(text: &str) -> Vec<&str> {
     let lines = text.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
     lines.filter_map(|line| line.split([' ', ',', '[']).find(|word| word.starts_with("--"))).collect()
 }
 
 #[test]
-fn short_help_is_a_part_of_the_long_one_in_groups() {
+fn short_help_is_a_grouped_part_of_the_long_one() {
     let room = Room::new();
     let [short, long] = ["-h", "--help"].map(|option| room.run(&["render", option]).stdout);
     let all = options(&long);

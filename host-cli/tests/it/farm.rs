@@ -1,4 +1,4 @@
-//! Jobs of farms: they run, and their picture is that of one render, to the byte.
+//! Farm jobs run, and their picture equals that of one render, byte for byte.
 #![cfg(unix)]
 
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::support::{Outcome, Room, shipped};
 use serde_json::Value;
 
-/// Names that a shell or an engine reads otherwise, unless they are quoted.
+/// Folder name that shells and engines misread unless it is quoted.
 const FOLDER: &str = "it's a {{Param.x}} $HOME";
 const SCENE: &str = "a {1} \"b\" {}.gltf";
 const PICTURE: &str = "o{{}}ut `id`.exr";
@@ -30,7 +30,7 @@ const OPTIONS: [&str; 15] = [
     "--irradiance-cache=on",
 ];
 
-/// Room with a scene in a folder, and its picture by one render.
+/// Room with a scene in a folder. Returns it with the scene's picture by one render.
 fn room() -> (Room, Vec<u8>) {
     let room = Room::new();
     std::fs::create_dir(room.path(FOLDER)).unwrap();
@@ -46,7 +46,7 @@ fn run(room: &Room, arguments: &[&str]) -> Outcome {
     Outcome::of(&room.command().current_dir(room.path(FOLDER)).args(arguments).output().unwrap())
 }
 
-/// The job of the scene for an engine.
+/// Text of the scene's job for an engine.
 fn job(room: &Room, engine: &str) -> String {
     let own =
         ["farm", engine, SCENE, "--parts", "3", "-o", PICTURE, "-o", "out.png", "--sample-type", "half"];
@@ -55,7 +55,7 @@ fn job(room: &Room, engine: &str) -> String {
     outcome.stdout
 }
 
-/// A command that finds the program in its path.
+/// Command whose path contains the program.
 fn in_path(program: &str) -> Command {
     let own = std::path::Path::new(env!("CARGO_BIN_EXE_photoncard")).parent().unwrap();
     let path = format!("{}:{}", own.display(), std::env::var("PATH").unwrap());
@@ -68,7 +68,7 @@ fn is_there(program: &str, test: &str) -> bool {
     Command::new(program).arg(test).output().is_ok_and(|output| output.status.success())
 }
 
-/// Runs a script of a job in a folder with other names still.
+/// Runs a job's script, whose own file name needs quoting as well.
 fn run_script(room: &Room, script: &str, arguments: &[&str]) {
     let path = room.path("the {2} job's.sh");
     std::fs::write(&path, script).unwrap();
@@ -76,7 +76,8 @@ fn run_script(room: &Room, script: &str, arguments: &[&str]) {
     assert_eq!(outcome.status, Some(0), "{script}\n{}\n{}", outcome.stdout, outcome.stderr);
 }
 
-/// Checks the pictures of a job that is done. One of halves has the pixels of the other, rounded.
+/// Checks the pictures of a finished job. The one with half-precision samples contains the rounded pixels of
+/// the other.
 fn check_pictures(room: &Room) {
     let own = ["render", SCENE, "-o", "half.exr", "-o", "whole.png", "--sample-type", "half"];
     let outcome = run(room, &[&own[..], &OPTIONS].concat());
@@ -86,7 +87,7 @@ fn check_pictures(room: &Room) {
     assert!(read("out.png") == read("whole.png"));
 }
 
-/// The tasks of a script one after another, without an engine.
+/// Runs all tasks of a script one after another, without an engine.
 fn by_hand(room: &Room, script: &str) {
     let seq = script.lines().find(|line| line.contains("| parallel ")).unwrap();
     let tasks = seq.split('|').next().unwrap().trim();
@@ -110,9 +111,9 @@ fn the_script_of_gnu_parallel_renders_the_picture() {
     check_pictures(&room);
 }
 
-/// Tasks that were killed, or run twice, or whose scene has changed since.
+/// Tasks are killed, run twice, or run after the scene has changed.
 #[test]
-fn a_job_that_is_run_again_goes_on_or_begins_anew() {
+fn a_repeated_job_continues_or_starts_again() {
     let (room, whole) = room();
     let folder = room.path(FOLDER);
     let script = job(&room, "parallel").replace(" --sample-type half", "");
@@ -135,7 +136,7 @@ fn a_job_that_is_run_again_goes_on_or_begins_anew() {
     assert!(picture() == std::fs::read(folder.join("other.exr")).unwrap() && picture() != whole);
 }
 
-/// The steps in the order in which Slurm runs them, each by the command that it would run.
+/// Runs the steps in the order of Slurm, each by the command that Slurm would run.
 #[test]
 fn the_script_of_slurm_submits_steps_that_render_the_picture() {
     let (room, _) = room();
@@ -165,7 +166,7 @@ fn the_script_of_slurm_submits_steps_that_render_the_picture() {
     check_pictures(&room);
 }
 
-/// Runs the template by the engine's own command: `tests/ci.sh` installs it.
+/// Runs the template by the engine's own command, which `tests/ci.sh` installs.
 #[test]
 fn the_template_of_open_job_description_renders_the_picture() {
     let (room, _) = room();
@@ -250,7 +251,7 @@ fn progress_and_failure_are_lines_of_open_job_description() {
 }
 
 #[test]
-fn frames_of_a_job_are_those_of_one_render() {
+fn frames_of_a_job_equal_those_of_one_render() {
     let (room, _) = room();
     std::fs::copy(shipped("cornell-moving.glb"), room.path(FOLDER).join(SCENE)).unwrap();
     let frames = [&["--frames", "8-10", "--fps", "12"], &OPTIONS[..]].concat();
@@ -265,9 +266,9 @@ fn frames_of_a_job_are_those_of_one_render() {
     }
 }
 
-/// Tasks of frames name the frame, and its pictures are merged one by one.
+/// Tasks name their frames, whose pictures are merged one by one.
 #[test]
-fn frames_are_tasks_of_their_own() {
+fn each_frame_is_a_task() {
     let room = Room::new();
     let own =
         ["farm", "slurm", "a.gltf", "--frames", "9-11", "--parts", "4", "-o", "d/p##.##.exr", "--seed", "3"];
@@ -300,7 +301,7 @@ fn frames_are_tasks_of_their_own() {
 }
 
 #[test]
-fn what_is_of_no_job_is_refused() {
+fn options_that_no_job_can_have_are_refused() {
     let room = Room::new();
     for (options, words) in [
         (&["-o", "a.exr", "--stats", "-"][..], ["--stats is not for a farm's job", "help: leave it out"]),

@@ -1,4 +1,5 @@
-//! First commands of a new user: a scene alone, outputs by default and to a pipe, words of other renderers.
+//! First commands of a new user: a scene without options, default outputs, pipes, and options of other
+//! renderers.
 
 use std::fs;
 use std::process::Stdio;
@@ -7,7 +8,7 @@ use crate::support::{Outcome, Room, scene, small_render};
 use serde_json::json;
 
 #[test]
-fn a_picture_without_a_name_is_beside_the_scene_and_replaces_no_other_file() {
+fn the_default_picture_is_beside_the_scene_and_replaces_no_other_file() {
     let room = Room::new();
     fs::create_dir(room.path("sub")).unwrap();
     room.write_scene("sub/room.one.gltf", &scene());
@@ -50,7 +51,7 @@ fn a_picture_goes_to_a_pipe() {
 }
 
 #[test]
-fn words_of_other_renderers_and_other_files_are_answered() {
+fn options_of_other_renderers_and_other_files_get_a_remedy() {
     let room = Room::new();
     room.write("a.blend", b"BLENDER-v405RENDH");
     room.write("a.obj", "v 0 0 0\n");
@@ -75,7 +76,7 @@ fn words_of_other_renderers_and_other_files_are_answered() {
     }
 }
 
-/// A map with one bright column in the middle lights what faces it.
+/// A map with one bright column in the middle lights surfaces that face it.
 #[test]
 fn environments_are_turned_by_the_option_and_by_blenders_convention() {
     let room = Room::new();
@@ -100,10 +101,10 @@ fn environments_are_turned_by_the_option_and_by_blenders_convention() {
     assert_eq!(red("blender.gltf", &["--environment-rotation", "90"]), ahead);
 }
 
-/// A program of the name ffmpeg, which joins the files of the list that it is given, or fails.
+/// A stand-in for ffmpeg joins the files of the list that it receives, or fails.
 #[cfg(unix)]
 #[test]
-fn frames_become_a_video_where_ffmpeg_is_there() {
+fn ffmpeg_makes_a_video_of_frames() {
     use std::os::unix::fs::PermissionsExt;
     let room = Room::new();
     let moving = crate::support::shipped("cornell-moving.glb");

@@ -13,16 +13,16 @@ use photoncard_shared::message::{self, Command, PROTOCOL_VERSION, Reply};
 use photoncard_shared::transport::Transport;
 use serde_json::{Value, json};
 
-/// Text that clears the screen, ends a line, begins a forged one, and reverses the direction of the rest.
+/// Text that clears the screen, ends a line, starts a forged one, and reverses the direction of the rest.
 const HOSTILE: &str = "x\u{1b}[2J\0\u{9b}31m\r\nforged\u{202e}\u{2066}\u{7f}";
-/// [`HOSTILE`] as it is printed.
+/// [`HOSTILE`] as it must be printed.
 const SHOWN: &str = "x\\u{1b}[2J\\0\\u{9b}31m\\r\\nforged\\u{202e}\\u{2066}\\u{7f}";
-/// [`HOSTILE`] as a path or an argument, which ends at a zero byte.
+/// [`HOSTILE`] as a path or an argument, which cannot contain a zero byte.
 const HOSTILE_PATH: &str = "x\u{1b}[2J\u{9b}31m\r\nforged\u{202e}";
 const SHOWN_PATH: &str = "x\\u{1b}[2J\\u{9b}31m\\r\\nforged\\u{202e}";
 
-/// Checks the status of a command, that it printed a text at least `times` times, and no unprintable
-/// character.
+/// Checks the status of a command, that its output contains `shown` at least `times` times, and that it
+/// contains no unprintable character.
 fn check_shown(outcome: &Outcome, status: i32, shown: &str, times: usize) {
     let Outcome { status: found, stdout, stderr } = outcome;
     assert_eq!(*found, Some(status), "{stderr}");
@@ -35,7 +35,7 @@ fn check_shown(outcome: &Outcome, status: i32, shown: &str, times: usize) {
     assert!(found >= times, "{shown} is there {found} times: {stdout}{stderr}");
 }
 
-/// Scene whose objects all have a hostile name.
+/// Scene with a hostile name on every object.
 fn hostile_scene(mut scene: Value) -> Value {
     scene["asset"]["generator"] = json!(HOSTILE);
     scene["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual"]);
@@ -140,7 +140,7 @@ fn the_name_of_a_picture_is_shown_escaped_by_a_viewer() {
     assert!(bytes[6..].starts_with(b"a\\u{1b}[2J.exr\0"), "{:?}", &bytes[..40]);
 }
 
-/// Answers a host's hello with the given build, until the host leaves.
+/// Answers the hello of a host with a hostile `build`, until the host disconnects.
 fn serve_hello(mut host: TcpStream, build: &str) {
     let mut transport = Transport::card();
     host.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
@@ -191,9 +191,9 @@ fn the_build_of_a_card_is_shown_escaped() {
     server.join().unwrap();
 }
 
-/// The options of a small render.
+/// Uses the options of a small render.
 #[test]
-fn a_material_of_a_hostile_name_can_be_set() {
+fn a_material_with_a_hostile_name_can_be_set() {
     let room = Room::new();
     let mut scene = scene();
     scene["materials"][0]["name"] = json!("\u{202e}floor");

@@ -1,10 +1,10 @@
-//! Frames: each is the picture of a command of its own, and a camera that moves alone takes nothing but
-//! tiles.
+//! Frames: each equals the picture of its own command, and a camera that moves alone only renders tiles
+//! again.
 
 use crate::support::{Outcome, Room, scene_bytes, scene_of, shipped};
 use serde_json::{Value, json};
 
-/// Frames of the box in which everything moves.
+/// Renders frames of the Cornell box in which everything moves.
 fn moving(room: &Room, options: &[&str]) -> Outcome {
     room.rendered(&shipped("cornell-moving.glb"), options)
 }
@@ -13,13 +13,13 @@ fn statistics(room: &Room, name: &str) -> Value {
     serde_json::from_slice(&room.read(name)).expect("JSON")
 }
 
-/// Bytes that each card received of the image.
+/// Bytes of the image that each card received.
 fn sent(statistics: &Value) -> Vec<u64> {
     let bytes = statistics["link"]["image_bytes"].as_array().expect("a list");
     bytes.iter().map(|bytes| bytes.as_u64().expect("a number")).collect()
 }
 
-/// The scene of the tests with an animation of its camera's place, after which the file ends.
+/// Scene of the tests with an animation of its camera's position, after which the file ends.
 fn walk() -> Value {
     let mut bytes = scene_bytes();
     let keys: [[f32; 4]; 2] = [[0.0, 1.0, 0.0, 0.5], [3.0, 0.5, 1.0, 2.0]];
@@ -41,7 +41,7 @@ fn walk() -> Value {
 }
 
 #[test]
-fn a_camera_that_moves_alone_takes_one_photon_pass_and_one_load() {
+fn a_moving_camera_takes_one_photon_pass_and_one_load() {
     let room = Room::new();
     let options = ["--animation", "pan", "--frames", "3-6", "--card", "emulated:1"];
     moving(&room, &[&options[..], &["-o", "a.#.exr", "--stats", "a.##.json"]].concat());
@@ -59,7 +59,8 @@ fn a_camera_that_moves_alone_takes_one_photon_pass_and_one_load() {
     }
 }
 
-/// A card may be loaded in a later frame, if the others have rendered the first before it had the image.
+/// A card may be loaded in a later frame only if the others have rendered the first one before it had the
+/// image.
 #[test]
 fn no_card_is_loaded_twice_for_cameras_that_move() {
     let room = Room::new();
@@ -75,8 +76,8 @@ fn no_card_is_loaded_twice_for_cameras_that_move() {
     }
 }
 
-/// Settings of a quality are chosen once, by the scene as it stands, so that frames of one machine fit those
-/// of another.
+/// The settings of a quality are chosen once, for the scene at rest, so that frames from different machines
+/// match.
 #[test]
 fn a_frame_is_the_same_after_others_and_alone_on_other_cards() {
     let room = Room::new();
@@ -118,7 +119,7 @@ fn a_frame_of_a_walk_is_the_picture_from_the_cameras_place() {
 }
 
 #[test]
-fn what_does_not_move_is_not_sent_again() {
+fn unchanged_lines_are_not_sent_again() {
     let room = Room::new();
     let names = ["-o", "a.#.png", "--stats", "a.#.json", "--card", "emulated:1"];
     moving(&room, &[&["--animation", "play", "--frames", "47,60,61"][..], &names].concat());
@@ -129,7 +130,7 @@ fn what_does_not_move_is_not_sent_again() {
 }
 
 #[test]
-fn assignments_and_the_environment_hold_in_every_frame() {
+fn assignments_and_the_environment_apply_to_every_frame() {
     let room = Room::new();
     let of = |options: &[&str]| moving(&room, &[&["--animation", "play"][..], options].concat());
     let changes = ["--set", "white.diffuse=0.1,0.2,0.3", "--environment", "1,2,3"];
@@ -141,7 +142,7 @@ fn assignments_and_the_environment_hold_in_every_frame() {
 }
 
 #[test]
-fn each_frame_is_told_of_with_its_cost() {
+fn each_frame_is_reported_with_its_cost() {
     let room = Room::new();
     let said = moving(
         &room,
@@ -169,10 +170,10 @@ fn statistics_and_provenance_name_the_frame() {
     );
 }
 
-/// Frames that are finished stay as they are, down to their time; those of other settings, forms or damaged
-/// files are rendered again.
+/// Finished frames are not written again; their modification time stays. Those with other settings or
+/// formats, and damaged ones, are rendered again.
 #[test]
-fn a_sequence_that_is_resumed_renders_what_is_not_finished() {
+fn a_resumed_sequence_renders_unfinished_frames() {
     let scene = shipped("cornell-moving.glb");
     // All that a quality would choose is stated: there is no pilot.
     let small =
@@ -233,8 +234,8 @@ fn a_sequence_that_is_resumed_renders_what_is_not_finished() {
     }
 }
 
-/// Kept samples of frames are gone on from with the settings that a pilot has chosen for them, whatever
-/// frames are finished.
+/// Kept samples of frames continue with the settings that a pilot has chosen for them, whichever frames are
+/// finished.
 #[test]
 fn samples_of_frames_are_added_with_the_settings_of_the_kept_ones() {
     let room = Room::new();
@@ -271,7 +272,7 @@ fn a_damaged_partial_picture_of_one_frame_stops_nothing_else() {
 }
 
 #[test]
-fn what_is_no_sequence_is_refused_before_any_work() {
+fn invalid_sequences_are_refused_before_any_work() {
     let room = Room::new();
     let moving = shipped("cornell-moving.glb");
     let still = shipped("cornell.gltf");

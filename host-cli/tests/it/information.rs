@@ -1,4 +1,4 @@
-//! Output of the other commands, also to closed streams.
+//! Output of informative commands, also to closed streams.
 
 use std::f64::consts::PI;
 use std::process::Stdio;
@@ -7,7 +7,7 @@ use crate::support::{Room, scene, shipped, small_render};
 use serde_json::{Value, json};
 
 #[test]
-fn scene_info_tells_what_a_scene_holds() {
+fn scene_info_prints_the_contents_of_a_scene() {
     let outcome = Room::new().run(&["scene", "info", &shipped("cornell-glossy.gltf")]);
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
     for word in [
@@ -24,9 +24,9 @@ fn scene_info_tells_what_a_scene_holds() {
     assert!(outcome.stdout.ends_with('\n'));
 }
 
-/// A scene with every feature: used ones are printed with their numbers, others are named as ignored.
+/// Used features are printed with their numbers, others are named as ignored.
 #[test]
-fn scene_info_tells_of_textures_lights_and_what_is_ignored() {
+fn scene_info_prints_textures_lights_and_ignored_features() {
     let outcome = Room::new().run(&[
         "scene",
         "info",
@@ -46,9 +46,9 @@ fn scene_info_tells_of_textures_lights_and_what_is_ignored() {
     }
 }
 
-/// Blender's 60 W become 60 / (4 pi) W/sr, unless its candela are to be taken as they stand.
+/// Blender's 60 W are 60 / (4 pi) W/sr, unless `--light-units` says that its numbers are taken unchanged.
 #[test]
-fn scene_info_tells_of_lights_in_the_units_of_their_exporter() {
+fn scene_info_prints_lights_in_the_units_of_their_exporter() {
     let lights = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/fixtures/blender/lights.glb");
     for (options, intensity, is_divided) in [
         (&[][..], 60.0 / (4.0 * PI), true),
@@ -66,7 +66,7 @@ fn scene_info_tells_of_lights_in_the_units_of_their_exporter() {
     }
 }
 
-/// JSON has what the report has, under keys.
+/// JSON has the contents of the report.
 #[test]
 fn scene_info_is_json_for_programs() {
     let room = Room::new();
@@ -88,7 +88,7 @@ fn scene_info_is_json_for_programs() {
     assert_eq!(value["bounds"], json!([[-1.0, 0.0, -1.0], [1.0, 1.0, 1.0]]));
 }
 
-/// The machine's own ports; each line has the address of one, by its path.
+/// Lists the machine's own ports. Each line contains the address of one.
 #[test]
 fn card_list_gives_an_address_for_every_serial_port() {
     let outcome = Room::new().run(&["card", "list"]);
@@ -111,7 +111,7 @@ fn card_list_gives_an_address_for_every_serial_port() {
 }
 
 #[test]
-fn card_info_tells_what_a_card_holds() {
+fn card_info_prints_the_budget_of_a_card() {
     for (card, dram) in
         [("emulated", 536_870_912), ("emulated-large", 536_870_912), ("emulated-micro:2", 16_777_216)]
     {
@@ -133,7 +133,7 @@ fn card_info_tells_what_a_card_holds() {
 }
 
 #[test]
-fn card_selftest_tells_what_was_tested() {
+fn card_selftest_prints_what_was_tested() {
     let outcome = Room::new().run(&["card", "selftest", "--quiet", "--card", "emulated-micro:2"]);
     assert_eq!((outcome.status, outcome.stderr.as_str()), (Some(0), ""));
     let lines: Vec<_> = outcome.stdout.lines().collect();
@@ -154,7 +154,7 @@ fn card_selftest_tells_what_was_tested() {
 }
 
 #[test]
-fn arguments_without_work_are_answered_by_the_usage() {
+fn incomplete_and_unknown_commands_get_the_usage() {
     for command in [&[][..], &["render"], &["paint"]] {
         let outcome = Room::new().run(command);
         assert_eq!(outcome.status, Some(2), "{command:?}");
@@ -162,14 +162,14 @@ fn arguments_without_work_are_answered_by_the_usage() {
     }
 }
 
-/// A pipe whose reader is closed.
+/// Pipe whose reading end is closed.
 fn closed_pipe() -> Stdio {
     let (_, writer) = std::io::pipe().unwrap();
     writer.into()
 }
 
 #[test]
-fn a_reader_that_leaves_early_breaks_nothing() {
+fn a_reader_that_closes_early_is_no_failure() {
     let room = Room::new();
     let output = room.command().args(["card", "info"]).stdout(closed_pipe()).output().unwrap();
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &[][..]));
@@ -184,7 +184,7 @@ fn a_reader_that_leaves_early_breaks_nothing() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_full_device_is_told() {
+fn a_full_device_is_reported() {
     let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     let output = Room::new().command().args(["card", "info"]).stdout(full).output().unwrap();
     assert_eq!(output.status.code(), Some(1));

@@ -1,4 +1,4 @@
-//! An interrupt ends a render or a self-test soon, with status 130 and no file left.
+//! An interrupt soon ends a render or a self-test, with status 130 and without files left behind.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader};
@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use crate::support::{Emulator, Room, shipped, small_render};
 
-/// Time limit of a stopped process, generous for a loaded machine.
+/// Time limit of a stopped process, long enough for a busy machine.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Waits for the end of a process, and kills it after the time limit.
@@ -24,7 +24,7 @@ fn wait(child: &mut Child) -> ExitStatus {
     panic!("the process went on for {PATIENCE:?}");
 }
 
-/// Interrupts a render as soon as it has printed `phase`.
+/// Interrupts a render once it has printed `phase`, and checks how it ends.
 fn interrupt(phase: &str, options: &[&str]) {
     let room = Room::new();
     room.write("out.exr", "old picture");
@@ -44,9 +44,9 @@ fn interrupt(phase: &str, options: &[&str]) {
     assert_eq!(room.read("out.exr"), b"old picture");
 }
 
-/// The card, which goes on with its test, serves the next host.
+/// The card continues with its test, and serves the next host.
 #[test]
-fn while_a_card_tests_itself() {
+fn an_interrupt_ends_a_self_test() {
     let room = Room::new();
     let card = Emulator::start(&room, "unix:card", &[]);
     let mut command = room.command();
@@ -66,12 +66,12 @@ fn while_a_card_tests_itself() {
 }
 
 #[test]
-fn while_photons_are_traced() {
+fn an_interrupt_ends_photon_tracing() {
     interrupt("photons", &["--photons", "20000000"]);
 }
 
 #[test]
-fn while_a_picture_is_rendered() {
+fn an_interrupt_ends_a_render() {
     // The image is loaded, and a single tile would take minutes.
     interrupt("load", &["--size", "256x256", "--spp", "4096", "--gather-rays", "64", "--tile", "32"]);
 }

@@ -1,4 +1,4 @@
-//! Cards of other processes: equal pictures over every link, and clear errors without one.
+//! Cards of other processes give equal pictures over every link, and clear errors if they cannot be reached.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Write};
@@ -10,7 +10,7 @@ use crate::support::{Emulator, Outcome, Room, shipped, small_render};
 
 const LISTEN: [&str; 3] = ["tcp:", "unix:card", "pty"];
 
-/// Checks that a command failed at its work with these words, and left no file but `names`.
+/// Checks that a command failed at its work with these words, and left no files but `names`.
 fn check_failed(room: &Room, outcome: &Outcome, words: &[&str], names: &[&str]) {
     let Outcome { status, stdout, stderr } = outcome;
     assert_eq!((*status, stdout.as_str()), (Some(1), ""), "{stderr}");
@@ -21,7 +21,7 @@ fn check_failed(room: &Room, outcome: &Outcome, words: &[&str], names: &[&str]) 
 }
 
 #[test]
-fn the_same_bytes_over_every_link() {
+fn pictures_are_equal_over_every_link() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
     let render = |name: &str, cards: &[&str]| {
@@ -45,7 +45,7 @@ fn the_same_bytes_over_every_link() {
 }
 
 #[test]
-fn a_card_goes_on_after_a_host_that_was_killed() {
+fn a_card_serves_the_next_host_after_a_killed_one() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
     let small = ["-o", "a.exr", "--quiet", "--card"];
@@ -68,7 +68,7 @@ fn a_card_goes_on_after_a_host_that_was_killed() {
 }
 
 #[test]
-fn cards_tell_of_themselves_over_links() {
+fn cards_report_their_budget_over_links() {
     let room = Room::new();
     for listen in LISTEN {
         let emulator = Emulator::start(&room, listen, &["--card", "emulated-micro"]);
@@ -100,7 +100,7 @@ fn a_host_is_not_disturbed_by_a_second_one() {
 }
 
 #[test]
-fn who_is_no_host_does_not_hold_a_card() {
+fn connections_that_are_no_host_do_not_occupy_a_card() {
     let silent_for_long = |said: &[u8]| {
         let room = Room::new();
         let emulator = Emulator::start(&room, "tcp:", &[]);
@@ -122,10 +122,10 @@ fn who_is_no_host_does_not_hold_a_card() {
     });
 }
 
-/// A card that cannot take the scene or the settings is left out beside one that can; alone it is the setting
-/// that is refused.
+/// A card that cannot hold the scene or the settings is not used if another can. If it is the only one, the
+/// setting is refused.
 #[test]
-fn a_card_that_is_too_small_is_left_out() {
+fn a_card_that_is_too_small_is_not_used() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
     let options = ["-o", "a.exr", "--size", "16x16", "--photons", "1000", "--neighbors", "200"];
@@ -146,7 +146,7 @@ fn a_card_that_is_too_small_is_left_out() {
 }
 
 #[test]
-fn cards_that_are_not_there() {
+fn missing_cards_are_reported() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
     let free_port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
@@ -179,7 +179,7 @@ fn cards_that_are_not_there() {
 }
 
 #[test]
-fn what_listens_may_be_no_card() {
+fn listeners_that_are_no_card_are_reported() {
     let room = Room::new();
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("tcp:{}", listener.local_addr().unwrap());
@@ -190,7 +190,7 @@ fn what_listens_may_be_no_card() {
 }
 
 #[test]
-fn an_emulator_ends_in_order() {
+fn an_emulator_ends_on_a_signal() {
     let room = Room::new();
     for (listen, signal) in
         [("unix:card", "-INT"), ("unix:card", "-TERM"), ("pty", "-INT"), ("tcp:", "-TERM")]
@@ -209,7 +209,7 @@ fn an_emulator_ends_in_order() {
 }
 
 #[test]
-fn addresses_that_cannot_be_listened_on() {
+fn unavailable_listening_addresses_are_reported() {
     let room = Room::new();
     let emulator = Emulator::start(&room, "unix:card", &[]);
     let taken = TcpListener::bind("127.0.0.1:0").unwrap();

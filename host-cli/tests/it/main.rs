@@ -1,4 +1,4 @@
-//! Tests of the command as it is run.
+//! Tests that run the command.
 
 mod bad_input;
 #[cfg(feature = "study")]

@@ -1,4 +1,5 @@
-//! Notices on scenes: what is ignored or missing is told, also to the quiet, and is an error of the strict.
+//! Notices on scenes: ignored or missing contents are reported even if the command is quiet, and are errors
+//! with `--strict`.
 
 use crate::support::{Room, scene};
 use photoncard_driver::exr::read_rgb;
@@ -18,7 +19,7 @@ fn without_texture() -> Value {
 }
 
 #[test]
-fn a_missing_texture_is_told_to_the_quiet_and_refused_by_the_strict() {
+fn a_missing_texture_is_reported_and_refused_with_strict() {
     let room = Room::new();
     room.write_scene("scene.gltf", &without_texture());
     let said = room.rendered("scene.gltf", &["-o", "a.exr", "--quiet"]).stderr;
@@ -46,7 +47,7 @@ fn a_missing_texture_is_told_to_the_quiet_and_refused_by_the_strict() {
     assert_eq!(room.rendered("whole.gltf", &["-o", "a.exr", "--quiet", "--strict"]).stderr, "");
 }
 
-/// A light that no surface meets: the sky is seen, and a plane from behind is black.
+/// No surface receives light: the sky is seen, and the back of a plane is black.
 #[test]
 fn a_scene_without_photons_has_a_picture() {
     let room = Room::new();
@@ -73,7 +74,7 @@ fn a_scene_without_photons_has_a_picture() {
 }
 
 #[test]
-fn an_orthographic_camera_is_refused_and_another_view_is_not() {
+fn an_orthographic_camera_is_refused_unless_another_view_is_stated() {
     let room = Room::new();
     let mut scene = scene();
     let orthographic = json!({"xmag": 1, "ymag": 1, "znear": 0.1, "zfar": 9});
@@ -91,9 +92,9 @@ fn an_orthographic_camera_is_refused_and_another_view_is_not() {
     );
 }
 
-/// A file without a camera, and one with an orthographic camera before another.
+/// One file has no camera, another has an orthographic camera before a perspective one.
 #[test]
-fn what_the_command_line_states_in_place_of_the_file_is_no_fault_of_a_strict_render() {
+fn strict_renders_accept_contents_that_the_command_line_replaces() {
     let room = Room::new();
     let mut bare = scene();
     bare["nodes"][1].as_object_mut().unwrap().remove("camera");

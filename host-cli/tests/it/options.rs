@@ -1,9 +1,9 @@
-//! Options that require others: without them they have no effect, which is reported.
+//! Options that require others have no effect without them, which is reported.
 
 use crate::support::{Room, scene, shipped};
 
 #[test]
-fn options_without_effect_are_said_to_have_none() {
+fn options_without_effect_are_reported() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     room.rendered("scene.gltf", &["-o", "plain.exr"]);
@@ -66,7 +66,7 @@ fn options_without_effect_are_said_to_have_none() {
 }
 
 #[test]
-fn options_of_an_exr_are_said_to_have_no_effect_without_one() {
+fn options_of_an_exr_are_reported_without_one() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     for option in ["--sample-type=half", "--aov=none"] {
@@ -79,7 +79,7 @@ fn options_of_an_exr_are_said_to_have_no_effect_without_one() {
 }
 
 #[test]
-fn options_with_effect_are_not() {
+fn options_with_effect_are_not_reported() {
     let room = Room::new();
     let small = ["-o", "a.exr", "--caustic-photons=99"];
     for options in [

@@ -1,4 +1,4 @@
-//! The archive that `package.sh` makes of the program.
+//! Archive that `package.sh` makes of the program.
 #![cfg(target_os = "linux")]
 
 use std::process::Command;
@@ -14,7 +14,7 @@ fn package(room: &Room, arguments: &[&str]) -> Outcome {
     Outcome::of(&command.output().unwrap())
 }
 
-/// Output of a program that must succeed.
+/// Output of a program, which must succeed.
 fn said(room: &Room, program: &str, arguments: &[&str]) -> String {
     let outcome =
         Outcome::of(&Command::new(program).args(arguments).current_dir(room.path("")).output().unwrap());
@@ -23,7 +23,7 @@ fn said(room: &Room, program: &str, arguments: &[&str]) -> String {
 }
 
 #[test]
-fn an_archive_has_all_that_a_user_needs_and_equal_bytes_whenever_it_is_made() {
+fn archives_are_complete_and_reproducible() {
     let room = Room::new();
     let program = env!("CARGO_BIN_EXE_photoncard");
     let archives = ["first", "second"].map(|folder| {
@@ -68,7 +68,7 @@ fn an_archive_has_all_that_a_user_needs_and_equal_bytes_whenever_it_is_made() {
 }
 
 #[test]
-fn what_cannot_be_packed_leaves_nothing() {
+fn a_failed_package_leaves_no_file() {
     let room = Room::new();
     for (arguments, status, message) in [
         (&["--output", "out"][..], 2, "usage"),

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use crate::support::{Outcome, Room, shipped};
 
-/// Options of a picture of 16 patches.
+/// Options of a picture with 16 patches.
 const PICTURE: [&str; 10] =
     ["--size", "64x48", "--crop", "3,64,0,47", "--photons", "800", "--gather-rays", "8", "--spp", "2"];
 
@@ -15,7 +15,7 @@ fn refused(outcome: &Outcome, words: &[&str]) {
     }
 }
 
-/// Renders a part; `options` replace or extend those of the picture.
+/// Renders a part. `options` replace or extend those of the picture.
 fn part(room: &Room, options: &[&str], part: &str, name: &str) -> Outcome {
     let own = ["--part", part, "-o", name];
     room.render(&shipped("cornell-glossy.gltf"), &[&PICTURE, options, &own].concat())
@@ -28,7 +28,7 @@ fn merged(room: &Room, arguments: &[&str]) -> Outcome {
 }
 
 #[test]
-fn the_merged_picture_is_the_file_of_one_render() {
+fn the_merged_picture_equals_the_file_of_one_render() {
     for options in
         [&["--quality", "draft", "--aov", "all"][..], &["--irradiance-cache", "off", "--seed", "5"]]
     {
@@ -65,7 +65,7 @@ fn a_part_of_a_retried_task_has_equal_bytes() {
 }
 
 #[test]
-fn a_part_without_pixels_is_a_part() {
+fn a_part_without_pixels_is_merged() {
     let room = Room::new();
     for number in 1..=9 {
         let own = ["--size", "70x9", "--part", &format!("{number}/9"), "-o", &format!("{number}.part")];
@@ -78,7 +78,7 @@ fn a_part_without_pixels_is_a_part() {
 
 #[cfg(unix)]
 #[test]
-fn the_printed_commands_make_what_is_missing() {
+fn the_printed_commands_render_missing_parts() {
     let room = Room::new();
     let folder = room.path("a folder's");
     std::fs::create_dir(&folder).unwrap();
@@ -131,7 +131,7 @@ fn differences_and_damage_are_named() {
 }
 
 #[test]
-fn parts_are_written_to_files_of_their_own_kind() {
+fn parts_are_written_to_part_files_only() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
     for (options, words) in [

@@ -1,4 +1,4 @@
-//! Pictures by passes: `--time`, `--noise`, and more samples of a finished picture.
+//! Pictures by passes: `--time`, `--noise`, and further samples of a finished picture.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader};
@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use crate::support::{Outcome, Room, shipped};
 use serde_json::Value;
 
-/// Options without which a pilot would choose samples and rays.
+/// Options that a pilot would choose otherwise.
 const STATED: [&str; 12] = [
     "--size",
     "24x20",
@@ -33,7 +33,7 @@ fn render_or_panic(room: &Room, picture: &str, options: &[&str]) -> Outcome {
     outcome
 }
 
-/// Number of samples a pixel that a render reports.
+/// Number of samples per pixel that a render reports.
 fn samples(outcome: &Outcome) -> String {
     let (before, _) = outcome.stderr.rsplit_once(" a pixel, ").expect("the number of samples");
     let mut words = before.rsplit(' ');
@@ -42,7 +42,7 @@ fn samples(outcome: &Outcome) -> String {
 }
 
 #[test]
-fn a_picture_of_a_stated_noise_or_time_is_the_render_of_its_samples() {
+fn a_picture_of_stated_noise_or_time_equals_the_render_of_its_samples() {
     let room = Room::new();
     for (options, said) in [(["--noise", "0.2"], "estimated noise"), (["--time", "0.3s"], "pass")] {
         let outcome = render_or_panic(&room, "passes.exr", &options);
@@ -54,7 +54,7 @@ fn a_picture_of_a_stated_noise_or_time_is_the_render_of_its_samples() {
 }
 
 #[test]
-fn kept_samples_are_added_to_and_the_picture_is_that_of_one_render() {
+fn a_picture_with_added_samples_equals_that_of_one_render() {
     let room = Room::new();
     render_or_panic(&room, "a.exr", &["--spp", "3", "--keep-samples"]);
     assert_eq!(room.names(), ["a.exr", "a.exr.partial"]);
@@ -73,7 +73,7 @@ fn kept_samples_are_added_to_and_the_picture_is_that_of_one_render() {
     assert!(room.read("a.exr.partial") == kept);
 }
 
-/// Options without anything that a pilot chooses.
+/// Options that leave samples, photons and rays to a pilot.
 const CHOSEN: [&str; 4] = ["--quality", "draft", "--size", "16x12"];
 
 /// Renders the Cornell box with settings that a pilot chooses.
@@ -102,7 +102,7 @@ fn the_options_that_an_aim_ends_with_render_its_picture_at_once() {
 }
 
 #[test]
-fn kept_samples_are_added_to_with_the_settings_that_were_chosen_for_them() {
+fn samples_are_added_with_the_settings_that_a_pilot_chose() {
     let room = Room::new();
     let first = chosen(&room, "a.exr", &["--spp", "3", "--keep-samples"]);
     assert_eq!(first.status, Some(0), "{}", first.stderr);
@@ -135,7 +135,7 @@ fn kept_samples_are_added_to_with_the_settings_that_were_chosen_for_them() {
 }
 
 #[test]
-fn an_aim_that_is_missed_is_told() {
+fn a_missed_aim_is_reported() {
     let room = Room::new();
     let outcome = room.run(
         &[
@@ -183,7 +183,7 @@ fn an_interrupt_writes_the_picture_of_the_complete_passes() {
 }
 
 #[test]
-fn aims_that_are_none_and_options_that_passes_lack_are_refused() {
+fn invalid_aims_and_options_that_passes_lack_are_refused() {
     let room = Room::new();
     for (options, word) in [
         (&["--time", "0"][..], "a time is a number of seconds"),

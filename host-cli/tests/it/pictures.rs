@@ -1,4 +1,4 @@
-//! Outputs of a render; the picture depends on nothing but the scene and its settings.
+//! Outputs of a render. The picture depends only on the scene and its settings.
 
 use crate::support::{Room, scene, scene_bytes, scene_of, shipped, small_render};
 use photoncard_driver::exr::{RgbImage, read_rgb};
@@ -9,7 +9,7 @@ fn picture(room: &Room, name: &str) -> RgbImage {
 }
 
 #[test]
-fn layers_are_asked_for_by_name_and_leave_the_picture_as_it_is() {
+fn layers_are_requested_by_name_and_do_not_change_the_picture() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let of_options = |options: &[&str]| {
@@ -71,9 +71,9 @@ fn a_render_writes_pictures_and_statistics() {
     }
 }
 
-/// The first line is what was loaded, the last what was written; with a remaining time in between.
+/// The first line describes what was loaded, the last what was written, with remaining times in between.
 #[test]
-fn a_render_says_what_it_loads_and_what_it_has_done() {
+fn a_render_reports_what_it_loads_and_what_it_writes() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let options = ["-o", "a.png", "-o", "./a.exr", "--spp", "3", "--crop", "0,8,0,5", "--tile", "1"];
@@ -94,7 +94,7 @@ fn a_render_says_what_it_loads_and_what_it_has_done() {
     );
 }
 
-/// Data alone is on standard output, and the rest where it always is.
+/// Only the statistics are on standard output.
 #[test]
 fn statistics_go_to_standard_output_by_a_dash() {
     let room = Room::new();
@@ -118,7 +118,7 @@ fn quiet_is_silent() {
 }
 
 #[test]
-fn the_same_bytes_however_they_are_rendered() {
+fn pictures_do_not_depend_on_how_they_are_rendered() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
     room.rendered(&cornell, &["-o", "first.exr", "--size", "20x20"]);
@@ -204,7 +204,7 @@ fn triangles_of_no_area_are_counted_and_left_out() {
 }
 
 #[test]
-fn what_is_ignored_is_said_once() {
+fn ignored_contents_are_reported_once() {
     let room = Room::new();
     let mut scene = scene();
     // An image of an unused texture is not read.
@@ -251,9 +251,9 @@ fn the_camera_gives_the_picture_its_aspect_ratio() {
     assert!(!room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x2"]).stderr.contains("aspect"));
 }
 
-/// A view by options is the one that a file states.
+/// A view by options equals that of a camera in the file.
 #[test]
-fn a_view_by_options_is_that_of_a_camera_there() {
+fn a_view_by_options_equals_that_of_a_camera_there() {
     let room = Room::new();
     let mut stated = scene();
     stated["nodes"][1]["translation"] = json!([0.25, 0.75, 2.5]);

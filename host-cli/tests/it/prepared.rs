@@ -1,4 +1,4 @@
-//! Prepared scenes: pictures of them are those of the glTF file, to the byte.
+//! Pictures of prepared scenes equal those of the glTF file, byte for byte.
 
 use crate::support::{Outcome, Room, shipped};
 
@@ -14,14 +14,14 @@ fn done(outcome: &Outcome) {
     assert_eq!((outcome.status, &*outcome.stdout), (Some(0), ""), "{}", outcome.stderr);
 }
 
-/// Prepares the glossy box with little work.
+/// Prepares the glossy box with few photons and rays.
 fn prepare(room: &Room) {
     let scene = shipped("cornell-glossy.gltf");
     done(&room.run(&["prepare", &scene, "-o", "scene.card", "--quality", "paper", "--photons", "300"]));
 }
 
 #[test]
-fn a_picture_of_a_prepared_scene_is_that_of_the_scene() {
+fn a_picture_of_a_prepared_scene_equals_that_of_the_scene() {
     let cornell = shipped("cornell-spheres.glb");
     // The pilot of a quality looks at the picture. Options of the scene, of photons and of rays are prepared,
     // those of the picture are stated again.
@@ -74,7 +74,7 @@ fn a_picture_of_a_prepared_scene_is_that_of_the_scene() {
 const FRAMES: [&str; 8] = ["--quality", "paper", "--photons", "300", "--gather-rays", "4", "--fps", "12"];
 
 #[test]
-fn frames_of_a_prepared_scene_are_those_of_the_scene() {
+fn frames_of_a_prepared_scene_equal_those_of_the_scene() {
     let moving = shipped("cornell-moving.glb");
     for (animation, frames, card, files) in [
         // Cameras move: all frames are in one file, whether it has a number or not.
@@ -122,7 +122,7 @@ fn frames_whose_meshes_move_have_files_of_their_own() {
 }
 
 #[test]
-fn options_of_what_is_prepared_are_refused_with_a_remedy() {
+fn options_of_the_preparation_are_refused_with_a_remedy() {
     let room = Room::new();
     prepare(&room);
     for option in [
@@ -147,7 +147,7 @@ fn options_of_what_is_prepared_are_refused_with_a_remedy() {
 }
 
 #[test]
-fn what_is_no_prepared_scene_is_refused() {
+fn files_that_are_no_prepared_scene_are_refused() {
     let room = Room::new();
     prepare(&room);
     let bytes = room.read("scene.card");

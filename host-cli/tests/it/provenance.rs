@@ -1,13 +1,13 @@
-//! Provenance: everything that pixels depend on in pictures, and everything that the work depends on in
-//! statistics.
+//! Provenance of pictures contains all on which pixels depend; that of statistics contains all on which the
+//! work depends.
 
 use std::collections::BTreeSet;
 
 use crate::support::{Room, scene, shipped};
 use serde_json::{Value, json};
 
-/// Options that pixels depend on: a value of each that is not the default, its key in the provenance, and the
-/// value there.
+/// Options on which pixels depend: one with a value that is not the default, its key in the provenance, and
+/// its value there.
 fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
     vec![
         (&["--size", "9x7"], "size", json!([9, 7])),
@@ -42,7 +42,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
     ]
 }
 
-/// Options that no pixel depends on.
+/// Options on which no pixel depends.
 const OTHERS: [&[&str]; 23] = [
     &["--strict"],
     &["--photon-map", "jensen"],
@@ -70,22 +70,22 @@ const OTHERS: [&[&str]; 23] = [
     &["--stats", "a.json"],
 ];
 
-/// Options on the storage of samples, which the file states itself, and on messages.
+/// Options about the storage of samples, which the file states itself, and about messages.
 const OF_THE_FILE: [&str; 5] = ["--output", "--sample-type", "--quiet", "--progress", "--help"];
 
-/// Option that pixels depend on, and that no shipped scene takes.
+/// Option on which pixels depend, but which applies to no shipped scene.
 const OF_SCENES_WITH_VARIANTS: &str = "--variant";
 
-/// Options of frames, which a test of their own has.
+/// Options of frames, which have their own test.
 const OF_FRAMES: [&str; 3] = ["--frames", "--animation", "--fps"];
 
-/// Options of prepared scenes and of parts, which tests of their own have.
+/// Options of prepared scenes and parts, which have their own tests.
 const OF_FARMS: [&str; 2] = ["--part", "--prepared"];
 
 /// Options that state the number of samples by an aim.
 const OF_SAMPLES: [&str; 2] = ["--noise", "--time"];
 
-/// Provenance in an EXR file: the text of the attribute `photoncard`.
+/// Provenance in an EXR file, which is the text of the attribute `photoncard`.
 fn provenance(file: &[u8]) -> Value {
     let head = b"photoncard\0string\0";
     let start = file.windows(head.len()).position(|bytes| bytes == head).expect("the attribute") + head.len();
@@ -93,7 +93,7 @@ fn provenance(file: &[u8]) -> Value {
     serde_json::from_slice(&text[..u32::from_le_bytes(*length) as usize]).expect("JSON")
 }
 
-/// Provenance of a render of a scene with mirrors and glass.
+/// Provenance of a rendered scene with mirrors and glass.
 fn rendered(room: &Room, options: &[&str]) -> Value {
     let small = if options.contains(&"--caustic-photons") { &[][..] } else { &["--caustic-photons", "99"] };
     // Samples that an earlier render has kept are not written over.
@@ -103,7 +103,7 @@ fn rendered(room: &Room, options: &[&str]) -> Value {
 }
 
 #[test]
-fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
+fn the_provenance_has_exactly_the_options_that_pixels_depend_on() {
     let room = Room::new();
     let plain = rendered(&room, &[]);
     assert_eq!((&plain["scene"], &plain["aov"]), (&json!("cornell-spheres.glb"), &json!("albedo,N,Z")));
@@ -121,7 +121,7 @@ fn what_pixels_depend_on_is_in_the_provenance_and_nothing_else() {
     }
 }
 
-/// JSON of a text chunk of a PNG file; `None` without one of the keyword.
+/// JSON in a text chunk of a PNG file; `None` without a chunk of this keyword.
 fn text_of_png(file: &[u8], keyword: &str) -> Option<Value> {
     let reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().expect("a PNG");
     let chunk = reader.info().uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == keyword);
@@ -156,7 +156,7 @@ fn all_pictures_and_the_statistics_of_a_render_have_one_provenance() {
 }
 
 #[test]
-fn statistics_name_what_the_work_depends_on_besides_pixels() {
+fn statistics_name_the_options_that_the_work_depends_on() {
     let room = Room::new();
     room.write_scene("scene.gltf", &scene());
     let work = |options: &[&str]| {
@@ -234,7 +234,7 @@ fn a_variant_is_in_the_provenance_and_changes_the_scene() {
     assert!(info.contains("Variants (2)\n  day\n  night\n"), "{info}");
 }
 
-/// A new option must be in one of the lists above.
+/// Every option must be in one of the lists above.
 #[test]
 fn every_option_is_known_to_change_pixels_or_not_to() {
     let help = Room::new().run(&["render", "--help"]).stdout;

@@ -1,12 +1,12 @@
-//! `--quality`: settings that are found for a scene, printed and stored.
+//! Option `--quality`: settings that are found for a scene are printed and stored.
 
 use crate::support::{Outcome, Room, shipped};
 use serde_json::Value;
 
-/// Settings that a quality finds, by their names in the provenance.
+/// Names in the provenance of the settings that a quality finds.
 const FOUND: [&str; 5] = ["spp", "photons", "gather-rays", "shadow-rays", "ic-error"];
 
-/// A small render of the Cornell box by the quality `draft`, and its statistics.
+/// Renders the Cornell box small with the quality `draft`. Returns the outcome and the statistics.
 fn drafted(room: &Room, picture: &str, options: &[&str]) -> (Outcome, Value) {
     let (cornell, stats) = (shipped("cornell.gltf"), format!("{picture}.json"));
     let fixed =
@@ -17,7 +17,7 @@ fn drafted(room: &Room, picture: &str, options: &[&str]) -> (Outcome, Value) {
 }
 
 #[test]
-fn the_settings_that_are_found_give_the_picture_again_without_a_pilot() {
+fn the_found_settings_reproduce_the_picture_without_a_pilot() {
     let room = Room::new();
     let (outcome, found) = drafted(&room, "a.exr", &[]);
     let settings = &found["provenance"]["pixels"];

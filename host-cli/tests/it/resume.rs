@@ -1,4 +1,4 @@
-//! Interrupted renders: when a card, its link or the host ends, finished tiles are kept.
+//! Interrupted renders: if a card, its link or the host ends, finished tiles are kept.
 #![cfg(unix)]
 
 #[cfg(target_os = "linux")]
@@ -11,11 +11,11 @@ use std::time::{Duration, Instant};
 use crate::support::{Emulator, Room, shipped};
 use serde_json::Value;
 
-/// A picture of 64 tiles that takes a second or two.
+/// Options of a picture with 64 tiles that takes a second or two.
 const PICTURE: [&str; 6] = ["--size", "128x128", "--photons", "2000", "--gather-rays", "50"];
 /// Size of a tile in the file of finished tiles, bytes.
 const TILE_BYTES: u64 = 8 + 24 + 60 * 256 + 4;
-/// Time limit of every wait.
+/// Time limit of every wait, long enough for a busy machine.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 fn arguments<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a str> {
@@ -26,7 +26,7 @@ fn partial_bytes(room: &Room) -> u64 {
     fs::metadata(room.path("a.exr.partial")).map_or(0, |found| found.len())
 }
 
-/// Starts a render, and waits until it has finished some tiles.
+/// Starts a render, and waits until it has finished `tiles` tiles.
 fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     let cornell = shipped("cornell.gltf");
     let mut command = room.command();
@@ -40,7 +40,8 @@ fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     host
 }
 
-/// Signal of a terminal that is closed; that of a stop if tests run without one, whose programs ignore it.
+/// Signal of a closed terminal; that of a stop if the tests run without a terminal, because programs then
+/// ignore hang-ups.
 fn hang_up() -> &'static str {
     #[cfg(target_os = "linux")]
     if hang_up::is_ignored() == Some(false) {
@@ -49,7 +50,7 @@ fn hang_up() -> &'static str {
     "-TERM"
 }
 
-/// The picture of an undisturbed render.
+/// Picture of an undisturbed render.
 fn expected() -> Vec<u8> {
     let room = Room::new();
     let outcome = room.run(&arguments(&shipped("cornell.gltf"), &["--quiet"]));
@@ -69,7 +70,7 @@ fn resumes(room: &Room, options: &[&str], expected: &[u8]) {
 }
 
 #[test]
-fn a_host_that_is_killed_loses_the_tiles_in_flight_alone() {
+fn a_killed_host_loses_only_tiles_in_flight() {
     let expected = expected();
     let room = Room::new();
     let mut host = begun(&room, &[], 5);
@@ -85,7 +86,7 @@ fn a_host_that_is_killed_loses_the_tiles_in_flight_alone() {
 }
 
 #[test]
-fn only_the_same_picture_is_gone_on_with() {
+fn only_a_render_with_equal_settings_is_resumed() {
     let room = Room::new();
     // A terminal that is closed ends a render as an interrupt does.
     let host = begun(&room, &["--stats", "a.json"], 1);
@@ -135,7 +136,7 @@ fn only_the_same_picture_is_gone_on_with() {
 }
 
 #[test]
-fn what_is_not_a_file_of_finished_tiles_is_left_alone() {
+fn files_without_finished_tiles_are_not_replaced() {
     use std::os::unix::fs::{FileTypeExt, symlink};
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
@@ -226,7 +227,7 @@ fn a_card_that_freezes_leaves_its_tiles_to_the_other() {
 }
 
 #[test]
-fn without_any_card_the_finished_tiles_are_kept() {
+fn finished_tiles_are_kept_when_all_cards_fail() {
     let expected = expected();
     for listen in ["tcp:", "pty"] {
         let room = Room::new();

@@ -1,4 +1,5 @@
-//! `photoncard card selftest` of a card with bad memory: what is wrong, where, and status 1.
+//! Command `photoncard card selftest` on a card with bad memory: it names the fault and its address, with
+//! status 1.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -12,7 +13,7 @@ use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
-/// Memory in which one data line is stuck at 1.
+/// Memory with one data line stuck at 1.
 struct StuckLine(Vec<Line>);
 
 impl MemoryPort for StuckLine {
@@ -58,7 +59,7 @@ fn tested(lines: usize) -> crate::support::Outcome {
 }
 
 #[test]
-fn a_bad_card_is_told_by_the_place_and_the_bits() {
+fn a_bad_card_is_reported_with_addresses_and_bits() {
     let outcome = tested(1 << 17);
     assert_eq!(outcome.status, Some(1), "{}", outcome.stderr);
     let lines: Vec<_> = outcome.stdout.lines().collect();
@@ -87,7 +88,7 @@ fn a_bad_card_is_told_by_the_place_and_the_bits() {
 }
 
 #[test]
-fn a_memory_that_is_too_small_is_told() {
+fn a_memory_that_is_too_small_is_reported() {
     let outcome = tested(512);
     assert_eq!(outcome.status, Some(1));
     assert!(outcome.stdout.contains("memory          65536 bytes: 512 lines"), "{}", outcome.stdout);

@@ -1,4 +1,4 @@
-//! `photoncard study` from outside: wrong arguments, an interrupt, and sweeps.
+//! Command `photoncard study`: wrong arguments, an interrupt, and sweeps.
 
 use crate::support::{Room, scene, shipped};
 
@@ -13,7 +13,7 @@ fn refused(arguments: &[&str], words: &[&str]) {
 }
 
 #[test]
-fn wrong_arguments_are_told_with_a_remedy() {
+fn wrong_arguments_are_refused_with_a_remedy() {
     refused(&["figure-6.18", "--out", "out"], &["figure-6.18", "figure-6.17", "all"]);
     refused(&["reordering"], &["--out"]);
     refused(&[], &["--out", "NAME"]);
@@ -80,7 +80,7 @@ fn room_with_a_scene() -> Room {
 }
 
 #[test]
-fn a_sweep_measures_every_combination_of_a_scene_of_ones_own() {
+fn a_sweep_measures_every_combination_of_values() {
     let room = room_with_a_scene();
     let arguments = [
         "--vary",
@@ -113,9 +113,9 @@ fn a_sweep_measures_every_combination_of_a_scene_of_ones_own() {
     assert!(page.contains("12.5 GB/s and 80 GFLOPS, reads of 100 ns, 128 tasks in flight"), "the provenance");
 }
 
-/// Requests of a sweep of all tiles are those of a render with counters.
+/// The requests of a sweep over all tiles equal those of a render with counters.
 #[test]
-fn a_sweep_of_all_tiles_counts_what_a_render_counts() {
+fn the_counts_of_a_sweep_over_all_tiles_equal_those_of_a_render() {
     let room = room_with_a_scene();
     let options =
         ["--size", "16x16", "--photons", "200", "--neighbors", "5", "--gather-rays", "8", "--tile", "4"];

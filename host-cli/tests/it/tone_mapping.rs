@@ -1,4 +1,4 @@
-//! Tone-mapped pictures: of a render, and of an EXR by `photoncard tonemap`, by the same formula.
+//! Tone-mapped pictures of a render, and of `photoncard tonemap` on an EXR, follow one formula.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use crate::support::{Outcome, Room, scene};
 use exr::prelude::{f16, write_rgb_file};
 use photoncard_driver::exr::read_rgb;
 
-/// Tone mappings: one by default, and others.
+/// Options of tone mappings. The first one is the default.
 const MAPPINGS: [&[&str]; 5] = [
     &[],
     &["--exposure=auto", "--tonemap=reinhard"],
@@ -25,9 +25,9 @@ fn tonemap(room: &Room, options: &[&str]) -> Outcome {
     room.run(&[&["tonemap"], options].concat())
 }
 
-/// One render writes both, in any order; its PNG is that of its EXR, whatever the exposure.
+/// One render writes both files in any order. The PNG equals that of its EXR at any exposure.
 #[test]
-fn the_png_of_a_render_is_that_of_its_exr() {
+fn the_png_of_a_render_equals_that_of_its_exr() {
     let room = room_with_a_scene();
     room.rendered("scene.gltf", &["-o", "only.exr", "--crop", "1,7,2,8"]);
     let mut pictures = Vec::new();
@@ -50,7 +50,7 @@ fn the_png_of_a_render_is_that_of_its_exr() {
 }
 
 #[test]
-fn a_render_to_a_png_alone_is_stopped_and_resumed_beside_it() {
+fn finished_tiles_of_a_png_alone_are_kept_beside_it() {
     let room = room_with_a_scene();
     room.write("a.png.partial", "notes");
     let outcome = room.render("scene.gltf", &["-o", "a.png", "--resume"]);
@@ -62,7 +62,7 @@ fn a_render_to_a_png_alone_is_stopped_and_resumed_beside_it() {
     assert_eq!(room.names(), ["a.exr", "a.png", "a.png.partial", "scene.gltf"]);
 }
 
-/// An EXR of another program: 16-bit samples, and pixels from `pixel`.
+/// Writes an EXR as another program would, with 16-bit samples given by `pixel`.
 fn foreign(path: &Path, pixel: impl Fn(usize, usize) -> f32 + Sync) {
     let half = |x, y| f16::from_f32(pixel(x, y));
     write_rgb_file(path, 5, 4, |x, y| (half(x, y), half(y, x), f16::ONE)).unwrap();
@@ -95,7 +95,7 @@ fn pictures_of_other_programs_are_tone_mapped() {
 }
 
 #[test]
-fn what_is_no_picture_is_refused_and_the_old_one_kept() {
+fn files_that_are_no_picture_are_refused_and_the_old_one_is_kept() {
     let room = room_with_a_scene();
     room.rendered("scene.gltf", &["-o", "good.exr"]);
     let good = room.read("good.exr");
@@ -134,7 +134,7 @@ fn what_is_no_picture_is_refused_and_the_old_one_kept() {
     }
 }
 
-/// Writes a picture without colours.
+/// Writes a picture without colour channels.
 fn depth_alone(path: &Path) {
     use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, SmallVec, WritableImage};
     let mut channels = SmallVec::new();
@@ -142,9 +142,9 @@ fn depth_alone(path: &Path) {
     Image::from_channels((3, 2), AnyChannels::sort(channels)).write().to_file(path).unwrap();
 }
 
-/// A file named .png that is an EXR is not replaced by its own picture.
+/// An EXR with the name of a PNG is not replaced by its own tone-mapped picture.
 #[test]
-fn the_picture_to_read_is_not_replaced() {
+fn the_input_picture_is_not_replaced() {
     let room = room_with_a_scene();
     room.rendered("scene.gltf", &["-o", "a.exr"]);
     let bytes = room.read("a.exr");

@@ -1,4 +1,4 @@
-//! Verification: tiles that two cards render for comparison.
+//! Verification: two cards render a tile, and the results are compared.
 
 use crate::support::{Room, scene, shipped};
 use serde_json::json;
@@ -11,7 +11,7 @@ fn statistics(room: &Room) -> serde_json::Value {
 }
 
 #[test]
-fn honest_cards_of_any_kind_agree_and_the_picture_is_the_same() {
+fn verification_of_honest_cards_does_not_change_the_picture() {
     let cornell = shipped("cornell.gltf");
     let rendered = |options: &[&str]| {
         let room = Room::new();
@@ -40,7 +40,7 @@ fn honest_cards_of_any_kind_agree_and_the_picture_is_the_same() {
 }
 
 #[test]
-fn what_cannot_be_verified_is_refused_in_words() {
+fn impossible_verification_is_refused_with_a_remedy() {
     let cornell = shipped("cornell.gltf");
     for (options, words) in [
         (&["--verify", "0.5", "--card", "emulated:1"][..], "a second card"),
@@ -57,9 +57,9 @@ fn what_cannot_be_verified_is_refused_in_words() {
     }
 }
 
-/// A lamp a hundredth of a millimetre above the floor.
+/// The lamp is a hundredth of a millimetre above the floor.
 #[test]
-fn dazzling_light_of_a_card_alone_is_told() {
+fn dazzling_light_of_a_single_card_is_reported() {
     let room = Room::new();
     let mut dazzling = scene();
     let lights = json!({"lights": [{"type": "point", "intensity": 1}]});

@@ -1,4 +1,5 @@
-//! Commands of the program and their options, from its manual pages; and which arguments it accepts.
+//! Commands of the program and their options, read from its manual pages, and checks of arguments against the
+//! program.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -6,7 +7,7 @@ use std::fs;
 use super::repository;
 use crate::support::Room;
 
-/// Options of each command; the command is named by its words after `photoncard`, with a space between them.
+/// Options of each command, whose key is its words after `photoncard`, separated by spaces.
 pub(crate) struct CommandTree {
     room: Room,
     options: BTreeMap<String, BTreeSet<String>>,
@@ -27,7 +28,7 @@ impl CommandTree {
         Self { room, options }
     }
 
-    /// The longest command that some words begin with.
+    /// Longest command with which some words begin.
     fn command(&self, words: &[&str]) -> Option<String> {
         let beginnings = (1..=words.len()).rev().map(|length| words[..length].join(" "));
         beginnings.into_iter().find(|command| self.options.contains_key(command))
@@ -38,21 +39,21 @@ impl CommandTree {
         self.command(&text.split_whitespace().collect::<Vec<_>>()).is_some()
     }
 
-    /// Commands that have all of some options.
+    /// Commands that have all of the wanted options.
     pub(crate) fn commands_with(&self, wanted: &[&str]) -> Vec<&str> {
         let having = self.options.iter().filter(|(_, has)| wanted.iter().all(|&option| has.contains(option)));
         having.map(|(command, _)| command.as_str()).collect()
     }
 
-    /// Defect of arguments that the program does not accept. With `--help` at their end it parses them and
-    /// does no work.
+    /// Defect of arguments that the program does not accept. A final `--help` makes it parse them without
+    /// work.
     pub(crate) fn defect_of_arguments(&self, arguments: &[&str]) -> Option<String> {
         let outcome = self.room.run(&[arguments, &["--help"]].concat());
         let said = outcome.stderr.trim();
         (outcome.status != Some(0)).then(|| format!("`photoncard {}`: {said}", arguments.join(" ")))
     }
 
-    /// Defects of a line of forms: a command with placeholders, and after two spaces a description of it.
+    /// Defects of a line of a synopsis: a command with placeholders and, after two spaces, its description.
     pub(crate) fn defects_of_synopsis(&self, line: &str) -> Vec<String> {
         let (form, description) = line.split_once("  ").unwrap_or((line, ""));
         let words: Vec<_> = form.split_whitespace().collect();
@@ -68,7 +69,7 @@ impl CommandTree {
         defects
     }
 
-    /// Defects of the words of a command after the program's name, with placeholders among them.
+    /// Defects of the words of a command after the program's name. They may contain placeholders.
     pub(crate) fn defects_of_form(&self, words: &[&str]) -> Vec<String> {
         // Help and version are options of the program itself.
         if words.first().is_none_or(|word| word.starts_with('-')) {
@@ -81,7 +82,7 @@ impl CommandTree {
         unknown.map(|option| format!("`photoncard {command}` has no {option}")).collect()
     }
 
-    /// Returns whether a form names something below a group of commands that the group does not have.
+    /// Returns whether a form names a command that its group of commands does not have.
     fn lacks(&self, group: &str, form: &str) -> bool {
         let below = form[group.len()..].trim_start();
         let is_group = self.options.keys().any(|command| command.starts_with(&format!("{group} ")));
@@ -94,13 +95,13 @@ impl CommandTree {
     }
 }
 
-/// Long options in a text.
+/// Long options that occur in a text.
 pub(crate) fn options_in(text: &str) -> impl Iterator<Item = &str> {
     let words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'));
     words.filter(|word| word.len() > 2 && word.starts_with("--"))
 }
 
-/// Options that a manual page describes: each line that begins with a name in bold has names of one.
+/// Options that a manual page describes. Each line that begins with a name in bold contains the names of one.
 fn options_of_page(page: &str) -> BTreeSet<String> {
     let page = page.replace("\\-", "-").replace("\\fR", " ");
     let described =

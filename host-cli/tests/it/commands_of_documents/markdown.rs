@@ -1,4 +1,4 @@
-//! The documents, and their parts that are no prose.
+//! Documents and their parts that are not prose.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,14 +7,14 @@ use pulldown_cmark::{CodeBlockKind, Event, Options, Parser, Tag};
 
 use super::repository;
 
-/// A document of the repository.
+/// Document of the repository.
 pub(crate) struct Document {
     /// Path in the repository.
     pub(crate) name: String,
     text: String,
 }
 
-/// A part of a document.
+/// Part of a document that is not prose.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Piece {
     /// A block of code.
@@ -29,7 +29,7 @@ pub(crate) enum Piece {
     Link(String),
 }
 
-/// All documents of the present state. The change log is of the past.
+/// All documents about the present state. The change log is about the past.
 pub(crate) fn documents() -> Vec<Document> {
     let in_folder = |folder: &str| {
         let mut names: Vec<_> = fs::read_dir(repository::path(folder))
@@ -50,12 +50,12 @@ impl Document {
         Self { name: name.to_owned(), text: text.to_owned() }
     }
 
-    /// The whole document.
+    /// Text of the whole document.
     pub(crate) fn text(&self) -> &str {
         &self.text
     }
 
-    /// Blocks of code, inline code and links, each with the number of its line.
+    /// Code blocks, inline code and links, each with its line number.
     pub(crate) fn pieces(&self) -> Vec<(usize, Piece)> {
         let mut pieces = Vec::new();
         let mut in_block = false;
@@ -91,7 +91,7 @@ impl Document {
         pieces
     }
 
-    /// Defect of a link to a file that does not exist.
+    /// Defect of a link whose target is a missing file.
     pub(crate) fn defect_of_link(&self, target: &str) -> Option<String> {
         let file = target.split('#').next().unwrap_or_default();
         let folder: PathBuf = Path::new(&self.name).parent().unwrap().join(file);

@@ -1,7 +1,7 @@
-//! Commands of the documents are those that the program has: README.md and others at the top, docs/*.md, and
-//! the README.md of scenes and tests.
+//! Commands in documents exist in the program. The documents are README.md and others at the top, docs/*.md,
+//! and the README.md of scenes and tests.
 //!
-//! Each fenced block of a document states by its info string what it is:
+//! The info string of a fenced block states its kind:
 //!
 //! | info string | contents | test |
 //! |---|---|---|
@@ -12,8 +12,7 @@
 //! | `text synopsis` | forms of commands with placeholders | commands and options exist |
 //! | another language | no commands | none |
 //!
-//! In inline code commands, options, those values that are no placeholders, and paths of the repository
-//! exist.
+//! Commands, options, values except placeholders, and paths of the repository in inline code must exist.
 
 mod command_tree;
 mod markdown;
@@ -23,7 +22,7 @@ mod script;
 use command_tree::CommandTree;
 use markdown::{Document, Piece};
 
-/// Kind of a fenced block, by its info string.
+/// Kind of a fenced block, stated by its info string.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Kind {
     Run,
@@ -46,7 +45,7 @@ impl Kind {
     }
 }
 
-/// Defects of a block, except those of running it.
+/// Defects of a block that are found without running it.
 fn defects_of_block(tree: &CommandTree, info: &str, text: &str) -> Vec<String> {
     match Kind::of(info) {
         None => vec![format!(
@@ -78,7 +77,7 @@ fn defects(tree: &CommandTree, document: &Document) -> Vec<String> {
 }
 
 #[test]
-fn documents_name_what_exists() {
+fn documents_name_existing_commands_options_and_files() {
     let tree = CommandTree::new();
     let documents = markdown::documents();
     assert!(documents.len() > 10, "{} documents are not all", documents.len());
@@ -86,7 +85,7 @@ fn documents_name_what_exists() {
     assert!(defects.is_empty(), "\n{}", defects.join("\n"));
 }
 
-/// Cells of the rows of a table, spaces removed.
+/// Cells of the rows of a table, without surrounding spaces.
 fn rows(text: &str) -> Vec<Vec<&str>> {
     let rows = text.lines().filter_map(|line| line.strip_prefix('|')?.strip_suffix('|'));
     rows.map(|row| row.split('|').map(str::trim).collect()).collect()
@@ -111,7 +110,7 @@ fn the_readme_is_short_and_compares_by_the_figures_of_quality() {
 }
 
 #[test]
-fn commands_of_documents_run() {
+fn commands_of_documents_succeed() {
     let mut number = 0;
     for document in markdown::documents() {
         for (line, piece) in document.pieces() {

@@ -16,12 +16,12 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap()
 }
 
-/// Name in the repository of one of its paths.
+/// Path relative to the repository.
 pub(crate) fn name(path: &Path) -> String {
     path.strip_prefix(root()).unwrap().to_str().unwrap().to_owned()
 }
 
-/// Returns whether a word is a path in the repository, and neither a placeholder nor a pattern.
+/// Returns whether a word is a path in the repository, and no placeholder or pattern.
 fn is_path(word: &str) -> bool {
     let is_plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_./".contains(c);
     let stem = word.strip_suffix("Cargo.toml").or_else(|| word.strip_suffix("README.md")).unwrap_or(word);
@@ -30,20 +30,20 @@ fn is_path(word: &str) -> bool {
         && stem.chars().all(is_plain)
 }
 
-/// Defect of a word that is a path in the repository and does not exist.
+/// Defect of a word that is a path in the repository but does not exist.
 pub(crate) fn defect_of_path(word: &str) -> Option<String> {
     let word = word.strip_prefix("./").unwrap_or(word);
     (is_path(word) && !path(word).exists()).then(|| format!("{word} does not exist"))
 }
 
-/// Defect of a script as the program of a command.
+/// Defect of a script that a command runs.
 pub(crate) fn defect_of_script(program: &str) -> Option<String> {
     let Ok(metadata) = fs::metadata(path(program)) else { return Some(format!("{program} does not exist")) };
     let is_executable = metadata.is_file() && metadata.permissions().mode() & 0o111 != 0;
     (!is_executable).then(|| format!("{program} is not executable"))
 }
 
-/// Returns whether a script of the repository has this option.
+/// Returns whether any script of the repository has this option.
 pub(crate) fn has_script_with(option: &str) -> bool {
     let mut folders = vec![path("tests"), path("host-cli")];
     while let Some(folder) = folders.pop() {
@@ -61,7 +61,7 @@ pub(crate) fn has_script_with(option: &str) -> bool {
     false
 }
 
-/// Defects of the arguments of cargo: crates, targets and folders that do not exist.
+/// Defects of cargo's arguments: crates, targets and folders that do not exist.
 pub(crate) fn defects_of_cargo(arguments: &[&str]) -> Vec<String> {
     let value = |options: &[&str]| {
         let place = arguments.iter().position(|argument| options.contains(argument))?;

@@ -1,4 +1,4 @@
-//! Commands as a document writes them: run, or checked without being run.
+//! Shell commands in documents, which are run or checked without being run.
 
 use std::net::TcpListener;
 use std::os::unix::fs::symlink;
@@ -10,10 +10,10 @@ use crate::support::{Outcome, Room};
 
 const PRELUDE: &str = include_str!("prelude.sh");
 
-/// Programs of others that documents call.
+/// Programs from elsewhere that documents may call.
 const FOREIGN: [&str; 4] = ["cmp", "mkdir", "export", "python"];
 
-/// Runs a script in an empty folder with the scenes and references. Returns what it says if it fails.
+/// Runs a script in an empty folder with the scenes and references. Returns its messages if it fails.
 pub(crate) fn run(text: &str) -> Result<(), String> {
     let room = Room::new();
     for folder in ["scenes", "tests"] {
@@ -29,7 +29,7 @@ pub(crate) fn run(text: &str) -> Result<(), String> {
     if outcome.status == Some(0) { Ok(()) } else { Err(said()) }
 }
 
-/// A script that listens to free ports in place of those that it states.
+/// Replaces the ports that a script states by free ones.
 fn with_free_ports(text: &str) -> String {
     let stated = text.split("--listen tcp:").skip(1).map(|rest| rest.split_whitespace().next().unwrap());
     stated.fold(text.to_owned(), |text, port| {
@@ -38,7 +38,7 @@ fn with_free_ports(text: &str) -> String {
     })
 }
 
-/// Simple commands of a script: words without quotes, redirections and assignments before the program's name.
+/// Simple commands of a script, as words without quotes, redirections and variable assignments.
 fn commands(script: &str) -> Vec<Vec<&str>> {
     let lines = script.lines().filter(|line| !line.trim_start().starts_with('#'));
     let parts = lines.flat_map(|line| line.split("&&").flat_map(|part| part.split([';', '|', '&'])));
@@ -50,7 +50,7 @@ fn commands(script: &str) -> Vec<Vec<&str>> {
     words.filter(|words| !words.is_empty()).collect()
 }
 
-/// Defects of a script's commands, none of which is run.
+/// Defects of a script's commands, which are not run.
 pub(crate) fn defects(tree: &CommandTree, text: &str) -> Vec<String> {
     let text = text.replace("\\\n", " ");
     commands(&text).into_iter().flat_map(|words| defects_of_command(tree, &words)).collect()
@@ -79,7 +79,7 @@ fn defects_of_command(tree: &CommandTree, words: &[&str]) -> Vec<String> {
     defects
 }
 
-/// Defects of inline code, with placeholders among its words.
+/// Defects of inline code, which may contain placeholders.
 pub(crate) fn defects_of_inline_code(tree: &CommandTree, text: &str) -> Vec<String> {
     let words: Vec<_> = text.split_whitespace().collect();
     let mut defects = match words[..] {
@@ -96,8 +96,8 @@ pub(crate) fn defects_of_inline_code(tree: &CommandTree, text: &str) -> Vec<Stri
     defects
 }
 
-/// Defects of options and of those values that are no placeholders: a command has all of the options, and
-/// accepts each value.
+/// Defects of options and of values that are no placeholders. Some command must have all the options and
+/// accept each value.
 fn defects_of_options(tree: &CommandTree, words: &[&str]) -> Vec<String> {
     let options: Vec<_> = words.iter().copied().filter(|word| word.starts_with("--")).collect();
     let commands = tree.commands_with(&options);

@@ -1,4 +1,4 @@
-//! Runs the command in a temporary folder, on small scenes.
+//! Runs the command in a temporary folder on small scenes.
 
 use std::fmt::Write;
 use std::fs;
@@ -9,7 +9,7 @@ use std::process::{Child, Command, Output, Stdio};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// Options of a minimal render; a test adds its own.
+/// Options of a minimal render, which a test can replace or extend.
 const SMALL: [(&str, &str); 6] = [
     ("--quality", "paper"),
     ("--size", "8x8"),
@@ -19,7 +19,7 @@ const SMALL: [(&str, &str); 6] = [
     ("--shadow-rays", "1"),
 ];
 
-/// Result of a command.
+/// Status and output of a finished command.
 pub(crate) struct Outcome {
     pub(crate) status: Option<i32>,
     pub(crate) stdout: String,
@@ -27,7 +27,7 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Status and output of a process, which must not have panicked.
+    /// Outcome of a process, which must not have panicked.
     pub(crate) fn of(output: &Output) -> Self {
         let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
         let outcome =
@@ -80,12 +80,12 @@ impl Room {
         Outcome::of(&self.command().args(arguments).output().unwrap())
     }
 
-    /// Small render; `options` replace or extend [`SMALL`].
+    /// Renders a small picture. `options` replace or extend [`SMALL`].
     pub(crate) fn render(&self, scene: &str, options: &[&str]) -> Outcome {
         self.run(&small_render(scene, options))
     }
 
-    /// Small render that must succeed.
+    /// Renders a small picture, which must succeed.
     pub(crate) fn rendered(&self, scene: &str, options: &[&str]) -> Outcome {
         let outcome = self.render(scene, options);
         assert_eq!(outcome.status, Some(0), "{options:?}: {}", outcome.stderr);
@@ -94,7 +94,7 @@ impl Room {
     }
 }
 
-/// Card that another process serves, until it is dropped.
+/// Card that another process serves. Dropping it ends the process.
 pub(crate) struct Emulator {
     pub(crate) process: Child,
     pub(crate) address: String,
@@ -111,7 +111,7 @@ impl Emulator {
         Self { process, address: address.trim_end().to_owned() }
     }
 
-    /// Sends the process a signal.
+    /// Sends a signal to the process.
     pub(crate) fn signal(&self, signal: &str) {
         let id = self.process.id().to_string();
         assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
@@ -135,7 +135,7 @@ impl Drop for Emulator {
     }
 }
 
-/// Arguments of a small render; `options` replace or extend [`SMALL`].
+/// Arguments of a small render. `options` replace or extend [`SMALL`].
 pub(crate) fn small_render<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a str> {
     let mut arguments = vec!["render", scene];
     for (option, value) in SMALL {
@@ -147,13 +147,13 @@ pub(crate) fn small_render<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a s
     arguments
 }
 
-/// Path of a scene that ships.
+/// Path of a shipped scene.
 pub(crate) fn shipped(name: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(name);
     path.to_str().unwrap().to_owned()
 }
 
-/// Bytes of [`scene`]: four corners of the floor, three of the lamp, six indices of the floor.
+/// Buffer of [`scene`]: four corners of the floor, three of the lamp, six indices of the floor.
 pub(crate) fn scene_bytes() -> Vec<u8> {
     let floor = [-1f32, 0., 1., 1., 0., 1., 1., 0., -1., -1., 0., -1.];
     let lamp = [0f32, 1., 0., 0.5, 1., 0., 0., 1., 0.5];
@@ -162,12 +162,12 @@ pub(crate) fn scene_bytes() -> Vec<u8> {
     bytes
 }
 
-/// A floor of two triangles under a lamp of one, seen by the camera `eye`.
+/// Scene of a floor with two triangles under a lamp with one, seen by the camera `eye`.
 pub(crate) fn scene() -> Value {
     scene_of(&scene_bytes())
 }
 
-/// Scene with these bytes.
+/// [`scene`] with the given buffer.
 pub(crate) fn scene_of(bytes: &[u8]) -> Value {
     json!({
         "asset": {"version": "2.0"},
@@ -212,7 +212,7 @@ fn data_uri(bytes: &[u8]) -> String {
     })
 }
 
-/// GLB of JSON and bytes.
+/// GLB with the given JSON and binary chunk.
 pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let padded = |bytes: &[u8], padding: u8| {
         let mut chunk = bytes.to_vec();

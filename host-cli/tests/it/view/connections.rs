@@ -1,4 +1,4 @@
-//! Who may connect, what a connection may send, and how many there are.
+//! Connections to a view: who may connect, what they may send, and how many there are.
 
 use std::net::TcpStream;
 
@@ -10,7 +10,7 @@ use super::small_view;
 use crate::support::Room;
 
 #[test]
-fn other_sites_are_refused() {
+fn pages_of_other_sites_are_refused() {
     let room = Room::new();
     let view = small_view(&room, &[]);
     let View { host, token, .. } = &view;
@@ -88,9 +88,9 @@ fn hostile_messages_are_answered_or_end_their_connection_alone() {
     assert_eq!(std::fs::read_dir(room.path("out")).unwrap().count(), 0);
 }
 
-/// There are 16 places, and no page that is gone holds one, even while nothing changes.
+/// There are 16 places. A page that has gone frees its place even while nothing changes.
 #[test]
-fn pages_come_and_go() {
+fn pages_that_have_gone_free_their_places() {
     let room = Room::new();
     let view = small_view(&room, &[]);
     view.connect().settle();
@@ -101,9 +101,9 @@ fn pages_come_and_go() {
     }
 }
 
-/// Connections that say nothing, more than there are places, neither end a page nor keep out the next one.
+/// More silent connections than there are places neither end a page nor exclude the next one.
 #[test]
-fn silent_connections_keep_no_page_out() {
+fn silent_connections_do_not_exclude_pages() {
     let room = Room::new();
     let view = small_view(&room, &[]);
     let mut page = view.connect();

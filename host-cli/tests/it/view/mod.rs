@@ -1,4 +1,4 @@
-//! `photoncard view`: what its page can see and do, and what others cannot.
+//! Command `photoncard view`: what its page can see and do, and what others cannot.
 
 mod connections;
 mod page;
@@ -33,7 +33,7 @@ fn small_view(room: &Room, more: &[&str]) -> View {
     View::start(room, "scene.gltf", &[&SMALL, more].concat())
 }
 
-/// Runs the command that a page shows, into `picture`.
+/// Runs the command that a page shows, with the output `picture`.
 fn run_shown(room: &Room, state: &Value, picture: &str) {
     let shown = state["command"].as_str().unwrap();
     let line =
@@ -58,7 +58,7 @@ fn a_page_is_greeted_with_the_scene() {
 
 #[test]
 #[cfg(unix)]
-fn the_settled_picture_is_that_of_the_command_shown() {
+fn the_settled_picture_equals_that_of_the_shown_command() {
     let room = Room::new();
     std::fs::create_dir(room.path("out")).unwrap();
     let view = small_view(&room, &["--out", "out"]);
@@ -98,11 +98,10 @@ fn the_settled_picture_is_that_of_the_command_shown() {
     }
 }
 
-/// The tiles of a settled picture took together what its command takes; with samples in several passes as
-/// well.
+/// The work of a settled picture's tiles adds up to that of its command, also for samples in several passes.
 #[test]
 #[cfg(unix)]
-fn tiles_tell_what_they_took() {
+fn tiles_report_their_work() {
     const UNKNOWN: u32 = u32::MAX;
     let room = Room::new();
     for (counters, options) in [
@@ -130,8 +129,7 @@ fn tiles_tell_what_they_took() {
     }
 }
 
-/// The shown command of a view whose quality finds its settings by pilot renders states all that they have
-/// found.
+/// The command of a view whose quality runs pilot renders states all settings that they have found.
 #[test]
 #[cfg(unix)]
 fn a_quality_finds_the_settings_of_the_settled_picture() {
@@ -184,7 +182,7 @@ fn pictures_are_refined_from_coarse_to_fine_and_follow_edits() {
 }
 
 #[test]
-fn a_scene_stays_lit() {
+fn an_edit_that_removes_all_light_is_refused() {
     let room = Room::new();
     let view = small_view(&room, &[]);
     let mut page = view.connect();
@@ -221,7 +219,7 @@ fn settings_that_no_card_can_hold_are_named_and_change_nothing() {
 }
 
 #[test]
-fn of_two_pages_one_steers() {
+fn only_one_of_two_pages_steers() {
     let room = Room::new();
     let view = small_view(&room, &[]);
     let mut first = view.connect();
@@ -268,7 +266,7 @@ fn a_card_that_dies_and_comes_back_is_shown_and_used() {
 }
 
 #[test]
-fn why_a_picture_is_not_saved_is_told_in_plain_text() {
+fn reasons_for_not_saving_a_picture_are_plain_text() {
     let room = Room::new();
     std::fs::create_dir(room.path("out")).unwrap();
     let view = small_view(&room, &["--out", "out"]);
@@ -284,7 +282,7 @@ fn why_a_picture_is_not_saved_is_told_in_plain_text() {
 }
 
 #[test]
-fn what_a_view_cannot_be_is_said_at_once() {
+fn impossible_options_are_refused_at_once() {
     let room = Room::new();
     let view = small_view(&room, &[]);
     for (options, said) in [
@@ -308,7 +306,7 @@ fn what_a_view_cannot_be_is_said_at_once() {
     }
 }
 
-/// A script stands in for the program that opens addresses, and `sh` for whoever reads what the view prints.
+/// A script stands in for the program that opens addresses, and `sh` for the reader of the view's output.
 #[test]
 #[cfg(target_os = "linux")]
 fn open_opens_the_page_and_other_addresses_come_with_a_warning() {
@@ -351,7 +349,7 @@ fn open_opens_the_page_and_other_addresses_come_with_a_warning() {
     }
 }
 
-/// A signal ends the view soon, whatever it does.
+/// A signal soon ends the view, whatever it is doing.
 #[test]
 #[cfg(unix)]
 fn an_interrupt_ends_the_view() {

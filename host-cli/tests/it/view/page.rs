@@ -1,4 +1,4 @@
-//! A page without a browser: a client of the view's socket.
+//! Page without a browser: a client of the view's WebSocket.
 
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read};
@@ -13,13 +13,13 @@ use tungstenite::{Message, WebSocket};
 
 use crate::support::Room;
 
-/// Time in which everything happens that a test waits for, on a loaded machine.
+/// Time limit of every wait of a test, long enough for a busy machine.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// A view in a process of its own, until it is dropped.
+/// View in another process. Dropping it ends the process.
 pub(crate) struct View {
     pub(crate) process: Child,
-    /// Address and port.
+    /// Address and port of the view.
     pub(crate) host: String,
     pub(crate) token: String,
 }
@@ -41,7 +41,10 @@ impl View {
         Self { host: host.to_owned(), token: token.to_owned(), process }
     }
 
-    /// A connection to the socket, by these headers.
+    /// Connects to the WebSocket with these headers.
+    ///
+    /// # Errors
+    /// HTTP status, if the view refuses the connection.
     pub(crate) fn try_connect(&self, target: &str, host: &str, origin: Option<&str>) -> Result<Page, u16> {
         let stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -64,13 +67,13 @@ impl View {
         }
     }
 
-    /// A page of the view's own.
+    /// Connects a page with valid headers.
     pub(crate) fn connect(&self) -> Page {
         let target = format!("/socket?token={}", self.token);
         self.try_connect(&target, &self.host, Some(&format!("http://{}", self.host))).unwrap()
     }
 
-    /// Answer to a request of a file: status and text.
+    /// Requests a file. Returns status and text of the answer.
     pub(crate) fn get(&self, target: &str, host: &str) -> (u16, String) {
         use std::io::Write;
         let mut stream = TcpStream::connect(&self.host).unwrap();
@@ -90,7 +93,7 @@ impl Drop for View {
     }
 }
 
-/// A connected page.
+/// Connected page.
 pub(crate) struct Page {
     socket: WebSocket<TcpStream>,
     received: usize,
@@ -98,10 +101,10 @@ pub(crate) struct Page {
     pub(crate) last: HashMap<String, Value>,
     /// Radiance of each pixel.
     pub(crate) pixels: HashMap<(u32, u32), [f32; 3]>,
-    /// Side of a pixel's square in each tile, with its wish.
+    /// Side of a pixel's square, with the wish, of each received tile.
     pub(crate) steps: Vec<(u32, u32)>,
-    /// Gathers, irradiance records and lines of DRAM of each tile of the newest wish whose pixels are the
-    /// picture's, by its corner.
+    /// Gathers, irradiance records and DRAM lines of each tile at full resolution of the newest wish, by the
+    /// tile's corner.
     pub(crate) work: HashMap<(u32, u32), [u32; 3]>,
 }
 
@@ -126,7 +129,7 @@ impl Page {
         let _ = self.socket.send(message);
     }
 
-    /// Reads messages until one of a type is as it should be.
+    /// Reads messages until one of type `kind` satisfies `is_right`. Returns it.
     pub(crate) fn wait(&mut self, kind: &str, is_right: impl Fn(&Value) -> bool) -> Value {
         let begin = Instant::now();
         while begin.elapsed() < PATIENCE {
@@ -151,7 +154,7 @@ impl Page {
         self.wait(kind, |_| true)
     }
 
-    /// Waits for a settled picture of a wish that is newer than the last settled one.
+    /// Waits for the settled picture of a wish that is newer than that of the last one.
     pub(crate) fn settle(&mut self) -> Value {
         let before = self
             .last
@@ -214,7 +217,7 @@ impl Page {
     }
 }
 
-/// Message that places the camera.
+/// Message that sets the camera.
 pub(crate) fn camera(x: f64, is_moving: bool) -> Value {
     json!({"type": "camera", "position": [x, 0.5, 3], "look_at": [0, 0.3, 0], "fov": 40, "moving": is_moving})
 }

@@ -1,4 +1,4 @@
-//! A headless Chromium, driven by its `DevTools` protocol.
+//! Headless Chromium, driven by its `DevTools` protocol.
 
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
@@ -11,12 +11,12 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
-/// Limit of time for the browser's start, and for each of its answers.
+/// Time limit for the browser's start and for each of its answers.
 const PATIENCE: Duration = Duration::from_secs(40);
-/// Programs that are a Chromium, in this order.
+/// Names of programs that are Chromium, in order of preference.
 const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
-/// A browser with a profile of its own, until it is dropped.
+/// Browser with its own profile. Dropping it ends the browser.
 pub(crate) struct Browser {
     process: Child,
     address: String,
@@ -25,7 +25,7 @@ pub(crate) struct Browser {
 }
 
 impl Browser {
-    /// Starts a Chromium. Returns `None` and says so if the tests are to be left out.
+    /// Starts Chromium. Returns `None`, and prints why, if the tests are to be skipped.
     pub(crate) fn start() -> Option<Self> {
         if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_BROWSER") {
             eprintln!("SKIPPED: the page is not tested, as PHOTONCARD_SKIP_BROWSER is set: {reason}");
@@ -42,8 +42,7 @@ impl Browser {
         Some(Self { process, address, control, _profile: profile })
     }
 
-    /// A new tab with a window of its own, of a size, in which nothing is loaded: one behind another would
-    /// stand still.
+    /// Opens an empty tab in its own window of this size. A tab behind another would not be rendered.
     pub(crate) fn tab(&mut self, size: [u32; 2]) -> Tab {
         let target =
             self.control.call("Target.createTarget", &json!({"url": "about:blank", "newWindow": true}));
@@ -82,7 +81,7 @@ fn launch(program: &str, profile: &TempDir) -> Option<Child> {
     command.spawn().ok()
 }
 
-/// Address of the `DevTools`, which the browser prints.
+/// Address of the `DevTools` that the browser prints.
 fn announced(process: &mut Child) -> String {
     let lines = BufReader::new(process.stderr.take().unwrap()).lines();
     let (sender, receiver) = mpsc::channel();
@@ -97,7 +96,7 @@ fn announced(process: &mut Child) -> String {
     receiver.recv_timeout(PATIENCE).expect("the browser prints the address of its DevTools")
 }
 
-/// A tab, by a connection of its own.
+/// Tab with its own connection.
 pub(crate) struct Tab {
     socket: WebSocket<TcpStream>,
     calls: u64,
@@ -115,7 +114,7 @@ impl Tab {
         Self { socket, calls: 0, faults: Vec::new() }
     }
 
-    /// Calls a method, and notes what goes wrong in the page meanwhile.
+    /// Calls a method, and records the page's errors until its answer.
     pub(crate) fn call(&mut self, method: &str, parameters: &Value) -> Value {
         self.calls += 1;
         let call = json!({"id": self.calls, "method": method, "params": parameters});
@@ -146,7 +145,7 @@ impl Tab {
         self.call("Page.navigate", &json!({"url": address}));
     }
 
-    /// Value of an expression, which may be a promise.
+    /// Evaluates an expression, which may be a promise.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
         let result = self.call("Runtime.evaluate", &parameters);
@@ -178,7 +177,8 @@ impl Tab {
         self.call("Input.dispatchMouseEvent", &parameters);
     }
 
-    /// Drags by `[dx, dy]` pixels with a button (`left`, `middle` or `right`); without a shift it is a click.
+    /// Drags by `[dx, dy]` pixels with a button (`left`, `middle` or `right`). With a zero shift it is a
+    /// click.
     pub(crate) fn press(&mut self, button: &str, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) {
         let buttons = match button {
             "left" => 1,
@@ -198,7 +198,8 @@ impl Tab {
         self.mouse("mouseWheel", place, &json!({"deltaX": 0, "deltaY": pixels}));
     }
 
-    /// Touches places with a finger each, moves each to its second place, and lets go.
+    /// Touches the first position of each finger, moves all fingers to their second positions, and releases
+    /// them.
     pub(crate) fn touch(&mut self, fingers: &[[[f64; 2]; 2]]) {
         let points = |share: f64| -> Vec<Value> {
             let at =
@@ -217,26 +218,26 @@ impl Tab {
         }
     }
 
-    /// Holds a key, by its code, for some milliseconds.
+    /// Holds the key with this code for some milliseconds.
     pub(crate) fn hold(&mut self, code: &str, milliseconds: u64) {
         self.key("keyDown", code);
         std::thread::sleep(Duration::from_millis(milliseconds));
         self.key("keyUp", code);
     }
 
-    /// Sends an event of a key: `keyDown` or `keyUp`.
+    /// Sends a key event: `keyDown` or `keyUp`.
     pub(crate) fn key(&mut self, kind: &str, code: &str) {
         self.call("Input.dispatchKeyEvent", &json!({"type": kind, "code": code}));
     }
 
-    /// Bytes of the page's objects and buffers, those of garbage left out.
+    /// Size of the page's objects and buffers after garbage collection, bytes.
     pub(crate) fn memory(&mut self) -> u64 {
         self.call("HeapProfiler.collectGarbage", &json!({}));
         let usage = self.call("Runtime.getHeapUsage", &json!({}));
         ["usedSize", "backingStorageSize"].iter().filter_map(|part| usage[part].as_f64()).sum::<f64>() as u64
     }
 
-    /// Codes of the pixels of a rectangle `[x, y, width, height]` on the screen.
+    /// Colours of the pixels in a rectangle `[x, y, width, height]` of the screen, as sRGB codes.
     pub(crate) fn pixels(&mut self, [x, y, width, height]: [f64; 4]) -> Vec<[u8; 3]> {
         let clip = json!({"x": x, "y": y, "width": width, "height": height, "scale": 1});
         let shot = self.call("Page.captureScreenshot", &json!({"format": "png", "clip": clip}));
@@ -244,7 +245,7 @@ impl Tab {
     }
 }
 
-/// Codes of the pixels of a PNG, without its alpha.
+/// Colours of a PNG's pixels without alpha, as sRGB codes.
 pub(crate) fn decoded(png: &[u8]) -> Vec<[u8; 3]> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];

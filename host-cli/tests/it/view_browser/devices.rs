@@ -1,4 +1,4 @@
-//! The page on devices: touch, clipboard, narrow windows, and graphics that are lost.
+//! Page on different devices: touch, clipboard, narrow windows, and a lost graphics context.
 
 use serde_json::{Value, json};
 
@@ -18,7 +18,7 @@ fn length([x, y, z]: Vector) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// Position of the camera, unit vector of its view, and distance from the middle of the scene.
+/// Position of the camera, unit vector of its view, and distance from the scene's centre.
 fn camera(tab: &mut Tab) -> (Vector, Vector, f64) {
     let [position, target, low, high] =
         ["state.camera.position", "state.camera.look_at", "scene.low", "scene.high"]
@@ -67,7 +67,7 @@ fn fingers_orbit_pan_and_zoom() {
     assert_eq!(tab.faults, [""; 0]);
 }
 
-/// By the clipboard, and where a page may not use that, by a selection.
+/// The page copies by the clipboard or, where it may not use that, by a selection.
 #[test]
 fn command_line_and_pose_are_copied() {
     let Some(mut browser) = Browser::start() else { return };
@@ -125,7 +125,7 @@ fn a_lost_graphics_context_comes_back_with_the_picture() {
     assert!(before.iter().any(|pixel| pixel[0] > 100), "the picture is black");
 }
 
-/// Controls of the picture are inside the window, apart from each other, whatever its size.
+/// Controls of the picture are inside the window and do not overlap, whatever its size.
 #[test]
 fn narrow_windows_cut_nothing_off() {
     let Some(mut browser) = Browser::start() else { return };
@@ -150,9 +150,9 @@ fn narrow_windows_cut_nothing_off() {
     }
 }
 
-/// Overlays of the shader and of the processor are equal, and tell their values.
+/// Overlays drawn by the shader and by the processor are equal, and show their values.
 #[test]
-fn overlays_map_what_tiles_took() {
+fn overlays_map_the_work_of_tiles() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let options =
@@ -187,9 +187,9 @@ fn overlays_map_what_tiles_took() {
     assert!(difference <= Some(2), "shader and processor differ: {difference:?}");
 }
 
-/// A view that does not model memory says so where its lines are asked for.
+/// A view that does not model memory says so when DRAM lines are requested.
 #[test]
-fn what_is_not_counted_is_said() {
+fn missing_counts_are_reported() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let view = View::start(&room, &shipped("cornell.gltf"), &SMALL);

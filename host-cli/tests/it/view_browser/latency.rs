@@ -1,4 +1,4 @@
-//! Latency and rate of the view, by the page's own clock: `tests/view_latency.sh` prints them.
+//! Measures latency and frame rate of the view by the page's own clock; `tests/view_latency.sh` prints them.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -8,12 +8,12 @@ use super::browser::{Browser, Tab};
 use super::server::View;
 use crate::support::{Room, shipped};
 
-/// A time in which any picture is there.
+/// Time limit for any picture.
 const LIMIT: Duration = Duration::from_secs(120);
-/// Moves that a median is taken of.
+/// Number of camera moves of which a median is taken.
 const MOVES: usize = 7;
 
-/// A figure, and its goal.
+/// Prints a figure with its goal.
 fn row(scene: &str, what: &str, value: f64, unit: &str, goal: &str) {
     println!("| {scene} | {what} | {value:.0} {unit} | {goal} |");
 }
@@ -49,7 +49,7 @@ fn latency() {
     }
 }
 
-/// A tab in which the first picture is shown.
+/// Opens a tab and waits for its first picture.
 fn shown(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = browser.tab([1100, 760]);
     tab.open(&view.address);
@@ -61,8 +61,8 @@ fn start(room: &Room, file: &str, size: &str) -> View {
     View::start(room, &shipped(file), &["--size", size])
 }
 
-/// A tab in which the settled picture has begun: pilot renders have found its settings, and its photons are
-/// traced.
+/// Opens a tab and waits until the settled picture has started: pilot renders have found its settings, and
+/// its photons are traced.
 fn refined(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = shown(browser, view);
     tab.wait("photoncard.state.settled || photoncard.picture.samples === photoncard.state.spp", LIMIT);
@@ -79,7 +79,7 @@ fn opened(browser: &mut Browser, file: &str) -> f64 {
     first.as_f64().unwrap() - started
 }
 
-/// Medians of the milliseconds of parts of a picture after moves of the camera.
+/// Median times of parts of a picture after camera moves, milliseconds.
 fn moved<const N: usize>(
     browser: &mut Browser,
     room: &Room,
@@ -108,7 +108,7 @@ fn moved<const N: usize>(
     times.map(median)
 }
 
-/// Whole pictures a second in the last one of four seconds of turning.
+/// Complete pictures per second, in the last of four seconds of turning the camera.
 fn turned(browser: &mut Browser, room: &Room, file: &str) -> f64 {
     let view = start(room, file, "256x256");
     let mut tab = refined(browser, &view);
@@ -123,7 +123,7 @@ fn turned(browser: &mut Browser, room: &Room, file: &str) -> f64 {
     median(rates.split_off(3))
 }
 
-/// Median of the milliseconds from another strength of the lamp to the first coarse picture.
+/// Median time from a change of the lamp's strength to the first coarse picture, milliseconds.
 fn relit(browser: &mut Browser, room: &Room, file: &str) -> f64 {
     let view = start(room, file, "512x512");
     let mut tab = refined(browser, &view);

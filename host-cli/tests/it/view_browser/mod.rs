@@ -1,4 +1,4 @@
-//! The page of `photoncard view` in a headless Chromium: what it shows is what the command renders, whatever
+//! Page of `photoncard view` in a headless Chromium. It shows the picture that the command renders, whatever
 //! is done to it.
 
 mod browser;
@@ -16,7 +16,7 @@ use person::{Person, SETTLED, darkness};
 use serde_json::json;
 use server::{View, run_shown, serve_page};
 
-/// Options of a small picture that has all kinds of light.
+/// Options of a small picture with all kinds of light.
 const SMALL: [&str; 14] = [
     "--quality",
     "paper",
@@ -34,17 +34,17 @@ const SMALL: [&str; 14] = [
     "2",
 ];
 
-/// Size of the browser's window, in which the panel is below the picture.
+/// Size of the browser's window, pixels, at which the panel is below the picture.
 const WINDOW: [u32; 2] = [360, 420];
 
-/// Script by which a page finds no WebGL2.
+/// Script that makes WebGL2 unavailable to a page.
 const WITHOUT_WEBGL2: &str = "const get = HTMLCanvasElement.prototype.getContext; HTMLCanvasElement.prototype.getContext = \
      function (kind, ...rest) { return kind === 'webgl2' ? null : get.call(this, kind, ...rest); }";
 
-/// A time that no step takes, on a machine that does much else.
+/// Time limit of every step, long enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(30);
 
-/// The page of a new view of a scene, when its first picture is finished.
+/// Opens the page of a new view, and waits for its first complete picture.
 fn opened(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = browser.tab(WINDOW);
     tab.open(&view.address);
@@ -52,8 +52,8 @@ fn opened(browser: &mut Browser, view: &View) -> Tab {
     tab
 }
 
-/// Saves the picture by the page, and renders the command line that it shows, which writes `picture.exr`: the
-/// files must be equal.
+/// Saves the picture by the page, and runs the shown command line, which writes `picture.exr`. The files must
+/// be equal.
 fn check_saved(room: &Room, tab: &mut Tab, name: &str) {
     let line = tab.save(name, "exr");
     run_shown(room, &line);
@@ -62,7 +62,7 @@ fn check_saved(room: &Room, tab: &mut Tab, name: &str) {
 }
 
 #[test]
-fn the_modules_of_the_page_do_what_they_say() {
+fn the_modules_of_the_page_pass_their_tests() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let view = View::start(&room, &shipped("cornell.gltf"), &SMALL);
@@ -71,7 +71,7 @@ fn the_modules_of_the_page_do_what_they_say() {
 }
 
 #[test]
-fn the_settled_picture_is_that_of_the_command_shown() {
+fn the_settled_picture_equals_that_of_the_shown_command() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let view = View::start(&room, &shipped("cornell.gltf"), &SMALL);
@@ -91,9 +91,9 @@ fn the_settled_picture_is_that_of_the_command_shown() {
     assert_eq!(tab.faults, [""; 0]);
 }
 
-/// By the shader, and by the processor where there is no WebGL2.
+/// Compares pictures drawn by the shader and, without WebGL2, by the processor.
 #[test]
-fn the_screen_has_the_codes_of_the_png() {
+fn the_colours_on_the_screen_equal_those_of_the_png() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let view = View::start(&room, &shipped("cornell.gltf"), &SMALL);
@@ -149,7 +149,7 @@ fn a_light_that_is_switched_off_darkens_the_picture() {
     }
 }
 
-/// A material has the properties of its kind, and a solid where it transmits light.
+/// A material shows the properties of its kind, including a solid's if it transmits light.
 #[test]
 fn a_material_becomes_glass() {
     let Some(mut browser) = Browser::start() else { return };
@@ -180,7 +180,7 @@ fn a_material_becomes_glass() {
 }
 
 #[test]
-fn two_pages_look_and_one_steers() {
+fn only_one_of_two_pages_steers() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     let view = View::start(&room, &shipped("cornell.gltf"), &SMALL);
@@ -203,7 +203,7 @@ fn two_pages_look_and_one_steers() {
     first.wait(&format!("{camera} !== '{}'", after.as_str().unwrap()), LIMIT);
 }
 
-/// A page's own camera goes back with everything else, and the next move begins there.
+/// The page's own camera is also reset, and the next move starts from there.
 #[test]
 fn undoing_all_changes_takes_the_camera_back() {
     let Some(mut browser) = Browser::start() else { return };
@@ -239,7 +239,7 @@ fn undoing_all_changes_takes_the_camera_back() {
     assert_eq!(tab.faults, [""; 0]);
 }
 
-/// Even if the page knows the token.
+/// The page of another origin is refused although it knows the token.
 #[test]
 fn a_page_of_another_origin_is_refused() {
     let Some(mut browser) = Browser::start() else { return };
@@ -258,10 +258,10 @@ fn a_page_of_another_origin_is_refused() {
     opened(&mut browser, &view);
 }
 
-/// Bytes that the page may hold more after many actions: a small picture, and the last measurements.
+/// Maximum growth of the page's memory after many actions, bytes: a small picture, and the last measurements.
 const MAX_PAGE: u64 = 8 << 20;
-/// Bytes that the command may hold more: tiles of two pictures and three films of 700x500 pixels, which is
-/// the largest window, each pixel with its layers. Tiles that were kept after each action would take more.
+/// Maximum growth of the command's memory, bytes: tiles of two pictures and three films of 700x500 pixels,
+/// the largest window, with all layers. Keeping tiles of each action would take more.
 const MAX_COMMAND: u64 = 5 * 700 * 500 * 112;
 
 fn check_memory((whose, after, before): (&str, u64, u64), limit: u64) {

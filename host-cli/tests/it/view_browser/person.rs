@@ -1,4 +1,4 @@
-//! Uses of the page's controls, as a person does them.
+//! Uses of the page's controls as by a person.
 
 use std::time::Duration;
 
@@ -7,35 +7,36 @@ use serde_json::{Value, json};
 use super::browser::Tab;
 use crate::support::shipped;
 
-/// Holds when the page shows a finished picture that has all changes.
+/// Expression that is true once the page shows a complete picture with all changes.
 pub(crate) const SETTLED: &str = "window.photoncard?.isSettled";
 
 const LIMIT: Duration = Duration::from_secs(30);
 
 pub(crate) trait Person {
-    /// Chooses an entry of a list, by the ids of the page.
+    /// Selects an entry of a list, by the ids of the page.
     fn choose(&mut self, list: &str, value: &str);
-    /// States an exposure in stops; `None` is the automatic one.
+    /// Sets the exposure, stops; `None` is automatic.
     fn expose(&mut self, stops: Option<f64>);
-    /// Drags on the picture by pixels, from a place in shares of its sides; without a shift it is a click.
+    /// Drags on the picture by `shift` pixels. `from` is in fractions of the picture's sides. With a zero
+    /// shift it is a click.
     fn drag(&mut self, button: &str, from: [f64; 2], shift: [f64; 2]);
-    /// Place `[x, y, width, height]` of the picture on the screen, pixels.
+    /// Rectangle `[x, y, width, height]` of the picture on the screen, pixels.
     fn picture(&mut self) -> [f64; 4];
-    /// Lets the picture have the window's pixels, one to one, without the panel.
+    /// Hides the panel, so that the picture fills the window one to one.
     fn fill_window(&mut self);
-    /// Turns the switch of a light.
+    /// Toggles the switch of a light.
     fn switch(&mut self, light: &str);
-    /// Labels of a material's fields, as far as they are shown.
+    /// Labels of the visible fields of a material.
     fn labels(&mut self, material: &str) -> Vec<String>;
-    /// Changes a field of a material, by its label, or turns a switch.
+    /// Sets the field of a material with this label, or toggles it.
     fn set_material(&mut self, material: &str, label: &str, value: f64);
-    /// Takes over the steering, if another page has it.
+    /// Takes over the steering from another page.
     fn take_over(&mut self);
     /// Saves the picture. Returns the command line that the page shows.
     fn save(&mut self, name: &str, ending: &str) -> String;
-    /// Codes of the picture's pixels on the screen.
+    /// Colours of the picture's pixels on the screen, as sRGB codes.
     fn shown(&mut self) -> Vec<[u8; 3]>;
-    /// The Cornell box is shown: one wall is red and the other green.
+    /// Checks that the Cornell box is shown, with one red and one green wall.
     fn check_walls(&mut self);
 }
 
@@ -144,7 +145,7 @@ impl Person for Tab {
     }
 }
 
-/// Labels of a material's fields, as an expression.
+/// Expression for the labels of a material's fields.
 fn labels_of(material: &str) -> String {
     format!(
         "[...[...document.querySelectorAll('#materials details')].find(one => \
@@ -152,13 +153,13 @@ fn labels_of(material: &str) -> String {
     )
 }
 
-/// The mean of what pixels lack to white.
+/// Mean difference of pixels from white.
 pub(crate) fn darkness(pixels: &[[u8; 3]]) -> f64 {
     let sum: u64 = pixels.as_flattened().iter().map(|&code| u64::from(255 - code)).sum();
     sum as f64 / (3 * pixels.len()) as f64
 }
 
-/// The Cornell box with a bulb besides its lamp.
+/// Cornell box with a point light besides its lamp.
 pub(crate) fn two_lights() -> Value {
     let mut scene: Value = serde_json::from_slice(&std::fs::read(shipped("cornell.gltf")).unwrap()).unwrap();
     let add = |list: &mut Value, entry: Value| {

@@ -1,4 +1,4 @@
-//! Random actions on the page: what people, networks and cards may do, one after the other.
+//! Random actions on the page, as people, networks and cards may perform them in sequence.
 
 use std::time::Duration;
 
@@ -8,17 +8,17 @@ use super::browser::Tab;
 use super::person::Person;
 use crate::support::{Emulator, Room};
 
-/// Numbers by a linear congruence (Knuth's MMIX): the same ones each time.
+/// Linear congruential generator (Knuth's MMIX) with a fixed seed.
 struct Numbers(u64);
 
 impl Numbers {
-    /// A number from 0 up to 1.
+    /// Pseudo-random number in [0, 1).
     fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 40) as f64 / (1_u64 << 24) as f64
     }
 
-    /// A number of a range.
+    /// Pseudo-random number in a range.
     fn of(&mut self, low: f64, high: f64) -> f64 {
         low + self.next() * (high - low)
     }
@@ -28,7 +28,7 @@ impl Numbers {
     }
 }
 
-/// An emulated card as a process of its own, which dies and comes back at the same port.
+/// Emulated card in another process, which can be killed and restarted at the same port.
 pub(crate) struct Card {
     emulator: Option<Emulator>,
     port: String,
@@ -45,7 +45,7 @@ impl Card {
         format!("tcp:127.0.0.1:{}", self.port)
     }
 
-    /// Kills the card, or starts it again.
+    /// Kills the card, or restarts it.
     fn toggle(&mut self, room: &Room) {
         self.emulator = match self.emulator.take() {
             Some(emulator) => {
@@ -57,7 +57,7 @@ impl Card {
     }
 }
 
-/// Does a number of random actions.
+/// Performs `actions` random actions.
 pub(crate) fn act(room: &Room, tab: &mut Tab, card: &mut Card, actions: usize) {
     let mut numbers = Numbers(21);
     for _ in 0..actions {
@@ -115,7 +115,7 @@ pub(crate) fn act(room: &Room, tab: &mut Tab, card: &mut Card, actions: usize) {
     tab.choose("side", "128");
 }
 
-/// Types into a field of the panel, or turns a switch.
+/// Types into a field of the panel, or toggles a switch.
 fn edit(tab: &mut Tab, numbers: &mut Numbers) {
     let which = numbers.next();
     let value = numbers.of(0.0, 1.0);

@@ -1,4 +1,4 @@
-//! The command under test, and a page of another origin.
+//! Command under test, and a server for a page of another origin.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::support::Room;
 
-/// A running `photoncard view`, until it is dropped.
+/// Running `photoncard view`. Dropping it ends the process.
 pub(crate) struct View {
     process: Child,
     /// Address of the page, with the token.
@@ -30,14 +30,14 @@ impl View {
         Self { process, address: address.expect("the command prints the address of its page") }
     }
 
-    /// Bytes of memory that the command holds; `None` where the system does not tell.
+    /// Memory of the command, bytes; `None` if the system does not report it.
     pub(crate) fn memory(&self) -> Option<u64> {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).ok()?;
         let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
         Some(1024 * line.trim().strip_suffix(" kB")?.parse::<u64>().ok()?)
     }
 
-    /// Address of the socket, as a page would have it.
+    /// Address of the WebSocket for a page.
     pub(crate) fn socket(&self) -> String {
         self.address.replace("http://", "ws://").replace("/?", "/socket?")
     }
@@ -51,7 +51,7 @@ impl Drop for View {
     }
 }
 
-/// Runs a command line as a shell does, with this program as `photoncard`.
+/// Runs a command line in a shell, with this program as `photoncard`.
 pub(crate) fn run_shown(room: &Room, line: &str) {
     let folder = std::path::Path::new(env!("CARGO_BIN_EXE_photoncard")).parent().unwrap();
     let path = std::env::join_paths(
@@ -63,7 +63,7 @@ pub(crate) fn run_shown(room: &Room, line: &str) {
     assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Serves one page, to whoever asks, on a port of its own: another origin. Returns its address.
+/// Serves a page to everyone on a port of its own, which makes it another origin. Returns its address.
 pub(crate) fn serve_page(page: String) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/", listener.local_addr().unwrap());
@@ -75,7 +75,7 @@ pub(crate) fn serve_page(page: String) -> String {
     address
 }
 
-/// Answers one request; a browser may also connect and ask nothing.
+/// Answers one request. A browser may also connect without a request.
 fn answer(mut stream: TcpStream, page: &str) {
     stream.set_read_timeout(Some(Duration::from_millis(500))).unwrap();
     if matches!(stream.read(&mut [0; 4096]), Ok(1..)) {
