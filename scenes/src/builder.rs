@@ -1,4 +1,4 @@
-//! Builder of glTF files from meshes, materials, nodes and cameras.
+//! Builds glTF files from meshes, materials, nodes and cameras.
 
 use base64::Engine;
 use glam::{Mat3, Quat, Vec2, Vec3};
@@ -10,7 +10,7 @@ use crate::document::{
 use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// glTF's constants for component types, targets of buffer views, and the filter of samplers.
+/// Constants of glTF: component types, targets of buffer views, and filters of samplers.
 const UNSIGNED_BYTE: u32 = 5121;
 const UNSIGNED_SHORT: u32 = 5123;
 const UNSIGNED_INT: u32 = 5125;
@@ -19,7 +19,7 @@ const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 const LINEAR: u32 = 9729;
 
-/// Vertices and indices that are in the file, for use by any number of meshes.
+/// Vertices and indices in the file, which any number of meshes may use.
 #[derive(Clone, Copy, Debug)]
 pub struct Geometry {
     pub(crate) attributes: PrimitiveAttributes,
@@ -27,12 +27,13 @@ pub struct Geometry {
     mode: Option<u32>,
 }
 
-/// Topology of vertices without indices: glTF's `mode`.
+/// Topology of vertices without indices (glTF's `mode`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Joined {
-    /// `TRIANGLE_STRIP`: each vertex with the two before it, every other triangle turned.
+    /// `TRIANGLE_STRIP`: each vertex forms a triangle with the two before it; every other triangle has the
+    /// opposite order.
     Strip,
-    /// `TRIANGLE_FAN`: each vertex with the one before it and the first.
+    /// `TRIANGLE_FAN`: each vertex forms a triangle with the previous one and the first.
     Fan,
 }
 
@@ -45,7 +46,7 @@ impl Joined {
     }
 }
 
-/// Wrap mode of texture coordinates beyond the image's border.
+/// Wrap mode: the image beyond texture coordinates 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {
     /// The image repeated (`REPEAT`).
@@ -66,7 +67,7 @@ impl Wrap {
     }
 }
 
-/// A pinhole camera.
+/// Pinhole camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Camera {
     /// Position of the eye, metres.
@@ -80,7 +81,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Axes of the node: a glTF camera looks along its own -z with +y up.
+    /// Axes of the node. A glTF camera looks along -z of its node, with +y up.
     fn axes(&self) -> [Vec3; 3] {
         let back = self.eye - self.target;
         // Divided rather than normalised, so that coordinate axes stay exact.
@@ -90,13 +91,11 @@ impl Camera {
         [right, back.cross(right), back]
     }
 
-    /// The node's rotation.
     pub(crate) fn rotation(&self) -> Quat {
         let [right, up, back] = self.axes();
         Quat::from_mat3(&Mat3::from_cols(right, up, back))
     }
 
-    /// The node's matrix.
     fn matrix(&self) -> [f32; 16] {
         let [right, up, back] = self.axes();
         let mut matrix = [0.0; 16];
@@ -109,7 +108,7 @@ impl Camera {
     }
 }
 
-/// A glTF file under construction.
+/// glTF file under construction.
 #[derive(Clone, Debug, Default)]
 pub struct SceneBuilder {
     pub(crate) document: Document,
@@ -131,7 +130,7 @@ impl SceneBuilder {
         self.document.images.len() - 1
     }
 
-    /// Adds a texture of an image, with bilinear filter and without mipmaps; returns its index.
+    /// Adds a texture with a bilinear filter and without mipmaps; returns its index.
     pub fn texture(&mut self, image: usize, [wrap_s, wrap_t]: [Wrap; 2]) -> usize {
         let sampler = Sampler {
             mag_filter: LINEAR,
@@ -145,7 +144,7 @@ impl SceneBuilder {
         self.document.textures.len() - 1
     }
 
-    /// Adds the vertices and indices of a mesh, with indices of 16 bits if they suffice, else 32.
+    /// Adds the vertices and indices of a mesh. Indices have 16 bits if these suffice, else 32.
     pub fn geometry(&mut self, mesh: &Mesh) -> Geometry {
         let attributes = self.attributes(mesh);
         let indices = mesh.triangles.iter().flatten();
@@ -160,14 +159,15 @@ impl SceneBuilder {
         Geometry { attributes, indices, mode: None }
     }
 
-    /// Adds the vertices of a mesh without indices, joined in their order; the mesh's triangles are ignored.
+    /// Adds the vertices of a mesh without indices, which `joined` connects in their order. The triangles of
+    /// the mesh are ignored.
     pub fn joined(&mut self, mesh: &Mesh, joined: Joined) -> Geometry {
         let attributes = self.attributes(mesh);
         Geometry { attributes, indices: None, mode: Some(joined.mode()) }
     }
 
-    /// Adds the attributes of a mesh's vertices. Normals that equal the positions, as on a unit sphere, share
-    /// their accessor.
+    /// Adds the attributes of a mesh's vertices. Normals share the accessor of the positions if they are
+    /// equal, as on a unit sphere.
     fn attributes(&mut self, mesh: &Mesh) -> PrimitiveAttributes {
         let (min, max) = mesh.bounds();
         let position = self.vectors(mesh.positions.iter().map(Vec3::to_array), "VEC3");
@@ -188,7 +188,7 @@ impl SceneBuilder {
         attributes
     }
 
-    /// Adds an attribute of vertices.
+    /// Adds an accessor for a vertex attribute.
     pub(crate) fn vectors<const N: usize>(
         &mut self,
         values: impl ExactSizeIterator<Item = [f32; N]>,
@@ -199,13 +199,13 @@ impl SceneBuilder {
         self.accessor(bytes, Some(ARRAY_BUFFER), FLOAT, count, kind)
     }
 
-    /// Adds numbers of no vertices, `count` elements of them.
+    /// Adds an accessor of `count` elements that are no vertex attribute.
     pub(crate) fn numbers(&mut self, values: &[f32], count: usize, kind: &'static str) -> usize {
         let bytes = values.iter().copied().flat_map(f32::to_le_bytes).collect();
         self.accessor(bytes, None, FLOAT, count, kind)
     }
 
-    /// Adds joints of vertices, four of each.
+    /// Adds an accessor for joints, four per vertex.
     pub(crate) fn joints(&mut self, joints: &[[u8; 4]]) -> usize {
         self.accessor(joints.as_flattened().to_vec(), Some(ARRAY_BUFFER), UNSIGNED_BYTE, joints.len(), "VEC4")
     }
@@ -232,7 +232,7 @@ impl SceneBuilder {
         self.document.buffer_views.len() - 1
     }
 
-    /// Adds a mesh of parts, each a geometry and the index of its material; returns the mesh's index.
+    /// Adds a mesh; returns its index. Each part is a geometry with the index of its material.
     pub fn mesh(&mut self, name: &str, parts: &[(Geometry, usize)]) -> usize {
         let primitives = parts.iter().map(|&(geometry, material)| Primitive {
             attributes: geometry.attributes,
@@ -245,7 +245,7 @@ impl SceneBuilder {
         self.document.meshes.len() - 1
     }
 
-    /// Adds a node that is to be the child of another; returns its index.
+    /// Adds a node that will be the child of another; returns its index.
     pub fn node(&mut self, node: Node) -> usize {
         self.document.nodes.push(node);
         self.document.nodes.len() - 1
@@ -258,26 +258,26 @@ impl SceneBuilder {
         index
     }
 
-    /// Adds a root node with `mesh` in `material`; mesh and node have one name.
+    /// Adds a mesh with a material, and a root node for it. Both have this name.
     pub fn object(&mut self, name: &str, mesh: &Mesh, material: usize) {
         let geometry = self.geometry(mesh);
         self.placed(name, geometry, material);
     }
 
-    /// [`Self::object`] with a geometry that is in the file.
+    /// [`Self::object`] for a geometry that is in the file already.
     pub fn placed(&mut self, name: &str, geometry: Geometry, material: usize) {
         let mesh = Some(self.mesh(name, &[(geometry, material)]));
         self.root(Node { name: name.into(), mesh, ..Node::default() });
     }
 
-    /// Adds a camera and its root node, both with one name.
+    /// Adds a camera and a root node for it. Both have this name.
     pub fn camera(&mut self, name: &str, camera: &Camera) {
         let index = self.lens(name, camera);
         let matrix = Some(camera.matrix());
         self.root(Node { name: name.into(), camera: Some(index), matrix, ..Node::default() });
     }
 
-    /// Adds a camera without its node; returns its index.
+    /// Adds a camera without a node; returns its index.
     pub(crate) fn lens(&mut self, name: &str, camera: &Camera) -> usize {
         let (aspect_ratio, yfov) = (camera.aspect_ratio, camera.yfov);
         let perspective = Perspective { aspect_ratio, yfov, znear: 0.001, zfar: 1000.0 };
@@ -299,7 +299,7 @@ impl SceneBuilder {
         (self.document, self.binary)
     }
 
-    /// The scene as one `.gltf` file with its buffer embedded.
+    /// Encodes the scene as one `.gltf` file with an embedded buffer.
     pub fn into_gltf(self) -> Vec<u8> {
         let encoded = base64::engine::general_purpose::STANDARD.encode(&self.binary);
         let (document, _) = self.finish(Some(format!("data:application/octet-stream;base64,{encoded}")));
@@ -308,7 +308,7 @@ impl SceneBuilder {
         json
     }
 
-    /// The scene as one `.glb` file.
+    /// Encodes the scene as one `.glb` file.
     pub fn into_glb(self) -> Vec<u8> {
         let (document, binary) = self.finish(None);
         let mut json = serde_json::to_vec(&document).expect("the document has only string keys");

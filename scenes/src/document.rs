@@ -1,11 +1,11 @@
-//! The part of glTF 2.0's JSON that the scenes use.
+//! Subset of the JSON of glTF 2.0 that the scenes use.
 //!
-//! Plain structs rather than `serde_json::Value`, so that the order of the keys, and with it every
-//! byte of the file, does not depend on how `serde_json` was built.
+//! Plain structs replace `serde_json::Value`, so that the order of keys, and thus every byte of the file,
+//! does not depend on the features of `serde_json`.
 
 use serde::Serialize;
 
-/// The top-level object of a glTF file.
+/// Top-level object of a glTF file.
 #[derive(Clone, Debug, Default, Serialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Document {
@@ -52,7 +52,7 @@ pub(crate) struct Roots {
     pub(crate) nodes: Vec<usize>,
 }
 
-/// A node of the hierarchy: a mesh, a camera or a light, with its transform and its children.
+/// Node of the hierarchy: a mesh, a camera or a light, with its transform and its children.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Node {
     pub(crate) name: String,
@@ -111,7 +111,7 @@ pub(crate) struct PrimitiveAttributes {
     pub(crate) weights_0: Option<usize>,
 }
 
-/// Displacements of a primitive's vertices.
+/// Morph target: displacements of a primitive's vertices.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[serde(rename_all = "UPPERCASE")]
 pub(crate) struct MorphTarget {
@@ -222,7 +222,7 @@ pub(crate) struct Volume {
     pub(crate) attenuation_color: [f64; 3],
 }
 
-/// Reference of a material to a texture, with its transform (`textureInfo`).
+/// Reference to a texture with its transform (`textureInfo`).
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(crate) struct TextureInfo {
     pub(crate) index: usize,
@@ -241,9 +241,9 @@ pub(crate) struct TextureExtensions {
 pub struct TextureTransform {
     /// Offset, in widths and heights of the image.
     pub offset: [f64; 2],
-    /// Rotation, radians, counterclockwise where the second coordinate grows downwards.
+    /// Rotation, radians, counter-clockwise if the second coordinate grows downwards.
     pub rotation: f64,
-    /// Scale: repetitions of the image in one unit of each coordinate.
+    /// Scale: repetitions of the image per unit of each coordinate.
     pub scale: [f64; 2],
 }
 
@@ -280,7 +280,7 @@ pub(crate) struct PhotoncardExtras {
     pub(crate) phong: Phong,
 }
 
-/// One Phong cosine lobe: `ks (n + 2) / (2 pi) cos^n(alpha)`.
+/// Phong cosine lobe: `ks (n + 2) / (2 pi) cos^n(alpha)`.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Phong {
     /// `ks`: albedo of the lobe, red, green and blue.
@@ -382,7 +382,7 @@ pub(crate) struct Lights {
     pub(crate) lights: Vec<PointLight>,
 }
 
-/// Light of `KHR_lights_punctual` that shines alike in all directions.
+/// Point light of `KHR_lights_punctual`, with equal intensity in all directions.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct PointLight {
     #[serde(rename = "type")]

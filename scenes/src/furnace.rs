@@ -1,4 +1,4 @@
-//! White furnace test: a closed cube whose walls all emit and reflect alike.
+//! White furnace: a closed cube whose walls emit and reflect equally.
 //!
 //! Radiance is uniform in every position and direction: `L = 1 + 0.5 L`, so `L = 2`.
 
@@ -8,7 +8,7 @@ use crate::builder::{Camera, SceneBuilder};
 use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// The inside of a cube: a box between swapped corners has its front inside.
+/// Cube that faces inwards, because the corners of the box are swapped.
 fn room() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.cuboid(Vec3::ONE, Vec3::NEG_ONE);

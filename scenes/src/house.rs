@@ -1,5 +1,5 @@
-//! A house of one room on open ground, with a window, for an environment: most of the sky's light falls
-//! beside the window.
+//! House of one room with a window, on open ground, for an environment: most of the sky's light does not
+//! reach the window.
 
 use glam::Vec3;
 
@@ -9,14 +9,15 @@ use crate::mesh::Mesh;
 
 /// Lower and upper corner of the room, metres.
 const ROOM: [Vec3; 2] = [Vec3::new(-2.5, 0.0, -2.0), Vec3::new(2.5, 2.6, 2.0)];
-/// Lower and upper corner of the window in the wall towards -z, where the sun of `sky.exr` is,, metres.
+/// Lower and upper corner of the window, metres. It is in the wall towards -z, on the side of the sun of
+/// `sky.exr`.
 const WINDOW: [[f32; 2]; 2] = [[-0.9, 0.9], [0.5, 2.1]];
 /// Thickness of walls, floor and ceiling, metres.
 const THICKNESS: f32 = 0.2;
-/// Half the side of the ground, metres, and its height.
+/// Half the side of the ground, and its height, metres.
 const GROUND: [f32; 2] = [15.0, -0.1];
 
-/// Lower and upper corners of furniture: a table's top, its two sides and a chest, metres.
+/// Lower and upper corner of each piece of furniture, metres: a table's top, its two sides, and a chest.
 const FURNITURE: [[[f32; 3]; 2]; 4] = [
     [[-0.7, 0.7, -0.5], [0.9, 0.75, 0.4]],
     [[-0.65, 0.0, -0.45], [-0.6, 0.7, 0.35]],
@@ -24,7 +25,7 @@ const FURNITURE: [[[f32; 3]; 2]; 4] = [
     [[-2.4, 0.0, 1.3], [-1.3, 0.9, 1.9]],
 ];
 
-/// The whole scene as a `.glb` file.
+/// Scene as a `.glb` file.
 pub(crate) fn house() -> Vec<u8> {
     let mut scene = SceneBuilder::default();
     let ground = scene.material(&Material::diffuse("ground", [0.25, 0.28, 0.16]));
@@ -60,7 +61,7 @@ fn lawn() -> Mesh {
     mesh
 }
 
-/// Walls and ceiling. The wall with the window is of four parts around it.
+/// Walls and ceiling. The wall with the window consists of four parts around it.
 fn walls() -> Mesh {
     let [lower, upper] = ROOM;
     let [inner, outer] = [lower, upper + THICKNESS];

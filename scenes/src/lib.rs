@@ -1,14 +1,14 @@
 //! Generators of the scenes that ship with photoncard.
 //!
-//! [`scenes`] returns all files, equal on every machine; a test compares them with the files beside this
-//! crate. `README.md` beside them describes each scene.
+//! [`scenes`] returns all files, with equal bytes on every machine. A test compares them with the files in
+//! the folder of this crate, whose `README.md` describes each scene.
 //!
 //! | module | contents |
 //! |---|---|
 //! | [`mesh`], `sphere` | triangle meshes and operations on them |
-//! | [`material`] | reflection, transmission and emission, as glTF states them |
+//! | [`material`] | reflection, transmission and emission as in glTF |
 //! | [`document`], [`builder`] | glTF's JSON, and its assembly from meshes, materials, nodes and cameras |
-//! | `motion` | animations, and what they move: cameras, lights, joints and morph targets |
+//! | `motion` | animations of cameras, lights, joints and morph targets |
 //! | `cornell`, `furnace`, `atrium`, `room`, `roughness`, `house` | one module for each scene and its variants |
 //! | `sky` | environment map for `atrium-open.glb` and `house.glb` |
 //!
@@ -38,7 +38,7 @@ pub struct SceneFile {
     pub bytes: Vec<u8>,
 }
 
-/// Files of all scenes, and of the sky that lights `atrium-open.glb` and `house.glb`.
+/// All scenes, and the sky that lights `atrium-open.glb` and `house.glb`.
 pub fn scenes() -> Vec<SceneFile> {
     vec![
         SceneFile { name: "cornell.gltf", bytes: cornell::lambertian() },

@@ -1,4 +1,4 @@
-//! Writes the scenes that ship into the folder of the first argument, by default the folder of this crate.
+//! Writes the shipped scenes into the folder of the first argument, by default the folder of this crate.
 
 use std::path::PathBuf;
 use std::process::ExitCode;

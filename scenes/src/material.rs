@@ -1,4 +1,4 @@
-//! Materials: reflection, transmission and emission of surfaces, as glTF states them.
+//! Materials: reflection, transmission and emission of surfaces as in glTF.
 
 use crate::document::{
     EmissiveStrength, Extensions, Extras, IndexOfRefraction, MaterialEntry, MetallicRoughness, Phong,
@@ -10,7 +10,7 @@ use crate::document::{
 pub struct Material {
     name: String,
     base_colour: [f64; 3],
-    /// Metallic factor and roughness; `None` is Lambertian.
+    /// Metallic factor and roughness; `None` for a Lambertian material.
     microfacets: Option<[f64; 2]>,
     glass: Option<Glass>,
     radiance: [f64; 3],
@@ -21,78 +21,78 @@ pub struct Material {
     alpha_cutoff: Option<f64>,
 }
 
-/// Medium of a clear, smooth body.
+/// Medium of a clear, smooth solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Glass {
     /// Index of refraction.
     pub ior: f64,
-    /// Approximate thickness of the body, metres, for renderers that do not trace through it.
+    /// Approximate thickness of the solid, metres, for renderers that do not trace rays through it.
     pub thickness: f64,
     /// Transmittance over `attenuation_distance`, red, green and blue.
     pub attenuation_colour: [f64; 3],
-    /// Distance that `attenuation_colour` is for, metres.
+    /// Distance over which the transmittance is `attenuation_colour`, metres.
     pub attenuation_distance: f64,
 }
 
 impl Material {
-    /// A purely Lambertian material of an albedo, red, green and blue.
+    /// Creates a Lambertian material with this albedo, red, green and blue.
     pub fn diffuse(name: &str, albedo: [f64; 3]) -> Self {
         Self { name: name.into(), base_colour: albedo, ..Self::default() }
     }
 
-    /// A material of glTF's metallic-roughness model; a metal of roughness 0 is a mirror.
+    /// Creates a material of glTF's metallic-roughness model. A metal of roughness 0 is a mirror.
     pub fn metallic_roughness(name: &str, base_colour: [f64; 3], metallic: f64, roughness: f64) -> Self {
         Self { microfacets: Some([metallic, roughness]), ..Self::diffuse(name, base_colour) }
     }
 
-    /// The surface of a clear, smooth body.
+    /// Creates the surface of a clear, smooth solid.
     pub fn glass(name: &str, glass: Glass) -> Self {
         Self { glass: Some(glass), ..Self::metallic_roughness(name, [1.0; 3], 0.0, 0.0) }
     }
 
-    /// This material with an emitted radiance, W/(sr m^2).
+    /// Sets the emitted radiance, W/(sr m^2).
     #[must_use]
     pub fn emitting(mut self, radiance: [f64; 3]) -> Self {
         self.radiance = radiance;
         self
     }
 
-    /// This material on both sides.
+    /// Makes the material double-sided.
     #[must_use]
     pub fn double_sided(mut self) -> Self {
         self.double_sided = true;
         self
     }
 
-    /// This material with an additional Phong lobe.
+    /// Adds a Phong lobe.
     #[must_use]
     pub fn with_phong(mut self, phong: Phong) -> Self {
         self.phong = Some(phong);
         self
     }
 
-    /// This material with its base colour multiplied by a texture.
+    /// Multiplies the base colour by a texture.
     #[must_use]
     pub fn textured(mut self, texture: usize, transform: Option<TextureTransform>) -> Self {
         self.base_texture = Some(info(texture, transform));
         self
     }
 
-    /// This material with its radiance multiplied by a texture.
+    /// Multiplies the emitted radiance by a texture.
     #[must_use]
     pub fn emission_textured(mut self, texture: usize) -> Self {
         self.emissive_texture = Some(info(texture, None));
         self
     }
 
-    /// This material, cut out where the base texture's alpha is below `cutoff`.
+    /// Cuts the surface out where the alpha of the base texture is below `cutoff`.
     #[must_use]
     pub fn cut_out(mut self, cutoff: f64) -> Self {
         self.alpha_cutoff = Some(cutoff);
         self
     }
 
-    /// glTF's `emissiveFactor`, at most 1, and the strength that it is multiplied by for a higher radiance.
+    /// glTF's `emissiveFactor`, at most 1, and for a higher radiance the strength that multiplies it.
     fn emission(&self) -> (Option<[f64; 3]>, Option<EmissiveStrength>) {
         let peak = self.radiance.into_iter().fold(0.0, f64::max);
         if peak == 0.0 {

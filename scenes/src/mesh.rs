@@ -1,20 +1,20 @@
-//! Triangle meshes, and the operations that make the scenes' shapes.
+//! Triangle meshes, and the operations that build the shapes of the scenes.
 //!
-//! Front faces are counterclockwise. Shapes share vertices along their inner edges, so they have no cracks;
-//! sines and cosines come from `libm`, so that every machine computes equal bits.
+//! Front faces are counter-clockwise. Shapes share vertices along inner edges, so that they have no cracks.
+//! Sines and cosines come from `libm`, so that every machine computes equal bits.
 
 use glam::{Vec2, Vec3};
 
-/// A mesh of indexed triangles.
+/// Mesh of indexed triangles.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Positions of the vertices, metres.
     pub positions: Vec<Vec3>,
-    /// Indices of the three vertices of each triangle, counterclockwise from the front.
+    /// Indices of the three vertices of each triangle, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
     /// Unit normals of the vertices; empty for a flat surface.
     pub normals: Vec<Vec3>,
-    /// Texture coordinates of the vertices, the second downwards in the image; empty without a texture.
+    /// Texture coordinates of the vertices, the second one downwards; empty without a texture.
     pub coordinates: Vec<Vec2>,
     /// Colours of the vertices, linear red, green and blue; empty if they are white.
     pub colours: Vec<[f32; 3]>,
@@ -40,32 +40,32 @@ impl Mesh {
         }
     }
 
-    /// Adds the quadrilateral between four vertices, cut from the first to the third.
+    /// Adds a quadrilateral of two triangles, divided from its first to its third vertex.
     fn quad_between(&mut self, [a, b, c, d]: [u32; 4]) {
         self.triangle([a, b, c]);
         self.triangle([a, c, d]);
     }
 
-    /// Adds a planar quadrilateral with vertices of its own.
+    /// Adds a planar quadrilateral with its own vertices.
     pub fn quad(&mut self, corners: [Vec3; 4]) {
         let corners = corners.map(|corner| self.vertex(corner));
         self.quad_between(corners);
     }
 
-    /// [`Self::quad`] with texture coordinates, which a mesh has everywhere or nowhere.
+    /// [`Self::quad`] with texture coordinates. Either all or no vertices of a mesh must have them.
     pub fn textured_quad(&mut self, corners: [Vec3; 4], coordinates: [[f32; 2]; 4]) {
         self.quad(corners);
         self.coordinates.extend(coordinates.map(Vec2::from_array));
     }
 
-    /// Adds a triangle with vertices of its own.
+    /// Adds a triangle with its own vertices.
     pub fn lone_triangle(&mut self, corners: [Vec3; 3]) {
         let corners = corners.map(|corner| self.vertex(corner));
         self.triangle(corners);
     }
 
-    /// Adds an upright prism: sides, top and bottom. `footprint` holds x and z, counterclockwise as
-    /// seen from above.
+    /// Adds an upright prism: sides, top and bottom. `footprint` has x and z of the corners,
+    /// counter-clockwise seen from above.
     pub fn prism(&mut self, footprint: [[f32; 2]; 4], bottom: f32, top: f32) {
         let at = |corner: usize, y: f32| Vec3::new(footprint[corner][0], y, footprint[corner][1]);
         for [from, to] in [[0, 1], [2, 3], [1, 2], [3, 0]] {
@@ -81,18 +81,18 @@ impl Mesh {
         self.prism(footprint, min.y, max.y);
     }
 
-    /// Adds a box of half-width `half` in x and z about the y axis.
+    /// Adds a box centred on the y axis, of half-width `half` in x and z.
     pub fn block(&mut self, half: f32, bottom: f32, top: f32) {
         self.cuboid(Vec3::new(-half, bottom, -half), Vec3::new(half, top, half));
     }
 
-    /// Adds a grid of `columns` by `rows` vertices; the front is on the side of (along a row) x (along a
-    /// column). `wrap` joins the last column to the first, the last row to the first, or both.
+    /// Adds a grid of `columns` by `rows` vertices. Its front faces along (direction of a row) x (direction
+    /// of a column). `wrap` joins the last column to the first, the last row to the first, or both.
     pub fn grid(&mut self, size: [usize; 2], wrap: [bool; 2], point: impl Fn(usize, usize) -> Vec3) {
         self.grid_cut(size, wrap, point, |_, _| false);
     }
 
-    /// [`Self::grid`] with the cells for which `other_cut` returns true cut along their other diagonal.
+    /// [`Self::grid`] whose cells are divided along the other diagonal where `other_cut` returns true.
     pub fn grid_cut(
         &mut self,
         [columns, rows]: [usize; 2],
@@ -121,8 +121,8 @@ impl Mesh {
         }
     }
 
-    /// Adds a surface of revolution about the y axis. `profile` holds radius and height, upwards on the
-    /// outside; where it begins and ends on the axis the solid is closed.
+    /// Adds a surface of revolution about the y axis. `profile` has radius and height, upwards on the
+    /// outside. If it begins and ends on the axis, the solid is closed.
     pub fn lathe(&mut self, segments: usize, profile: &[[f32; 2]]) {
         self.fluted_lathe(segments, profile, |_, _| 1.0);
     }
@@ -142,7 +142,7 @@ impl Mesh {
         });
     }
 
-    /// Adds the whole of another mesh, moved by `offset`.
+    /// Appends another mesh, moved by `offset`.
     pub fn append(&mut self, other: &Self, offset: Vec3) {
         let first = self.positions.len() as u32;
         self.positions.extend(other.positions.iter().map(|&p| p + offset));
@@ -152,7 +152,7 @@ impl Mesh {
         self.triangles.extend(other.triangles.iter().map(|corners| corners.map(|index| first + index)));
     }
 
-    /// The mesh after a quarter turn about the y axis, from +z towards +x.
+    /// Rotates the mesh by a quarter turn about the y axis, from +z towards +x.
     #[must_use]
     pub fn quarter_turn(mut self) -> Self {
         for p in &mut self.positions {
@@ -164,7 +164,7 @@ impl Mesh {
         self
     }
 
-    /// Gives each vertex the normal of the triangles around it, weighted by their areas.
+    /// Computes the normal of each vertex as the area-weighted mean of the triangles around it.
     #[must_use]
     pub fn smooth(mut self) -> Self {
         let mut sums = vec![Vec3::ZERO; self.positions.len()];
@@ -185,7 +185,7 @@ impl Mesh {
     }
 }
 
-/// The point at `index / count` of the unit circle, from +x towards +y.
+/// Point at `index / count` of the unit circle, from +x towards +y.
 pub fn on_circle(index: usize, count: usize) -> Vec2 {
     let angle = core::f32::consts::TAU * index as f32 / count as f32;
     Vec2::new(libm::cosf(angle), libm::sinf(angle))

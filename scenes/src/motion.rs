@@ -1,4 +1,4 @@
-//! Motion: animations, cameras and lights whose nodes move, skins, and morph targets.
+//! Animations, cameras and lights on nodes that move, skins, and morph targets.
 
 use glam::{Mat4, Quat, Vec3};
 
@@ -8,18 +8,18 @@ use crate::document::{
     NodeExtensions, PointLight, RootExtensions, Skin,
 };
 
-/// Values between keyframes.
+/// Interpolation between keyframes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Between {
-    /// The value of the keyframe before.
+    /// Value of the previous keyframe (`STEP`).
     Step,
-    /// Straight from one to the next.
+    /// Linear interpolation between the keyframes.
     Linear,
-    /// A curve, along whose keyframes the tangent is that of the chord between the neighbours.
+    /// Cubic spline whose tangent at a keyframe is the slope of the chord between its neighbours.
     Smooth,
 }
 
-/// Property of a node that moves, with its value at each keyframe.
+/// Animated property of a node, with its value at each keyframe.
 pub(crate) enum Values {
     Translations(Vec<Vec3>),
     Rotations(Vec<Quat>),
@@ -27,7 +27,7 @@ pub(crate) enum Values {
     Weights(Vec<f32>),
 }
 
-/// A property of a node at keyframes of equal distance in time, from 0 on.
+/// Property of a node at equidistant keyframes, from time 0.
 pub(crate) struct Track {
     pub(crate) node: usize,
     pub(crate) values: Values,
@@ -63,7 +63,7 @@ impl Values {
     }
 }
 
-/// Rotations with the sign by which each is near the one before.
+/// Rotations whose signs are chosen so that consecutive quaternions are close.
 fn on_one_side(rotations: &[Quat]) -> impl Iterator<Item = Quat> {
     rotations.iter().scan(None, |before: &mut Option<Quat>, &rotation| {
         let is_opposite = before.is_some_and(|before| before.dot(rotation) < 0.0);
@@ -113,7 +113,7 @@ impl SceneBuilder {
         KeyframeSampler { input, output: self.numbers(&numbers, of_each * values.len(), kind), interpolation }
     }
 
-    /// Adds a camera whose node can move; returns the node.
+    /// Adds a camera whose node can be animated; returns the node.
     pub(crate) fn moving_camera(&mut self, name: &str, camera: &Camera) -> usize {
         let (lens, rotation) = (self.lens(name, camera), camera.rotation().to_array());
         self.root(Node {
@@ -125,7 +125,7 @@ impl SceneBuilder {
         })
     }
 
-    /// Adds a point light without its node: what makes a node shine.
+    /// Adds a point light. Returns the extension for the node that emits it.
     pub(crate) fn point_light(&mut self, name: &str, color: [f64; 3], intensity: f64) -> NodeExtensions {
         let extensions = &mut self.document.extensions;
         let lights =
@@ -134,7 +134,7 @@ impl SceneBuilder {
         NodeExtensions { light: LightIndex { light: lights.len() - 1 } }
     }
 
-    /// Adds a skin of joints, whose nodes stand at these places when it is bound; returns its index.
+    /// Adds a skin; returns its index. Joints are nodes with their positions in the bind pose.
     pub(crate) fn skin(&mut self, joints: &[(usize, Vec3)]) -> usize {
         let inverse = joints.iter().flat_map(|(_, place)| Mat4::from_translation(-*place).to_cols_array());
         let inverse: Vec<f32> = inverse.map(|number| number + 0.0).collect();
@@ -144,7 +144,7 @@ impl SceneBuilder {
         self.document.skins.len() - 1
     }
 
-    /// Gives vertices the first two joints of a skin: each has the share of the second one.
+    /// Binds vertices to the first two joints of a skin. `shares` are the weights of the second one.
     pub(crate) fn hung(&mut self, mut geometry: Geometry, shares: &[f32]) -> Geometry {
         geometry.attributes.joints_0 = Some(self.joints(&vec![[0, 1, 0, 0]; shares.len()]));
         let weights = shares.iter().map(|share| [1.0 - share, *share, 0.0, 0.0]);
@@ -152,7 +152,7 @@ impl SceneBuilder {
         geometry
     }
 
-    /// Gives the only primitive of a mesh a morph target.
+    /// Adds a morph target to the only primitive of a mesh.
     pub(crate) fn morph_target(&mut self, mesh: usize, displacements: &[Vec3]) {
         let position = self.vectors(displacements.iter().map(Vec3::to_array), "VEC3");
         let extent = |fold: fn(Vec3, Vec3) -> Vec3, from: Vec3| {

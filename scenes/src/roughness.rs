@@ -1,4 +1,4 @@
-//! Ten balls on the ground beneath a lamp: metals and dielectrics, from nearly smooth to rough.
+//! Ten balls on the ground under a lamp: metals and dielectrics, from nearly smooth to rough.
 
 use glam::Vec3;
 

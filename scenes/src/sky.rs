@@ -1,6 +1,6 @@
-//! A clear sky as an equirectangular map: blue overhead, bright at the horizon, with a soft sun.
+//! Clear sky as an equirectangular map: blue at the zenith, bright at the horizon, with a soft sun.
 //!
-//! The centre of the map is -z and its top +y, as photoncard's option `--environment` takes it.
+//! The centre of the map is -z and its top is +y, as the option `--environment` of photoncard expects.
 
 use std::io::Cursor;
 
@@ -9,13 +9,13 @@ use glam::Vec3;
 
 const SIZE: [usize; 2] = [128, 64];
 
-/// Radiance at the zenith, at the horizon, and of the ground below it, W/(sr m^2).
+/// Radiance at the zenith, at the horizon, and of the ground, W/(sr m^2).
 const ZENITH: Vec3 = Vec3::new(0.30, 0.62, 1.40);
 const HORIZON: Vec3 = Vec3::new(1.35, 1.50, 1.70);
 const GROUND: Vec3 = Vec3::new(0.22, 0.19, 0.15);
 
-/// Direction of the sun; its radiance at the centre, W/(sr m^2); and the angle at which `1/e` of that is
-/// left, radians.
+/// Direction of the sun, the radiance at its centre, W/(sr m^2), and the angle from it at which the radiance
+/// has fallen to `1/e`, radians.
 const SUN: Vec3 = Vec3::new(-0.55, 0.75, -0.6);
 const SUN_RADIANCE: Vec3 = Vec3::new(1100.0, 900.0, 620.0);
 const SUN_WIDTH: f32 = 0.06;
@@ -38,7 +38,7 @@ fn direction(column: usize, row: usize) -> Vec3 {
     Vec3::new(sine * libm::sinf(phi), cosine, -sine * libm::cosf(phi))
 }
 
-/// The map as an `OpenEXR` file of half floats.
+/// Map as an `OpenEXR` file with half-precision samples.
 pub(crate) fn sky() -> Vec<u8> {
     let channels = SpecificChannels::rgb(|place: exr::prelude::Vec2<usize>| {
         let [red, green, blue] = radiance(direction(place.x(), place.y())).to_array().map(f16::from_f32);

@@ -1,4 +1,4 @@
-//! A sphere of nearly equal triangles.
+//! Sphere of nearly equal triangles.
 
 use std::collections::HashMap;
 
@@ -6,7 +6,8 @@ use glam::Vec3;
 
 use crate::mesh::Mesh;
 
-/// Faces of an icosahedron, as indices of the vertices of [`icosahedron`], counterclockwise from outside.
+/// Faces of an icosahedron, as indices of the vertices of [`icosahedron`], counter-clockwise seen from
+/// outside.
 const FACES: [[u32; 3]; 20] = [
     [0, 11, 5],
     [0, 5, 1],
@@ -30,7 +31,8 @@ const FACES: [[u32; 3]; 20] = [
     [9, 8, 1],
 ];
 
-/// The smooth unit sphere about the origin: an icosahedron, each triangle cut into four `subdivisions` times.
+/// Smooth unit sphere about the origin: an icosahedron whose triangles are divided into four, `subdivisions`
+/// times.
 pub(crate) fn icosphere(subdivisions: u32) -> Mesh {
     let mut mesh = icosahedron();
     for _ in 0..subdivisions {

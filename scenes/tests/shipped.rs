@@ -1,4 +1,4 @@
-//! The shipped scenes equal the generators' output, and are valid.
+//! Shipped scenes equal the generators' output, and are valid.
 
 use std::fs;
 use std::path::Path;
@@ -9,7 +9,7 @@ use gltf::buffer::Source;
 use gltf::mesh::Mode;
 use gltf::{Gltf, Node, Primitive};
 
-/// Name of each scene, its range of triangles, and its cameras.
+/// Name of each scene, the range of its number of triangles, and its cameras.
 const EXPECTED: [(&str, std::ops::RangeInclusive<usize>, &[&str]); 12] = [
     ("cornell.gltf", 36..=36, &["camera"]),
     ("cornell-glossy.gltf", 36..=36, &["camera", "floor"]),
@@ -51,7 +51,7 @@ fn joined<'a>(primitive: &Primitive<'_>, indices: &'a [u32]) -> Box<dyn Iterator
     }
 }
 
-/// Adds the triangles of a node and its descendants, in world space.
+/// Adds the triangles of a node and its descendants in world space.
 fn collect(node: &Node<'_>, parent: Mat4, data: &[u8], triangles: &mut Vec<[Vec3; 3]>) {
     let transform = parent * Mat4::from_cols_array_2d(&node.transform().matrix());
     for primitive in node.mesh().iter().flat_map(gltf::Mesh::primitives) {
@@ -78,7 +78,7 @@ fn triangles(file: &Gltf) -> Vec<[Vec3; 3]> {
 }
 
 #[test]
-fn shipped_files_are_what_the_generator_makes() {
+fn shipped_files_equal_the_generators_output() {
     let scenes = photoncard_scenes::scenes();
     // One of them is the sky, which is no scene of its own.
     assert_eq!(scenes.len(), EXPECTED.len() + 1);

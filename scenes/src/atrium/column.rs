@@ -1,9 +1,9 @@
-//! Columns, pedestals and balusters, turned about the y axis.
+//! Columns, pedestals and balusters, which are surfaces of revolution about the y axis.
 
 use super::dimensions::{EMBED, GALLERY_FLOOR, GROUND_SPRINGING, STEP_TOP, UPPER_SPRINGING};
 use crate::mesh::Mesh;
 
-/// A fluted column with a base and a capital, on the steps of the court.
+/// Fluted column with a base and a capital, on the steps of the court.
 pub(super) fn ground_column() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.block(0.40, STEP_TOP - EMBED, 0.28);
@@ -38,7 +38,7 @@ pub(super) fn ground_column() -> Mesh {
     mesh
 }
 
-/// Sixteen flutes that fade out towards both ends; the shaft swells a little (entasis).
+/// Shaft with sixteen flutes that fade out towards both ends. It swells slightly (entasis).
 fn fluted_shaft() -> Mesh {
     let profile = [
         [0.265, 0.48],
@@ -57,7 +57,7 @@ fn fluted_shaft() -> Mesh {
     mesh
 }
 
-/// A slender, smooth column on a pedestal, with a wide abacus for the upper arches.
+/// Slender, smooth column on a pedestal, with a wide abacus for the upper arches.
 pub(super) fn upper_column() -> Mesh {
     let floor = GALLERY_FLOOR[1];
     let mut mesh = Mesh::default();
@@ -83,7 +83,7 @@ pub(super) fn upper_column() -> Mesh {
     mesh
 }
 
-/// The balusters between two pedestals.
+/// Balusters between two pedestals.
 pub(super) fn balusters() -> Mesh {
     let floor = GALLERY_FLOOR[1];
     let profile =
@@ -97,7 +97,7 @@ pub(super) fn balusters() -> Mesh {
     mesh
 }
 
-/// The square pier at each corner of the court on the ground.
+/// Square pier at each corner of the court, on the ground floor.
 pub(super) fn ground_pier() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.block(0.54, STEP_TOP - EMBED, 0.36);
@@ -107,7 +107,7 @@ pub(super) fn ground_pier() -> Mesh {
     mesh
 }
 
-/// The square pier at each corner of the gallery.
+/// Square pier at each corner of the gallery.
 pub(super) fn upper_pier() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.block(0.34, GALLERY_FLOOR[1] - 0.03, 6.03);

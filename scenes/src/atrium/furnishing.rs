@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::dimensions::EMBED;
 use crate::mesh::{Mesh, on_circle};
 
-/// A curtain hung from its rod behind an upper arch, gathered in folds that open downwards.
+/// Curtain that hangs from a rod behind an upper arch, in folds that widen downwards.
 pub(super) fn curtain() -> Mesh {
     const FOLDS: usize = 5;
     const PER_FOLD: usize = 6;
@@ -25,7 +25,6 @@ pub(super) fn curtain() -> Mesh {
     mesh
 }
 
-/// The rod of a curtain.
 pub(super) fn curtain_rod() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.grid([8, 4], [true, false], |segment, row| {
@@ -36,7 +35,7 @@ pub(super) fn curtain_rod() -> Mesh {
     mesh
 }
 
-/// A banner laid over the handrail, falling in front of the gallery's edge.
+/// Banner over the handrail that hangs in front of the gallery's edge.
 pub(super) fn banner() -> Mesh {
     const PER_SPAN: usize = 2;
     const COLUMNS: usize = 25;
@@ -70,7 +69,7 @@ pub(super) fn banner() -> Mesh {
     mesh
 }
 
-/// A door of four sunk panels that fills an arched recess up to its springing.
+/// Door with four recessed panels, which fills an arched recess up to its springing.
 pub(super) fn door(half_width: f32, bottom: f32, top: f32, offset: f32) -> Mesh {
     let mut mesh = Mesh::default();
     let reach = half_width + EMBED;
@@ -92,7 +91,7 @@ pub(super) fn door(half_width: f32, bottom: f32, top: f32, offset: f32) -> Mesh 
     mesh
 }
 
-/// A big pot of turned earthenware, hollow down to its soil.
+/// Large earthenware pot, hollow down to its soil.
 pub(super) fn pot() -> Mesh {
     let profile = [
         [0.26, -EMBED],
@@ -113,14 +112,14 @@ pub(super) fn pot() -> Mesh {
     mesh
 }
 
-/// The soil of a pot, a low mound.
+/// Soil of a pot, a low mound.
 pub(super) fn soil() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.lathe(20, &[[0.35, 0.61], [0.2, 0.635], [0.0, 0.64]]);
     mesh
 }
 
-/// A clipped bush: a cone of bulging rows, closed below.
+/// Trimmed bush: a cone of bulging rows, closed at the bottom.
 pub(super) fn bush() -> Mesh {
     let profile = [
         [0.0, 0.72],
@@ -145,7 +144,7 @@ pub(super) fn bush() -> Mesh {
     mesh
 }
 
-/// A slim vase for a niche.
+/// Slender vase for a niche.
 pub(super) fn vase() -> Mesh {
     let profile = [
         [0.10, 0.83],
@@ -166,7 +165,6 @@ pub(super) fn vase() -> Mesh {
     mesh
 }
 
-/// The stand of a vase.
 pub(super) fn vase_stand() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.block(0.24, -EMBED, 0.12);
@@ -175,7 +173,7 @@ pub(super) fn vase_stand() -> Mesh {
     mesh
 }
 
-/// The fountain's stone: a round basin, a stem and a bowl.
+/// Stone of the fountain: a round basin, a stem and a bowl.
 pub(super) fn fountain() -> Mesh {
     let basin = [
         [1.55, -EMBED],
@@ -209,7 +207,7 @@ pub(super) fn fountain() -> Mesh {
     mesh
 }
 
-/// The water in the basin and in the bowl.
+/// Water surfaces in the basin and in the bowl.
 pub(super) fn water() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.lathe(40, &[[1.22, 0.46], [0.7, 0.46], [0.2, 0.46]]);

@@ -1,16 +1,16 @@
-//! The sky over the court and the sun in it.
+//! Sky over the court, and the sun in it.
 //!
-//! Space beyond the scene is black, so the sky is a wedge on the roof that closes the opening: low in the
-//! north, high in the south. Its shape is invisible, as its radiance is uniform. It is small, because light
-//! from one part of it to another is lost. The sun is in its high corner, so that light falls over the
-//! southern eaves obliquely on the northern side.
+//! The space beyond the scene is black. The sky is therefore an emissive wedge on the roof that closes the
+//! opening, low in the north and high in the south. Its shape is invisible, because its radiance is uniform.
+//! It is small, because light from one part of it to another is lost. The sun is in its high corner, so that
+//! sunlight passes the southern eaves obliquely and reaches the northern side.
 
 use glam::Vec3;
 
 use crate::mesh::Mesh;
 
-/// Half the width of the sky; heights of its foot, within the roof, and of its top; its south and north end,
-/// metres.
+/// Half the width of the sky; heights of its foot, which is within the roof, and of its top; its south and
+/// north end; all metres.
 const SKY_X: f32 = 13.3;
 const SKY_Y: [f32; 2] = [9.2, 12.9];
 const SKY_Z: [f32; 2] = [-7.4, 5.6];

@@ -1,13 +1,13 @@
-//! Masonry: walls with arched openings, arch mouldings, vaults, mouldings around the court, and paving.
+//! Masonry: walls with arched openings, mouldings, vaults and paving.
 
 use glam::{Vec2, Vec3};
 
 use super::dimensions::{EMBED, HALF};
 use crate::mesh::{Mesh, on_circle};
 
-/// A wall panel with one opening, round at its top, centred on x = 0.
+/// Wall panel with one opening that is round at its top and centred on x = 0.
 ///
-/// The panel has no ends, top or underside: they would lie within its neighbours.
+/// The panel has no ends, top or underside, because they would lie within adjacent parts.
 pub(super) struct ArchedPanel {
     pub(super) width: f32,
     pub(super) bottom: f32,
@@ -16,7 +16,7 @@ pub(super) struct ArchedPanel {
     pub(super) radius: f32,
     /// Offsets of the front and the back face.
     pub(super) faces: [f32; 2],
-    /// Number of segments of a quarter circle of the arch.
+    /// Number of segments per quarter circle of the arch.
     pub(super) segments: usize,
     /// Number of strips between the opening and the outline.
     pub(super) strips: usize,
@@ -44,7 +44,7 @@ impl ArchedPanel {
         mesh
     }
 
-    /// Points of the opening from right to left, each with its partner on the panel's outline.
+    /// Points of the opening from right to left, each with the corresponding point of the panel's outline.
     fn outline(&self) -> Vec<[Vec2; 2]> {
         let half = self.width / 2.0;
         let mut right = Vec::new();
@@ -76,7 +76,7 @@ impl ArchedPanel {
     }
 }
 
-/// A moulding over an arch: a rectangle, given by radii and offsets, with its two front edges bevelled.
+/// Moulding over an arch: a rectangular section between two radii and two offsets, with bevelled front edges.
 pub(super) fn arch_moulding(springing: f32, radii: [f32; 2], offsets: [f32; 2], segments: usize) -> Mesh {
     let [inner, outer] = radii;
     let [front, back] = offsets;
@@ -100,9 +100,9 @@ pub(super) fn arch_moulding(springing: f32, radii: [f32; 2], offsets: [f32; 2], 
     mesh
 }
 
-/// A groin vault over a square bay centred on the y axis: two half cylinders that meet in the diagonals.
+/// Groin vault over a square bay centred on the y axis: two half cylinders that intersect in the diagonals.
 ///
-/// The vault reaches into the walls at both ends of z and, with `all_round`, of x too.
+/// The vault extends into the walls at both ends of z and, with `all_round`, also of x.
 pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh {
     const STEPS: usize = 10;
     // Position and height of a cylinder's lines, at equal angles, so that its facets are equal.
@@ -128,9 +128,9 @@ pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh 
     mesh
 }
 
-/// A profile swept around the court, with mitred corners.
+/// Sweeps a profile around the court, with mitred corners.
 ///
-/// `profile` is a closed polygon of offset and height, counterclockwise with offsets to the right.
+/// `profile` is a closed polygon of offset and height, counter-clockwise if offsets point to the right.
 pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
     const STEPS: [usize; 2] = [16, 6];
     // From corner to corner, along +x on the side of +z and on around.

@@ -1,4 +1,4 @@
-//! A court of two storeys of arcades under an open sky, in the spirit of the Sponza atrium.
+//! Court with two storeys of arcades under an open sky, in the style of the Sponza atrium.
 
 mod column;
 mod dimensions;
@@ -20,7 +20,8 @@ use side::Plan;
 
 pub(crate) use self::walk::walk;
 
-/// Field of view and aspect ratio of the cameras: a horizontal field of view of 73 degrees at 16:9.
+/// Vertical field of view and aspect ratio of the cameras, which give a horizontal field of view of 73
+/// degrees.
 const LENS: (f64, f64) = (0.789, 16.0 / 9.0);
 
 const RED: usize = 0;
@@ -67,14 +68,14 @@ const SIDES: [Plan; 4] = [
     },
 ];
 
-/// The court under a sky and a sun of its own.
+/// Court under its own sky and sun.
 pub(crate) fn atrium() -> Vec<u8> {
     let mut scene = lit_court();
     place_cameras(&mut scene);
     scene.into_glb()
 }
 
-/// The court under a sky and a sun, without cameras.
+/// Court under its own sky and sun, without cameras.
 fn lit_court() -> SceneBuilder {
     let (mut scene, colours) = court();
     scene.object("sky", &light::sky(), colours.sky);
@@ -82,14 +83,14 @@ fn lit_court() -> SceneBuilder {
     scene
 }
 
-/// The court without any light, to be lit by an environment map.
+/// Court without lights, for an environment map.
 pub(crate) fn open() -> Vec<u8> {
     let (mut scene, _) = court();
     place_cameras(&mut scene);
     scene.into_glb()
 }
 
-/// The court without lights and cameras.
+/// Court without lights and cameras.
 fn court() -> (SceneBuilder, Palette) {
     let mut scene = SceneBuilder::default();
     let colours = Palette::new(&mut scene);
@@ -103,7 +104,7 @@ fn court() -> (SceneBuilder, Palette) {
     (scene, colours)
 }
 
-/// Adds the parts that run around the whole court: steps, cornices with the floors behind them, rails, outer
+/// Adds the parts that surround the whole court: steps, cornices with the floors behind them, rails, outer
 /// wall.
 fn build_rings(scene: &mut SceneBuilder, colours: &Palette) {
     let steps = [[-0.9, -0.1], [0.62, -0.1], [0.62, STEP_TOP], [-0.6, STEP_TOP], [-0.6, 0.08], [-0.9, 0.08]];
@@ -155,7 +156,7 @@ fn build_rings(scene: &mut SceneBuilder, colours: &Palette) {
     scene.object("hand-rail", &masonry::ring(&hand), colours.trim);
 }
 
-/// Adds slabs of two stones in the court, of stone and terracotta in the corridors.
+/// Adds slabs of two kinds of stone in the court, and of stone and terracotta in the corridors.
 fn build_floor(scene: &mut SceneBuilder, colours: &Palette) {
     const SLAB: f32 = 0.75;
     const OUTER: [i32; 2] = [21, 11];

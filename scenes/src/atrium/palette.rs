@@ -1,4 +1,4 @@
-//! The materials of the atrium, all Lambertian.
+//! Materials of the atrium, all of them Lambertian.
 
 use crate::builder::SceneBuilder;
 use crate::material::Material;

@@ -1,4 +1,4 @@
-//! Meshes that the atrium instances more than once.
+//! Meshes that occur several times in the atrium.
 
 use glam::Vec3;
 
@@ -100,7 +100,7 @@ impl Parts {
         parts
     }
 
-    /// Makes curtains and banners; the four colours of a cloth share its vertices.
+    /// Adds curtains and banners. The four colours of a cloth share its vertices.
     fn hang_cloths(&mut self, scene: &mut SceneBuilder, colours: &Palette) {
         let curtain = scene.geometry(&furnishing::curtain());
         let rod = scene.geometry(&furnishing::curtain_rod());
@@ -153,7 +153,7 @@ fn upper_moulding() -> Mesh {
     arch_moulding(UPPER_SPRINGING, [radius + 0.015, radius + 0.12], offsets, 12)
 }
 
-/// The arch across the corridor between two vaults, a little lower than the vaults.
+/// Arch across the corridor between two vaults, slightly lower than they are.
 fn rib() -> Mesh {
     let radius = BAY / 2.0;
     let arch = arch_moulding(GROUND_SPRINGING, [radius - 0.11, radius + 0.05], [-0.18, 0.18], 16);
@@ -190,7 +190,7 @@ fn upper_niche() -> Mesh {
     panel.mesh()
 }
 
-/// A flat pier on the ground corridor's back wall, where a rib comes down.
+/// Pilaster on the back wall of the ground-floor corridor, below a rib.
 fn pilaster() -> Mesh {
     let wall = CORRIDOR[1];
     let mut mesh = Mesh::default();
@@ -204,7 +204,7 @@ fn pilaster() -> Mesh {
     mesh
 }
 
-/// A beam under the gallery's ceiling with the flat pier that carries it.
+/// Beam under the gallery's ceiling, with the pilaster that supports it.
 fn beam() -> Mesh {
     let wall = CORRIDOR[1];
     let mut mesh = Mesh::default();
@@ -213,7 +213,7 @@ fn beam() -> Mesh {
     mesh
 }
 
-/// The back wall beyond the last bay, both storeys, with its near end at x = 0.
+/// Back wall beyond the last bay, of both storeys; its near end is at x = 0.
 fn corner_wall() -> Mesh {
     let [inner, outer] = [CORRIDOR[1], OUTER_WALL[0]];
     let mut mesh = Mesh::default();

@@ -1,4 +1,4 @@
-//! One side of the court: its arcades, the corridors behind them, and their furnishing.
+//! Side of the court: its arcades, the corridors behind them, and their furnishing.
 
 use glam::Vec3;
 
@@ -7,23 +7,23 @@ use super::parts::Parts;
 use crate::builder::SceneBuilder;
 use crate::document::Node;
 
-/// Cloths in or below the upper arches: index of the arch, index of the colour.
+/// Cloths in or below the upper arches: index of the arch and index of the colour.
 pub(super) type Hangings = &'static [(usize, usize)];
 
-/// Plan of one side: its name, size, frame and cloths.
+/// Plan of a side: its name, size, local frame and cloths.
 pub(super) struct Plan {
     pub(super) name: &'static str,
     pub(super) bays: usize,
-    /// Local x axis in the world; axes are quarter turns of the world's, so that nothing is rounded.
+    /// Local x axis in world space. Axes are quarter turns of the world's, so that nothing is rounded.
     pub(super) x_axis: [f32; 3],
-    /// Local z axis in the world.
+    /// Local z axis in world space.
     pub(super) z_axis: [f32; 3],
     pub(super) origin: [f32; 3],
     pub(super) curtains: Hangings,
     pub(super) banners: Hangings,
 }
 
-/// Builds a side's nodes as children of one root node.
+/// Adds the nodes of a side as children of one root node.
 pub(super) fn build(scene: &mut SceneBuilder, parts: &Parts, plan: &Plan) {
     let half = plan.bays as f32 * BAY / 2.0;
     let mut side = Side { scene, parts, half, bays: plan.bays, children: Vec::new() };
@@ -58,7 +58,7 @@ impl Side<'_> {
         self.children.push(self.scene.node(node));
     }
 
-    /// Local x of the centre of an upper arch.
+    /// Local x of the centre of upper arch `index`.
     fn upper_arch(&self, index: usize) -> f32 {
         BAY / 2.0 * (index as f32 + 0.5) - self.half
     }
@@ -116,7 +116,7 @@ impl Side<'_> {
         }
     }
 
-    /// Adds the piers and the vault of the corner at the far end of local x, and the walls beyond both ends.
+    /// Adds the piers and the vault of the corner at positive local x, and the walls beyond both ends.
     fn corner(&mut self) {
         let parts = self.parts;
         let half = self.half;
@@ -130,7 +130,7 @@ impl Side<'_> {
     }
 }
 
-/// Adds a free-standing mesh at a position in the world, scaled.
+/// Adds a free-standing mesh at a position in world space, scaled.
 pub(super) fn stand(scene: &mut SceneBuilder, name: &str, mesh: usize, place: Vec3, scale: f32) {
     let scale = (scale != 1.0).then_some([scale; 3]);
     let translation = Some(place.to_array());

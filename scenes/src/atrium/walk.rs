@@ -1,4 +1,4 @@
-//! A walk through the court, past the fountain and up to the far arcade.
+//! Walk through the court, past the fountain and up to the far arcade.
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ use crate::motion::{Between, Track, Values};
 /// Time between two views, seconds.
 const INTERVAL: f32 = 2.0;
 
-/// Places of the eye and of what it looks at, metres. The first is that of the atrium's camera `court`.
+/// Positions of the eye and of its target, metres. The first pair is that of the atrium's camera `court`.
 const VIEWS: [[[f32; 3]; 2]; 6] = [
     [[-11.2, 2.0, -2.9], [-2.0, 3.4, 0.6]],
     [[-7.4, 1.9, -1.9], [1.0, 3.2, 0.9]],
@@ -19,7 +19,7 @@ const VIEWS: [[[f32; 3]; 2]; 6] = [
     [[7.4, 1.8, -0.4], [14.0, 3.4, 0.4]],
 ];
 
-/// The court under its sky and its sun, seen by a camera that walks for ten seconds.
+/// Court under its sky and sun, seen by a camera that walks for ten seconds.
 pub(crate) fn walk() -> Vec<u8> {
     let mut scene = lit_court();
     let (yfov, aspect_ratio) = LENS;

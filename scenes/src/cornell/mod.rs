@@ -1,5 +1,5 @@
-//! The Cornell box, scaled to two metres, and three variants: with a glossy floor, with a lamp that faces the
-//! ceiling, and with a mirror ball and a glass ball instead of its blocks.
+//! Cornell box, scaled to two metres, and three variants: with a glossy floor, with a lamp that faces the
+//! ceiling, and with a mirror ball and a glass ball in place of its blocks.
 
 mod moving;
 
@@ -13,7 +13,7 @@ use crate::material::{Glass, Material};
 use crate::mesh::Mesh;
 use crate::sphere::icosphere;
 
-/// Corners of a quadrilateral, counterclockwise from the front.
+/// Corners of a quadrilateral, counter-clockwise seen from the front.
 type Quad = [[f32; 3]; 4];
 
 const LIGHT: Quad = [[-0.23, 0.99, -0.18], [0.23, 0.99, -0.18], [0.23, 0.99, 0.2], [-0.23, 0.99, 0.2]];
@@ -23,7 +23,7 @@ const BACK: Quad = [[-1.0, -1.0, -1.0], [1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [-1
 const GREEN_WALL: Quad = [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, -1.0]];
 const RED_WALL: Quad = [[-1.0, -1.0, 1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, 1.0, 1.0]];
 
-/// A box that stands on, or a little in, the floor: x and z of its four corners, then bottom and top.
+/// Box that stands on the floor or slightly in it: x and z of its four corners, bottom and top.
 struct StandingBox {
     footprint: [[f32; 2]; 4],
     bottom: f32,
@@ -57,27 +57,28 @@ const GREEN: [f64; 3] = [0.105421, 0.37798, 0.076425];
 const RED: [f64; 3] = [0.570068, 0.0430135, 0.0443706];
 const LIGHT_RADIANCE: [f64; 3] = [18.387, 13.9873, 6.75357];
 
-/// A lamp that faces upwards, and the cup around it: half its side, and the heights of its bottom and its
-/// rim, metres.
+/// Geometry of a lamp that faces upwards and of the cup around it: corners of the lamp, half the cup's side,
+/// and the heights of its bottom and rim, metres.
 const UPLIGHT: Quad = [[-0.12, 0.72, 0.12], [0.12, 0.72, 0.12], [0.12, 0.72, -0.12], [-0.12, 0.72, -0.12]];
 const CUP: (f32, f32, f32) = (0.14, 0.7, 0.86);
 const CUP_ALBEDO: [f64; 3] = [0.1; 3];
-/// Radiance at which the lamp emits the power of the ceiling's lamp from a third of its area, W/(sr m^2).
+/// Radiance of the upward lamp, W/(sr m^2). With a third of the area it emits the power of the ceiling's
+/// lamp.
 const UPLIGHT_RADIANCE: [f64; 3] = [56.0, 42.6, 20.6];
 
-/// Centres and radius of the balls, which float a little above the floor, metres.
+/// Centres and radius of the balls, metres. They float slightly above the floor.
 const MIRROR_BALL: [f32; 3] = [-0.45, -0.58, -0.4];
 const GLASS_BALL: [f32; 3] = [0.42, -0.58, 0.3];
 const BALL_RADIUS: f32 = 0.4;
-/// Clear glass with the tint of a bottle where it is thick.
+/// Clear glass that is tinted like a bottle where it is thick.
 const GLASS: Glass =
     Glass { ior: 1.5, thickness: 0.8, attenuation_colour: [0.8, 0.93, 0.86], attenuation_distance: 1.0 };
 
-/// A camera whose picture the whole open side fills.
+/// Camera whose picture is filled by the open side of the box.
 const FRONT: Camera =
     Camera { eye: Vec3::new(0.0, 0.0, 3.9), target: Vec3::ZERO, yfov: 0.6860487863861751, aspect_ratio: 1.0 };
 
-/// A camera that looks down from near, so that the floor fills the picture, from its open edge to the back
+/// Camera that looks down from close by, so that the floor fills the picture from its open edge to the back
 /// wall.
 const TOWARDS_FLOOR: Camera = Camera {
     eye: Vec3::new(-0.15, 0.5, 1.75),
@@ -98,7 +99,7 @@ fn standing_box(shape: &StandingBox) -> Mesh {
     mesh
 }
 
-/// The box with the given material on its floor, or the white of the other walls, and a lamp.
+/// Box with a material on its floor (by default that of the white walls), its blocks, and a lamp.
 fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> SceneBuilder {
     let (mut scene, white) = empty_box(floor, add_lamp);
     scene.object("small-box", &standing_box(&SMALL_BOX), white);
@@ -107,7 +108,7 @@ fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> Sce
     scene
 }
 
-/// The walls and the lamp, and the index of the material of white walls.
+/// Box without blocks. Returns it with the index of the white walls' material.
 fn empty_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> (SceneBuilder, usize) {
     let mut scene = SceneBuilder::default();
     let white = scene.material(&Material::diffuse("white", WHITE));
@@ -135,12 +136,12 @@ fn add_uplight(scene: &mut SceneBuilder) {
     scene.object("cup", &cup_walls(), cup);
 }
 
-/// The Lambertian box, lit by the lamp in the ceiling.
+/// Lambertian box, lit by the lamp in the ceiling.
 pub(crate) fn lambertian() -> Vec<u8> {
     cornell_box(None, add_ceiling_lamp).into_gltf()
 }
 
-/// The box with a floor that has a Phong lobe, lit by the lamp in the ceiling.
+/// Box whose floor has a Phong lobe, lit by the lamp in the ceiling.
 pub(crate) fn glossy_floor() -> Vec<u8> {
     let phong = Phong { specular: [0.35; 3], exponent: 32.0 };
     let floor = Material::diffuse("floor", [0.45, 0.28, 0.14]).with_phong(phong);
@@ -149,13 +150,13 @@ pub(crate) fn glossy_floor() -> Vec<u8> {
     scene.into_gltf()
 }
 
-/// The Lambertian box, lit by a lamp in a cup that only a spot of the ceiling sees: nearly all light is
-/// indirect, by way of that spot.
+/// Lambertian box with a lamp in a cup that illuminates only a spot of the ceiling, so that nearly all light
+/// is indirect.
 pub(crate) fn uplight() -> Vec<u8> {
     cornell_box(None, add_uplight).into_gltf()
 }
 
-/// A mirror ball and a glass ball between Lambertian walls: a scene of caustics.
+/// Mirror ball and glass ball between Lambertian walls, which cause caustics.
 pub(crate) fn spheres() -> Vec<u8> {
     let (mut scene, _) = empty_box(None, add_ceiling_lamp);
     let mirror = scene.material(&Material::metallic_roughness("mirror", [1.0; 3], 1.0, 0.0));
@@ -171,7 +172,7 @@ pub(crate) fn spheres() -> Vec<u8> {
     scene.into_glb()
 }
 
-/// The bottom and the four sides of the cup.
+/// Bottom and four sides of the cup.
 fn cup_walls() -> Mesh {
     let (side, bottom, rim) = CUP;
     let corners = [[-side, -side], [side, -side], [side, side], [-side, side]];

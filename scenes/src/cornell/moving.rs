@@ -1,5 +1,5 @@
-//! The Cornell box with what moves in it: a lamp that swings, a reed that bends by its joints, a block that
-//! bulges, and a camera.
+//! Cornell box with moving parts: a lamp that swings, a reed that bends at its joints, a block that twists by
+//! a morph target, and a camera.
 
 use glam::{Quat, Vec3};
 
@@ -10,10 +10,11 @@ use crate::material::Material;
 use crate::mesh::Mesh;
 use crate::motion::{Between, Track, Values};
 
-/// Time between two keyframes, seconds. All animations have five, and end as they begin.
+/// Time between two keyframes, seconds. All animations have five keyframes, and end as they begin.
 const INTERVAL: f32 = 0.5;
 
-/// Place from which the lamp hangs, length of its rod, half its side, metres, and its largest angle, radians.
+/// Geometry of the lamp: position of its pivot, length of its rod, half its side, metres, and its maximum
+/// angle, radians.
 const PIVOT: Vec3 = Vec3::new(0.0, 0.98, 0.35);
 const ROD: f32 = 0.6;
 const LAMP: f32 = 0.09;
@@ -22,8 +23,8 @@ const LAMP_RADIANCE: [f64; 3] = [4.0, 3.0, 1.7];
 /// Intensity of the point light below the lamp, W/sr.
 const GLOW: f64 = 0.4;
 
-/// Foot of the reed, its height and half its width, metres, the number of its segments, and its largest
-/// angles, radians.
+/// Geometry of the reed: position of its foot, height, half its width, metres, number of segments, and its
+/// maximum angles, radians.
 const FOOT: Vec3 = Vec3::new(-0.45, -1.0, -0.2);
 const HEIGHT: f32 = 1.2;
 const REED: f32 = 0.12;
@@ -31,11 +32,11 @@ const SEGMENTS: usize = 8;
 const BEND: f32 = 0.9;
 const TURN: f32 = 0.3;
 
-/// Middle of the block on the floor, and half its side, metres.
+/// Centre of the block on the floor, and half its side, metres.
 const BLOCK: Vec3 = Vec3::new(0.45, -0.7, 0.2);
 const SIDE: f32 = 0.3;
 
-/// The box and its animations: `play` moves lamp, reed and block, `pan` the camera.
+/// Box with two animations: `play` moves lamp, reed and block, `pan` moves the camera.
 pub(crate) fn moving() -> Vec<u8> {
     let (mut scene, white) = empty_box(None, add_ceiling_lamp);
     let lamp = add_swinging_lamp(&mut scene);
@@ -66,13 +67,13 @@ pub(crate) fn moving() -> Vec<u8> {
     scene.into_glb()
 }
 
-/// Rotation by twice an angle.
+/// Quaternion of a rotation about `axis` by twice the angle `half`, radians.
 fn quaternion(axis: Vec3, half: f32) -> Quat {
     let (sine, cosine) = (libm::sin(f64::from(half)) as f32, libm::cos(f64::from(half)) as f32);
     Quat::from_vec4((axis * sine).extend(cosine))
 }
 
-/// Adds an emissive block with a point light below it, on a rod; returns the node that turns.
+/// Adds an emissive block on a rod with a point light below it; returns the node that is rotated.
 fn add_swinging_lamp(scene: &mut SceneBuilder) -> usize {
     let material = scene.material(&Material::diffuse("lantern", WHITE).emitting(LAMP_RADIANCE));
     let mut shape = Mesh::default();
@@ -89,7 +90,7 @@ fn add_swinging_lamp(scene: &mut SceneBuilder) -> usize {
     scene.root(Node { name: "pendulum".into(), translation, children, ..Node::default() })
 }
 
-/// Adds a tall prism on two joints; returns their nodes.
+/// Adds a tall prism with two joints; returns the nodes of the joints.
 fn add_reed(scene: &mut SceneBuilder) -> [usize; 2] {
     let material = scene.material(&Material::diffuse("reed", [0.2, 0.5, 0.7]));
     let corners = [[-REED, REED], [REED, REED], [REED, -REED], [-REED, -REED]];
@@ -120,7 +121,7 @@ fn add_reed(scene: &mut SceneBuilder) -> [usize; 2] {
     [lower, upper]
 }
 
-/// Adds a block with a morph target that turns its top; returns its node.
+/// Adds a block with a morph target that twists its top; returns its node.
 fn add_block(scene: &mut SceneBuilder, material: usize) -> usize {
     let mut shape = Mesh::default();
     shape.cuboid(Vec3::splat(-SIDE), Vec3::splat(SIDE));

@@ -5,7 +5,7 @@ use glam::{Vec2, Vec3};
 use crate::document::Node;
 use crate::mesh::{Mesh, on_circle};
 
-/// The plinth: position in x and z, half width, and height, metres.
+/// Plinth: position in x and z, half its width, and its height, metres.
 const PLINTH: ([f32; 2], f32, f32) = ([-1.15, -0.95], 0.22, 0.62);
 
 const DRUM: [f32; 3] = [-0.25, 0.0, -0.35];
@@ -13,7 +13,7 @@ const DRUM_RADIUS: f32 = 0.28;
 const DRUM_HEIGHT: f32 = 0.42;
 const DRUM_SEGMENTS: usize = 48;
 
-/// A block whose vertex colours change from bottom to top and from left to right.
+/// Block whose vertex colours change from bottom to top and from left to right.
 pub(super) fn plinth() -> Mesh {
     let ([x, z], half, height) = PLINTH;
     let mut block = Mesh::default();
@@ -28,7 +28,7 @@ pub(super) fn plinth() -> Mesh {
     mesh
 }
 
-/// A smooth vase, open at the top, on the plinth.
+/// Smooth vase on the plinth, open at the top.
 pub(super) fn vase() -> Mesh {
     let ([x, z], _, height) = PLINTH;
     let profile = [
@@ -60,8 +60,8 @@ pub(super) fn vase() -> Mesh {
     mesh
 }
 
-/// The side of the drum as a strip: top and bottom vertices in turns, counterclockwise from above, the seam
-/// twice.
+/// Side of the drum as a strip: alternating top and bottom vertices, counter-clockwise seen from above, with
+/// the seam twice.
 pub(super) fn drum_side() -> Mesh {
     let mut mesh = Mesh::default();
     for segment in 0..=DRUM_SEGMENTS {
@@ -77,7 +77,7 @@ pub(super) fn drum_side() -> Mesh {
     mesh
 }
 
-/// The head of the drum as a fan: its centre, then the rim counterclockwise from above.
+/// Head of the drum as a fan: its centre, then the rim counter-clockwise seen from above.
 pub(super) fn drum_head() -> Mesh {
     let mut mesh = Mesh::default();
     mesh.positions.push(Vec3::Y * DRUM_HEIGHT);
@@ -91,7 +91,7 @@ pub(super) fn drum_head() -> Mesh {
     mesh
 }
 
-/// The drum's node. Its scale mirrors the mesh: a reader must keep front faces counterclockwise.
+/// Node of the drum. Its scale mirrors the mesh, so that a reader must flip the winding to keep the front.
 pub(super) fn drum_node(mesh: usize) -> Node {
     Node {
         name: "drum".into(),

@@ -1,4 +1,4 @@
-//! A closed room where nearly every surface has a texture, all of them Lambertian.
+//! Closed room in which nearly every surface has a texture. All materials are Lambertian.
 
 mod furniture;
 mod patterns;
@@ -11,7 +11,7 @@ use crate::document::TextureTransform;
 use crate::material::Material;
 use crate::mesh::Mesh;
 
-/// Half the room's size in x and z, and its height, in metres.
+/// Half the room's size in x and z, and its height, metres.
 const HALF: [f32; 2] = [2.0, 1.6];
 const HEIGHT: f32 = 2.6;
 
@@ -19,10 +19,10 @@ const LAMP_RADIANCE: [f64; 3] = [14.0, 12.0, 9.5];
 const WINDOW_RADIANCE: [f64; 3] = [9.0; 3];
 const PLASTER: [f64; 3] = [0.72, 0.70, 0.66];
 
-/// A picture on the wall, as a JPEG file made by `painting.py` beside it.
+/// Picture on the wall, a JPEG file that `painting.py` in this folder generates.
 const PAINTING: &[u8] = include_bytes!("painting.jpg");
 
-/// Texture coordinates of the whole image on a quadrilateral whose first corner is at the lower left.
+/// Texture coordinates that map the whole image to a quadrilateral whose first corner is at the lower left.
 const WHOLE: [[f32; 2]; 4] = [[0.0, 1.0], [1.0, 1.0], [1.0, 0.0], [0.0, 0.0]];
 
 /// Indices of textures in the file.
@@ -54,7 +54,7 @@ impl Textures {
     }
 }
 
-/// The whole scene as a `.glb` file.
+/// Scene as a `.glb` file.
 pub(crate) fn room() -> Vec<u8> {
     let mut scene = SceneBuilder::default();
     let textures = Textures::new(&mut scene);
@@ -77,7 +77,7 @@ fn textured(corners: [[f32; 3]; 4], coordinates: [[f32; 2]; 4]) -> Mesh {
     mesh
 }
 
-/// Adds floor, ceiling and walls: the wallpaper is mirrored on one wall and slanted on another.
+/// Adds floor, ceiling and walls. The wallpaper is mirrored on one wall and slanted on another.
 fn build_walls(scene: &mut SceneBuilder, textures: &Textures) {
     let [x, z] = HALF;
     let mut white = |name: &str, texture: usize, transform: Option<TextureTransform>| {
@@ -127,7 +127,7 @@ fn hang(scene: &mut SceneBuilder, textures: &Textures) {
     scene.object("painting", &textured(canvas, WHOLE), painting);
 }
 
-/// Adds a cut-out screen, a vase on a coloured plinth, and a drum of a strip and a fan.
+/// Adds a cut-out screen, a vase on a coloured plinth, and a drum made of a strip and a fan.
 fn furnish(scene: &mut SceneBuilder, textures: &Textures) {
     let lattice = Material::diffuse("lattice", [1.0; 3]).textured(textures.lattice, None).cut_out(0.5);
     let lattice = scene.material(&lattice.double_sided());

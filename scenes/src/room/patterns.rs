@@ -1,5 +1,4 @@
-//! Patterns of the room's textures. None equals its mirror image, so that a texture that is mapped wrongly
-//! shows.
+//! Patterns of the room's textures. None equals its mirror image, so that wrong mappings are visible.
 
 use core::f32::consts::TAU;
 
@@ -18,7 +17,7 @@ fn opaque(colour: [f32; 3]) -> [u8; 4] {
     [red, green, blue, u8::MAX]
 }
 
-/// Eight rows of wooden planks, which tile without a seam.
+/// Eight rows of wooden planks that tile seamlessly.
 pub(super) fn planks() -> Picture {
     const SIDE: u32 = 512;
     Picture::new([SIDE, SIDE], |column, row| {
@@ -37,7 +36,7 @@ pub(super) fn planks() -> Picture {
     })
 }
 
-/// Five-petalled flowers off the middle, beside a stripe, on a ground that grows darker downwards.
+/// Five-petalled flowers that are off-centre, beside a stripe, on a ground that darkens downwards.
 pub(super) fn wallpaper() -> Picture {
     const SIDE: u32 = 256;
     Picture::new([SIDE, SIDE], |column, row| {
@@ -59,8 +58,7 @@ pub(super) fn wallpaper() -> Picture {
     })
 }
 
-/// Slats that cross, with a leaf in every other gap; alpha falls off smoothly, through one half at their
-/// edges.
+/// Crossing slats with a leaf in every other gap. Alpha falls off smoothly, and is a half at their edges.
 pub(super) fn lattice() -> Picture {
     const SIDE: u32 = 128;
     Picture::new([SIDE, SIDE], |column, row| {
@@ -84,7 +82,7 @@ pub(super) fn lattice() -> Picture {
     })
 }
 
-/// Panes of coloured glass between leads: the Voronoi cells of scattered points.
+/// Panes of coloured glass separated by leads: the Voronoi cells of scattered points.
 pub(super) fn stained_glass() -> Picture {
     const SIDE: u32 = 128;
     const CELLS: u32 = 5;

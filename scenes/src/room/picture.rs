@@ -1,6 +1,6 @@
-//! Pictures, encoded as PNG files.
+//! Pictures encoded as PNG files.
 
-/// A picture of sRGB texels, rows from the top; alpha is linear.
+/// Picture of sRGB texels with linear alpha, in rows from the top.
 pub(super) struct Picture {
     width: u32,
     height: u32,
@@ -8,14 +8,14 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// A picture whose texels `texel` gives by column and row.
+    /// Creates a picture. `texel` returns the texel at a column and row.
     pub(super) fn new([width, height]: [u32; 2], texel: impl Fn(u32, u32) -> [u8; 4]) -> Self {
         let texel = &texel;
         let texels = (0..height).flat_map(|row| (0..width).map(move |column| texel(column, row))).collect();
         Self { width, height, texels }
     }
 
-    /// The PNG file, without an alpha channel if the picture is opaque.
+    /// Encodes a PNG file, without an alpha channel if the picture is opaque.
     pub(super) fn png(&self) -> Vec<u8> {
         let is_opaque = self.texels.iter().all(|texel| texel[3] == u8::MAX);
         let (colour, channels) = if is_opaque { (png::ColorType::Rgb, 3) } else { (png::ColorType::Rgba, 4) };
