@@ -110,7 +110,7 @@ impl SceneFile {
         if self.anchor.get().is_none() {
             self.at_rest()?;
         }
-        let buffers = Buffers::load(&self.document)?;
+        let buffers = Buffers::of(&self.document);
         let source = Source::new(&self.document, &buffers);
         nodes::cameras(&self.document, &animation::poses(&source, moment)?, self.anchor.get())
     }
@@ -125,7 +125,7 @@ impl SceneFile {
     /// # Errors
     /// If one is not sound.
     pub fn animations(&self) -> Result<Vec<Animation>, SceneError> {
-        let buffers = Buffers::load(&self.document)?;
+        let buffers = Buffers::of(&self.document);
         let source = Source::new(&self.document, &buffers);
         let clips = self.document.root.animations.iter().enumerate();
         let described = clips.map(|(index, clip)| {
@@ -172,7 +172,7 @@ impl SceneFile {
     /// The scene, from what it has without its nodes.
     fn placed(&self, mut scene: Scene, moment: Option<&Moment>) -> Result<Scene, SceneError> {
         let Self { document, light_units, bare: _, room, unreadable, framed: _, anchor } = self;
-        let buffers = Buffers::load(document)?;
+        let buffers = Buffers::of(document);
         let source = Source::new(document, &buffers);
         let poses = moment.map_or(Ok(Poses::new()), |moment| animation::poses(&source, moment))?;
         let mut notices = Notices { unreadable: unreadable.clone(), ..Notices::default() };
@@ -210,7 +210,7 @@ impl SceneFile {
 
 /// The scene without what its nodes place, and the images that cannot be read.
 fn bare_scene(document: &Document, room: &mut Room) -> Result<(Scene, Vec<String>), SceneError> {
-    let buffers = Buffers::load(document)?;
+    let buffers = Buffers::of(document);
     let source = Source::new(document, &buffers);
     let mut textures = Textures::new(document);
     let materials = material::load(document, &mut textures)?;
