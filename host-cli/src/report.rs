@@ -137,8 +137,8 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
-/// The part of a line around column `at` that has at most `width` characters, and the column of `at` in it, so
-/// that `mark` characters fit from there on. Ellipses stand for what is left out.
+/// The part of a line around column `at` that has at most `width` characters, and the column of `at` in it.
+/// From there on `mark` characters fit. Ellipses stand for what is left out.
 fn around(line: &str, at: usize, mark: usize, width: usize) -> (String, usize) {
     let count = line.chars().count();
     let least = (at + mark).saturating_sub(width).min(at);

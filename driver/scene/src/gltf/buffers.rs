@@ -17,8 +17,8 @@ const EXPORT_AGAIN: &str = "export the scene again; the buffer and its descripti
 /// it: one that nothing uses may be absent, or be an extension's.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
-    /// At least as long as `byteLength`, or empty for the placeholders of compressed views; `None` for the BIN
-    /// chunk.
+    /// At least as long as `byteLength`, or empty for the placeholders of compressed views. `None` stands for
+    /// the BIN chunk.
     bytes: Vec<OnceCell<Option<Bytes<'static>>>>,
     decoded: DecodedViews,
 }
