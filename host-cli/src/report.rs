@@ -85,10 +85,13 @@ impl Layout {
             let line = contents.line() + before.matches('\n').count() + 1;
             let mark = self.coloured(AnsiColor::Magenta.on_default(), "╰── ");
             let shown = text[start..].lines().next().unwrap_or_default();
-            let (shown, indent) = around(shown, indent, self.width.saturating_sub(EXCERPT_MARK));
+            let named = label.label().unwrap_or_default();
+            let mark_width = "╰── ".chars().count() + named.chars().count();
+            let room = self.width.saturating_sub(EXCERPT_MARK);
+            let (shown, indent) = around(shown, indent, mark_width, room);
             writeln!(f, "   ╭─[{}:{line}]", contents.name().unwrap_or_default())?;
             writeln!(f, "   │ {shown}")?;
-            writeln!(f, "   · {:indent$}{mark}{}", "", label.label().unwrap_or_default())?;
+            writeln!(f, "   · {:indent$}{mark}{named}", "")?;
         }
         Ok(())
     }
@@ -133,14 +136,15 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
-/// Part of a line around column `at` of at most `width` characters, and the column of `at` in it. Ellipses
-/// stand for the rest.
-fn around(line: &str, at: usize, width: usize) -> (String, usize) {
+/// The part of a line around column `at` that has at most `width` characters, and the column of `at` in it.
+/// From there on `mark` characters fit. Ellipses stand for what is left out.
+fn around(line: &str, at: usize, mark: usize, width: usize) -> (String, usize) {
     let count = line.chars().count();
-    if count <= width {
+    let least = (at + mark).saturating_sub(width).min(at);
+    if count <= width && least == 0 {
         return (line.to_owned(), at);
     }
-    let start = at.saturating_sub(width / 2).min(count - width);
+    let start = at.saturating_sub(width / 2).min(count.saturating_sub(width)).max(least);
     let [is_cut_before, is_cut_after] = [start > 0, start + width < count];
     let part = line.chars().skip(start).take(width).enumerate();
     let shown = part.map(|(column, character)| match column {
@@ -194,10 +198,11 @@ mod tests {
     fn an_excerpt_fits_the_terminal() {
         for (at, expected) in [(0, ("012345678…", 0)), (9, ("…56789abc…", 5)), (19, ("…bcdefghij", 9))]
         {
-            let (shown, column) = around("0123456789abcdefghij", at, 10);
+            let (shown, column) = around("0123456789abcdefghij", at, 1, 10);
             assert_eq!((&*shown, column), expected);
         }
-        assert_eq!(around("0123", 3, 4), ("0123".to_owned(), 3));
+        assert_eq!(around("0123", 3, 1, 4), ("0123".to_owned(), 3));
+        assert_eq!(around("0123456789", 9, 4, 10), ("…456789".to_owned(), 6));
         let error = MietteDiagnostic::new("no number").with_label(LabeledSpan::at(60..61, "here"));
         let source = NamedSource::new("a.gltf", "1".repeat(60) + "x" + &"2".repeat(60));
         let report = Report::new(error).with_source_code(source);

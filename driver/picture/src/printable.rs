@@ -21,7 +21,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
 
 /// Quotes a word for a POSIX shell, so that the shell takes it literally.
 pub fn shell_word(word: &str) -> Cow<'_, str> {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:@%+".contains(c);
     if !word.is_empty() && word.chars().all(is_plain) {
         return Cow::Borrowed(word);
     }

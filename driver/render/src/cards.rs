@@ -21,6 +21,7 @@ use super::executor::{BudgetCheck, Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, greet};
 use super::open_card::OpenCard;
 use super::outputs::Outputs;
+use super::statistics::EARLIER_RENDER;
 use super::{CardAddress, CardError, CardSet, Observer, RenderError, RenderSettings};
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
@@ -193,7 +194,7 @@ impl Cards {
         };
         let dazzling = names.iter().cloned().enumerate();
         let dazzling = dazzling.map(|(card, name)| (name, scheduler.dazzling_of(card)));
-        let kept = ("an earlier render".to_owned(), scheduler.counts().kept_dazzling);
+        let kept = (EARLIER_RENDER.to_owned(), scheduler.counts().kept_dazzling + outputs.kept_dazzling);
         let outcome = Outcome {
             counters: scheduler.counters(),
             dazzling: dazzling.chain([kept]).filter(|(_, tiles)| *tiles > 0).collect(),

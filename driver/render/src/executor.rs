@@ -82,7 +82,7 @@ pub(super) struct Outcome {
     /// Numbers of tiles that were rendered more than once or taken over.
     pub(super) tiles: TileCounts,
     /// Names of cards that rendered dazzling tiles which no other card verified, with the number of such
-    /// tiles. Tiles that were kept count for `an earlier render`.
+    /// tiles. Kept tiles count for [`EARLIER_RENDER`](crate::statistics::EARLIER_RENDER).
     pub(super) dazzling: Vec<(String, usize)>,
     /// Error that ended the work. The other fields describe the work until then.
     pub(super) failure: Option<RenderError>,

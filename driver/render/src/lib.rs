@@ -56,7 +56,7 @@ pub use settings::{
     CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
     Picture, RenderSettings, Schedule, TileOutputs,
 };
-pub use statistics::{LinkStatistics, Rays, Statistics};
+pub use statistics::{EARLIER_RENDER, LinkStatistics, Rays, Statistics};
 pub use times::Times;
 
 use photoncard_map::pack::PackedScene;

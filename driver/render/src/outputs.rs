@@ -17,6 +17,8 @@ pub(super) struct Outputs<'a> {
     partial: Option<PartialRender>,
     /// Earlier samples that the render adds to. All tiles that are shown include them.
     pub(super) base: Option<Arc<Film>>,
+    /// Number of dazzling tiles among samples that the file of finished tiles has kept.
+    pub(super) kept_dazzling: usize,
     viewers: Vec<Box<dyn Viewer>>,
     pub(super) observer: &'a dyn Observer,
 }
@@ -45,8 +47,13 @@ impl<'a> Outputs<'a> {
         };
         let begun = settings.outputs.partial.as_ref().map(begin).transpose()?;
         let (partial, kept) = begun.map_or((None, None), |(partial, kept)| (Some(partial), kept));
+        let is_dazzling = |tile: &&Tile| {
+            let kept = kept.as_ref().and_then(|kept| kept.finished(tile));
+            kept.is_some_and(|tile| tile.is_dazzling())
+        };
+        let kept_dazzling = tiles.iter().filter(is_dazzling).count();
         let base = kept.map(Arc::new).or(base);
-        let outputs = Self { partial, viewers: viewers(settings, film), base, observer };
+        let outputs = Self { partial, viewers: viewers(settings, film), base, kept_dazzling, observer };
         outputs.report_kept();
         let resumed: Vec<&Tile> = tiles.iter().filter(|tile| film.has(tile)).collect();
         resumed.iter().filter_map(|tile| film.finished(tile)).for_each(|tile| outputs.put(&tile));

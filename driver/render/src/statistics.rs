@@ -13,6 +13,9 @@ use super::times::Times;
 use super::{MemoryStatistics, Provenance, RenderSettings};
 use crate::cost_model::Flops;
 
+/// Name, in place of a card's, of a render whose finished tiles were kept.
+pub const EARLIER_RENDER: &str = "an earlier render";
+
 /// Contents of the statistics file. The keys are stable.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Statistics {
@@ -45,7 +48,7 @@ pub struct Statistics {
     /// Number of tiles with light far above that of the scene's surfaces that were not verified because there
     /// was no second card, and of such tiles that were kept.
     pub dazzling_tiles: usize,
-    /// Names of the cards that rendered these tiles; `an earlier render` for kept ones.
+    /// Names of the cards that rendered these tiles; [`EARLIER_RENDER`] for kept ones.
     #[serde(skip)]
     pub dazzling_cards: Vec<String>,
     /// Number of tiles rendered again because their card was outvoted. The other counts include such a tile

@@ -147,8 +147,8 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders tiles on chips of a kind. With `caches` the memory of each tile is modelled, and its caches are
-    /// empty at first.
+    /// Renders tiles on chips of a kind. With `caches` the memory of each tile is modelled, and its caches
+    /// are empty at first.
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.

@@ -311,6 +311,7 @@ impl<K: ChipKind> Chip<K> {
 
     /// Begins a drain of the queue. The tile of its first gather counts it.
     fn begin_drain(&mut self, frame: &FrameParameters) {
+        // An empty queue has nothing to drain.
         let Some((waiting, first)) = self.shared.gathers.begin_drain(frame.drain) else { return };
         if let Some(flight) = self.flights.values_mut().get_mut(first.target.flight()) {
             flight.counters.drains += 1;

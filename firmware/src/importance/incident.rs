@@ -53,6 +53,7 @@ impl IncidentFlux {
                 continue;
             }
             let direction = unit(decode_direction(photon.direction()).into());
+            // Light from below the surface reaches no cell of the hemisphere.
             let Some(cell) = cell_of(normal, direction) else { continue };
             let power = Vec3::from_array(photon.power().decode()).dot(colour);
             if let Some(sum) = flux.cells.get_mut(cell as usize) {

@@ -213,6 +213,7 @@ pub(super) fn meet_leaf<S: Search>(
     while may_meet != 0 {
         let slot = may_meet.trailing_zeros() as usize;
         may_meet &= may_meet - 1;
+        // Most triangles that may be met are not.
         let Some(intersection) = frame.intersect_slot(sheared, slot, until) else { continue };
         let index = leaf.wrapping_mul(LEAF_TRIANGLES as u32).wrapping_add(slot as u32);
         let weights = intersection.barycentric;

@@ -9,6 +9,7 @@ use std::fmt::Arguments;
 use std::io::IsTerminal;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use photoncard_driver::render::{CardError, Observer, Phase};
@@ -212,11 +213,24 @@ impl Display {
     }
 }
 
-/// Flag that SIGINT, SIGTERM and SIGHUP set. A second SIGINT or SIGTERM ends the process.
+/// Time from a signal to the end of its repetitions: `timeout` sends each to the process and to its group.
+const REPETITIONS: Duration = Duration::from_millis(300);
+
+/// Flag that SIGINT, SIGTERM and SIGHUP set. A later SIGINT or SIGTERM, which is no repetition, ends the
+/// process.
 pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
-    let stopped = Arc::new(AtomicBool::new(false));
+    let [stopped, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
+    let flags = (stopped.clone(), ends.clone());
+    std::thread::Builder::new().name("signals".into()).spawn(move || {
+        let (stopped, ends) = flags;
+        while !stopped.load(Ordering::Relaxed) {
+            std::thread::sleep(REPETITIONS / 3);
+        }
+        std::thread::sleep(REPETITIONS);
+        ends.store(true, Ordering::Relaxed);
+    })?;
     for signal in [SIGINT, SIGTERM] {
-        signal_hook::flag::register_conditional_shutdown(signal, 130, stopped.clone())?;
+        signal_hook::flag::register_conditional_shutdown(signal, 130, ends.clone())?;
         signal_hook::flag::register(signal, stopped.clone())?;
     }
     #[cfg(target_os = "linux")]

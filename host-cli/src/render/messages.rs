@@ -6,7 +6,8 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::photon_map::PhotonsFor;
 use photoncard_driver::quality::{Beyond, Fit, Quality, Stated};
 use photoncard_driver::render::{
-    MemoryStatistics, NamedSettings, Picture, ReadStatistics, RenderSettings, Rendering, Statistics, Times,
+    EARLIER_RENDER, MemoryStatistics, NamedSettings, Picture, ReadStatistics, RenderSettings, Rendering,
+    Statistics, Times,
 };
 use photoncard_driver::scene::{Camera, Scene};
 use serde_json::Value;
@@ -62,9 +63,15 @@ pub(super) fn say_dazzling(statistics: &Statistics) {
     let Statistics { dazzling_tiles, dazzling_cards, .. } = statistics;
     if *dazzling_tiles > 0 {
         let tiles = counted(*dazzling_tiles, "tile");
+        let is_kept = dazzling_cards.iter().any(|card| card == EARLIER_RENDER);
+        let remedy = if is_kept {
+            "rendered again without --resume, by another --card too"
+        } else {
+            "by another --card"
+        };
         say(format_args!(
-            "photoncard: {tiles} of {} with light far beyond that of the surfaces, and no second card to verify it: a lamp without \
-             extent that nearly touches a surface makes such light, and so does a faulty card (verified by another --card)",
+            "photoncard: {tiles} of {} with light far beyond that of the surfaces, which no second card has verified: a lamp without \
+             extent that nearly touches a surface makes such light, and so does a faulty card (verified {remedy})",
             dazzling_cards.join(", ")
         ));
     }

@@ -8,6 +8,7 @@ use photoncard_driver::scene::LightUnits;
 use super::wish::{Wish, numbers};
 use crate::arguments::SceneOptions;
 use crate::environment::EnvironmentOption;
+use crate::shell;
 
 /// Words of the command that renders the picture of a wish.
 pub(super) fn words(scene: &SceneOptions, quality: Quality, wish: &Wish) -> Vec<String> {
@@ -25,7 +26,7 @@ pub(super) fn words(scene: &SceneOptions, quality: Quality, wish: &Wish) -> Vec<
 
 /// Words quoted for a shell.
 pub(super) fn quoted(words: &[String]) -> String {
-    words.iter().map(|word| quote(word)).collect::<Vec<_>>().join(" ")
+    words.iter().map(|word| shell::quoted(word)).collect::<Vec<_>>().join(" ")
 }
 
 /// Path that cannot be mistaken for an option.
@@ -137,13 +138,4 @@ fn of_rays(integrator: &Integrator, words: &mut Words) {
     words.add("--irradiance-cache", if irradiance_error.is_some() { "on" } else { "off" });
     words.add_some("--ic-error", *irradiance_error);
     words.add("--adaptive", &adaptive_threshold.map_or("off".to_owned(), |threshold| threshold.to_string()));
-}
-
-/// Word quoted for a shell.
-fn quote(word: &str) -> String {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_@%+=:,./-".contains(&byte);
-    if !word.is_empty() && word.bytes().all(is_plain) {
-        return word.to_owned();
-    }
-    format!("'{}'", word.replace('\'', r"'\''"))
 }

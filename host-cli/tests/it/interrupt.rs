@@ -35,7 +35,9 @@ fn interrupt(phase: &str, options: &[&str]) {
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     let told = lines.find(|line| line.starts_with(&format!("photoncard: {phase} ")));
     assert!(told.is_some(), "the render ended before its phase {phase}");
-    let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    // Twice, as `timeout` signals a process and its group.
+    let process = child.id().to_string();
+    let kill = Command::new("kill").args(["-INT", &process, &process]).status().unwrap();
     assert!(kill.success());
     assert_eq!(wait(&mut child).code(), Some(130));
     let last = lines.last();

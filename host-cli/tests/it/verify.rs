@@ -80,6 +80,15 @@ fn dazzling_light_of_a_single_card_is_reported() {
         );
         assert_eq!(statistics(&room)["dazzling_tiles"].as_u64().unwrap() > 0, is_told);
     }
+    // Samples of a card alone are kept, and others added by two.
+    let kept = [&["-o", "k.exr", "--quiet", "--keep-samples"][..], &view].concat();
+    room.rendered("scene.gltf", &[&kept[..], &["--spp", "2", "--card", "emulated:1"]].concat());
+    let added = [&kept[..], &["--spp", "4", "--card", "emulated:2", "--resume"]].concat();
+    let said = room.rendered("scene.gltf", &added).stderr;
+    assert!(
+        said.contains("an earlier render with light far beyond") && said.contains("without --resume"),
+        "{said}"
+    );
     // Parts do not state which cards have rendered them.
     for number in ["1", "2"] {
         let part = [&format!("--part={number}/2"), "-o", &format!("{number}.part"), "--quiet"];

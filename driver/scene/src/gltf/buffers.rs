@@ -1,5 +1,6 @@
 //! Bytes of a scene's buffers, from the BIN chunk, data URIs and files in the scene's folder.
 
+use std::cell::OnceCell;
 use std::sync::Arc;
 
 use gltf::json;
@@ -12,20 +13,22 @@ use crate::error::SceneError;
 
 const EXPORT_AGAIN: &str = "export the scene again; the buffer and its description do not fit";
 
-/// Bytes of every buffer, and of the compressed buffer views decoded so far.
+/// Bytes of the buffers and of the compressed buffer views that were read. A buffer is read when a view needs
+/// it: one that nothing uses may be absent, or be an extension's.
 pub(super) struct Buffers<'a> {
-    /// Bytes of each buffer, at least `byteLength` long. Placeholders of compressed views are empty.
-    bytes: Vec<Bytes<'a>>,
+    document: &'a Document,
+    /// At least as long as `byteLength`, or empty for the placeholders of compressed views. `None` stands for
+    /// the BIN chunk.
+    bytes: Vec<OnceCell<Option<Bytes<'static>>>>,
     decoded: DecodedViews,
 }
 
 impl<'a> Buffers<'a> {
-    /// Reads the buffers of a document.
-    pub(super) fn load(document: &'a Document) -> Result<Self, SceneError> {
+    /// Buffers of a document, none of which is read.
+    pub(super) fn of(document: &'a Document) -> Self {
         let Document { root, .. } = document;
-        let bytes =
-            (0..root.buffers.len()).map(|index| load_one(document, index)).collect::<Result<_, _>>()?;
-        Ok(Self { bytes, decoded: DecodedViews::new(root.buffer_views.len()) })
+        let bytes = root.buffers.iter().map(|_| OnceCell::new()).collect();
+        Self { document, bytes, decoded: DecodedViews::new(root.buffer_views.len()) }
     }
 
     /// Bytes of the buffer view `index`; `None` if they exceed its buffer.
@@ -36,22 +39,31 @@ impl<'a> Buffers<'a> {
         view: &json::buffer::View,
     ) -> Result<Option<&[u8]>, SceneError> {
         if let Some(compressed) = Compressed::of(document, index, view)? {
-            let stream = self.part(compressed.buffer(), compressed.place());
+            let stream = self.part(compressed.buffer(), compressed.place())?;
             return self.decoded.get(document, &compressed, stream).map(Some);
         }
         let offset = view.byte_offset.map_or(0, |offset| offset.0);
-        Ok(self.part(view.buffer.value(), (offset, view.byte_length.0)))
+        self.part(view.buffer.value(), (offset, view.byte_length.0))
     }
 
-    /// Bytes of a buffer at an offset; `None` if they exceed the buffer.
-    fn part(&self, buffer: usize, (offset, length): (u64, u64)) -> Option<&[u8]> {
-        let start = usize::try_from(offset).ok()?;
-        let end = usize::try_from(offset.checked_add(length)?).ok()?;
-        self.bytes.get(buffer)?.get(start..end)
+    /// Bytes of a buffer from an offset on; `None` if they exceed it.
+    fn part(&self, buffer: usize, (offset, length): (u64, u64)) -> Result<Option<&[u8]>, SceneError> {
+        let Some(cell) = self.bytes.get(buffer) else { return Ok(None) };
+        let bytes = match cell.get() {
+            Some(bytes) => bytes,
+            None => {
+                let bytes = load_one(self.document, buffer)?;
+                cell.get_or_init(|| bytes)
+            }
+        };
+        let bytes = bytes.as_deref().or(self.document.blob()).unwrap_or_default();
+        let ends = [Some(offset), offset.checked_add(length)].map(|end| usize::try_from(end?).ok());
+        Ok(ends[0].zip(ends[1]).and_then(|(start, end)| bytes.get(start..end)))
     }
 }
 
-fn load_one(document: &Document, index: usize) -> Result<Bytes<'_>, SceneError> {
+/// Bytes of a buffer; `None` for the BIN chunk.
+fn load_one(document: &Document, index: usize) -> Result<Option<Bytes<'static>>, SceneError> {
     let buffer = &document.root.buffers[index];
     let fault = |field: &str, reason: String, remedy| SceneError::Buffer {
         location: document.location(format!("buffers[{index}]{field}")),
@@ -59,24 +71,26 @@ fn load_one(document: &Document, index: usize) -> Result<Bytes<'_>, SceneError> 
         remedy,
     };
     if is_placeholder(document, index, buffer) {
-        return Ok(Bytes::Part(&[]));
+        return Ok(Some(Bytes::Part(&[])));
     }
     let bytes = match (&buffer.uri, document.blob()) {
         (Some(uri), _) if is_data(uri) => {
             let (_, bytes) = decode_data(uri).map_err(|reason| fault(".uri", reason, EXPORT_AGAIN))?;
-            Bytes::Shared(Arc::new(bytes))
+            Some(Bytes::Shared(Arc::new(bytes)))
         }
         (Some(uri), _) => {
             let file = locate(&document.path, uri).map_err(|reason| fault(".uri", reason, INSIDE_FOLDER))?;
-            document.files.read(&file).map_err(|source| SceneError::Unreadable { file, source })?
+            Some(document.files.read(&file).map_err(|source| SceneError::Unreadable { file, source })?)
         }
-        (None, Some(blob)) if index == 0 => Bytes::Part(blob),
+        (None, Some(_)) if index == 0 => None,
         (None, _) => {
-            let reason = "it has no uri, and only the first buffer of a GLB may do without".to_owned();
+            let reason =
+                "it has no uri, and is not the BIN chunk of a GLB, so that its bytes are nowhere".to_owned();
             return Err(fault("", reason, EXPORT_AGAIN));
         }
     };
-    let (stated, available) = (buffer.byte_length.0, bytes.len() as u64);
+    let length = bytes.as_deref().or(document.blob()).map_or(0, <[u8]>::len);
+    let (stated, available) = (buffer.byte_length.0, length as u64);
     if available < stated {
         let reason = format!("{stated} bytes are stated and {available} are there");
         return Err(fault(".byteLength", reason, EXPORT_AGAIN));

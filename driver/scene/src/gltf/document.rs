@@ -181,7 +181,7 @@ impl Document {
         let reason = match fault {
             Fault::IndexOutOfBounds => "the index refers to nothing",
             Fault::Invalid => "the value is not one that glTF knows",
-            Fault::Missing => "it is missing",
+            Fault::Missing => "it is missing, or a member that it needs",
             Fault::Oversize => "the size is beyond this machine's limits",
             Fault::Unsupported => "it is not supported",
         };
@@ -296,7 +296,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
     if text.trim().is_empty() {
         return Err(not_gltf("it is empty"));
     }
-    let json_scan::Scanned { bytes, repeated_key } =
+    let json_scan::Scanned { bytes, repeated_key, extras } =
         json_scan::scan(text).ok_or_else(|| SceneError::Invalid {
             location: Location::new(path, ""),
             reason: format!(
@@ -322,15 +322,22 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
         Err(error) if error.is_data() => {
             // The document as values, and as the crate's types.
             check(bytes.saturating_mul(2))?;
-            foreign::decode(|| Ok(parse_amended(path, text)), || not_gltf(CONTRADICTION))?
+            foreign::decode(|| Ok(parse_amended(path, text, &extras)), || not_gltf(CONTRADICTION))?
         }
         Err(error) => Err(json_error(path, text, &error)),
     }
 }
 
-/// [`parse`] of a text that is valid JSON but that the types of the `gltf` crate reject.
-fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, Shortened), SceneError> {
-    let mut document = serde_json::from_str(text).map_err(|error| json_error(path, text, &error))?;
+/// [`parse`] of a text that is JSON and not in the form of the `gltf` crate.
+fn parse_amended(
+    path: &Path,
+    text: &str,
+    extras: &[Range<usize>],
+) -> Result<(json::Root, Shortened), SceneError> {
+    // Contents of `extras` may be what no value holds, such as 1e999.
+    let document = serde_json::from_str(text);
+    let document = document.or_else(|error| serde_json::from_str(&without(text, extras)).map_err(|_| error));
+    let mut document = document.map_err(|error| json_error(path, text, &error))?;
     if schema::is_of_version_1(&document) {
         return Err(other_kinds::version_1(path));
     }
@@ -341,6 +348,18 @@ fn parse_amended(path: &Path, text: &str) -> Result<(json::Root, Shortened), Sce
         SceneError::Invalid { location: Location::new(path, item), reason, remedy }
     })?;
     Ok((root, shortened))
+}
+
+/// The text with `null` at the places of some values, which are in ascending order.
+fn without(text: &str, values: &[Range<usize>]) -> String {
+    let mut rest = 0;
+    let mut kept = String::with_capacity(text.len());
+    for value in values {
+        kept += text.get(rest..value.start).unwrap_or_default();
+        kept += "null";
+        rest = value.end;
+    }
+    kept + text.get(rest..).unwrap_or_default()
 }
 
 const CONTRADICTION: &str = "its structure contradicts itself";

@@ -1,17 +1,21 @@
 //! Scans a JSON text in one pass before it is parsed, without storing values.
 //!
-//! The scan bounds the memory of the parsed text, because two characters may become a material of hundreds of
-//! bytes. Each value counts as the largest value of its kind, in the types of the `gltf` crate and of the
-//! loader, times two because lists grow by doubling. The scan also finds repeated keys of an object. glTF
-//! forbids them, and parsers differ in which value they take.
+//! It bounds the memory of the parsed text: two characters may become a material of hundreds of bytes. Each
+//! value counts as the largest value of its kind, in the types of the `gltf` crate and in the loader's, times
+//! two, as lists grow by doubling. It also finds keys that stand twice in an object. glTF forbids them, and
+//! parsers take either value.
+//!
+//! A parser skips values that it does not need, whatever they are: numbers beyond the range of floats, lone
+//! surrogates, any depth. So does the scan, which knows tokens alone and never fails. Its result is right for
+//! valid JSON; parsing finds whether the text is valid.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
-use std::fmt::{self, Write as _};
+use std::fmt::Write as _;
+use std::ops::Range;
 
 use glam::DMat4;
 use gltf::json;
-use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
 
 use super::specular_glossiness::Conversion;
 use crate::{Camera, Material};
@@ -30,13 +34,18 @@ const VALUE: u64 = 64;
 /// primitive.
 const OBJECT: u64 = 640;
 
-/// Result of a scan. It covers the text before the first syntax error.
+/// Maximum number of characters of a key in a message.
+const SHOWN: usize = 80;
+
+/// Result of a scan.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) struct Scanned {
     /// Estimated memory of the parsed text, bytes.
     pub(super) bytes: u64,
     /// JSON path of the first repeated key of an object. Keys in `extras` may repeat.
     pub(super) repeated_key: Option<String>,
+    /// Places of the values of `extras`, without those in others.
+    pub(super) extras: Vec<Range<usize>>,
 }
 
 /// Maximum memory of the parsed text, bytes.
@@ -46,12 +55,47 @@ pub(super) fn limit(text: &str) -> u64 {
 
 /// Scans a text; `None` if its estimated memory exceeds [`limit`].
 pub(super) fn scan(text: &str) -> Option<Scanned> {
-    let limit = limit(text);
-    let mut scan = Scan { bytes: 0, limit, keys: Vec::new(), path: Vec::new(), repeated_key: None };
-    let root = Value { kind: Kind::Root, is_free: false, scan: &mut scan };
-    let _ = root.deserialize(&mut serde_json::Deserializer::from_str(text));
-    let Scan { bytes, repeated_key, .. } = scan;
-    (bytes <= limit).then_some(Scanned { bytes, repeated_key })
+    let (limit, bytes) = (limit(text), text.as_bytes());
+    let mut scan = Scan::default();
+    let mut at = 0;
+    while let Some(&byte) = bytes.get(at) {
+        let start = at;
+        at += 1;
+        match byte {
+            b'{' | b'[' => scan.open(byte == b'{', start),
+            b'}' | b']' => scan.close(at),
+            b',' => scan.separate(),
+            b'"' => {
+                let end = end_of_string(bytes, at);
+                scan.string(&text[at..end], start, end + 1);
+                at = end + 1;
+            }
+            b':' | b' ' | b'\t' | b'\r' | b'\n' => {}
+            _ => {
+                let is_end = |byte: &u8| matches!(byte, b',' | b'}' | b']' | b' ' | b'\t' | b'\r' | b'\n');
+                at += bytes[at..].iter().position(is_end).unwrap_or(bytes.len() - at);
+                scan.begin_value(start);
+                scan.end_value(at);
+            }
+        }
+        if scan.bytes > limit {
+            return None;
+        }
+    }
+    let Scan { bytes, repeated_key, extras, .. } = scan;
+    Some(Scanned { bytes, repeated_key, extras })
+}
+
+/// Index of the quotation mark that ends a string, or the length of the text.
+fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
+    while let Some(byte) = bytes.get(at) {
+        match byte {
+            b'"' => break,
+            b'\\' => at += 2,
+            _ => at += 1,
+        }
+    }
+    at.min(bytes.len())
 }
 
 /// Estimated memory of an element of a list of the root, bytes: twice that of the `gltf` crate's and the
@@ -84,7 +128,7 @@ fn element(list: &str) -> u64 {
 }
 
 /// Position of a value in the document.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Root,
     /// Member of the root. If it is a list, each element counts this number of bytes.
@@ -94,171 +138,140 @@ enum Kind {
     Other,
 }
 
-/// Step of a JSON path.
-enum Step<'t> {
-    Key(Cow<'t, str>),
-    Index(usize),
+/// An object or a list around the present place.
+struct Frame {
+    kind: Kind,
+    /// Index in [`Scan::keys`] of an object's first key; `None` for a list.
+    first_key: Option<usize>,
+    /// Number of an object's keys, or of a list's elements, up to now.
+    count: usize,
+    /// True if the next string is a key.
+    expects_key: bool,
 }
 
+/// State of a scan.
+#[derive(Default)]
 struct Scan<'t> {
     bytes: u64,
-    limit: u64,
-    /// Keys of the objects that enclose the current position, the outermost first.
+    frames: Vec<Frame>,
+    /// Keys of the objects around the present place, from the outermost.
     keys: Vec<Cow<'t, str>>,
-    path: Vec<Step<'t>>,
+    /// Start of the outermost `extras` around the present place, and the number of frames around it.
+    free: Option<(usize, usize)>,
     repeated_key: Option<String>,
+    extras: Vec<Range<usize>>,
 }
 
-impl Scan<'_> {
-    fn add<E: Error>(&mut self, bytes: u64) -> Result<(), E> {
-        self.bytes += bytes;
-        if self.bytes <= self.limit { Ok(()) } else { Err(E::custom("more than the limit")) }
+impl<'t> Scan<'t> {
+    fn open(&mut self, is_object: bool, start: usize) {
+        let kind = self.begin_value(start);
+        let first_key = is_object.then_some(self.keys.len());
+        self.frames.push(Frame { kind, first_key, count: 0, expects_key: is_object });
     }
 
-    /// Removes the keys of the current object, which start at index `first`, and records a repeated one.
-    fn end_object(&mut self, first: usize, is_free: bool) {
-        let keys = &mut self.keys[first..];
-        if !is_free && self.repeated_key.is_none() {
-            keys.sort_unstable();
-            let twice = keys.windows(2).find(|pair| pair[0] == pair[1]);
-            self.repeated_key = twice.map(|pair| at(&self.path, &pair[0]));
+    fn close(&mut self, end: usize) {
+        let Some(Frame { first_key, .. }) = self.frames.pop() else { return };
+        if let Some(first) = first_key {
+            self.end_object(first);
         }
-        self.keys.truncate(first);
-    }
-}
-
-/// JSON path of a key of the object at `path`.
-fn at(path: &[Step], key: &str) -> String {
-    let mut text = String::new();
-    for step in path {
-        let _ = match step {
-            Step::Key(key) => write!(text, "{}{key}", if text.is_empty() { "" } else { "." }),
-            Step::Index(index) => write!(text, "[{index}]"),
-        };
-    }
-    if !text.is_empty() {
-        text.push('.');
-    }
-    text + key
-}
-
-/// Visitor of a value. `is_free` is true in `extras`.
-struct Value<'s, 't> {
-    kind: Kind,
-    is_free: bool,
-    scan: &'s mut Scan<'t>,
-}
-
-impl<'t> Value<'_, 't> {
-    fn inside(&mut self, kind: Kind, is_free: bool) -> Value<'_, 't> {
-        Value { kind, is_free: is_free || self.is_free, scan: self.scan }
-    }
-}
-
-impl<'t> DeserializeSeed<'t> for Value<'_, 't> {
-    type Value = ();
-
-    fn deserialize<D: Deserializer<'t>>(self, deserializer: D) -> Result<(), D::Error> {
-        deserializer.deserialize_any(self)
-    }
-}
-
-impl<'t> Visitor<'t> for Value<'_, 't> {
-    type Value = ();
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("JSON")
+        self.end_value(end);
     }
 
-    fn visit_unit<E>(self) -> Result<(), E> {
-        Ok(())
+    fn separate(&mut self) {
+        if let Some(frame) = self.frames.last_mut() {
+            frame.expects_key = frame.first_key.is_some();
+        }
     }
 
-    fn visit_bool<E>(self, _: bool) -> Result<(), E> {
-        Ok(())
+    /// Takes a string between its quotation marks, a key or a value.
+    fn string(&mut self, text: &'t str, start: usize, end: usize) {
+        match self.frames.last_mut().filter(|frame| frame.expects_key) {
+            Some(frame) => {
+                frame.expects_key = false;
+                let is_counted = frame.count > 0 || matches!(frame.kind, Kind::Root | Kind::Element);
+                self.bytes += if is_counted { VALUE } else { VALUE + OBJECT };
+                frame.count += 1;
+                self.keys.push(unescaped(text));
+            }
+            None => {
+                self.begin_value(start);
+                self.bytes += text.len() as u64;
+                self.end_value(end);
+            }
+        }
     }
 
-    fn visit_i64<E>(self, _: i64) -> Result<(), E> {
-        Ok(())
-    }
-
-    fn visit_u64<E>(self, _: u64) -> Result<(), E> {
-        Ok(())
-    }
-
-    fn visit_f64<E>(self, _: f64) -> Result<(), E> {
-        Ok(())
-    }
-
-    fn visit_str<E: Error>(self, text: &str) -> Result<(), E> {
-        self.scan.add(text.len() as u64)
-    }
-
-    fn visit_seq<A: SeqAccess<'t>>(mut self, mut list: A) -> Result<(), A::Error> {
-        let (kind, bytes) = match self.kind {
+    /// Counts a value, and returns its position.
+    fn begin_value(&mut self, start: usize) -> Kind {
+        let depth = self.frames.len();
+        let Some(frame) = self.frames.last_mut() else { return Kind::Root };
+        if frame.first_key.is_some() {
+            let key = self.keys.last().map_or("", |key| key);
+            if key == "extras" {
+                self.free.get_or_insert((start, depth));
+            }
+            return if frame.kind == Kind::Root { Kind::List(element(key)) } else { Kind::Other };
+        }
+        frame.count += 1;
+        let (kind, bytes) = match frame.kind {
             Kind::List(bytes) => (Kind::Element, bytes),
             _ => (Kind::Other, VALUE),
         };
-        for index in 0.. {
-            self.scan.path.push(Step::Index(index));
-            let next = list.next_element_seed(self.inside(kind, false))?;
-            self.scan.path.pop();
-            if next.is_none() {
-                break;
-            }
-            self.scan.add(bytes)?;
-        }
-        Ok(())
+        self.bytes += bytes;
+        kind
     }
 
-    fn visit_map<A: MapAccess<'t>>(mut self, mut map: A) -> Result<(), A::Error> {
-        let mut is_counted = matches!(self.kind, Kind::Root | Kind::Element);
-        let first = self.scan.keys.len();
-        while let Some(key) = map.next_key_seed(Key)? {
-            if !std::mem::replace(&mut is_counted, true) {
-                self.scan.add(OBJECT)?;
-            }
-            self.scan.add(VALUE)?;
-            let kind = match self.kind {
-                Kind::Root => Kind::List(element(&key)),
-                _ => Kind::Other,
-            };
-            let is_free = key == "extras";
-            self.scan.keys.push(key.clone());
-            self.scan.path.push(Step::Key(key));
-            map.next_value_seed(self.inside(kind, is_free))?;
-            self.scan.path.pop();
+    fn end_value(&mut self, end: usize) {
+        if let Some((start, _)) = self.free.take_if(|(_, depth)| *depth == self.frames.len()) {
+            self.extras.push(start..end);
         }
-        self.scan.end_object(first, self.is_free);
-        Ok(())
+    }
+
+    /// Removes the keys of an object, from index `first`, and notes one that stands twice.
+    fn end_object(&mut self, first: usize) {
+        if self.free.is_none() && self.repeated_key.is_none() {
+            let keys = &mut self.keys[first..];
+            keys.sort_unstable();
+            let twice = keys.windows(2).find(|pair| pair[0] == pair[1]).map(|pair| pair[0].clone());
+            self.repeated_key = twice.map(|key| self.path_to(&key, first));
+        }
+        self.keys.truncate(first);
+    }
+
+    /// JSON path of a key of the object that was closed last, whose first key is `first`.
+    fn path_to(&self, key: &str, first: usize) -> String {
+        let mut path = String::new();
+        // The present key of an object precedes the keys of the object in it.
+        let mut ends = self.frames.iter().filter_map(|frame| frame.first_key).skip(1).chain([first]);
+        for frame in &self.frames {
+            if frame.first_key.is_none() {
+                let _ = write!(path, "[{}]", frame.count.saturating_sub(1));
+            } else if let Some(end) = ends.next() {
+                append(&mut path, self.keys.get(end.saturating_sub(1)).map_or("", |key| key));
+            }
+        }
+        append(&mut path, key);
+        path
     }
 }
 
-/// Visitor of a key, which is borrowed from the text unless it has escapes.
-struct Key;
-
-impl<'t> DeserializeSeed<'t> for Key {
-    type Value = Cow<'t, str>;
-
-    fn deserialize<D: Deserializer<'t>>(self, deserializer: D) -> Result<Cow<'t, str>, D::Error> {
-        deserializer.deserialize_str(self)
+/// Appends a key to a JSON path.
+fn append(path: &mut String, key: &str) {
+    if !path.is_empty() {
+        path.push('.');
+    }
+    path.extend(key.chars().take(SHOWN));
+    if key.chars().nth(SHOWN).is_some() {
+        path.push('…');
     }
 }
 
-impl<'t> Visitor<'t> for Key {
-    type Value = Cow<'t, str>;
-
-    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("a key")
+/// A key without its escapes. One that is not text, by a lone surrogate, stays as it is written.
+fn unescaped(key: &str) -> Cow<'_, str> {
+    if !key.contains('\\') {
+        return key.into();
     }
-
-    fn visit_borrowed_str<E>(self, key: &'t str) -> Result<Cow<'t, str>, E> {
-        Ok(key.into())
-    }
-
-    fn visit_str<E>(self, key: &str) -> Result<Cow<'t, str>, E> {
-        Ok(key.to_owned().into())
-    }
+    serde_json::from_str::<String>(&format!("\"{key}\"")).map_or(key.into(), Cow::Owned)
 }
 
 #[cfg(test)]
@@ -291,20 +304,43 @@ mod tests {
     }
 
     #[test]
-    fn invalid_json_counts_up_to_its_first_error() {
+    fn a_text_that_is_no_json_is_scanned_without_fail() {
         let bytes = |text: &str| scan(text).unwrap().bytes;
-        assert_eq!((bytes("{\"a\": [1, 2, nonsense"), bytes("")), (3 * VALUE, 0));
+        assert_eq!((bytes("{\"a\": [1, 2, nonsense"), bytes("")), (4 * VALUE, 0));
+        for text in ["}", "]]", "\"", "\"\\", "{,,{", "[}", "{\"a\"", ":", "{]\"a\"", "ä", "{\"ä\":é"] {
+            assert!(scan(text).is_some(), "{text}");
+        }
+    }
+
+    /// Values that a parser skips, in front of what it must not miss.
+    #[test]
+    fn no_value_ends_a_scan() {
+        let deep = "[".repeat(1000) + &"]".repeat(1000);
+        for value in ["1e999", r#""\ud800""#, r#"{"\ud800": 1}"#, &deep, "-1.5e-7", "true"] {
+            let text = format!(r#"{{"extras": {value}, "b": {{"c": {value}, "d": 1, "d": 2}}}}"#);
+            let scanned = scan(&text).unwrap();
+            assert_eq!(scanned.repeated_key.as_deref(), Some("b.d"), "{text}");
+            assert_eq!(scanned.extras.len(), 1);
+            assert_eq!(&text[scanned.extras[0].clone()], value);
+            let bomb = format!(r#"{{"v": {value}, "materials": [{}]}}"#, vec!["{}"; 1_000_000].join(","));
+            assert_eq!(scan(&bomb), None, "{value}");
+        }
     }
 
     #[test]
-    fn the_path_of_a_repeated_key_is_found() {
+    fn the_place_of_a_key_that_stands_twice_is_found() {
+        let long = format!(r#"{{"{0}": 1, "{0}": 2}}"#, "k".repeat(5000));
+        let shown = "k".repeat(80) + "…";
         for (text, expected) in [
             (r#"{"a": [1, {"b": null}, {"b": -1.5, "c": {"d": "", "d": true}}]}"#, Some("a[2].c.d")),
-            (r#"{"a": {"b": 1}, "b": [{"b": 1}, {"b": 2}]}"#, None),
+            (r#"{"z": 0, "a": {"b": 1}, "b": [{"b": 1}, {"b": 2}]}"#, None),
+            (r#"{"z": 0, "a": {"y": 1, "b": [[0, {"x": 1, "x": 1}]]}}"#, Some("a.b[0][1].x")),
             (r#"{"extras": {"b": 1, "b": [{"c": 1, "c": 1}]}, "b": 3, "b": 4}"#, Some("b")),
+            (r#"{"a": {"extras": {"extras": 1, "b": 1, "b": 2}}, "extras": [{"b": 1, "b": 2}]}"#, None),
             (r#"[{"x": [[]]}, {"x": 1, "\u0078": 1}]"#, Some("[1].x")),
-            (r#"{"a": {"z": 1, "b": 2, "z": 3}, "c""#, Some("a.z")),
+            (r#"{"a": {"z": "\"", "b": 2, "z": 3}, "c""#, Some("a.z")),
             (r#"{"a": 1, "b": {"a": 2}}"#, None),
+            (&long, Some(&shown)),
         ] {
             assert_eq!(scan(text).unwrap().repeated_key.as_deref(), expected, "{text}");
         }

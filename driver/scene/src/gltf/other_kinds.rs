@@ -109,10 +109,13 @@ pub(super) fn refused_file(path: &Path, bytes: &[u8]) -> Option<SceneError> {
         Kind::ByHand(what) => (*what, BY_HAND.to_owned()),
         Kind::Partial => {
             let is_beside_picture = ending.as_deref() == Some("partial");
-            let picture = if is_beside_picture { path.with_extension("") } else { PathBuf::from("OUT.exr") };
+            let (renaming, picture) = match is_beside_picture {
+                true => (String::new(), path.with_extension("")),
+                false => (format!("mv {} OUT.exr.partial && ", shell_word(&file)), PathBuf::from("OUT.exr")),
+            };
             let picture = picture.to_string_lossy();
             let remedy = format!(
-                "give the scene of that render, which goes on from them: photoncard render SCENE.glb -o {} --resume",
+                "give the scene of that render, which goes on from them: {renaming}photoncard render SCENE.glb -o {} --resume",
                 shell_word(&picture)
             );
             ("a file of finished tiles of a render", remedy)

@@ -112,7 +112,7 @@ impl SceneFile {
         if self.anchor.get().is_none() {
             self.at_rest()?;
         }
-        let buffers = Buffers::load(&self.document)?;
+        let buffers = Buffers::of(&self.document);
         let source = Source::new(&self.document, &buffers);
         nodes::cameras(&self.document, &animation::poses(&source, moment)?, self.anchor.get())
     }
@@ -127,7 +127,7 @@ impl SceneFile {
     /// # Errors
     /// If an animation is invalid.
     pub fn animations(&self) -> Result<Vec<Animation>, SceneError> {
-        let buffers = Buffers::load(&self.document)?;
+        let buffers = Buffers::of(&self.document);
         let source = Source::new(&self.document, &buffers);
         let clips = self.document.root.animations.iter().enumerate();
         let described = clips.map(|(index, clip)| {
@@ -174,7 +174,7 @@ impl SceneFile {
     /// Completes a scene, which has all but its nodes' contents, at a moment or at rest.
     fn placed(&self, mut scene: Scene, moment: Option<&Moment>) -> Result<Scene, SceneError> {
         let Self { document, light_units, bare: _, room, unreadable, framed: _, anchor } = self;
-        let buffers = Buffers::load(document)?;
+        let buffers = Buffers::of(document);
         let source = Source::new(document, &buffers);
         let poses = moment.map_or(Ok(Poses::new()), |moment| animation::poses(&source, moment))?;
         let mut notices = Notices { unreadable: unreadable.clone(), ..Notices::default() };
@@ -213,7 +213,7 @@ impl SceneFile {
 /// Reads the scene without its nodes' meshes, lights and cameras. Returns it with descriptions of unreadable
 /// images.
 fn bare_scene(document: &Document, room: &mut Room) -> Result<(Scene, Vec<String>), SceneError> {
-    let buffers = Buffers::load(document)?;
+    let buffers = Buffers::of(document);
     let source = Source::new(document, &buffers);
     let mut textures = Textures::new(document);
     let materials = material::load(document, &mut textures)?;

@@ -64,7 +64,7 @@ pub(super) fn amend(document: &mut Value) -> Shortened {
             channels.retain(|channel| {
                 let Some(target) = target_without_node(channel) else { return true };
                 let of_this_kind = match target.get("extensions") {
-                    Some(Value::Object(_)) => &mut shortened.by_extensions,
+                    Some(Value::Object(extensions)) if !extensions.is_empty() => &mut shortened.by_extensions,
                     _ => &mut shortened.without_target,
                 };
                 of_this_kind.insert(index);
@@ -166,8 +166,8 @@ fn simplify(value: &mut Value) {
     }
 }
 
-/// Reason why `value` cannot be parsed as `T`. It is parsed as text, because the types of the `gltf` crate
-/// are compiled once per input format, which takes a minute.
+/// Reason why `value` is no `T`. It is read as text, since the types of the `gltf` crate are compiled once
+/// for each form of their input.
 fn fault<T: DeserializeOwned>(value: &Value) -> Option<String> {
     let error = serde_json::from_str::<T>(&value.to_string()).err()?.to_string();
     let end = error.rfind(" at line ").unwrap_or(error.len());

@@ -104,6 +104,11 @@ fn channels_of_extensions_are_left_out_and_the_others_stay() {
         aimless.notices.len() == 1 && said.contains("is no node are ignored: animation 'lost'"),
         "{said}"
     );
+    let named = loaded(|json| {
+        let channel = json!({"sampler": 0, "target": {"path": "scale", "extensions": {}}});
+        json["animations"] = json!([{"channels": [channel], "samplers": [{"input": 0, "output": 0}]}]);
+    });
+    assert!(named.notices.concat().contains("is no node"), "{:?}", named.notices);
     let required = load_changed(|json| json["extensionsRequired"] = json!(["KHR_animation_pointer"]));
     assert!(matches!(required, Err(SceneError::RequiredExtension { .. })));
 }
@@ -229,4 +234,46 @@ fn an_orthographic_camera_is_refused_as_the_view() {
     let alone = alone.unwrap();
     assert!(matches!(alone.camera(None), Err(SceneError::OrthographicCamera { .. })));
     assert!(alone.notices.iter().all(|notice| !notice.contains("framed")), "{:?}", alone.notices);
+}
+
+/// Loads a scene of this text, with the bytes of the triangle beside it.
+fn load_text(text: &str) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("data.bin"), triangle_bytes()).unwrap();
+    std::fs::write(folder.path().join("scene.gltf"), text).unwrap();
+    photoncard_scene::gltf::load(&folder.path().join("scene.gltf"))
+}
+
+/// JSON that no value holds, and that a parser skips, is that of `extras`, whatever else has to be amended.
+#[test]
+fn contents_of_extras_are_free() {
+    let deep = "[".repeat(200) + &"]".repeat(200);
+    for contents in ["1e999", r#""\ud800""#, &deep, r#"{"a": 1, "a": 2}"#] {
+        for is_amended in [false, true] {
+            let mut json = triangle_json();
+            if is_amended {
+                json["scenes"].as_array_mut().unwrap().push(json!({}));
+            }
+            json["extras"] = json!("contents");
+            let text = json.to_string().replace("\"contents\"", contents);
+            let loaded = load_text(&text);
+            assert!(loaded.is_ok(), "{contents}, {is_amended}: {:?}", loaded.err());
+            let repeated = text.replace("\"meshes\":", "\"meshes\": [], \"meshes\":");
+            let Err(SceneError::Invalid { location, .. }) = load_text(&repeated) else {
+                panic!("{contents}")
+            };
+            assert_eq!(location.item, "meshes");
+        }
+    }
+}
+
+/// A buffer that nothing uses may be absent, or be an extension's.
+#[test]
+fn buffers_without_use_are_not_read() {
+    for buffer in [json!({"byteLength": 10}), json!({"byteLength": 10, "uri": "absent.bin"})] {
+        let scene = loaded(|json| {
+            push(json, "buffers", buffer);
+        });
+        assert_eq!(scene.notices, Vec::<String>::new());
+    }
 }

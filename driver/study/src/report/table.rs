@@ -186,7 +186,7 @@ impl Table {
                 header.push(format!("{} half-width{unit}", column.name));
             }
         }
-        let mut csv = csv_record(&header);
+        let mut records = vec![header];
         for row in &self.rows {
             let mut record = Vec::new();
             for (cell, with_half_width) in row.iter().zip(&with_half_width) {
@@ -195,9 +195,9 @@ impl Table {
                     record.push(cell.half_width().map_or_else(String::new, number::full));
                 }
             }
-            csv.push_str(&csv_record(&record));
+            records.push(record);
         }
-        csv
+        csv_of(&records).unwrap_or_default()
     }
 
     /// Encodes the table as an HTML element `table`, without its title. Integers are written in full, other
@@ -233,18 +233,11 @@ impl Table {
     }
 }
 
-fn csv_record(fields: &[String]) -> String {
-    let quote = |field: &String| {
-        let is_plain = !field.contains(['"', ',', '\r', '\n']) && field.trim() == field;
-        if is_plain { field.clone() } else { format!("\"{}\"", field.replace('"', "\"\"")) }
-    };
-    // A record of one empty field would be an empty line, which readers skip.
-    if let [field] = fields
-        && field.is_empty()
-    {
-        return "\"\"\r\n".to_owned();
-    }
-    fields.iter().map(quote).collect::<Vec<_>>().join(",") + "\r\n"
+/// CSV of records. Writing to memory does not fail, and the records have one length.
+fn csv_of(records: &[Vec<String>]) -> Option<String> {
+    let mut csv = csv::WriterBuilder::new().terminator(csv::Terminator::CRLF).from_writer(Vec::new());
+    records.iter().try_for_each(|record| csv.write_record(record)).ok()?;
+    String::from_utf8(csv.into_inner().ok()?).ok()
 }
 
 #[cfg(test)]
@@ -252,26 +245,10 @@ mod tests {
     use super::super::markup::reader;
     use super::*;
 
-    /// Parses CSV as defined by RFC 4180.
-    fn parse(csv: &str) -> Vec<Vec<String>> {
-        let (mut records, mut record, mut field) = (Vec::new(), Vec::new(), String::new());
-        let mut characters = csv.chars().peekable();
-        let mut is_quoted = false;
-        while let Some(character) = characters.next() {
-            match character {
-                '"' if is_quoted && characters.peek() == Some(&'"') => field.extend(characters.next()),
-                '"' => is_quoted = !is_quoted,
-                ',' if !is_quoted => record.push(std::mem::take(&mut field)),
-                '\r' if !is_quoted => {
-                    assert_eq!(characters.next(), Some('\n'));
-                    record.push(std::mem::take(&mut field));
-                    records.push(std::mem::take(&mut record));
-                }
-                _ => field.push(character),
-            }
-        }
-        assert!(!is_quoted && record.is_empty() && field.is_empty());
-        records
+    fn parse(text: &str) -> Vec<Vec<String>> {
+        let records =
+            csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes()).into_records();
+        records.map(|record| record.unwrap().iter().map(str::to_owned).collect()).collect()
     }
 
     fn nasty() -> Table {

@@ -188,6 +188,7 @@ impl Choice {
         for ((option, child), (estimate, weight)) in
             options.iter_mut().zip(children).zip(estimates.iter().zip(weights))
         {
+            // A node may have fewer children, and a child that lights nothing here has no estimate.
             let (Some(child), Some(_)) = (child, estimate) else { continue };
             let even = 1.0 / count;
             // Not `<= 0`: in an unsound image the sum may be NaN.
