@@ -136,8 +136,8 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
-/// The part of a line around column `at` that has at most `width` characters, and the column of `at` in it.
-/// From there on `mark` characters fit. Ellipses stand for what is left out.
+/// Part of a line around column `at` of at most `width` characters, and the column of `at` in it. At least
+/// `mark` characters fit from there on. Ellipses stand for the rest.
 fn around(line: &str, at: usize, mark: usize, width: usize) -> (String, usize) {
     let count = line.chars().count();
     let least = (at + mark).saturating_sub(width).min(at);

@@ -213,10 +213,11 @@ impl Display {
     }
 }
 
-/// Time from a signal to the end of its repetitions: `timeout` sends each to the process and to its group.
+/// Time after a signal within which another counts as a repetition, because `timeout` sends each to the
+/// process and to its group.
 const REPETITIONS: Duration = Duration::from_millis(300);
 
-/// Flag that SIGINT, SIGTERM and SIGHUP set. A later SIGINT or SIGTERM, which is no repetition, ends the
+/// Flag that SIGINT, SIGTERM and SIGHUP set. A later SIGINT or SIGTERM that is no repetition ends the
 /// process.
 pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     let [stopped, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));

@@ -14,17 +14,17 @@ use crate::error::SceneError;
 const EXPORT_AGAIN: &str = "export the scene again; the buffer and its description do not fit";
 
 /// Bytes of the buffers and of the compressed buffer views that were read. A buffer is read when a view needs
-/// it: one that nothing uses may be absent, or be an extension's.
+/// it, because an unused one may be missing or belong to an extension.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
-    /// At least as long as `byteLength`, or empty for the placeholders of compressed views. `None` stands for
-    /// the BIN chunk.
+    /// Bytes of each buffer, at least `byteLength` long; empty for placeholders of compressed views, `None`
+    /// for the BIN chunk.
     bytes: Vec<OnceCell<Option<Bytes<'static>>>>,
     decoded: DecodedViews,
 }
 
 impl<'a> Buffers<'a> {
-    /// Buffers of a document, none of which is read.
+    /// Buffers of a document, which are not read yet.
     pub(super) fn of(document: &'a Document) -> Self {
         let Document { root, .. } = document;
         let bytes = root.buffers.iter().map(|_| OnceCell::new()).collect();
@@ -46,7 +46,7 @@ impl<'a> Buffers<'a> {
         self.part(view.buffer.value(), (offset, view.byte_length.0))
     }
 
-    /// Bytes of a buffer from an offset on; `None` if they exceed it.
+    /// Bytes of a buffer at an offset; `None` if they exceed the buffer.
     fn part(&self, buffer: usize, (offset, length): (u64, u64)) -> Result<Option<&[u8]>, SceneError> {
         let Some(cell) = self.bytes.get(buffer) else { return Ok(None) };
         let bytes = match cell.get() {
@@ -62,7 +62,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// Bytes of a buffer; `None` for the BIN chunk.
+/// Reads a buffer; `None` for the BIN chunk.
 fn load_one(document: &Document, index: usize) -> Result<Option<Bytes<'static>>, SceneError> {
     let buffer = &document.root.buffers[index];
     let fault = |field: &str, reason: String, remedy| SceneError::Buffer {

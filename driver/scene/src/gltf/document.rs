@@ -328,7 +328,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
     }
 }
 
-/// [`parse`] of a text that is JSON and not in the form of the `gltf` crate.
+/// [`parse`] of a text that is valid JSON but that the types of the `gltf` crate reject.
 fn parse_amended(
     path: &Path,
     text: &str,
@@ -350,7 +350,7 @@ fn parse_amended(
     Ok((root, shortened))
 }
 
-/// The text with `null` at the places of some values, which are in ascending order.
+/// Text with `null` in place of some values, whose ranges are in ascending order.
 fn without(text: &str, values: &[Range<usize>]) -> String {
     let mut rest = 0;
     let mut kept = String::with_capacity(text.len());

@@ -1,9 +1,9 @@
 //! Scans a JSON text in one pass before it is parsed, without storing values.
 //!
-//! It bounds the memory of the parsed text: two characters may become a material of hundreds of bytes. Each
-//! value counts as the largest value of its kind, in the types of the `gltf` crate and in the loader's, times
-//! two, as lists grow by doubling. It also finds keys that stand twice in an object. glTF forbids them, and
-//! parsers take either value.
+//! The scan bounds the memory of the parsed text, because two characters may become a material of hundreds of
+//! bytes. Each value counts as the largest value of its kind, in the types of the `gltf` crate and of the
+//! loader, times two because lists grow by doubling. The scan also finds repeated keys of an object. glTF
+//! forbids them, and parsers differ in which value they take.
 //!
 //! A parser skips values that it does not need, whatever they are: numbers beyond the range of floats, lone
 //! surrogates, any depth. So does the scan, which knows tokens alone and never fails. Its result is right for
@@ -44,7 +44,7 @@ pub(super) struct Scanned {
     pub(super) bytes: u64,
     /// JSON path of the first repeated key of an object. Keys in `extras` may repeat.
     pub(super) repeated_key: Option<String>,
-    /// Places of the values of `extras`, without those in others.
+    /// Byte ranges of the values of `extras`, except those inside others.
     pub(super) extras: Vec<Range<usize>>,
 }
 
@@ -86,7 +86,7 @@ pub(super) fn scan(text: &str) -> Option<Scanned> {
     Some(Scanned { bytes, repeated_key, extras })
 }
 
-/// Index of the quotation mark that ends a string, or the length of the text.
+/// Index of the quotation mark that ends a string, or the length of the text without one.
 fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
     while let Some(byte) = bytes.get(at) {
         match byte {
@@ -133,17 +133,17 @@ enum Kind {
     Root,
     /// Member of the root. If it is a list, each element counts this number of bytes.
     List(u64),
-    /// An element of a list of the root, which is counted by its list.
+    /// Element of a list of the root, which is counted by its list.
     Element,
     Other,
 }
 
-/// An object or a list around the present place.
+/// Object or list that encloses the current position.
 struct Frame {
     kind: Kind,
     /// Index in [`Scan::keys`] of an object's first key; `None` for a list.
     first_key: Option<usize>,
-    /// Number of an object's keys, or of a list's elements, up to now.
+    /// Number of the object's keys, or of the list's elements, so far.
     count: usize,
     /// True if the next string is a key.
     expects_key: bool,
@@ -154,9 +154,9 @@ struct Frame {
 struct Scan<'t> {
     bytes: u64,
     frames: Vec<Frame>,
-    /// Keys of the objects around the present place, from the outermost.
+    /// Keys of the objects that enclose the current position, the outermost first.
     keys: Vec<Cow<'t, str>>,
-    /// Start of the outermost `extras` around the present place, and the number of frames around it.
+    /// Start of the outermost enclosing `extras`, and the number of frames around it; `None` outside.
     free: Option<(usize, usize)>,
     repeated_key: Option<String>,
     extras: Vec<Range<usize>>,
@@ -183,7 +183,7 @@ impl<'t> Scan<'t> {
         }
     }
 
-    /// Takes a string between its quotation marks, a key or a value.
+    /// Processes a string, a key or a value, between its quotation marks.
     fn string(&mut self, text: &'t str, start: usize, end: usize) {
         match self.frames.last_mut().filter(|frame| frame.expects_key) {
             Some(frame) => {
@@ -201,7 +201,7 @@ impl<'t> Scan<'t> {
         }
     }
 
-    /// Counts a value, and returns its position.
+    /// Counts a value and returns its position.
     fn begin_value(&mut self, start: usize) -> Kind {
         let depth = self.frames.len();
         let Some(frame) = self.frames.last_mut() else { return Kind::Root };
@@ -227,7 +227,7 @@ impl<'t> Scan<'t> {
         }
     }
 
-    /// Removes the keys of an object, from index `first`, and notes one that stands twice.
+    /// Removes the keys of an object, which start at index `first`, and records a repeated one.
     fn end_object(&mut self, first: usize) {
         if self.free.is_none() && self.repeated_key.is_none() {
             let keys = &mut self.keys[first..];
@@ -238,7 +238,7 @@ impl<'t> Scan<'t> {
         self.keys.truncate(first);
     }
 
-    /// JSON path of a key of the object that was closed last, whose first key is `first`.
+    /// JSON path of a key of the object that was closed last, whose first key has the index `first`.
     fn path_to(&self, key: &str, first: usize) -> String {
         let mut path = String::new();
         // The present key of an object precedes the keys of the object in it.
@@ -266,7 +266,7 @@ fn append(path: &mut String, key: &str) {
     }
 }
 
-/// A key without its escapes. One that is not text, by a lone surrogate, stays as it is written.
+/// Key without escapes. A key with a lone surrogate, which is no text, stays as it is written.
 fn unescaped(key: &str) -> Cow<'_, str> {
     if !key.contains('\\') {
         return key.into();
@@ -312,7 +312,7 @@ mod tests {
         }
     }
 
-    /// Values that a parser skips, in front of what it must not miss.
+    /// Values that a parser skips precede contents that the scan must find.
     #[test]
     fn no_value_ends_a_scan() {
         let deep = "[".repeat(1000) + &"]".repeat(1000);

@@ -88,7 +88,7 @@ pub(super) fn remove_unknown_paths(root: &mut json::Root) -> BTreeMap<usize, usi
     shortened
 }
 
-/// A channel whose path neither glTF nor an extension of the channel defines.
+/// Channel whose path neither glTF nor an extension of the channel defines.
 pub(super) struct UnknownPath {
     pub(super) animation: usize,
     pub(super) channel: usize,
@@ -166,8 +166,8 @@ fn simplify(value: &mut Value) {
     }
 }
 
-/// Reason why `value` is no `T`. It is read as text, since the types of the `gltf` crate are compiled once
-/// for each form of their input.
+/// Reason why `value` cannot be parsed as `T`. It is parsed as text, because the types of the `gltf` crate
+/// are compiled once per input format.
 fn fault<T: DeserializeOwned>(value: &Value) -> Option<String> {
     let error = serde_json::from_str::<T>(&value.to_string()).err()?.to_string();
     let end = error.rfind(" at line ").unwrap_or(error.len());
