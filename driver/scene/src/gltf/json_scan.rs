@@ -328,7 +328,7 @@ mod tests {
     }
 
     #[test]
-    fn the_place_of_a_key_that_stands_twice_is_found() {
+    fn the_path_of_a_repeated_key_is_found() {
         let long = format!(r#"{{"{0}": 1, "{0}": 2}}"#, "k".repeat(5000));
         let shown = "k".repeat(80) + "…";
         for (text, expected) in [
