@@ -1,4 +1,5 @@
-//! Server of the page: its files and WebSockets. Each connection has its own thread; their number is bounded.
+//! Serves the page: its files, and WebSocket connections. Each connection has a thread of its own. Their
+//! number is bounded.
 //!
 //! A connection is a stranger until the gate accepts it. Strangers have their own limit, and the oldest is
 //! closed for a new one. Silent strangers therefore cannot keep pages out, and pages cannot keep strangers
