@@ -4,8 +4,10 @@ use glam::Vec3;
 use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Rendering,
 };
-use photoncard_driver::scene::{Material, Reflection, Scene, Triangle};
+use photoncard_driver::scene::{Material, Scene, Triangle};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, room, scene};
+
+use super::specular::mirror;
 
 fn settings() -> RenderSettings {
     RenderSettings {
@@ -18,18 +20,6 @@ fn settings() -> RenderSettings {
         },
         ..RenderSettings::default()
     }
-}
-
-fn mirror(reflectance: f32) -> Material {
-    let reflection = Reflection::MetallicRoughness {
-        base_colour: Vec3::splat(reflectance),
-        metallic: 1.0,
-        roughness: 0.0,
-        dielectric: Vec3::splat(0.04),
-        grazing: 1.0,
-        transmission: None,
-    };
-    Material::new("mirror", reflection)
 }
 
 /// Double-sided material that reflects `albedo` and emits the rest of a radiance of 1.

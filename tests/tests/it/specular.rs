@@ -27,7 +27,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-fn mirror(reflectance: f32) -> Material {
+pub(super) fn mirror(reflectance: f32) -> Material {
     let reflection = Reflection::MetallicRoughness {
         base_colour: Vec3::splat(reflectance),
         metallic: 1.0,
