@@ -65,13 +65,13 @@ pub(super) fn say_dazzling(statistics: &Statistics) {
         let tiles = counted(*dazzling_tiles, "tile");
         let is_kept = dazzling_cards.iter().any(|card| card == EARLIER_RENDER);
         let remedy = if is_kept {
-            "rendered again without --resume, by another --card too"
+            "verified if it is rendered again without --resume, by another --card too"
         } else {
-            "by another --card"
+            "verified by another --card"
         };
         say(format_args!(
             "photoncard: {tiles} of {} with light far beyond that of the surfaces, which no second card has verified: a lamp without \
-             extent that nearly touches a surface makes such light, and so does a faulty card (verified {remedy})",
+             extent that nearly touches a surface makes such light, and so does a faulty card ({remedy})",
             dazzling_cards.join(", ")
         ));
     }
