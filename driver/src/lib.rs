@@ -100,17 +100,23 @@
 //!
 //! # Crates
 //!
-//! This crate re-exports the modules of six crates. Each of them imports crates in rows above it;
+//! This crate re-exports the modules of six crates. Each of them imports crates above it in this list;
 //! `photoncard_cards` imports only `photoncard_picture`.
 //!
-//! | crate | modules | contents |
-//! |---|---|---|
-//! | [`photoncard_picture`] | [`film`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`], [`tone_mapping`], [`difference`], [`output`], [`printable`], [`choice`] | pixels of a picture and their destinations; its files; names of enumerations |
-//! | [`photoncard_scene`] | [`scene`], [`error`] | triangles, materials, textures, lights and cameras of a glTF file; its errors |
-//! | [`photoncard_map`] | [`bvh`], [`pack`], [`photon`], [`photon_map`] | bounding volume hierarchy, light tree, photon pass and photon map: the sections of the card image |
-//! | [`photoncard_cards`] | [`link`], [`session`], [`scheduler`], [`dispatcher`] | ports of bytes; the host's end of the protocol, without I/O; assignment of tiles to cards |
-//! | [`photoncard_render`] | [`render`], [`emulator`], [`quality`], [`partial`], [`parts`], [`display`], [`cost_model`] | a render from a scene to a complete film; emulated chips on threads of this process; settings from pilot renders; the file of finished tiles; parts of a picture and their merge; the client of a display server; FLOPs and DRAM bytes by Table 7.1 |
-//! | [`photoncard_study`] | [`study`] | measurements of shipped scenes, and reports |
+//! - [`photoncard_picture`] ([`film`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`], [`tone_mapping`],
+//!   [`difference`], [`output`], [`printable`], [`choice`]): pixels of a picture and their destinations; its
+//!   files; names of enumerations.
+//! - [`photoncard_scene`] ([`scene`], [`error`]): triangles, materials, textures, lights and cameras of a
+//!   glTF file; its errors.
+//! - [`photoncard_map`] ([`bvh`], [`pack`], [`photon`], [`photon_map`]): bounding volume hierarchy, light
+//!   tree, photon pass and photon map: the sections of the card image.
+//! - [`photoncard_cards`] ([`link`], [`session`], [`scheduler`], [`dispatcher`]): ports of bytes; the host's
+//!   end of the protocol, without I/O; assignment of tiles to cards.
+//! - [`photoncard_render`] ([`render`], [`emulator`], [`quality`], [`partial`], [`parts`], [`display`],
+//!   [`cost_model`]): a render from a scene to a complete film; emulated chips on threads of this process;
+//!   settings from pilot renders; the file of finished tiles; parts of a picture and their merge; the client
+//!   of a display server; FLOPs and DRAM bytes by Table 7.1.
+//! - [`photoncard_study`] ([`study`]): measurements of shipped scenes, and reports.
 //!
 //! Below all of them are `photoncard_shared` (formats of memory and wire) and `photoncard_firmware`, whose
 //! code `photoncard_map` uses to compute photons, disc fractions and irradiance points.

@@ -1,15 +1,17 @@
 //! `photoncard view`: a page of the browser that shows a scene while it is rendered.
 //!
-//! | module | contents |
-//! |---|---|
-//! | `refinement` | order of the pictures: a state machine |
-//! | `wish`, `passes`, `command_line` | the requested picture: its settings, those of coarse pictures, and the command that renders it |
-//! | `canvas`, `pages`, `cards` | tiles of the newest wish; the next message to each page; states of the cards |
-//! | `request`, `describe` | messages of a page, and messages to it |
-//! | `state` | all of these as one state, without threads, clock, input or output |
-//! | `hub`, `painter`, `fitting`, `returning` | the state under a lock, the threads that render and that run pilot renders, and the one that looks for lost cards |
-//! | `http`, `gate`, `page_files`, `socket`, `server` | requests, access control, the page's files, WebSockets |
-//! | `saving`, `browser` | pictures that a page saves, and the browser that shows it |
+//! - `refinement`: order of the pictures: a state machine.
+//! - `wish`, `passes`, `command_line`: the requested picture: its settings, those of coarse pictures, and the
+//!   command that renders it.
+//! - `canvas`, `pages`, `cards`: tiles of the newest wish; the next message to each page; states of the
+//!   cards.
+//! - `request`, `describe`: messages of a page, and messages to it.
+//! - `state`: all of these as one state, without threads, clock, input or output.
+//! - `hub`, `painter`, `fitting`, `returning`: the state under a lock, the threads that render and that run
+//!   pilot renders, and the one that looks for lost cards.
+//! - `http`, `gate`, `page_files`, `socket`, `server`: requests, access control, the page's files,
+//!   web sockets.
+//! - `saving`, `browser`: pictures that a page saves, and the browser that shows it.
 
 mod browser;
 mod canvas;

@@ -17,7 +17,7 @@ struct TileInFlight {
     assignment: Assignment,
     /// Records of all pixels, valid where `is_received`.
     records: Vec<u8>,
-    /// Whether the record of each pixel was received.
+    /// Flags of the pixels whose records were received.
     is_received: Vec<bool>,
 }
 

@@ -22,7 +22,7 @@ impl Emulated {
         Self { budget: K::BUDGET, points: K::Points::ENTRIES }
     }
 
-    /// The same kind with another budget, within the ranges of a chip's indices.
+    /// Kind with another budget, within the ranges of a chip's indices, and equal gather points.
     #[must_use]
     pub fn with_budget(self, budget: Budget) -> Self {
         Self { budget, ..self }

@@ -325,7 +325,7 @@ impl<'a> Source<'a> {
         let view = self.document.root.buffer_views.get(index).ok_or_else(|| {
             self.document.invalid(item, format!("buffer view {index} does not exist"), REMEDY)
         })?;
-        let bytes = self.buffers.view(self.document, index, view)?;
+        let bytes = self.buffers.view(index, view)?;
         Ok((bytes, view.byte_stride.map(|stride| stride.0)))
     }
 

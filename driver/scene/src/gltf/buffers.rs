@@ -32,15 +32,10 @@ impl<'a> Buffers<'a> {
     }
 
     /// Bytes of the buffer view `index`; `None` if they exceed its buffer.
-    pub(super) fn view(
-        &self,
-        document: &Document,
-        index: usize,
-        view: &json::buffer::View,
-    ) -> Result<Option<&[u8]>, SceneError> {
-        if let Some(compressed) = Compressed::of(document, index, view)? {
+    pub(super) fn view(&self, index: usize, view: &json::buffer::View) -> Result<Option<&[u8]>, SceneError> {
+        if let Some(compressed) = Compressed::of(self.document, index, view)? {
             let stream = self.part(compressed.buffer(), compressed.place())?;
-            return self.decoded.get(document, &compressed, stream).map(Some);
+            return self.decoded.get(self.document, &compressed, stream).map(Some);
         }
         let offset = view.byte_offset.map_or(0, |offset| offset.0);
         self.part(view.buffer.value(), (offset, view.byte_length.0))
