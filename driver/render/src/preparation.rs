@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use photoncard_map::pack::{CardImage, PackedScene};
 use photoncard_map::photon_map::{self, Guiding, MappedImage, PhotonTimes, map_photons};
-use photoncard_scene::FixedScene;
+use photoncard_scene::Scene;
 use photoncard_shared::message::CausticGather;
 
 use super::executor::FitChips;
@@ -31,7 +31,7 @@ pub(super) struct Prepared {
 /// # Errors
 /// If the image does not fit the chips, the photons cannot be traced, or the observer stops the render.
 pub(super) fn prepare(
-    scene: &FixedScene,
+    scene: &Scene,
     packed: PackedScene,
     settings: &RenderSettings,
     fit: &mut FitChips,
@@ -39,7 +39,7 @@ pub(super) fn prepare(
     observer: &dyn Observer,
 ) -> Result<Prepared, RenderError> {
     let start = Instant::now();
-    let photon_settings = settings.photon_settings_of(scene);
+    let photon_settings = settings.photon_settings(scene);
     fit(&|budget| Ok(photon_map::check_packed(&packed, &photon_settings, budget)?))?;
     let total = settings.photons.count as u64;
     let progress = |stored: usize| {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{PhotonSettings, check_image};
 use photoncard_picture::film::{Film, FilmError};
-use photoncard_scene::{FixedScene, Scene};
+use photoncard_scene::Scene;
 use photoncard_shared::message::{FrameParameters, SumScale};
 
 use super::cards::Cards;
@@ -55,27 +55,14 @@ impl Renderer {
         Self { cards: None, kept: Some(kept) }
     }
 
-    /// Renders a picture of a scene.
+    /// Renders a picture of a scene. For another camera of the same scene neither triangles nor texels are
+    /// read.
     ///
     /// # Errors
     /// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
     pub fn render(
         &mut self,
         scene: &Scene,
-        settings: &RenderSettings,
-        observer: &dyn Observer,
-    ) -> Result<Rendering, RenderError> {
-        self.render_fixed(&scene.into(), settings, observer)
-    }
-
-    /// Renders a picture of a scene that does not change between pictures. For another camera neither
-    /// triangles nor texels are read.
-    ///
-    /// # Errors
-    /// As [`Self::render`].
-    pub fn render_fixed(
-        &mut self,
-        scene: &FixedScene,
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
@@ -92,7 +79,7 @@ impl Renderer {
     /// other layers.
     pub fn refine(
         &mut self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         base: Arc<Film>,
         observer: &dyn Observer,
@@ -117,26 +104,12 @@ impl Renderer {
         choose: &dyn Fn(&PackedScene) -> Chosen,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_chosen_fixed(&scene.into(), settings, choose, observer)
-    }
-
-    /// Does [`Self::render_chosen`] for a scene that does not change between pictures.
-    ///
-    /// # Errors
-    /// As [`Self::render_chosen`].
-    pub fn render_chosen_fixed(
-        &mut self,
-        scene: &FixedScene,
-        settings: &RenderSettings,
-        choose: &dyn Fn(&PackedScene) -> Chosen,
-        observer: &dyn Observer,
-    ) -> Result<Rendering, RenderError> {
         self.render_by(scene, settings, Some(choose), None, observer)
     }
 
     fn render_by(
         &mut self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         base: Option<Arc<Film>>,
@@ -151,7 +124,7 @@ impl Renderer {
 
     fn render_on_cards(
         &mut self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         base: Option<Arc<Film>>,
@@ -263,8 +236,8 @@ pub(super) struct Kept {
 
 impl Kept {
     /// Returns whether the image is of this scene, with the photons of the settings.
-    fn is_of(&self, scene: &FixedScene, settings: &RenderSettings) -> bool {
-        self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings_of(scene)
+    fn is_of(&self, scene: &Scene, settings: &RenderSettings) -> bool {
+        self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings(scene)
     }
 }
 
@@ -279,7 +252,7 @@ pub(super) enum Source {
 impl Source {
     /// Determines the source of the image, and the settings as stated or chosen.
     pub(super) fn new(
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         kept: &mut Option<Kept>,
@@ -313,7 +286,7 @@ impl Source {
     /// If it does not fit the chips, the photons cannot be traced, or the observer stops the render.
     pub(super) fn prepare(
         self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         fit: &mut FitChips,
         times: &mut Times,
@@ -328,7 +301,7 @@ impl Source {
         };
         Ok(Kept {
             scene: scene.checksum_without_cameras().to_owned(),
-            photons: settings.photon_settings_of(scene),
+            photons: settings.photon_settings(scene),
             prepared: prepare(scene, packed, settings, fit, times, observer)?,
         })
     }

@@ -11,7 +11,7 @@ pub const MAX_TEXELS: u64 = 1 << 28;
 /// Mapping of an image to surfaces: transform of coordinates, wrap modes and filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
-    /// Index into [`Scene::images`](super::Scene::images).
+    /// Index into [`Scene::images`](super::SceneContents::images).
     pub image: u32,
     /// Index of the set of texture coordinates in [`VertexAttributes`](super::VertexAttributes): 0 or 1.
     pub set: u32,

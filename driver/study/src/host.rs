@@ -11,7 +11,7 @@ use photoncard_map::photon_map::{
     MappedImage, PhotonMapSize, PhotonSettings, PhotonTimes, TracedPhotons, map_photons, map_traced,
 };
 use photoncard_render::{RenderError, RenderSettings};
-use photoncard_scene::Scene;
+use photoncard_scene::{Scene, SceneContents};
 use photoncard_shared::address::LINE_BYTES;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
@@ -19,6 +19,7 @@ use serde_json::json;
 
 use super::error::StudyError;
 use super::laboratory::{StudyObserver, load_scene};
+use super::point::identity;
 use super::store::PointStore;
 
 /// Displacement of moving lights, relative to the scene's diagonal.
@@ -109,7 +110,7 @@ impl<'a> HostBench<'a> {
         let scene = load_scene(&self.scenes, file)?;
         let threads = self.pool.current_num_threads();
         let key = json!({
-            "identity": settings.identity_with(&scene.checksum()), "scene": file, "threads": threads, "changes": changes,
+            "identity": identity(settings, scene.checksum()), "scene": file, "threads": threads, "changes": changes,
         });
         let name = format!("host-{}", file.split('.').next().unwrap_or_default());
         if let Some(known) = self.store.get(&name, &key) {
@@ -190,7 +191,7 @@ fn move_lights(scene: &mut Scene) {
     let lower = corners().fold(Vec3::INFINITY, Vec3::min);
     let upper = corners().fold(Vec3::NEG_INFINITY, Vec3::max);
     let step = Vec3::X * (LIGHT_STEP * lower.distance(upper));
-    let Scene { triangles, materials, .. } = scene;
+    let SceneContents { triangles, materials, .. } = &mut **scene;
     for triangle in triangles {
         let material = materials.get(triangle.material as usize);
         if material.is_some_and(|material| material.emission.max_element() > 0.0) {

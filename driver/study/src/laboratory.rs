@@ -84,17 +84,11 @@ pub struct Laboratory<'a> {
     store: PointStore,
     pool: ThreadPool,
     observer: &'a dyn StudyObserver,
-    loaded: HashMap<String, LoadedScene>,
+    loaded: HashMap<String, Scene>,
     /// Card image of the last point. The next point may share it.
     last: Option<LastImage>,
     /// Last reference. Points with other images but the same photons may share it.
     reference: Option<SceneReference>,
-}
-
-struct LoadedScene {
-    scene: Scene,
-    /// Checksum of the scene ([`Scene::checksum`]), which represents its content in keys.
-    digest: String,
 }
 
 struct LastImage {
@@ -163,15 +157,14 @@ impl<'a> Laboratory<'a> {
 
     /// Adds a scene with a name. It replaces the file with this name in the folder of scenes.
     pub fn add(&mut self, name: &str, scene: Scene) {
-        let digest = scene.checksum();
-        self.loaded.insert(name.to_owned(), LoadedScene { scene, digest });
+        self.loaded.insert(name.to_owned(), scene);
     }
 
     /// Loads the scene of a file, before a point's assignments are applied.
     ///
     /// # Errors
     /// If the file is missing or cannot be read.
-    fn load(&mut self, file: &str) -> Result<&LoadedScene, StudyError> {
+    fn load(&mut self, file: &str) -> Result<&Scene, StudyError> {
         if !self.loaded.contains_key(file) {
             let scene = load_scene(&self.scenes, file)?;
             self.add(file, scene);
@@ -202,7 +195,7 @@ impl<'a> Laboratory<'a> {
     }
 
     fn key(&mut self, point: &Point) -> Result<Value, StudyError> {
-        Ok(point.key(&self.load(&point.scene)?.digest))
+        Ok(point.key(&self.load(&point.scene)?.checksum()))
     }
 
     fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
@@ -239,7 +232,7 @@ impl<'a> Laboratory<'a> {
         }
         // The previous image is dropped first: two images may not fit into memory.
         self.last = None;
-        let mut scene = self.load(&point.scene)?.scene.clone();
+        let mut scene = self.load(&point.scene)?.clone();
         for assignment in &point.assignments {
             scene.apply(assignment)?;
         }

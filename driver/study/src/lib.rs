@@ -41,7 +41,7 @@ use self::scale::machine_row;
 pub use self::studies::{Study, Sweep};
 use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::Machine;
-use photoncard_scene::Scene;
+use photoncard_scene::{Scene, SceneContents};
 
 /// Options of [`run`]: the studies, their scale, and the folders that they read and write.
 #[derive(Clone, Debug)]
@@ -118,7 +118,7 @@ pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<
     for point in sweep.points() {
         point.check()?;
         point.settings.camera(&scene)?;
-        let mut materials = Scene { materials: scene.materials.clone(), ..Scene::default() };
+        let mut materials = Scene::from(SceneContents { materials: scene.materials.clone(), ..SceneContents::default() });
         point.assignments.iter().try_for_each(|assignment| materials.apply(assignment))?;
     }
     let mut laboratory = Laboratory::new(&out, Path::new(""), threads, observer)?;

@@ -3,7 +3,8 @@
 use photoncard_picture::choice::Choice;
 use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::memory_model::CacheSettings;
-use photoncard_render::{PhotonMaps, RenderError, RenderSettings};
+use photoncard_render::{NamedSettings, PROGRAM, PhotonMaps, RenderError, RenderSettings};
+use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Value, json};
 
 use super::sample::SampleRate;
@@ -98,7 +99,7 @@ impl Point {
     /// Key of the point in the store: everything that the result depends on. `scene` is the scene's checksum.
     pub fn key(&self, scene: &str) -> Value {
         let mut key = json!({
-            "identity": self.settings.identity_with(scene),
+            "identity": identity(&self.settings, scene),
             "work": self.settings.of_work(),
             "chip": self.chip().budget(),
             "scene": self.scene,
@@ -125,6 +126,15 @@ impl Point {
             photons: photons.clone(),
         }
     }
+}
+
+/// Everything that pixels of a scene with this checksum depend on, with the settings as they are stated.
+pub(super) fn identity(settings: &RenderSettings, scene: &str) -> NamedSettings {
+    let mut identity = settings.of_pixels();
+    identity.insert("program".to_owned(), json!(PROGRAM));
+    identity.insert("layout".to_owned(), json!(LAYOUT_VERSION));
+    identity.insert("scene-checksum".to_owned(), json!(scene));
+    identity
 }
 
 /// Everything that a point's card image depends on.

@@ -41,7 +41,7 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     // Assignments are settings of the points.
     let inputs = input::provenance(&arguments.scene).into_iter().filter(|(name, _)| name != "set");
     let mut settings: Vec<_> = inputs.map(|(name, value)| (name, value.to_string())).collect();
-    settings.push(("scene-checksum".to_owned(), scene.checksum()));
+    settings.push(("scene-checksum".to_owned(), scene.checksum().to_owned()));
     let provenance = Provenance { settings, ..provenance };
     let StudyOutput { out, threads, .. } = &arguments.output;
     let (out, threads, machine) = (out.clone(), *threads, arguments.machine.machine());
