@@ -1,5 +1,5 @@
-//! Executor that renders tiles on cards. It connects to all cards, greets them, and renders on them in
-//! parallel. Cards stay open for the next picture.
+//! Renders tiles on cards: connects to all cards, greets them, and renders on them in parallel. Cards stay
+//! open for the next picture.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::AtomicBool;
@@ -17,11 +17,11 @@ use photoncard_shared::message::Tile;
 
 use super::card_thread::render_on;
 use super::crew::Crew;
-use super::executor::{BudgetCheck, Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, greet};
 use super::open_card::OpenCard;
 use super::outputs::Outputs;
 use super::statistics::EARLIER_RENDER;
+use super::work::{BudgetCheck, Outcome, Work};
 use super::{CardAddress, CardError, CardSet, Observer, RenderError, RenderSettings};
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
@@ -236,14 +236,18 @@ impl Cards {
         }
         Ok(sum)
     }
-}
 
-impl Executor for Cards {
-    fn budgets(&self) -> Vec<Budget> {
+    /// Budgets of the cards.
+    pub(super) fn budgets(&self) -> Vec<Budget> {
         self.cards.iter().map(|(_, card)| card.budget).collect()
     }
 
-    fn leave_out(
+    /// Leaves out cards whose budgets fail the check, as long as `needed` others are left, and reports their
+    /// names to the observer.
+    ///
+    /// # Errors
+    /// The failure of a card, if too few are left.
+    pub(super) fn leave_out(
         &mut self,
         check: BudgetCheck,
         needed: usize,
@@ -273,11 +277,12 @@ impl Executor for Cards {
         self.lose(misfits.collect(), needed, observer)
     }
 
-    fn finishes_tiles_early(&self) -> bool {
-        true
-    }
-
-    fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
+    /// Renders the tiles and stores them in the sinks.
+    ///
+    /// # Errors
+    /// If the tiles cannot be rendered, or the observer stops the render. If the outcome so far is known, the
+    /// error is in [`Outcome::failure`] instead.
+    pub(super) fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
         let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared image store no copy of it.
         self.shared.give(image.clone(), None);

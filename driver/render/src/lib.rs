@@ -1,8 +1,7 @@
 //! A render, from a loaded scene to a complete film.
 //!
-//! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, executor, statistics.
-//! The executor fills the film. It is either the cards at the ends of their links or, for the order
-//! `hilbert`, emulated chips and the host. [`render`] is a renderer's first picture.
+//! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, cards, statistics. The
+//! cards at the ends of their links fill the film. [`render`] is a renderer's first picture.
 #![forbid(unsafe_code)]
 
 mod address;
@@ -14,7 +13,6 @@ pub mod display;
 pub mod emulator;
 mod error;
 mod exchange;
-mod executor;
 mod greeting;
 mod memory;
 mod noise;
@@ -35,7 +33,7 @@ mod settings;
 mod statistics;
 mod times;
 mod verification;
-mod whole_frame;
+mod work;
 
 pub use address::CardAddress;
 pub use error::{CardError, RenderError};

@@ -63,12 +63,10 @@ impl<'a> Outputs<'a> {
         Ok(outputs)
     }
 
-    /// Sinks of finished tiles: the film, the outputs that show them, and the partial file if tiles are
-    /// finished early.
-    pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>, finished_early: bool) -> Vec<&'s dyn TileSink> {
+    /// Sinks of finished tiles: the film, the outputs that show them, and the partial file.
+    pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>) -> Vec<&'s dyn TileSink> {
         let mut sinks: Vec<&dyn TileSink> = vec![film, self];
-        let partial = self.partial.as_ref().filter(|_| finished_early);
-        sinks.extend(partial.map(|partial| partial as &dyn TileSink));
+        sinks.extend(self.partial.as_ref().map(|partial| partial as &dyn TileSink));
         sinks
     }
 

@@ -8,8 +8,8 @@ use photoncard_map::photon_map::{self, Guiding, MappedImage, PhotonTimes, map_ph
 use photoncard_scene::Scene;
 use photoncard_shared::message::CausticGather;
 
-use super::executor::FitChips;
 use super::times::Times;
+use super::work::FitChips;
 use super::{Observer, Phase, RenderError, RenderSettings};
 
 /// Card image, and the frame parameters that are derived from it.

@@ -10,11 +10,10 @@ use photoncard_scene::Scene;
 use photoncard_shared::message::{FrameParameters, SumScale};
 
 use super::cards::Cards;
-use super::executor::{BudgetCheck, Executor, FitChips, Work};
 use super::outputs::Outputs;
 use super::preparation::{Prepared, prepare};
 use super::times::Times;
-use super::whole_frame::WholeFrame;
+use super::work::{BudgetCheck, FitChips, Work};
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
 use crate::partial::{PartialRender, PartialSettings};
 
@@ -134,30 +133,24 @@ impl Renderer {
         let camera = settings.camera(scene)?;
         settings.check()?;
         let Self { cards, kept } = self;
-        let mut whole_frame;
-        let executor: &mut dyn Executor = if settings.schedule.order.is_of_whole_frame() {
-            whole_frame = WholeFrame::new(settings)?;
-            &mut whole_frame
-        } else {
-            connected(cards, settings, observer)?
-        };
+        let cards = connected(cards, settings, observer)?;
         let needed = settings.needed_cards();
-        executor.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
+        cards.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
         settings.outputs.partial.as_ref().map(PartialSettings::check_free).transpose()?;
         let mut times = Times::default();
         let (settings, source) = Source::new(scene, settings, choose, kept, &mut times)?;
-        executor.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
-        let tile = settings.tile_side(&executor.budgets());
+        cards.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
+        let tile = settings.tile_side(&cards.budgets());
         let settings = &settings.with(|s| s.schedule.tile = Some(tile));
         settings.check()?;
-        settings.check_budgets(&executor.budgets())?;
+        settings.check_budgets(&cards.budgets())?;
         // A film may be large: it is allocated after the settings are checked.
         let mut film = settings.film(source.sum_scale())?;
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
         let tiles = settings.tiles(tile);
         let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
         let is_image_kept = matches!(source, Source::Kept(_));
-        let fit = &mut |check: BudgetCheck| executor.leave_out(check, needed, observer);
+        let fit = &mut |check: BudgetCheck| cards.leave_out(check, needed, observer);
         let made = source.prepare(scene, settings, fit, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;
         let frame = FrameParameters {
@@ -166,7 +159,7 @@ impl Renderer {
             ..settings.frame(&camera, prepared.max_distance, prepared.caustics)
         };
         let film = Mutex::new(film);
-        let sinks = outputs.sinks(&film, executor.finishes_tiles_early());
+        let sinks = outputs.sinks(&film);
         let image = &prepared.image;
         let work = Work {
             settings,
@@ -178,8 +171,8 @@ impl Renderer {
             sinks,
             outputs: &outputs,
         };
-        let budgets = executor.budgets();
-        let mut outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
+        let budgets = cards.budgets();
+        let mut outcome = cards.run(work).inspect_err(|_| outputs.report_kept())?;
         times.load = outcome.load_seconds;
         times.render = outcome.render_seconds;
         times.total = start.elapsed().as_secs_f64();

@@ -15,8 +15,6 @@ impl RenderSettings {
         let Some(share) = self.cards.verify else { return Ok(()) };
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
             ["a share of the tiles is above 0 and at most 1", "give a number such as 0.02"]
-        } else if self.schedule.order.is_of_whole_frame() {
-            ["with --order hilbert the host does the gathers, and no card a whole tile", "use --order sort"]
         } else if self.cards.count() < 2 {
             ["a tile is verified by a second card", "give two --card or more, or --card emulated:2"]
         } else if self.modelled_caches().is_some() {

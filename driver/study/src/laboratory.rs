@@ -206,6 +206,9 @@ impl<'a> Laboratory<'a> {
         let bench =
             Bench { scene: &last.scene, mapped: &last.mapped, pool: &self.pool, is_stopped: &is_stopped };
         let outcome = match &point.task {
+            Task::Traffic { caches, .. } if point.is_along_curve => {
+                Outcome::Traffic(bench.along_curve(&point.settings, caches)?)
+            }
             Task::Traffic { chip, caches, sample, least_tiles } => {
                 Outcome::Traffic(bench.traffic(&point.settings, *chip, caches, *sample, *least_tiles)?)
             }
@@ -304,6 +307,7 @@ mod tests {
                 schedule: Schedule { tile: Some(tile), ..Schedule::default() },
                 ..RenderSettings::default()
             },
+            is_along_curve: false,
             task: Task::Quality { tiles: 1, reference_rays: 1 },
         }
     }

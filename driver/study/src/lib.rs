@@ -23,6 +23,7 @@ mod sample;
 mod scale;
 pub mod store;
 mod studies;
+mod whole_frame;
 
 use std::path::{Path, PathBuf};
 
@@ -32,13 +33,14 @@ pub use self::figures::check;
 pub use self::host::{Change, Changed, HostBench, HostFrame, LIGHT_STEP};
 pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
 pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
-pub use self::point::{ImageKey, Point, Task};
+pub use self::point::{ALONG_CURVE, ImageKey, Point, Task};
 pub use self::quality::{Quality, Reference, TileDeviation};
 use self::report::{Provenance, Report};
 pub use self::sample::{Estimate, SampleRate, choose};
 pub use self::scale::Scale;
 use self::scale::machine_row;
 pub use self::studies::{Study, Sweep};
+pub use self::whole_frame::{FrameOutcome, WholeFrame};
 use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::Machine;
 use photoncard_scene::{Scene, SceneContents};

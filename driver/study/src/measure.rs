@@ -6,7 +6,6 @@ use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::contents::Contents;
 use photoncard_render::emulator::direct::{RenderedTile, render_tiles_apart, render_tiles_in_flight};
 use photoncard_render::emulator::memory_model::{CacheSettings, MemoryTraffic};
-use photoncard_render::emulator::whole_frame::{CurveJob, render_along_curve};
 use photoncard_render::{RenderError, RenderSettings};
 use photoncard_scene::Scene;
 use photoncard_shared::address::{STRUCTURES, Structure};
@@ -16,6 +15,7 @@ use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
 use super::sample::{Chosen, Estimate, SampleRate, choose};
+use super::whole_frame::WholeFrame;
 
 /// Reads of one structure of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -164,8 +164,7 @@ impl Bench<'_> {
     }
 
     /// Measures the work and memory traffic of a frame, from a sample of its tiles. All tiles are rendered if
-    /// several are in flight, or if the order is [of the whole
-    /// frame](photoncard_cards::scheduler::GatherOrder::is_of_whole_frame).
+    /// several are in flight.
     ///
     /// # Errors
     /// If the scene has no camera with the name in the settings, the card image is malformed, or the bench is
@@ -179,10 +178,7 @@ impl Bench<'_> {
         least_tiles: usize,
     ) -> Result<Measurement, RenderError> {
         let frame = self.frame(settings)?;
-        let all = tiles(settings.window(), settings.tile_side(&[chip.budget()]), settings.schedule.order);
-        if settings.schedule.order.is_of_whole_frame() {
-            return self.whole_frame(&frame, &all, caches);
-        }
+        let all = all_tiles(settings, chip);
         if settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1 {
             return self.in_flight(chip, &frame, &all, caches);
         }
@@ -228,20 +224,29 @@ impl Bench<'_> {
         })
     }
 
-    fn whole_frame(
+    /// Measures the work and memory traffic of a frame whose gathers are done along one Hilbert curve, on
+    /// reference chips.
+    ///
+    /// # Errors
+    /// As [`Self::traffic`], and if the frame has too many gathers.
+    pub fn along_curve(
         &self,
-        frame: &FrameParameters,
-        tiles: &[Tile],
+        settings: &RenderSettings,
         caches: &CacheSettings,
     ) -> Result<Measurement, RenderError> {
-        let chips = self.pool.current_num_threads();
-        let job = CurveJob { image: &self.mapped.image, frame, tiles, chips };
-        let outcome = render_along_curve(job, Some(caches), &[], &|_, _| !(self.is_stopped)())?;
-        let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
+        let frame = &self.frame(settings)?;
+        let tiles = &all_tiles(settings, EmulatedKind::Reference);
+        let &Self { mapped: MappedImage { image, .. }, pool, is_stopped, .. } = self;
+        let outcome = WholeFrame { image, frame, tiles, caches, pool, is_stopped }.render()?;
         Ok(Measurement {
-            tiles: vec![whole],
+            tiles: vec![TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic)],
             rendered: tiles.len(),
-            map: PhotonMapSize::of(&self.mapped.image),
+            map: PhotonMapSize::of(image),
         })
     }
+}
+
+/// All tiles of a picture on chips of a kind.
+fn all_tiles(settings: &RenderSettings, chip: EmulatedKind) -> Vec<Tile> {
+    tiles(settings.window(), settings.tile_side(&[chip.budget()]), settings.schedule.order)
 }

@@ -159,7 +159,7 @@ impl Scale {
     pub fn traffic_behind(&self, scene: &str, settings: RenderSettings, caches: CacheSettings) -> Point {
         let chip = EmulatedKind::Reference;
         let task = Task::Traffic { chip, caches, sample: self.sample, least_tiles: self.least_tiles };
-        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
+        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
     /// Point that measures the traffic of all tiles on one chip of kind `chip`, which has them in flight,
@@ -183,7 +183,7 @@ impl Scale {
     /// Point that measures the error of [`Self::quality_tiles`] tiles.
     pub fn quality(&self, scene: &str, settings: RenderSettings) -> Point {
         let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
-        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
+        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
     /// Names and values of the settings that all points share, for a report's provenance.

@@ -10,7 +10,7 @@ use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::scene::Scene;
 use photoncard_driver::study::report::Provenance;
-use photoncard_driver::study::{AxisError, Point, Sweep, SweepOptions, Task};
+use photoncard_driver::study::{ALONG_CURVE, AxisError, Point, Sweep, SweepOptions, Task};
 
 use crate::arguments::{
     Arguments, CACHE, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,
@@ -56,9 +56,12 @@ fn point(
     notices: &mut BTreeSet<String>,
 ) -> Result<Point, Failure> {
     let (caches, others): (Vec<_>, Vec<_>) = values.iter().copied().partition(|(name, _)| *name == CACHE);
+    let (curve, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|value| *value == ("order", ALONG_CURVE));
     let replaced = replaced(&others).map_err(|error| refused(&others, &reason(&error)))?;
     let arguments = replaced.as_ref().unwrap_or(arguments);
     let mut point = arguments.point(&input::name(&arguments.scene));
+    point.is_along_curve = !curve.is_empty();
     if let (Some((_, text)), Task::Traffic { caches: behind, .. }) = (caches.first(), &mut point.task) {
         *behind = cache(text).map_err(|reason| refused(&caches, &reason))?;
     }

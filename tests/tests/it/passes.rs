@@ -182,17 +182,6 @@ fn records_are_gathered_again_on_other_cards_and_for_another_camera() {
 }
 
 #[test]
-fn gathers_of_a_whole_frame_may_be_done_in_a_pass() {
-    let scene = everything();
-    let along_curve = settings().with(|s| s.schedule.order = GatherOrder::Hilbert);
-    let mut renderer = Renderer::default();
-    let first = pass(&mut renderer, &scene, &settings(), (2, None));
-    let all = pass(&mut renderer, &scene, &along_curve, (3, Some(first)));
-    let expected = render_or_panic(&everything(), &settings().with(|s| s.integrator.samples = 3)).film;
-    assert!(all.film.sums().eq(expected.sums()));
-}
-
-#[test]
 fn a_picture_with_kept_samples_continues_even_after_a_stop() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.exr.partial");

@@ -10,7 +10,6 @@ pub mod memory_model;
 mod tile_lines;
 pub mod trace;
 mod traced;
-pub mod whole_frame;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

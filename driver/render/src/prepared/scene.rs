@@ -10,9 +10,9 @@ use photoncard_scene::{Camera, Scene};
 use photoncard_shared::budget::Budget;
 use serde_json::{Map, Value};
 
-use crate::executor::BudgetCheck;
 use crate::renderer::{Chosen, Kept, Renderer, Source};
 use crate::times::Times;
+use crate::work::BudgetCheck;
 use crate::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
 
 /// A scene with its photon map, as a card image, and the settings that the image depends on.

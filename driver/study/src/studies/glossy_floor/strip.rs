@@ -20,13 +20,13 @@ const NEARLY_FLAT: f64 = 1.1;
 
 /// Point that renders all tiles of the strip, without the irradiance cache.
 fn point(scale: &Scale, line: Line, exponent: u32) -> Point {
-    let Point { scene, assignments, mut settings, mut task } = line::point(scale, line, false, exponent);
+    let mut point = line::point(scale, line, false, exponent);
     let full = Window::full(scale.side, scale.side);
-    settings.picture.crop = Some(Window { y0: scale.side - scale.side / DIVISOR, ..full });
-    if let Task::Traffic { sample, .. } = &mut task {
+    point.settings.picture.crop = Some(Window { y0: scale.side - scale.side / DIVISOR, ..full });
+    if let Task::Traffic { sample, .. } = &mut point.task {
         *sample = SampleRate::ALL;
     }
-    Point { scene, assignments, settings, task }
+    point
 }
 
 pub(super) fn points(scale: &Scale) -> Vec<Point> {

@@ -1,4 +1,4 @@
-//! Trait of executors, which render the tiles of a picture.
+//! Work of the cards on a picture, and its outcome.
 
 use std::sync::{Arc, Mutex};
 
@@ -12,7 +12,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{FrameParameters, Tile};
 
 use super::outputs::Outputs;
-use super::{Observer, RenderError, RenderSettings};
+use super::{RenderError, RenderSettings};
 use crate::emulator::memory_model::MemoryTraffic;
 
 /// Function that checks whether a chip with a budget can render a picture.
@@ -21,36 +21,7 @@ pub(super) type BudgetCheck<'a> = &'a dyn Fn(&Budget) -> Result<(), RenderError>
 /// Function that applies a check to all chips.
 pub(super) type FitChips<'a> = dyn FnMut(BudgetCheck) -> Result<(), RenderError> + 'a;
 
-/// Executor, which renders the tiles of a picture.
-pub(super) trait Executor {
-    /// Budgets of the chips, one per chip.
-    fn budgets(&self) -> Vec<Budget>;
-
-    /// Leaves out chips whose budgets fail the check, as long as `needed` others are left, and reports their
-    /// names to the observer.
-    ///
-    /// # Errors
-    /// The failure of a chip, if too few are left.
-    fn leave_out(
-        &mut self,
-        check: BudgetCheck,
-        needed: usize,
-        observer: &dyn Observer,
-    ) -> Result<(), RenderError>;
-
-    /// Returns whether tiles are finished one after another. A render that ends early then has finished
-    /// tiles.
-    fn finishes_tiles_early(&self) -> bool;
-
-    /// Renders the tiles and stores them in the sinks.
-    ///
-    /// # Errors
-    /// If the tiles cannot be rendered, or the observer stops the render. If the outcome so far is known, the
-    /// error is in [`Outcome::failure`] instead.
-    fn run(&mut self, work: Work) -> Result<Outcome, RenderError>;
-}
-
-/// Work that an executor gets.
+/// Work that cards get.
 pub(super) struct Work<'a> {
     pub(super) settings: &'a RenderSettings,
     pub(super) image: &'a Arc<CardImage>,
@@ -67,7 +38,7 @@ pub(super) struct Work<'a> {
     pub(super) outputs: &'a Outputs<'a>,
 }
 
-/// Outcome of an executor's work.
+/// Outcome of the work of cards.
 #[derive(Default)]
 pub(super) struct Outcome {
     /// Counters of the work.
