@@ -1,4 +1,4 @@
-//! Input and output of a session: jobs, assignments and events.
+//! Input and output of a session: jobs, assignments, restarts and events.
 
 use std::sync::Arc;
 
@@ -25,6 +25,15 @@ pub struct Assignment {
     pub tile: Tile,
     /// True if a card has crashed at the tile before. Another crash at it is not counted against the card.
     pub is_suspect: bool,
+}
+
+/// Reason to greet a card with a new session number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Restart {
+    /// The session begins, or the card has other work to do. Its tiles are dropped.
+    NewWork,
+    /// The card was reset or silent, or its link was closed. Its tiles are returned as events.
+    Lost,
 }
 
 /// Event that a session reports.

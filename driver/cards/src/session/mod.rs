@@ -20,7 +20,7 @@ mod tiles;
 mod upload;
 
 pub use error::SessionError;
-pub use job::{Assignment, Event, Job};
+pub use job::{Assignment, Event, Job, Restart};
 pub use link_bytes::LinkBytes;
 pub use pixel_limits::PixelLimits;
 pub use upload::Upload;
@@ -98,7 +98,7 @@ impl Session {
             is_flushed: false,
             unheard_bytes: 0,
         };
-        session.greet_card();
+        session.restart(Restart::NewWork, now);
         session
     }
 
@@ -133,7 +133,7 @@ impl Session {
             (State::Greeting, _) => {}
             (State::Ready, _) => self.begin_load(),
             (State::Rendering, Some(before)) => self.go_on_from(&before.upload, now),
-            _ => self.greet_anew(now),
+            _ => self.restart(Restart::NewWork, now),
         }
     }
 
@@ -141,7 +141,9 @@ impl Session {
     /// frame.
     fn go_on_from(&mut self, held: &Upload, now: Duration) {
         let Some(job) = &self.job else { return };
-        let Some(runs) = job.upload.missing_from(held.checksum()) else { return self.greet_anew(now) };
+        let Some(runs) = job.upload.missing_from(held.checksum()) else {
+            return self.restart(Restart::NewWork, now);
+        };
         let is_held = job.upload.checksum() == held.checksum();
         self.channel.drop_commands();
         self.stale_replies = std::mem::take(&mut self.tiles).most_replies();
@@ -303,7 +305,10 @@ impl Session {
                     self.clock.heard(now);
                     self.unheard_bytes = bytes.len() as u64;
                 }
-                Some(LineEvent::Unknown) if self.clock.has_heard() => self.reset(now)?,
+                Some(LineEvent::Unknown) if self.clock.has_heard() => {
+                    self.count_reset()?;
+                    self.restart(Restart::Lost, now);
+                }
                 // The greeting was lost.
                 Some(LineEvent::Unknown) => self.channel.transport.send_again(),
             }
@@ -343,7 +348,9 @@ impl Session {
         }
         // A card that holds another host's session of equal number treats the hello as a repeated frame.
         if self.state == State::Greeting && self.clock.is_greeted_in_vain(now) {
-            return self.reset(now);
+            self.count_reset()?;
+            self.restart(Restart::Lost, now);
+            return Ok(());
         }
         if self.clock.must_ask(now) {
             self.channel.transport.probe();
@@ -373,40 +380,31 @@ impl Session {
         self.tiles.give_back(at_work, &mut self.events);
     }
 
-    /// Greets the card again with a new session number, after its link was closed or the card was silent. Its
-    /// tiles are returned.
-    pub fn greet_again(&mut self, now: Duration) {
-        self.left_suspect = self.tiles.is_at_suspect();
-        self.give_back();
-        self.channel.bytes.resets += 1;
-        self.greet_anew(now);
-    }
-
-    /// Greets the card with a new session number. The card drops its work.
-    fn greet_anew(&mut self, now: Duration) {
+    /// Greets the card with a new session number, by which it drops its work.
+    pub fn restart(&mut self, reason: Restart, now: Duration) {
+        if reason == Restart::Lost {
+            self.left_suspect = self.tiles.is_at_suspect();
+            self.give_back();
+            self.channel.bytes.resets += 1;
+        }
         self.tiles = TilesInFlight::default();
         self.clock = Clock::new(now);
-        self.greet_card();
+        self.unheard_bytes = 0;
+        self.state = State::Greeting;
+        self.stale_replies = 0;
+        self.channel.greet();
     }
 
-    /// Greets a card again that does not know the session, or that answers the greeting without a hello.
-    fn reset(&mut self, now: Duration) -> Result<(), SessionError> {
+    /// Counts the reset of a card that does not know the session, or that answers the greeting without a
+    /// hello.
+    fn count_reset(&mut self) -> Result<(), SessionError> {
         self.failures.forget_lines();
-        self.fail()?;
-        self.greet_again(now);
-        Ok(())
+        self.fail()
     }
 
     /// Counts a failure of the card, unless it was working on a tile at which cards have crashed before.
     fn fail(&mut self) -> Result<(), SessionError> {
         if self.tiles.is_at_suspect() { Ok(()) } else { self.failures.count() }
-    }
-
-    fn greet_card(&mut self) {
-        self.unheard_bytes = 0;
-        self.state = State::Greeting;
-        self.stale_replies = 0;
-        self.channel.greet();
     }
 
     fn send(&mut self, command: &Command) {
