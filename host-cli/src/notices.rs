@@ -83,8 +83,8 @@ mod tests {
     use clap::Parser as _;
 
     use super::*;
-    use photoncard_driver::scene::SceneContents;
     use crate::arguments::{Arguments, Command, RenderOptions};
+    use photoncard_driver::scene::SceneContents;
 
     #[test]
     fn the_first_sentences_are_named_and_the_others_counted() {
@@ -109,7 +109,11 @@ mod tests {
 
     #[test]
     fn strict_renders_refuse_ignored_contents() {
-        let scene = Scene::from(SceneContents { notices: vec!["n0".into(); 5], remarks: vec!["r".into()], ..SceneContents::default() });
+        let scene = Scene::from(SceneContents {
+            notices: vec!["n0".into(); 5],
+            remarks: vec!["r".into()],
+            ..SceneContents::default()
+        });
         assert_eq!(refused("", &scene).unwrap().matches("n0").count(), 5);
         let lenient = SceneOptions { strict: false, ..options("").scene };
         let uses = Uses::of(&lenient, &Picture::default(), None);

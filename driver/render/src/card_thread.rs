@@ -7,9 +7,8 @@ use photoncard_cards::session::{Job, Restart, SessionError};
 use photoncard_shared::address::LINE_BYTES;
 
 use super::crew::{Crew, EndOthersOnPanic};
-use super::exchange::{WAIT, exchange};
 use super::greeting::GreetedCard;
-use super::reopening::reopen;
+use super::open_card::{WAIT, exchange, reopen};
 use super::{CardError, Phase, RenderError};
 
 struct CardAtWork<'a> {

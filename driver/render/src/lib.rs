@@ -12,7 +12,6 @@ mod crew;
 pub mod display;
 pub mod emulator;
 mod error;
-mod exchange;
 mod greeting;
 mod memory;
 mod noise;
@@ -22,17 +21,13 @@ mod outputs;
 pub mod partial;
 pub mod parts;
 mod passes;
-mod preparation;
 mod prepared;
 mod provenance;
 pub mod quality;
 mod renderer;
-mod reopening;
 mod self_test;
 mod settings;
 mod statistics;
-mod times;
-mod verification;
 mod work;
 
 pub use address::CardAddress;
@@ -55,7 +50,7 @@ pub use settings::{
     Picture, RenderSettings, Schedule, TileOutputs,
 };
 pub use statistics::{EARLIER_RENDER, LinkStatistics, Rays, Statistics};
-pub use times::Times;
+pub use work::Times;
 
 use photoncard_map::pack::PackedScene;
 use photoncard_scene::Scene;

@@ -11,9 +11,7 @@ use photoncard_shared::message::{FrameParameters, SumScale};
 
 use super::cards::Cards;
 use super::outputs::Outputs;
-use super::preparation::{Prepared, prepare};
-use super::times::Times;
-use super::work::{BudgetCheck, FitChips, Work};
+use super::work::{BudgetCheck, FitChips, Prepared, Times, Work, prepare};
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
 use crate::partial::{PartialRender, PartialSettings};
 

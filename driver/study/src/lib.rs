@@ -120,7 +120,8 @@ pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<
     for point in sweep.points() {
         point.check()?;
         point.settings.camera(&scene)?;
-        let mut materials = Scene::from(SceneContents { materials: scene.materials.clone(), ..SceneContents::default() });
+        let mut materials =
+            Scene::from(SceneContents { materials: scene.materials.clone(), ..SceneContents::default() });
         point.assignments.iter().try_for_each(|assignment| materials.apply(assignment))?;
     }
     let mut laboratory = Laboratory::new(&out, Path::new(""), threads, observer)?;

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use super::report::name;
+use super::report::is_portable;
 
 /// Name of the points' folder within the study's folder.
 const POINTS: &str = "points";
@@ -134,7 +134,7 @@ impl PointStore {
     }
 
     fn path(&self, name: &str, key: &Value) -> Result<PathBuf, StoreError> {
-        if !name::is_portable(name) {
+        if !is_portable(name) {
             return Err(StoreError::BadName { name: name.to_owned() });
         }
         let hash = fnv1a(key.to_string().bytes());

@@ -164,7 +164,8 @@ fn units_of_lights_are_the_exporters_unless_they_are_stated() {
             None => assert!(on_units.is_empty(), "{generator} {units:?}: {on_units:?}"),
         }
     }
-    let sums = [Auto, Photometric, Radiometric, Watts].map(|units| of_exporter(BLENDER, units).checksum().to_owned());
+    let sums = [Auto, Photometric, Radiometric, Watts]
+        .map(|units| of_exporter(BLENDER, units).checksum().to_owned());
     assert_eq!(sums[0], sums[1]);
     assert!(sums[1] != sums[2] && sums[2] != sums[3] && sums[3] != sums[1], "{sums:?}");
 }
@@ -210,7 +211,9 @@ fn errors_on_files_of_blender_say_what_to_tick() {
 
 #[test]
 fn a_light_is_part_of_the_checksum() {
-    let sum = |intensity: f64| lit(&json!({"type": "point", "intensity": intensity})).unwrap().checksum().to_owned();
+    let sum = |intensity: f64| {
+        lit(&json!({"type": "point", "intensity": intensity})).unwrap().checksum().to_owned()
+    };
     assert_ne!(sum(1.0), sum(2.0));
     let scene = lit(&json!({"type": "point"})).unwrap();
     let mut sums = vec![scene.checksum().to_owned()];

@@ -188,11 +188,7 @@ fn all_tiles_add_up_to_the_render() {
             (measured.total(|tile| tile.counters.records as f64), statistics.records),
             (measured.total(|tile| tile.counters.photons_tested as f64), statistics.photons_tested),
         ] {
-            assert_eq!(
-                (total.value, total.half_width),
-                (expected as f64, 0.0),
-                "{point:?}"
-            );
+            assert_eq!((total.value, total.half_width), (expected as f64, 0.0), "{point:?}");
         }
         let [raw, dram] = [measured.raw_bytes(), measured.photon_map_bytes()];
         assert!(raw.value > 0.0 && dram.value > 0.0 && raw.half_width == 0.0 && dram.half_width == 0.0);

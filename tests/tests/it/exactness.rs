@@ -328,7 +328,9 @@ fn gathers_along_one_curve_through_a_frame_bring_the_light_of_any_order() {
     let mapped = map_photons(packed(), &settings().photon_settings(&scene), &|_| true).unwrap();
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
     let caches = "photon=16K/128/4,scene=16K/128/4".parse().unwrap();
-    for (irradiance_error, layers) in [(None, Layers::NONE), (Some(0.025), Layers::NONE), (None, Layers::all())] {
+    for (irradiance_error, layers) in
+        [(None, Layers::NONE), (Some(0.025), Layers::NONE), (None, Layers::all())]
+    {
         let settings = settings().with(|s| {
             s.integrator.irradiance_error = irradiance_error;
             s.picture.layers = layers;

@@ -133,8 +133,8 @@ fn the_eye_sees_the_environment() {
         Vec3::new((theta.sin() * phi.sin()) as f32, theta.cos() as f32, -(theta.sin() * phi.cos()) as f32);
     let view = Camera { vertical_fov: 0.001, ..camera(Vec3::Y, direction) };
     let environment = Some(sky());
-    let scene = bare_floor(Vec3::ZERO)
-        .with(|scene| (scene.environment, scene.cameras) = (environment, vec![view]));
+    let scene =
+        bare_floor(Vec3::ZERO).with(|scene| (scene.environment, scene.cameras) = (environment, vec![view]));
     let film = render_or_panic(&scene, &settings(1, 1)).film;
     for pixel in radiances(&film) {
         for (found, expected) in pixel.into_iter().zip([0.25, 0.5, 1.0]) {

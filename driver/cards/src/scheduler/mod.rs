@@ -23,7 +23,6 @@ mod dealing;
 mod ending;
 mod entry;
 mod error;
-mod homes;
 #[cfg(test)]
 mod tests;
 mod tiles;

@@ -1,4 +1,4 @@
-//! Input and output of a session: jobs, assignments, restarts and events.
+//! Input, output and states of a session: jobs, assignments, restarts and events.
 
 use std::sync::Arc;
 
@@ -55,4 +55,24 @@ pub enum Event {
     Computed(Vec<u8>),
     /// Progress or result of a memory test.
     MemoryTested(MemoryTest),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// The hello is sent.
+    Greeting,
+    /// The card has answered the greeting, and has no job.
+    Ready,
+    /// Checksums of the card's chunks are requested.
+    Comparing,
+    /// Lines of the image are being sent.
+    Loading,
+    /// All lines are sent.
+    Accepting,
+    /// Parameters of the frame are sent.
+    Framing,
+    /// The card has image and frame, and accepts tiles.
+    Rendering,
+    /// A part of the self-test is requested.
+    Testing,
 }

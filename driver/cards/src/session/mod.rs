@@ -8,20 +8,16 @@
 mod channel;
 mod clock;
 mod error;
-mod failures;
 mod job;
-mod link_bytes;
-mod load;
 mod pixel_limits;
 mod replies;
 mod self_test;
-mod state;
 mod tiles;
 mod upload;
 
+pub use channel::LinkBytes;
 pub use error::SessionError;
 pub use job::{Assignment, Event, Job, Restart};
-pub use link_bytes::LinkBytes;
 pub use pixel_limits::PixelLimits;
 pub use upload::Upload;
 pub use upload::changed_runs;
@@ -35,13 +31,12 @@ use photoncard_shared::message::{self, Command, MemoryUse, OPERAND_BYTES};
 use photoncard_shared::transport::Event as LineEvent;
 
 use self::channel::Channel;
-use self::clock::Clock;
+use self::clock::{Clock, Failures};
 use self::error::check_versions;
-use self::failures::Failures;
-use self::load::{Comparison, Load};
+use self::job::State;
 use self::self_test::Request;
-use self::state::State;
 use self::tiles::TilesInFlight;
+use self::upload::{Comparison, Load};
 
 /// Maximum number of tiles on a card, whatever its budget. More would be delayed if the card were lost.
 const MAX_CREDITS: u32 = 16;

@@ -7,13 +7,11 @@
 //! a render nor delays its tiles.
 
 mod address;
-mod error;
 pub mod packet;
 mod queue;
 mod sender;
 #[cfg(test)]
 mod tests;
 
-pub use address::{DEFAULT_PORT, DisplayAddress};
-pub use error::DisplayError;
+pub use address::{DEFAULT_PORT, DisplayAddress, DisplayError};
 pub use sender::{Display, DisplaySettings};

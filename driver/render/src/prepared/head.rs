@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::scene::{PreparedScene, View, is_camera};
-use crate::preparation::Prepared;
 use crate::renderer::Kept;
+use crate::work::Prepared;
 use crate::{Integrator, PROGRAM, PhotonMaps, RenderSettings};
 
 /// Head of the file.

@@ -11,8 +11,7 @@ use photoncard_shared::budget::Budget;
 use serde_json::{Map, Value};
 
 use crate::renderer::{Chosen, Kept, Renderer, Source};
-use crate::times::Times;
-use crate::work::BudgetCheck;
+use crate::work::{BudgetCheck, Times};
 use crate::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
 
 /// A scene with its photon map, as a card image, and the settings that the image depends on.

@@ -6,8 +6,7 @@ use photoncard_firmware::sampler::hash;
 use photoncard_map::pack::PackedScene;
 use photoncard_picture::film::Film;
 use photoncard_picture::heading::Heading;
-use photoncard_scene::Scene;
-use photoncard_scene::gltf;
+use photoncard_scene::{Scene, gltf};
 use serde_json::{Value, json};
 
 use super::file::KIND;
@@ -33,8 +32,7 @@ fn prepared(folder: &Path) -> PathBuf {
     let choose = |_: &PackedScene| Ok((photons.clone(), integrator.clone()));
     let notes = json!({ "name": "cornell" }).as_object().unwrap().clone();
     let (scene, other) = (scene(), RenderSettings::default());
-    let prepared =
-        PreparedScene::new(&scene, &other, &[REFERENCE], &choose, notes, &Unobserved).unwrap();
+    let prepared = PreparedScene::new(&scene, &other, &[REFERENCE], &choose, notes, &Unobserved).unwrap();
     let path = folder.join("scene.card");
     prepared.write(&path).unwrap();
     path

@@ -218,7 +218,12 @@ fn bare_scene(document: &Document, room: &mut Room) -> Result<(Scene, Vec<String
     let mut textures = Textures::new(document);
     let materials = material::load(document, &mut textures)?;
     let generator = document.root.asset.generator.clone();
-    let mut scene = Scene::from(SceneContents { materials, variants: variants::names(document), generator, ..SceneContents::default() });
+    let mut scene = Scene::from(SceneContents {
+        materials,
+        variants: variants::names(document),
+        generator,
+        ..SceneContents::default()
+    });
     let mut unreadable = Vec::new();
     textures.finish(&source, room, &mut scene, &mut unreadable)?;
     Ok((scene, unreadable))

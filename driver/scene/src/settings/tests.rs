@@ -3,7 +3,9 @@
 use glam::Vec3;
 
 use crate::error::SceneError;
-use crate::{Environment, Material, PunctualKind, PunctualLight, Reflection, Scene, SceneContents, Transmission};
+use crate::{
+    Environment, Material, PunctualKind, PunctualLight, Reflection, Scene, SceneContents, Transmission,
+};
 
 fn scene() -> Scene {
     let material = |name: &str| Material::lambertian(name, Vec3::splat(0.5));

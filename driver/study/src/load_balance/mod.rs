@@ -8,19 +8,16 @@
 //! Times are whole nanoseconds, and simultaneous events happen in the order of the chips, so that a
 //! simulation gives the same result on every machine.
 
-mod order;
-
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::time::Duration;
 
-use photoncard_shared::counters::Counters;
-use photoncard_shared::message::PIXEL_BYTES;
-
-pub use self::order::TileOrder;
 use photoncard_cards::scheduler::Scheduler;
+use photoncard_firmware::sampler::hash;
 use photoncard_picture::sink::FinishedTile;
 use photoncard_picture::sums::SumFormat;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{PIXEL_BYTES, Tile};
 
 /// Model of the chips' links. One host serves all of them, one message at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -191,8 +188,7 @@ impl Simulation {
     /// Handles the arrival of a result. The scheduler's clock, which only matters for lost or late cards, is
     /// not used.
     fn receive(&mut self, chip: usize, id: u32) {
-        let finished =
-            FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);
+        let finished = FinishedTile::new(tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);
         if let Some(tile) = finished {
             self.scheduler.answer(chip, tile, Duration::ZERO);
             self.scheduler.complete(id);
@@ -237,6 +233,39 @@ fn nanoseconds(seconds: f64) -> Result<u128, LoadBalanceError> {
 
 fn seconds(nanoseconds: u128) -> f64 {
     nanoseconds as f64 / 1e9
+}
+
+/// Order in which tiles are assigned to chips.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TileOrder {
+    /// Row by row, as the driver assigns them.
+    #[default]
+    Picture,
+    /// Random permutation with this seed.
+    Random(u32),
+    /// Descending cost (Graham 1969). Costs are only known after the render, so that this is a bound and not
+    /// a policy.
+    LongestFirst,
+}
+
+impl TileOrder {
+    /// Tiles with these costs, in this order. A tile's number is its index in `costs`.
+    fn tiles(self, costs: &[u128]) -> Vec<Tile> {
+        let mut tiles: Vec<Tile> = (0_u32..).zip(costs).map(|(id, _)| tile(id)).collect();
+        match self {
+            Self::Picture => {}
+            // The hash is a bijection, so that there are no ties.
+            Self::Random(seed) => tiles.sort_by_key(|tile| (hash(hash(seed) ^ tile.id), tile.id)),
+            // The sort is stable: tiles of equal cost stay in the picture's order.
+            Self::LongestFirst => tiles.sort_by_key(|tile| Reverse(costs[tile.id as usize])),
+        }
+        tiles
+    }
+}
+
+/// Tile number `id`. Its rectangle is not used.
+fn tile(id: u32) -> Tile {
+    Tile { id, x: id, y: 0, width: 1, height: 1 }
 }
 
 #[cfg(test)]

@@ -6,20 +6,18 @@
 mod figure;
 mod html;
 mod markup;
-pub(crate) mod name;
 pub(crate) mod number;
 mod plot;
 mod table;
 
 use std::collections::HashSet;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use thiserror::Error;
 
 pub use self::figure::{FIGURES, Figure};
-pub(crate) use self::figure::{figures_csv, slug};
+pub(crate) use self::figure::{figures_csv, is_portable, slug};
 pub use self::html::{Block, Provenance, Report, Section};
 pub use self::number::human;
 pub use self::plot::{Panel, Plot, Point, Series, XAxis, XScale, YAxis, YScale};
@@ -75,7 +73,7 @@ pub fn write(folder: &Path, report: &Report) -> Result<(), ReportError> {
     let blocks = || report.sections.iter().flat_map(|section| &section.blocks);
     for block in blocks() {
         if let Block::Table { name, .. } | Block::Plot { name, .. } = block
-            && !name::is_portable(name)
+            && !is_portable(name)
         {
             return Err(ReportError::BadName { name: name.clone() });
         }

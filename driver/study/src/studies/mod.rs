@@ -11,7 +11,6 @@ mod overlap;
 mod present;
 mod reordering;
 mod scaling;
-mod scenes;
 mod sweep;
 mod techniques;
 mod times;

@@ -14,10 +14,9 @@ use super::super::sample::Estimate;
 use super::super::scale::{Scale, WIDEST_TILE};
 use super::overlap;
 use super::present::{
-    GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series,
-    table, text,
+    CORNELL, GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section,
+    series, table, text,
 };
-use super::scenes::CORNELL;
 use super::times::{self, TimedFrame};
 
 /// Order of a row: one of a chip's, or none for all gathers of the frame along one curve.
@@ -246,10 +245,7 @@ fn plot_of_orders<'a>(nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement)
 }
 
 /// Paragraph on the fraction of the rays that end in a gather.
-fn share_of_gathers<'a>(
-    scale: &Scale,
-    nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement,
-) -> String {
+fn share_of_gathers<'a>(scale: &Scale, nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> String {
     let naive = nominal(Some(GatherOrder::Naive), PhotonLayout::Jensen);
     let gathers = naive.gathers().value;
     let rays = naive.total(|tile| tile.counters.gather_rays as f64).value;

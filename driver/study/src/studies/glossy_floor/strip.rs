@@ -9,8 +9,7 @@ use super::super::super::point::{Point, Task};
 use super::super::super::report::{Block, Figure, Table, slug};
 use super::super::super::sample::{Estimate, SampleRate};
 use super::super::super::scale::Scale;
-use super::super::present::{columns, gigabytes, key, say, table, text};
-use super::super::scenes::GLOSSY;
+use super::super::present::{GLOSSY, columns, gigabytes, key, say, table, text};
 use super::line::{self, LINES, Line, change, exponents, line_name, spread};
 
 /// Height of the strip at the picture's lower edge: the picture's height divided by this number.
