@@ -44,7 +44,7 @@ pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{Material, Reflection, Transmission};
 pub use self::parts::{Part, parts};
 pub use self::texture::shared_exponent;
-pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
+pub use self::texture::{Encoding, Image, MAX_SIDE, Texture, Wrap};
 pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
 use crate::error::SceneError;
 
@@ -232,7 +232,7 @@ impl Scene {
     }
 
     /// Returns whether the scene has an emissive triangle, a punctual light or a lit environment.
-    pub fn has_light(&self) -> bool {
+    pub(crate) fn has_light(&self) -> bool {
         self.lights.iter().any(|light| light.intensity.max_element() > 0.0)
             || self.environment.as_ref().is_some_and(Environment::is_lit)
             || self.triangles.iter().any(|triangle| self.emits(triangle))

@@ -6,7 +6,7 @@ use photoncard_shared::layout::TexelFormat;
 pub const MAX_SIDE: u32 = 16_384;
 
 /// Maximum number of texels of all images of a scene together, and of an environment.
-pub const MAX_TEXELS: u64 = 1 << 28;
+pub(crate) const MAX_TEXELS: u64 = 1 << 28;
 
 /// Mapping of an image to surfaces: transform of coordinates, wrap modes and filter.
 #[derive(Clone, Copy, Debug, PartialEq)]

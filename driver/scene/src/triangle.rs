@@ -69,7 +69,7 @@ impl VertexAttributes {
     };
 
     /// Unit normals of the corners; the geometric normal of a flat triangle.
-    pub fn normals_of(&self, triangle: &Triangle) -> [Vec3; 3] {
+    pub(crate) fn normals_of(&self, triangle: &Triangle) -> [Vec3; 3] {
         self.normals.unwrap_or_else(|| [triangle.scaled_normal().normalize_or_zero(); 3])
     }
 }

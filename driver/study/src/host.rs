@@ -23,37 +23,37 @@ use super::point::identity;
 use super::store::PointStore;
 
 /// Displacement of moving lights, relative to the scene's diagonal.
-pub const LIGHT_STEP: f32 = 0.01;
+pub(crate) const LIGHT_STEP: f32 = 0.01;
 
 /// Host's work for the photon map of one scene, and the effects of changes of its light.
 #[derive(Clone, Debug, Deserialize, Serialize)]
-pub struct HostFrame {
+pub(crate) struct HostFrame {
     /// Size of the card image, bytes.
-    pub image_bytes: u64,
+    pub(crate) image_bytes: u64,
     /// Size of the photon map in the card image.
-    pub map: PhotonMapSize,
+    pub(crate) map: PhotonMapSize,
     /// Number of threads used.
-    pub threads: usize,
+    pub(crate) threads: usize,
     /// Time to trace photons, seconds.
-    pub tracing: f64,
+    pub(crate) tracing: f64,
     /// Time to build the map and the other sections of the image, seconds.
-    pub building: f64,
+    pub(crate) building: f64,
     /// Time to measure distances and disc fractions, seconds.
-    pub measuring: f64,
+    pub(crate) measuring: f64,
     /// Effects of the measured changes.
-    pub changes: Vec<Changed>,
+    pub(crate) changes: Vec<Changed>,
 }
 
 impl HostFrame {
     /// Total time, seconds.
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.tracing + self.building + self.measuring
     }
 }
 
 /// Change of a scene's light between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub enum Change {
+pub(crate) enum Change {
     /// The emission of all lights is halved.
     Dimmed,
     /// All lights move by [`LIGHT_STEP`].
@@ -64,17 +64,17 @@ pub enum Change {
 
 /// Lines that a change affects.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
-pub struct Changed {
+pub(crate) struct Changed {
     /// The change of light.
-    pub change: Change,
+    pub(crate) change: Change,
     /// Size of all changed lines, bytes.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
     /// Size of all lines of the new image, bytes.
-    pub of: u64,
+    pub(crate) of: u64,
 }
 
 /// Measures the host's work, and keeps the results in a [store](super::store).
-pub struct HostBench<'a> {
+pub(crate) struct HostBench<'a> {
     scenes: PathBuf,
     store: PointStore,
     pool: ThreadPool,
@@ -86,7 +86,7 @@ impl<'a> HostBench<'a> {
     ///
     /// # Errors
     /// If the folder cannot be created, or the threads cannot be started.
-    pub fn new(
+    pub(crate) fn new(
         folder: &Path,
         scenes: &Path,
         threads: Option<usize>,
@@ -101,7 +101,7 @@ impl<'a> HostBench<'a> {
     /// # Errors
     /// If the scene cannot be read, its photons cannot be mapped, the result cannot be stored, or the
     /// observer stops the study.
-    pub fn measure(
+    pub(crate) fn measure(
         &mut self,
         file: &str,
         settings: &RenderSettings,

@@ -33,7 +33,7 @@ pub trait StudyObserver: Sync {
 
 /// Result of measuring a point. The variant depends on its [`Task`].
 #[derive(Clone, Debug, Deserialize, Serialize)]
-pub enum Outcome {
+pub(crate) enum Outcome {
     /// Result of [`Task::Traffic`].
     Traffic(Measurement),
     /// Result of [`Task::Quality`].
@@ -77,7 +77,7 @@ impl Results {
     }
 }
 
-/// Measures points, and keeps their outcomes in a [store](super::store).
+/// Measures points, and keeps their outcomes in a folder.
 pub struct Laboratory<'a> {
     scenes: PathBuf,
     store: PointStore,
@@ -194,7 +194,7 @@ impl<'a> Laboratory<'a> {
     }
 
     fn key(&mut self, point: &Point) -> Result<Value, StudyError> {
-        Ok(point.key(&self.load(&point.scene)?.checksum()))
+        Ok(point.key(self.load(&point.scene)?.checksum()))
     }
 
     fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {

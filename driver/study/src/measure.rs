@@ -75,7 +75,7 @@ impl TileMeasurement {
     }
 
     /// Reads of one structure.
-    pub fn reads_of(&self, structure: Structure) -> ReadSums {
+    pub(crate) fn reads_of(&self, structure: Structure) -> ReadSums {
         self.sum(|other| other == structure)
     }
 
@@ -115,7 +115,7 @@ impl Measurement {
     }
 
     /// Bytes of the scene fetched from DRAM.
-    pub fn scene_bytes(&self) -> Estimate {
+    pub(crate) fn scene_bytes(&self) -> Estimate {
         self.total(|tile| tile.scene().dram_bytes as f64)
     }
 
@@ -126,15 +126,15 @@ impl Measurement {
 }
 
 /// Bench of emulated chips: a scene, its card image, and threads that emulate the chips.
-pub struct Bench<'a> {
+pub(crate) struct Bench<'a> {
     /// Scene of the bench.
-    pub scene: &'a Scene,
+    pub(crate) scene: &'a Scene,
     /// Card image of the scene, with its photon map.
-    pub mapped: &'a MappedImage,
+    pub(crate) mapped: &'a MappedImage,
     /// Threads, each of which emulates one chip. Their stacks must have room for a chip while it is built.
-    pub pool: &'a ThreadPool,
+    pub(crate) pool: &'a ThreadPool,
     /// Function that returns whether to stop. It is polled before each tile.
-    pub is_stopped: &'a (dyn Fn() -> bool + Sync),
+    pub(crate) is_stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Bench<'_> {
@@ -142,7 +142,7 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// If the settings' camera is not possible in the scene.
-    pub fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
+    pub(crate) fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
         let camera = settings.camera(self.scene)?;
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
@@ -152,7 +152,7 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.
-    pub fn render(
+    pub(crate) fn render(
         &self,
         chip: EmulatedKind,
         frame: &FrameParameters,
@@ -169,7 +169,7 @@ impl Bench<'_> {
     /// # Errors
     /// If the scene has no camera with the name in the settings, the card image is malformed, or the bench is
     /// stopped.
-    pub fn traffic(
+    pub(crate) fn traffic(
         &self,
         settings: &RenderSettings,
         chip: EmulatedKind,
@@ -229,7 +229,7 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// As [`Self::traffic`], and if the frame has too many gathers.
-    pub fn along_curve(
+    pub(crate) fn along_curve(
         &self,
         settings: &RenderSettings,
         caches: &CacheSettings,

@@ -77,7 +77,7 @@ impl Scale {
 
     /// Returns true if all points have the settings of the dissertation's nominal frame. Only figures at such
     /// a scale may be compared with published ones.
-    pub fn is_nominal(&self) -> bool {
+    pub(crate) fn is_nominal(&self) -> bool {
         let frame =
             |scale: &Self| (scale.side, scale.photons, scale.neighbors, scale.gather_rays, scale.shadow_rays);
         frame(self) == frame(&Self::FULL)
@@ -146,7 +146,7 @@ impl Scale {
 
     /// Settings of [`Self::all_on`] with the dissertation's tiles of 16x16 pixels, of which a frame has
     /// enough for many chips.
-    pub fn all_on_in_small_tiles(&self) -> RenderSettings {
+    pub(crate) fn all_on_in_small_tiles(&self) -> RenderSettings {
         self.all_on().with(|s| s.schedule.tile = Some(TILE))
     }
 
@@ -213,7 +213,7 @@ impl Scale {
 
     /// Number of gathers of a frame in which every gather ray of every pixel ends in one: `side^2 N_FG`, 26.2
     /// million at the nominal values.
-    pub fn nominal_gathers(&self) -> f64 {
+    pub(crate) fn nominal_gathers(&self) -> f64 {
         f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
     }
 }

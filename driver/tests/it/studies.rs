@@ -12,10 +12,9 @@ use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::render::{Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
-use photoncard_driver::study::report::Provenance;
 use photoncard_driver::study::{
-    Axis, AxisError, Laboratory, Point, Quality, SampleRate, Scale, Study, StudyError, StudyObserver,
-    StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
+    Axis, AxisError, Laboratory, Point, Provenance, Quality, SampleRate, Scale, Study, StudyError,
+    StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
 };
 
 /// Observer that counts measured points, and stops the study after a number of them.

@@ -9,8 +9,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::scene::Scene;
-use photoncard_driver::study::report::Provenance;
-use photoncard_driver::study::{ALONG_CURVE, AxisError, Point, Sweep, SweepOptions, Task};
+use photoncard_driver::study::{ALONG_CURVE, AxisError, Point, Provenance, Sweep, SweepOptions, Task};
 
 use crate::arguments::{
     Arguments, CACHE, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,

@@ -6,7 +6,7 @@ use std::{fmt, io};
 use photoncard_cards::link::host_name;
 
 /// Default port of tev.
-pub const DEFAULT_PORT: u16 = 14158;
+const DEFAULT_PORT: u16 = 14158;
 
 /// Address of a display server in the form `HOST:PORT`.
 #[derive(Clone, Debug, PartialEq, Eq)]

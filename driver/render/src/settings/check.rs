@@ -41,7 +41,7 @@ impl RenderSettings {
     ///
     /// # Errors
     /// As [`Self::check_budget`].
-    pub fn check_budgets(&self, budgets: &[Budget]) -> Result<(), RenderError> {
+    pub(crate) fn check_budgets(&self, budgets: &[Budget]) -> Result<(), RenderError> {
         budgets.iter().try_for_each(|budget| self.check_budget(budget))
     }
 

@@ -21,30 +21,30 @@ use photoncard_shared::message::{PIXEL_BYTES, Tile};
 
 /// Model of the chips' links. One host serves all of them, one message at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LinkModel {
+pub(crate) struct LinkModel {
     /// Time that the host takes for a tile command, seconds.
-    pub command_seconds: f64,
+    pub(crate) command_seconds: f64,
     /// Time that the host takes for the result of a tile (pixels and final message), seconds.
-    pub result_seconds: f64,
+    pub(crate) result_seconds: f64,
     /// Latency of any message, seconds.
-    pub latency_seconds: f64,
+    pub(crate) latency_seconds: f64,
 }
 
 /// Number of chips, their credits and their links.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setup {
+pub(crate) struct Setup {
     /// Number of chips.
-    pub chips: usize,
+    pub(crate) chips: usize,
     /// Maximum number of unanswered tile commands per chip
     /// ([`Budget::tiles`](photoncard_shared::budget::Budget::tiles)).
-    pub credits: usize,
+    pub(crate) credits: usize,
     /// Model of the links.
-    pub link: LinkModel,
+    pub(crate) link: LinkModel,
 }
 
 /// Error of [`simulate`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum LoadBalanceError {
+pub(crate) enum LoadBalanceError {
     /// The picture has no tiles.
     #[error("there are no tiles to deal; give the cost of one at least")]
     NoTiles,
@@ -62,50 +62,40 @@ pub enum LoadBalanceError {
 }
 
 /// Maximum time of a tile or a message, seconds. With it, sums of nanoseconds stay exact.
-pub const MAX_SECONDS: f64 = 1e9;
+pub(crate) const MAX_SECONDS: f64 = 1e9;
 
 /// Result of a simulation. Times are seconds since the host began to assign tiles.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Balance {
+pub(crate) struct Balance {
     /// Time when the host has the last result, seconds.
-    pub makespan_seconds: f64,
+    pub(crate) makespan_seconds: f64,
     /// Time to render all tiles on one chip, without links, seconds.
-    pub work_seconds: f64,
+    pub(crate) work_seconds: f64,
     /// Time when each chip is done with its last tile, seconds; 0 for a chip without tiles.
-    pub chip_seconds: Vec<f64>,
+    pub(crate) chip_seconds: Vec<f64>,
     /// Time that the host spent on messages, seconds.
-    pub host_seconds: f64,
+    pub(crate) host_seconds: f64,
     /// Maximum number of tiles that were assigned and unanswered at the same time, over all chips.
-    pub most_in_flight: usize,
+    pub(crate) most_in_flight: usize,
     /// Index of the chip that rendered each tile, in the picture's order.
-    pub chip_of_tile: Vec<usize>,
+    pub(crate) chip_of_tile: Vec<usize>,
 }
 
 impl Balance {
     /// Speed-up over one chip without links: `work / makespan`.
-    pub fn speedup(&self) -> f64 {
+    pub(crate) fn speedup(&self) -> f64 {
         if self.makespan_seconds > 0.0 { self.work_seconds / self.makespan_seconds } else { 1.0 }
     }
 
     /// Parallel efficiency, `speedup / chips`: fraction of the chips' time until the makespan that they spend
     /// on rendering.
-    pub fn efficiency(&self) -> f64 {
+    pub(crate) fn efficiency(&self) -> f64 {
         self.speedup() / self.chip_seconds.len() as f64
     }
 
     /// Idle fraction, `1 - efficiency`: chips wait for tiles, or for the last chip.
-    pub fn idle_share(&self) -> f64 {
+    pub(crate) fn idle_share(&self) -> f64 {
         1.0 - self.efficiency()
-    }
-
-    /// Time when the slowest chip is done, seconds.
-    pub fn slowest_chip_seconds(&self) -> f64 {
-        self.chip_seconds.iter().copied().fold(0.0, f64::max)
-    }
-
-    /// Mean over the chips of the time when they are done, seconds.
-    pub fn mean_chip_seconds(&self) -> f64 {
-        self.chip_seconds.iter().sum::<f64>() / self.chip_seconds.len() as f64
     }
 }
 
@@ -115,7 +105,7 @@ impl Balance {
 ///
 /// # Errors
 /// If there are no tiles, no chips or no credits, or a time is negative, above [`MAX_SECONDS`] or NaN.
-pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balance, LoadBalanceError> {
+pub(crate) fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balance, LoadBalanceError> {
     let &Setup { chips, credits, link } = setup;
     if costs.is_empty() {
         return Err(LoadBalanceError::NoTiles);
@@ -237,7 +227,7 @@ fn seconds(nanoseconds: u128) -> f64 {
 
 /// Order in which tiles are assigned to chips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum TileOrder {
+pub(crate) enum TileOrder {
     /// Row by row, as the driver assigns them.
     #[default]
     Picture,

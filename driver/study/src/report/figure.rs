@@ -3,7 +3,7 @@
 use super::table::{Cell, Column, Table};
 
 /// Name of the file with the key figures of a run.
-pub const FIGURES: &str = "figures.csv";
+pub(crate) const FIGURES: &str = "figures.csv";
 
 /// A key figure of a study.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,13 +23,18 @@ pub struct Figure {
 
 impl Figure {
     /// Creates a figure without an interval.
-    pub fn new(name: impl Into<String>, scene: &str, value: impl Into<Cell>, unit: &'static str) -> Self {
+    pub(crate) fn new(
+        name: impl Into<String>,
+        scene: &str,
+        value: impl Into<Cell>,
+        unit: &'static str,
+    ) -> Self {
         Self { name: name.into(), scene: scene.to_owned(), value: value.into(), unit, interval: None }
     }
 
     /// Adds the ends of the confidence interval to the figure.
     #[must_use]
-    pub fn within(self, lower: f64, upper: f64) -> Self {
+    pub(crate) fn within(self, lower: f64, upper: f64) -> Self {
         Self { interval: Some([lower, upper]), ..self }
     }
 }

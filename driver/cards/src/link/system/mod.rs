@@ -21,7 +21,7 @@ pub use serial::{ListedPort, SerialLink, list_serial_ports, open_serial};
 pub use socket::connect_tcp;
 #[cfg(unix)]
 pub use socket::connect_unix;
-pub use socket::{host_name, tcp_address};
+pub use socket::host_name;
 pub use stream::StreamPort;
 #[cfg(not(unix))]
 pub use unsupported::connect_unix;
