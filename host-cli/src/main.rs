@@ -13,7 +13,8 @@
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
-//! | `render` (and `prepare`), `merge`, `farm`, `view`, `tonemap`, `scene`, `card`, `card_list`, `card_self_test`, `emulate`, `diff`, `documents`, `study` | one module for each command |
+//! | `render` (and `prepare`), `farm`, `view`, `scene`, `documents`, `study` | one module for each command |
+//! | `card`, `pictures` | commands on cards (`card`, `emulate`), and on pictures (`merge`, `tonemap`, `diff`) |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render
 //! from Rust, use `photoncard_driver` directly.
@@ -21,21 +22,17 @@
 
 mod arguments;
 mod card;
-mod card_list;
-mod card_self_test;
 mod console;
-mod diff;
 mod documents;
-mod emulate;
 mod environment;
 mod failure;
 mod farm;
 #[cfg(target_os = "linux")]
 mod hang_up;
 mod input;
-mod merge;
 mod notices;
 mod outputs;
+mod pictures;
 mod progress;
 mod render;
 mod report;
@@ -43,13 +40,12 @@ mod scene;
 mod shell;
 #[cfg(feature = "study")]
 mod study;
-mod tonemap;
 mod view;
 
 use std::process::ExitCode;
 
 use crate::arguments::{Arguments, CardCommand, Command, ProgressForm, SceneCommand};
-use crate::progress::openjd;
+use crate::progress::fail_openjd;
 
 #[cfg(not(feature = "study"))]
 fn without_studies() -> failure::Failure {
@@ -66,17 +62,17 @@ fn main() -> ExitCode {
     let result = match &mut arguments.command {
         Command::Render(options) => render::run(options),
         Command::Prepare(options) => render::prepare::run(options),
-        Command::Merge(options) => merge::run(options),
+        Command::Merge(options) => pictures::merge(options),
         Command::Farm(command) => farm::run(command),
         Command::View(options) => view::run(options),
-        Command::Tonemap(options) => tonemap::run(options),
+        Command::Tonemap(options) => pictures::tonemap(options),
         Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
-        Command::Card(CardCommand::List) => card_list::run(),
+        Command::Card(CardCommand::List) => card::list(),
         Command::Card(CardCommand::Info { card }) => card::info(card),
         Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
-        Command::Card(CardCommand::Selftest { card, quiet }) => card_self_test::run(card, *quiet),
-        Command::Emulate(options) => emulate::run(options),
-        Command::Diff(options) => diff::run(options),
+        Command::Card(CardCommand::Selftest { card, quiet }) => card::self_test(card, *quiet),
+        Command::Emulate(options) => card::emulate(options),
+        Command::Diff(options) => pictures::diff(options),
         Command::Completions { shell } => documents::completions(*shell),
         Command::Man { folder } => documents::man(folder),
         #[cfg(feature = "study")]
@@ -89,7 +85,7 @@ fn main() -> ExitCode {
         Err(failure) => {
             console::say_failure(&failure);
             if arguments.command.progress() == ProgressForm::Openjd {
-                openjd::fail(&failure);
+                fail_openjd(&failure);
             }
             failure.status()
         }

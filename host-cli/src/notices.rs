@@ -84,6 +84,7 @@ mod tests {
 
     use super::*;
     use crate::arguments::{Arguments, Command, RenderOptions};
+    use photoncard_driver::scene::SceneContents;
 
     #[test]
     fn the_first_sentences_are_named_and_the_others_counted() {
@@ -108,12 +109,16 @@ mod tests {
 
     #[test]
     fn strict_renders_refuse_ignored_contents() {
-        let scene = Scene { notices: vec!["n0".into(); 5], remarks: vec!["r".into()], ..Scene::default() };
+        let scene = Scene::from(SceneContents {
+            notices: vec!["n0".into(); 5],
+            remarks: vec!["r".into()],
+            ..SceneContents::default()
+        });
         assert_eq!(refused("", &scene).unwrap().matches("n0").count(), 5);
         let lenient = SceneOptions { strict: false, ..options("").scene };
         let uses = Uses::of(&lenient, &Picture::default(), None);
         assert!(say_ignored(&lenient, &scene, &uses).is_ok());
-        assert_eq!(refused("", &Scene { notices: Vec::new(), ..scene }), None);
+        assert_eq!(refused("", &scene.with(|scene| scene.notices.clear())), None);
     }
 
     /// Each notice concerns contents that the command line replaces: the view, animations or the environment.
@@ -125,11 +130,11 @@ mod tests {
             (Concern::Animations, "", Some("--frames 1-2 -o a.#.exr")),
             (Concern::Environment, "--environment 1,1,1", Some("")),
         ] {
-            let scene = Scene {
+            let scene = Scene::from(SceneContents {
                 notices: vec!["first".into(), "second".into()],
                 concerns: vec![(1, concern)],
-                ..Scene::default()
-            };
+                ..SceneContents::default()
+            });
             let said = |line: &str| refused(line, &scene).unwrap();
             assert!(said(replaced).contains("first") && !said(replaced).contains("second"), "{concern:?}");
             if let Some(line) = used {

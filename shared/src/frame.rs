@@ -1,12 +1,15 @@
 //! Frames: byte sequences with a checksum, for a line that damages, loses or repeats bytes.
 //!
 //! ```text
-//! COBS( kind: u8 | session: u32 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all before: u32 ) 0x00
+//! COBS( kind: u8 | session: u32 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all
+//! before: u32 ) 0x00
 //! ```
 //!
 //! Numbers are little-endian. A frame contains no zero byte, by byte stuffing ([`crate::stuffing`]), so that
 //! a receiver finds the next frame after any damage. [`crate::transport`] defines the meaning of the numbers
 //! in the header.
+
+use core::fmt;
 
 use heapless::Vec;
 use memchr::memchr;
@@ -37,6 +40,20 @@ pub enum FrameError {
     /// A [`FrameKind`] unknown to this version.
     Kind,
 }
+
+impl fmt::Display for FrameError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::TooLong => "the frame is too long",
+            Self::Encoding => "the frame is not encoded by COBS",
+            Self::TooShort => "the frame is shorter than a header and a checksum",
+            Self::Checksum => "the frame has another checksum",
+            Self::Kind => "the frame is of an unknown kind",
+        })
+    }
+}
+
+impl core::error::Error for FrameError {}
 
 /// Purpose of a frame. The numbers are part of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

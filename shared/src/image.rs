@@ -8,6 +8,8 @@
 //! [`SectionKind::PhotonLeaves`]. The sections of the other layout are empty. Sections of irradiance points,
 //! the caustic map, textures and vertex attributes are empty if the scene has none.
 
+use core::fmt;
+
 use crate::address::{LINE_BYTES, Line, LineAddress, Structure};
 use crate::layout::{
     Attributes, DistantLight, Emitter, Layers, Material, Photon, PhotonGrid, Record, Texture,
@@ -242,6 +244,19 @@ pub enum HeaderError {
     /// The section with this index extends past the image's last line.
     Section(u8),
 }
+
+impl fmt::Display for HeaderError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Magic => f.write_str("the lines are no card image"),
+            Self::Version(version) => write!(f, "the card image has layout version {version}"),
+            Self::Unit => f.write_str("a number in the card image's header is out of range"),
+            Self::Section(index) => write!(f, "section {index} extends past the card image's last line"),
+        }
+    }
+}
+
+impl core::error::Error for HeaderError {}
 
 const PHOTON_GRID: usize = 32;
 const SECTION_TABLE: usize = 64;

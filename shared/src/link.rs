@@ -1,5 +1,6 @@
 //! A port: one end of a byte link.
 
+use core::fmt;
 use core::time::Duration;
 
 /// Permanent failure of a [`Port`].
@@ -10,6 +11,17 @@ pub enum PortError {
     /// The device failed with this error code of its own.
     Device(u32),
 }
+
+impl fmt::Display for PortError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Closed => f.write_str("the other end of the link is gone"),
+            Self::Device(code) => write!(f, "the device of the link has failed (error {code})"),
+        }
+    }
+}
+
+impl core::error::Error for PortError {}
 
 /// One end of a byte link. Every call returns within the time `wait`, whether or not bytes were moved.
 pub trait Port {

@@ -74,7 +74,7 @@ fn number(value: f64) -> String {
 
 fn print_table(runs: &[Run]) {
     println!("//! Operations of a step. Written by `tests/operations.sh`.\n");
-    println!("use super::operations::Operations;\nuse super::step::Step;\nuse crate::choice::Choice;\n");
+    println!("use photoncard_picture::choice::Choice;\n\nuse super::step::{{Operations, Step}};\n");
     println!(
         "/// Operations of one step of each kind, in the order of [`Step::ALL`]: means over tiles of several scenes."
     );

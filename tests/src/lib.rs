@@ -13,7 +13,7 @@ pub mod wire;
 use glam::Vec3;
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{RenderSettings, Rendering, Unobserved, render};
-use photoncard_driver::scene::{Camera, Material, Reflection, Scene, Transmission, Triangle};
+use photoncard_driver::scene::{Camera, Material, Reflection, Scene, SceneContents, Transmission, Triangle};
 
 /// Creates a grey, one-sided Lambertian material that does not emit.
 pub fn lambertian(name: &str, albedo: f32) -> Material {
@@ -72,7 +72,7 @@ pub fn camera(origin: Vec3, forward: Vec3) -> Camera {
 
 /// Creates a scene of triangles, materials and one camera.
 pub fn scene(triangles: Vec<Triangle>, materials: Vec<Material>, camera: Camera) -> Scene {
-    Scene { triangles, materials, cameras: vec![camera], ..Scene::default() }
+    Scene::from(SceneContents { triangles, materials, cameras: vec![camera], ..SceneContents::default() })
 }
 
 /// Renders a scene.

@@ -53,7 +53,8 @@ pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, materi
 pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f32; 2]; 4], material: u32) {
     let [a, b, c, d] = coordinates.map(Vec2::from);
     for (triangle, coordinates) in quad(corners, material).into_iter().zip([[a, b, c], [a, c, d]]) {
-        scene.triangles.push(Triangle { attributes: scene.attributes.len() as u32, ..triangle });
+        let attributes = scene.attributes.len() as u32;
+        scene.triangles.push(Triangle { attributes, ..triangle });
         scene
             .attributes
             .push(VertexAttributes { coordinates: [coordinates, [Vec2::ZERO; 3]], ..VertexAttributes::NONE });
@@ -63,6 +64,7 @@ pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f
 /// Adds equal tangents to the textured triangles of a material: a direction, with the sign of the bitangent
 /// in w.
 pub fn add_tangents(scene: &mut Scene, material: u32, tangent: Vec4) {
+    let scene = &mut **scene;
     for triangle in scene.triangles.iter().filter(|triangle| triangle.material == material) {
         scene.attributes[triangle.attributes as usize].tangents = scene.tangents.len() as u32;
         scene.tangents.push([tangent; 3]);

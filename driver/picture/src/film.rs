@@ -340,7 +340,7 @@ impl Film {
     }
 
     /// Marks a tile's pixels as not written.
-    pub fn erase(&mut self, tile: &Tile) {
+    pub(crate) fn erase(&mut self, tile: &Tile) {
         for index in pixel_positions(tile).filter_map(|(x, y)| self.index(x, y)).collect::<Vec<_>>() {
             self.missing += usize::from(std::mem::replace(&mut self.written[index], false));
         }

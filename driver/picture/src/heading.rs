@@ -30,22 +30,20 @@ pub struct Heading<T> {
 }
 
 /// Reason why a heading cannot be read.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
 pub enum HeadingFault {
     /// The file is not of this kind, in any version.
+    #[error("the file is of another kind")]
     Foreign,
     /// The file is of this kind, but of another version: the given one.
+    #[error("the file is of version {0}")]
     Version(u32),
     /// The heading is truncated or damaged. The text describes how.
+    #[error("the file is damaged: {0}")]
     Damaged(&'static str),
     /// The file cannot be read.
-    Unreadable(io::Error),
-}
-
-impl From<io::Error> for HeadingFault {
-    fn from(error: io::Error) -> Self {
-        Self::Unreadable(error)
-    }
+    #[error("the file cannot be read: {0}")]
+    Unreadable(#[from] io::Error),
 }
 
 impl Kind {

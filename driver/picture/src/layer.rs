@@ -107,7 +107,7 @@ impl Layer {
 
     /// Returns whether the layer is always stored in single precision, because distances and counts exceed
     /// the precision of halves.
-    pub fn is_always_single(self) -> bool {
+    pub(crate) fn is_always_single(self) -> bool {
         matches!(self, Self::Depth | Self::Gathers)
     }
 }

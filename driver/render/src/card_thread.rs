@@ -3,13 +3,12 @@
 use std::time::Duration;
 
 use photoncard_cards::scheduler::{CardNumber, Standing};
-use photoncard_cards::session::{Job, SessionError};
+use photoncard_cards::session::{Job, Restart, SessionError};
 use photoncard_shared::address::LINE_BYTES;
 
 use super::crew::{Crew, EndOthersOnPanic};
-use super::exchange::{WAIT, exchange};
 use super::greeting::GreetedCard;
-use super::reopening::reopen;
+use super::open_card::{WAIT, exchange, reopen};
 use super::{CardError, Phase, RenderError};
 
 struct CardAtWork<'a> {
@@ -77,7 +76,7 @@ impl CardAtWork<'_> {
             return Ok(false);
         }
         let is_closed = matches!(error, SessionError::Port(_));
-        self.greeted.session.greet_again(crew.start.elapsed());
+        self.greeted.session.restart(Restart::Lost, crew.start.elapsed());
         self.collect()?;
         if !std::mem::replace(&mut self.is_lost, true) {
             crew.lose(number, CardError::Session(error), Standing::Lost, false)?;

@@ -1,5 +1,5 @@
-//! Executor that renders tiles on cards. It connects to all cards, greets them, and renders on them in
-//! parallel. Cards stay open for the next picture.
+//! Renders tiles on cards: connects to all cards, greets them, and renders on them in parallel. Cards stay
+//! open for the next picture.
 
 use std::panic::resume_unwind;
 use std::sync::atomic::AtomicBool;
@@ -8,7 +8,7 @@ use std::thread::ScopedJoinHandle;
 use std::time::{Duration, Instant};
 
 use photoncard_cards::dispatcher::Dispatcher;
-use photoncard_cards::scheduler::{CardNumber, Scheduler, Standing};
+use photoncard_cards::scheduler::{CardNumber, Scheduler, Standing, near, spread};
 use photoncard_cards::session::{Job, PixelLimits, Upload};
 use photoncard_map::pack::CardImage;
 use photoncard_picture::sink::TileSink;
@@ -17,11 +17,11 @@ use photoncard_shared::message::Tile;
 
 use super::card_thread::render_on;
 use super::crew::Crew;
-use super::executor::{BudgetCheck, Executor, Outcome, Work};
 use super::greeting::{GreetedCard, GreetingError, greet};
 use super::open_card::OpenCard;
 use super::outputs::Outputs;
 use super::statistics::EARLIER_RENDER;
+use super::work::{BudgetCheck, Outcome, Work};
 use super::{CardAddress, CardError, CardSet, Observer, RenderError, RenderSettings};
 use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
@@ -236,14 +236,18 @@ impl Cards {
         }
         Ok(sum)
     }
-}
 
-impl Executor for Cards {
-    fn budgets(&self) -> Vec<Budget> {
+    /// Budgets of the cards.
+    pub(super) fn budgets(&self) -> Vec<Budget> {
         self.cards.iter().map(|(_, card)| card.budget).collect()
     }
 
-    fn leave_out(
+    /// Leaves out cards whose budgets fail the check, as long as `needed` others are left, and reports their
+    /// names to the observer.
+    ///
+    /// # Errors
+    /// The failure of a card, if too few are left.
+    pub(super) fn leave_out(
         &mut self,
         check: BudgetCheck,
         needed: usize,
@@ -273,11 +277,12 @@ impl Executor for Cards {
         self.lose(misfits.collect(), needed, observer)
     }
 
-    fn finishes_tiles_early(&self) -> bool {
-        true
-    }
-
-    fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
+    /// Renders the tiles and stores them in the sinks.
+    ///
+    /// # Errors
+    /// If the tiles cannot be rendered, or the observer stops the render. If the outcome so far is known, the
+    /// error is in [`Outcome::failure`] instead.
+    pub(super) fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
         let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
         // Emulated cards that receive the shared image store no copy of it.
         self.shared.give(image.clone(), None);
@@ -325,4 +330,49 @@ fn latest(results: Vec<Result<Duration, RenderError>>) -> Result<Duration, Rende
         }
     }
     if is_stopped { Err(RenderError::Stopped) } else { Ok(latest) }
+}
+
+impl RenderSettings {
+    /// Checks that tiles can be verified, if requested.
+    ///
+    /// # Errors
+    /// If there are fewer than two cards, the share is not valid, or reads are counted, which would be those
+    /// of both cards.
+    pub(super) fn check_verification(&self) -> Result<(), RenderError> {
+        let Some(share) = self.cards.verify else { return Ok(()) };
+        let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
+            ["a share of the tiles is above 0 and at most 1", "give a number such as 0.02"]
+        } else if self.cards.count() < 2 {
+            ["a tile is verified by a second card", "give two --card or more, or --card emulated:2"]
+        } else if self.modelled_caches().is_some() {
+            ["reads of memory are counted once for each tile", "leave --counters, --cache and --trace out"]
+        } else {
+            return Ok(());
+        };
+        let (value, reason, remedy) = (share.to_string(), reason.into(), remedy.into());
+        Err(RenderError::Setting { option: "--verify", value, reason, remedy })
+    }
+
+    /// Minimum number of cards that a render needs.
+    pub(super) fn needed_cards(&self) -> usize {
+        if self.cards.verify.is_some() { 2 } else { 1 }
+    }
+
+    /// Creates the scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice,
+    /// because all reads count.
+    pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
+        // Modelled caches are read in the order of the picture.
+        if self.modelled_caches().is_some() {
+            return Scheduler::new(tiles, cards);
+        }
+        let ordered = match self.schedule.focus {
+            Some(focus) => near(tiles, focus),
+            None => spread(tiles),
+        };
+        let scheduler = Scheduler::new(ordered, cards).with_helpers();
+        match self.cards.verify {
+            Some(share) => scheduler.verifying(share, self.integrator.seed),
+            None => scheduler,
+        }
+    }
 }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use photoncard_cards::dispatcher::Dispatcher;
 use photoncard_cards::scheduler::{CardNumber, SchedulerError, Source, Standing, rectangles};
 
-use super::exchange::WAIT;
+use super::open_card::WAIT;
 use super::outputs::Outputs;
 use super::{CardError, RenderError};
 

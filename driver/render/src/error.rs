@@ -11,7 +11,6 @@ use photoncard_scene::error::SceneError;
 use photoncard_shared::message::Fault;
 
 use crate::emulator::direct::DirectError;
-use crate::emulator::whole_frame::CurveError;
 use crate::partial::PartialError;
 
 /// Error of a card.
@@ -141,7 +140,7 @@ pub enum RenderError {
         /// Tiles in the form of arguments of `--crop`.
         tiles: String,
     },
-    /// The threads of whole-frame reordering cannot be started.
+    /// The threads of the pilot's chips cannot be started.
     #[error("the chips could not be started: {0}")]
     #[diagnostic(help("use fewer cards"))]
     Chips(rayon::ThreadPoolBuildError),
@@ -155,22 +154,6 @@ pub enum RenderError {
     /// The observer stopped the render.
     #[error("stopped before the picture was complete")]
     Stopped,
-}
-
-impl From<CurveError> for RenderError {
-    fn from(error: CurveError) -> Self {
-        match error {
-            CurveError::Stopped => Self::Stopped,
-            CurveError::Image(fault) => Self::Image(fault),
-            CurveError::Start(source) => Self::Chips(source),
-            CurveError::TooManyGathers { .. } => Self::Setting {
-                option: "--order",
-                value: "hilbert".into(),
-                reason: error.to_string(),
-                remedy: "render a part with --crop, fewer --spp or --gather-rays, or use --order sort".into(),
-            },
-        }
-    }
 }
 
 impl From<DirectError> for RenderError {

@@ -8,8 +8,7 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::link::{Port, PortError};
 use photoncard_shared::message::{MemoryUse, Tile};
 
-use super::exchange::exchange;
-use super::open_card::OpenCard;
+use super::open_card::{OpenCard, exchange};
 use super::{CardAddress, CardError, Observer, RenderError, Unobserved};
 use crate::emulator::SharedImage;
 

@@ -1,8 +1,7 @@
 //! A render, from a loaded scene to a complete film.
 //!
-//! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, executor, statistics.
-//! The executor fills the film. It is either the cards at the ends of their links or, for the order
-//! `hilbert`, emulated chips and the host. [`render`] is a renderer's first picture.
+//! A [`Renderer`] is one pipeline: settings, film, outputs, card image, frame, sinks, cards, statistics. The
+//! cards at the ends of their links fill the film. [`render`] is a renderer's first picture.
 #![forbid(unsafe_code)]
 
 mod address;
@@ -13,8 +12,6 @@ mod crew;
 pub mod display;
 pub mod emulator;
 mod error;
-mod exchange;
-mod executor;
 mod greeting;
 mod memory;
 mod noise;
@@ -24,18 +21,14 @@ mod outputs;
 pub mod partial;
 pub mod parts;
 mod passes;
-mod preparation;
 mod prepared;
 mod provenance;
 pub mod quality;
 mod renderer;
-mod reopening;
 mod self_test;
 mod settings;
 mod statistics;
-mod times;
-mod verification;
-mod whole_frame;
+mod work;
 
 pub use address::CardAddress;
 pub use error::{CardError, RenderError};
@@ -57,7 +50,7 @@ pub use settings::{
     Picture, RenderSettings, Schedule, TileOutputs,
 };
 pub use statistics::{EARLIER_RENDER, LinkStatistics, Rays, Statistics};
-pub use times::Times;
+pub use work::Times;
 
 use photoncard_map::pack::PackedScene;
 use photoncard_scene::Scene;

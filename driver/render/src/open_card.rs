@@ -1,14 +1,16 @@
-//! Open connections to cards.
+//! Open connections to cards: transfer of bytes between a session and its port, and reconnection.
 
-use std::time::Duration;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::{Duration, Instant};
 
 use photoncard_cards::link::{
     FaultInjector, LineFaults, LinkError, RemoteAddress, connect_tcp, connect_unix, open_serial,
 };
+use photoncard_cards::session::{Session, SessionError};
 use photoncard_shared::link::{Port, PortError};
 
-use super::CardError;
 use super::address::CardAddress;
+use super::{CardError, RenderError};
 use crate::emulator::{EmulatedCard, MemoryModel, MemoryRecord, SharedImage, TileLines};
 
 /// Host's end of a link.
@@ -145,4 +147,69 @@ pub(super) fn reach(address: &RemoteAddress) -> Result<BoxedPort, LinkError> {
 
 fn boxed(port: impl Port + Send + 'static) -> BoxedPort {
     Box::new(port)
+}
+
+/// Maximum time that a port waits for a byte, and thus until a card's thread notices that the render was
+/// stopped.
+pub(super) const WAIT: Duration = Duration::from_millis(4);
+
+/// Moves the available bytes once in each direction. Waits at most [`WAIT`] if there are none. `slowest` is
+/// the argument of [`Session::tick`].
+pub(super) fn exchange(
+    session: &mut Session,
+    port: &mut impl Port,
+    slowest: Option<f64>,
+    start: Instant,
+) -> Result<(), SessionError> {
+    session.prepare();
+    let sent = match session.outgoing() {
+        [] => 0,
+        outgoing => port.write(outgoing, WAIT).map_err(SessionError::Port)?,
+    };
+    session.sent(sent, start.elapsed());
+    let mut buffer = [0; 8192];
+    let wait = if session.has_more_to_send() || session.is_idle() { Duration::ZERO } else { WAIT };
+    match port.read(&mut buffer, wait).map_err(SessionError::Port)? {
+        0 => session.acknowledge(),
+        received => session.receive(&buffer[..received], start.elapsed())?,
+    }
+    session.tick(slowest, start.elapsed())
+}
+
+/// Pause before each attempt to reconnect.
+const RETRY: Duration = Duration::from_millis(500);
+
+/// Tries to reconnect to a card until it succeeds, or all tiles are done. `wait_for_end` waits for at most
+/// the given time and returns whether all tiles are done.
+pub(super) fn reopen(
+    address: &RemoteAddress,
+    wait_for_end: &dyn Fn(Duration) -> Result<bool, RenderError>,
+) -> Result<Option<BoxedPort>, RenderError> {
+    // The first attempt waits as well: a peer that closes every link at once must not be contacted in a tight
+    // loop.
+    while !wait_for_end(RETRY)? {
+        let attempt = try_to_reach(address.clone());
+        loop {
+            match attempt.recv_timeout(WAIT) {
+                Ok(Some(port)) => return Ok(Some(port)),
+                Err(RecvTimeoutError::Timeout) if wait_for_end(Duration::ZERO)? => return Ok(None),
+                Err(RecvTimeoutError::Timeout) => {}
+                Ok(None) | Err(RecvTimeoutError::Disconnected) => break,
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Tries to connect once, on a separate thread: resolving or connecting to an address can take seconds, and a
+/// render that ends does not wait for it. A port that nobody receives is closed.
+fn try_to_reach(address: RemoteAddress) -> Receiver<Option<BoxedPort>> {
+    let (sender, receiver) = channel();
+    let work = move || {
+        // The receiver is gone if the render has ended.
+        let _ = sender.send(reach(&address).ok());
+    };
+    // If no thread can be started, the next attempt follows later.
+    let _ = std::thread::Builder::new().name("reopen".into()).spawn(work);
+    receiver
 }

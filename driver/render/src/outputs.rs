@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 use photoncard_picture::film::Film;
 use photoncard_picture::sink::{FinishedTile, TileSink};
 use photoncard_picture::viewer::Viewer;
-use photoncard_scene::FixedScene;
+use photoncard_scene::Scene;
 use photoncard_shared::message::Tile;
 
 use super::{Observer, RenderSettings};
@@ -30,14 +30,14 @@ impl<'a> Outputs<'a> {
     /// # Errors
     /// If the file of finished tiles cannot be read, or is not the file of this picture.
     pub(super) fn open(
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         tiles: &[Tile],
         (film, base): (&mut Film, Option<Arc<Film>>),
         observer: &'a dyn Observer,
     ) -> Result<Self, PartialError> {
         let begin = |partial| {
-            let mut identity = settings.identity_of(scene);
+            let mut identity = settings.identity(scene);
             // The file is of any number of samples, and states those that rays are divided among.
             identity.remove("spp");
             if settings.integrator.irradiance_error.is_some() {
@@ -63,12 +63,10 @@ impl<'a> Outputs<'a> {
         Ok(outputs)
     }
 
-    /// Sinks of finished tiles: the film, the outputs that show them, and the partial file if tiles are
-    /// finished early.
-    pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>, finished_early: bool) -> Vec<&'s dyn TileSink> {
+    /// Sinks of finished tiles: the film, the outputs that show them, and the partial file.
+    pub(super) fn sinks<'s>(&'s self, film: &'s Mutex<Film>) -> Vec<&'s dyn TileSink> {
         let mut sinks: Vec<&dyn TileSink> = vec![film, self];
-        let partial = self.partial.as_ref().filter(|_| finished_early);
-        sinks.extend(partial.map(|partial| partial as &dyn TileSink));
+        sinks.extend(self.partial.as_ref().map(|partial| partial as &dyn TileSink));
         sinks
     }
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use photoncard_map::pack::PackedScene;
-use photoncard_scene::FixedScene;
+use photoncard_scene::Scene;
 
 use super::noise::NoiseEstimate;
 use super::renderer::{Chosen, Renderer, Rendering};
@@ -67,7 +67,7 @@ impl Renderer {
     /// As [`Self::render_chosen`], if the first pass fails.
     pub fn render_until(
         &mut self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         choose: &dyn Fn(&PackedScene) -> Chosen,
         aim: Aim,
@@ -83,7 +83,7 @@ impl Renderer {
             Ok((photons, integrator))
         };
         let settings = settings.clone().with(|settings| settings.schedule.keep_records = true);
-        let rendering = self.render_chosen_fixed(scene, &settings, &first, observer)?;
+        let rendering = self.render_chosen(scene, &settings, &first, observer)?;
         let (photons, integrator) = chosen.into_inner();
         let mut settings = RenderSettings { photons, integrator, ..settings };
         let mut passes = Passes { rendering, noise: None, count: 1, ending: Ending::Reached };

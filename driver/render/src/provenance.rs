@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::Vec3;
-use photoncard_scene::{Camera, FixedScene};
+use photoncard_scene::{Camera, Scene};
 use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{FrameParameters, PROTOCOL_VERSION};
 use serde::Serialize;
@@ -26,12 +26,12 @@ impl Provenance {
     /// Provenance of a render of `scene`, seen by `camera`, on chips with `budgets`.
     pub(super) fn new(
         settings: &RenderSettings,
-        scene: &FixedScene,
+        scene: &Scene,
         camera: &Camera,
         frame: &FrameParameters,
         budgets: &[Budget],
     ) -> Self {
-        let mut pixels = settings.identity_of(scene);
+        let mut pixels = settings.identity(scene);
         // All layers of the picture: those of the host are in the identity of no tile.
         pixels.insert("aov".to_owned(), json!(settings.picture.layers.to_string()));
         // The automatic distance, if none is given.

@@ -6,15 +6,12 @@ use std::time::Instant;
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{PhotonSettings, check_image};
 use photoncard_picture::film::{Film, FilmError};
-use photoncard_scene::{FixedScene, Scene};
+use photoncard_scene::Scene;
 use photoncard_shared::message::{FrameParameters, SumScale};
 
 use super::cards::Cards;
-use super::executor::{BudgetCheck, Executor, FitChips, Work};
 use super::outputs::Outputs;
-use super::preparation::{Prepared, prepare};
-use super::times::Times;
-use super::whole_frame::WholeFrame;
+use super::work::{BudgetCheck, FitChips, Prepared, Times, Work, prepare};
 use super::{Integrator, Observer, PhotonMaps, Provenance, RenderError, RenderSettings, Statistics};
 use crate::partial::{PartialRender, PartialSettings};
 
@@ -55,27 +52,14 @@ impl Renderer {
         Self { cards: None, kept: Some(kept) }
     }
 
-    /// Renders a picture of a scene.
+    /// Renders a picture of a scene. For another camera of the same scene neither triangles nor texels are
+    /// read.
     ///
     /// # Errors
     /// If settings or scene do not fit the cards, a card fails, or the observer stops the render.
     pub fn render(
         &mut self,
         scene: &Scene,
-        settings: &RenderSettings,
-        observer: &dyn Observer,
-    ) -> Result<Rendering, RenderError> {
-        self.render_fixed(&scene.into(), settings, observer)
-    }
-
-    /// Renders a picture of a scene that does not change between pictures. For another camera neither
-    /// triangles nor texels are read.
-    ///
-    /// # Errors
-    /// As [`Self::render`].
-    pub fn render_fixed(
-        &mut self,
-        scene: &FixedScene,
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
@@ -92,7 +76,7 @@ impl Renderer {
     /// other layers.
     pub fn refine(
         &mut self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         base: Arc<Film>,
         observer: &dyn Observer,
@@ -117,26 +101,12 @@ impl Renderer {
         choose: &dyn Fn(&PackedScene) -> Chosen,
         observer: &dyn Observer,
     ) -> Result<Rendering, RenderError> {
-        self.render_chosen_fixed(&scene.into(), settings, choose, observer)
-    }
-
-    /// Does [`Self::render_chosen`] for a scene that does not change between pictures.
-    ///
-    /// # Errors
-    /// As [`Self::render_chosen`].
-    pub fn render_chosen_fixed(
-        &mut self,
-        scene: &FixedScene,
-        settings: &RenderSettings,
-        choose: &dyn Fn(&PackedScene) -> Chosen,
-        observer: &dyn Observer,
-    ) -> Result<Rendering, RenderError> {
         self.render_by(scene, settings, Some(choose), None, observer)
     }
 
     fn render_by(
         &mut self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         base: Option<Arc<Film>>,
@@ -151,7 +121,7 @@ impl Renderer {
 
     fn render_on_cards(
         &mut self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         base: Option<Arc<Film>>,
@@ -161,30 +131,24 @@ impl Renderer {
         let camera = settings.camera(scene)?;
         settings.check()?;
         let Self { cards, kept } = self;
-        let mut whole_frame;
-        let executor: &mut dyn Executor = if settings.schedule.order.is_of_whole_frame() {
-            whole_frame = WholeFrame::new(settings)?;
-            &mut whole_frame
-        } else {
-            connected(cards, settings, observer)?
-        };
+        let cards = connected(cards, settings, observer)?;
         let needed = settings.needed_cards();
-        executor.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
+        cards.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
         settings.outputs.partial.as_ref().map(PartialSettings::check_free).transpose()?;
         let mut times = Times::default();
         let (settings, source) = Source::new(scene, settings, choose, kept, &mut times)?;
-        executor.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
-        let tile = settings.tile_side(&executor.budgets());
+        cards.leave_out(&|budget| settings.check_budget(budget), needed, observer)?;
+        let tile = settings.tile_side(&cards.budgets());
         let settings = &settings.with(|s| s.schedule.tile = Some(tile));
         settings.check()?;
-        settings.check_budgets(&executor.budgets())?;
+        settings.check_budgets(&cards.budgets())?;
         // A film may be large: it is allocated after the settings are checked.
         let mut film = settings.film(source.sum_scale())?;
         base.as_ref().map_or(Ok(()), |base| film.begin_after(base)).map_err(not_more(settings))?;
         let tiles = settings.tiles(tile);
         let outputs = Outputs::open(scene, settings, &tiles, (&mut film, base), observer)?;
         let is_image_kept = matches!(source, Source::Kept(_));
-        let fit = &mut |check: BudgetCheck| executor.leave_out(check, needed, observer);
+        let fit = &mut |check: BudgetCheck| cards.leave_out(check, needed, observer);
         let made = source.prepare(scene, settings, fit, &mut times, observer)?;
         let prepared = &kept.insert(made).prepared;
         let frame = FrameParameters {
@@ -193,7 +157,7 @@ impl Renderer {
             ..settings.frame(&camera, prepared.max_distance, prepared.caustics)
         };
         let film = Mutex::new(film);
-        let sinks = outputs.sinks(&film, executor.finishes_tiles_early());
+        let sinks = outputs.sinks(&film);
         let image = &prepared.image;
         let work = Work {
             settings,
@@ -205,8 +169,8 @@ impl Renderer {
             sinks,
             outputs: &outputs,
         };
-        let budgets = executor.budgets();
-        let mut outcome = executor.run(work).inspect_err(|_| outputs.report_kept())?;
+        let budgets = cards.budgets();
+        let mut outcome = cards.run(work).inspect_err(|_| outputs.report_kept())?;
         times.load = outcome.load_seconds;
         times.render = outcome.render_seconds;
         times.total = start.elapsed().as_secs_f64();
@@ -263,8 +227,8 @@ pub(super) struct Kept {
 
 impl Kept {
     /// Returns whether the image is of this scene, with the photons of the settings.
-    fn is_of(&self, scene: &FixedScene, settings: &RenderSettings) -> bool {
-        self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings_of(scene)
+    fn is_of(&self, scene: &Scene, settings: &RenderSettings) -> bool {
+        self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings(scene)
     }
 }
 
@@ -279,7 +243,7 @@ pub(super) enum Source {
 impl Source {
     /// Determines the source of the image, and the settings as stated or chosen.
     pub(super) fn new(
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         choose: Option<Choice>,
         kept: &mut Option<Kept>,
@@ -313,7 +277,7 @@ impl Source {
     /// If it does not fit the chips, the photons cannot be traced, or the observer stops the render.
     pub(super) fn prepare(
         self,
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         fit: &mut FitChips,
         times: &mut Times,
@@ -328,7 +292,7 @@ impl Source {
         };
         Ok(Kept {
             scene: scene.checksum_without_cameras().to_owned(),
-            photons: settings.photon_settings_of(scene),
+            photons: settings.photon_settings(scene),
             prepared: prepare(scene, packed, settings, fit, times, observer)?,
         })
     }

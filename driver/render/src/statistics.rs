@@ -7,9 +7,7 @@ use photoncard_shared::layout::{LEAF_PHOTONS, Photon, PhotonLeaf, Record};
 use photoncard_shared::message::FrameParameters;
 use serde::Serialize;
 
-use super::executor::Outcome;
-use super::preparation::Prepared;
-use super::times::Times;
+use super::work::{Outcome, Prepared, Times};
 use super::{MemoryStatistics, Provenance, RenderSettings};
 use crate::cost_model::Flops;
 

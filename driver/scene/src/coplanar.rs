@@ -103,7 +103,7 @@ impl Box3 {
 
 /// Emissive triangle that may be lifted.
 struct Lamp {
-    /// Index in [`Scene::triangles`].
+    /// Index in [`Scene::triangles`](super::SceneContents::triangles).
     index: usize,
     triangle: Triangle,
     bounds: Box3,
@@ -208,7 +208,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::{Material, Reflection};
+    use crate::{Material, Reflection, SceneContents};
 
     /// One-sided triangle at `height` that faces down, shifted by `x`.
     fn panel(height: f32, x: f32, material: u32) -> Triangle {
@@ -222,7 +222,7 @@ mod tests {
         let diffuse = Reflection::Phong { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 0.0 };
         let wall = Material { double_sided: double_sided[0], ..Material::new("wall", diffuse) };
         let lamp = Material { emission: Vec3::ONE, double_sided: double_sided[1], ..wall.clone() };
-        Scene { materials: vec![wall, lamp], triangles, ..Scene::default() }
+        Scene::from(SceneContents { materials: vec![wall, lamp], triangles, ..SceneContents::default() })
     }
 
     fn lifted(double_sided: [bool; 2], triangles: Vec<Triangle>) -> Scene {

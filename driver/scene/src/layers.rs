@@ -5,8 +5,8 @@ use glam::Vec3;
 
 use super::out_of_range::{OutOfRange, Property, every, fault, is_share};
 
-/// Layers of a material. Every texture is an index into [`Scene::textures`](super::Scene::textures), and
-/// multiplies the value that it varies.
+/// Layers of a material. Every texture is an index into [`Scene::textures`](super::SceneContents::textures),
+/// and multiplies the value that it varies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layers {
     /// Normal map of the base.

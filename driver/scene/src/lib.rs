@@ -1,17 +1,16 @@
 //! Loaded scenes: triangles, materials, textures, lights and cameras in world space.
 //!
 //! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel.
-//! Coordinates are relative to the scene's own origin, which lies at [`Scene::offset`] in the file, because
-//! single precision is coarse far from an origin.
+//! Coordinates are relative to the scene's own origin, which lies at [`SceneContents::offset`] in the file,
+//! because single precision is coarse far from an origin.
 #![forbid(unsafe_code)]
 
 mod blender;
 mod camera;
-mod checksum;
+mod contents;
 mod coplanar;
 mod environment;
 pub mod error;
-mod fixed;
 pub mod gltf;
 mod layers;
 mod light;
@@ -28,11 +27,15 @@ mod settings;
 mod texture;
 mod triangle;
 
+use std::ops::{Deref, DerefMut};
+use std::sync::OnceLock;
+
 use glam::{DVec3, Vec3};
+use photoncard_shared::checksum::Checksum;
 
 pub use self::camera::Camera;
+pub use self::contents::{Concern, SceneContents};
 pub use self::environment::Environment;
-pub use self::fixed::FixedScene;
 pub use self::layers::{Coat, DiffuseTransmission, Layers, NormalMap, Sheen};
 pub use self::light::{PunctualKind, PunctualLight};
 pub use self::light_units::LightUnits;
@@ -41,7 +44,7 @@ pub use self::map_size::MAX_ENVIRONMENT_TEXELS;
 pub use self::material::{Material, Reflection, Transmission};
 pub use self::parts::{Part, parts};
 pub use self::texture::shared_exponent;
-pub use self::texture::{Encoding, Image, MAX_SIDE, MAX_TEXELS, Texture, Wrap};
+pub use self::texture::{Encoding, Image, MAX_SIDE, Texture, Wrap};
 pub use self::triangle::{CornerTangents, NO_ATTRIBUTES, NO_TANGENTS, Triangle, VertexAttributes};
 use crate::error::SceneError;
 
@@ -54,61 +57,88 @@ const NO_LIGHT: &str = "give a material of at least one triangle an emissiveFact
                         is a white sky";
 
 /// Scene in world space, with all instances expanded. [`gltf::load`] reads one from a file.
+///
+/// It dereferences to its [contents](SceneContents). Checksums are computed once; mutable access to the
+/// contents discards them.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// Position of the scene's origin in the coordinates of its file, metres. It is 0 unless the scene lies
-    /// far from the file's origin.
-    pub offset: DVec3,
-    /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
-    pub triangles: Vec<Triangle>,
-    /// Attributes of the triangles that have any: normals, texture coordinates and colours of the corners.
-    pub attributes: Vec<VertexAttributes>,
-    /// Tangents of the triangles whose material has a normal map.
-    pub tangents: Vec<CornerTangents>,
-    /// Materials; the index in [`Triangle::material`] refers to this list.
-    pub materials: Vec<Material>,
-    /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.
-    pub textures: Vec<Texture>,
-    /// Images. One that textures use in two encodings is listed twice.
-    pub images: Vec<Image>,
-    /// Point, spot and directional lights (`KHR_lights_punctual`).
-    pub lights: Vec<PunctualLight>,
-    /// Environment light from infinitely far; `None` in a scene from a glTF file.
-    pub environment: Option<Environment>,
-    /// Cameras in file order. Never empty: a file without cameras gets one that frames the scene.
-    pub cameras: Vec<Camera>,
-    /// Program that wrote the file (`asset.generator`), if it says so.
-    pub generator: Option<String>,
-    /// Names of the file's variants of materials.
-    pub variants: Vec<String>,
-    /// Orthographic cameras of the file, which are not rendered: the number of perspective cameras before
-    /// each, and its name.
-    pub orthographic: Vec<(usize, String)>,
-    /// Sentences about missing contents of the file and about contents that the renderer ignores, each once.
-    pub notices: Vec<String>,
-    /// Notices that matter only to some pictures: index in [`Self::notices`], and the subject.
-    pub concerns: Vec<(usize, Concern)>,
-    /// Sentences about contents of the file that the renderer interprets in another way than they are stated,
-    /// each once.
-    pub remarks: Vec<String>,
-    /// Number of triangles of zero area, which were left out.
-    pub skipped_triangles: usize,
+    contents: SceneContents,
+    known: Known,
 }
 
-/// Subject of a notice that matters only to pictures that use it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Concern {
-    /// Default view. A picture that states its view does not use it.
-    View,
-    /// Cameras that cannot be used, in a file that has others.
-    OtherCameras,
-    /// Animations. A picture of the scene at rest does not use them.
-    Animations,
-    /// Environment light of the file. A picture may replace it by that of another file.
-    Environment,
+/// Properties of a scene that take a pass over all triangles and texels, computed when first used.
+#[derive(Clone, Debug, Default)]
+struct Known {
+    /// Checksum of the triangles and texels.
+    bulk: OnceLock<Checksum>,
+    checksum: OnceLock<String>,
+    without_cameras: OnceLock<String>,
+    is_specular: OnceLock<bool>,
+}
+
+impl Deref for Scene {
+    type Target = SceneContents;
+
+    fn deref(&self) -> &SceneContents {
+        &self.contents
+    }
+}
+
+impl DerefMut for Scene {
+    fn deref_mut(&mut self) -> &mut SceneContents {
+        self.known = Known::default();
+        &mut self.contents
+    }
+}
+
+impl From<SceneContents> for Scene {
+    fn from(contents: SceneContents) -> Self {
+        Self { contents, known: Known::default() }
+    }
 }
 
 impl Scene {
+    /// Applies a change to the contents.
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut SceneContents)) -> Self {
+        change(&mut self);
+        self
+    }
+
+    /// Creates a stand-in for a scene of which only the cameras, the offset, and the checksums with and
+    /// without cameras are known, and whether it is specular.
+    pub fn of_cameras(
+        cameras: Vec<Camera>,
+        offset: DVec3,
+        checksums: [String; 2],
+        is_specular: bool,
+    ) -> Self {
+        let [checksum, without_cameras] = checksums.map(OnceLock::from);
+        let contents = SceneContents { cameras, offset, ..SceneContents::default() };
+        let known = Known { checksum, without_cameras, is_specular: is_specular.into(), ..Known::default() };
+        Self { contents, known }
+    }
+
+    /// Replaces the cameras. Checksums of triangles and texels stay known.
+    pub fn set_cameras(&mut self, cameras: Vec<Camera>) {
+        self.contents.cameras = cameras;
+        self.known.checksum = OnceLock::new();
+    }
+
+    /// CRC-32C of all contents that a render reads, as eight hexadecimal digits.
+    pub fn checksum(&self) -> &str {
+        self.known.checksum.get_or_init(|| self.contents.checksum(self.bulk_checksum(), &self.cameras))
+    }
+
+    /// [`Self::checksum`] without the cameras. It covers everything that the card image depends on.
+    pub fn checksum_without_cameras(&self) -> &str {
+        self.known.without_cameras.get_or_init(|| self.contents.checksum(self.bulk_checksum(), &[]))
+    }
+
+    fn bulk_checksum(&self) -> Checksum {
+        self.known.bulk.get_or_init(|| self.contents.bulk_checksum()).clone()
+    }
+
     /// Notices that matter to a picture; `uses` returns whether the picture uses a subject.
     pub fn notices_on(&self, uses: impl Fn(Concern) -> bool) -> Vec<&str> {
         let is_idle =
@@ -202,7 +232,7 @@ impl Scene {
     }
 
     /// Returns whether the scene has an emissive triangle, a punctual light or a lit environment.
-    pub fn has_light(&self) -> bool {
+    pub(crate) fn has_light(&self) -> bool {
         self.lights.iter().any(|light| light.intensity.max_element() > 0.0)
             || self.environment.as_ref().is_some_and(Environment::is_lit)
             || self.triangles.iter().any(|triangle| self.emits(triangle))
@@ -222,8 +252,10 @@ impl Scene {
 
     /// Returns whether any triangle has one of the [`Self::specular_materials`].
     pub fn is_specular(&self) -> bool {
-        let is_specular = self.specular_materials();
-        self.triangles.iter().any(|triangle| is_specular.get(triangle.material as usize) == Some(&true))
+        *self.known.is_specular.get_or_init(|| {
+            let is_specular = self.specular_materials();
+            self.triangles.iter().any(|triangle| is_specular.get(triangle.material as usize) == Some(&true))
+        })
     }
 
     /// Flags of the materials that focus light. They reflect or transmit perfectly specularly, or have a lobe
@@ -283,5 +315,49 @@ impl Scene {
     pub fn check_light(&self) -> Result<(), SceneError> {
         let remedy = if self.is_of_blender() { blender::NO_LIGHT } else { NO_LIGHT };
         if self.has_light() { Ok(()) } else { Err(SceneError::NoLight { remedy }) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(x: f32) -> Camera {
+        let [right, up, forward] = [Vec3::X, Vec3::Y, Vec3::NEG_Z];
+        let origin = Vec3::X * x;
+        Camera { name: "eye".to_owned(), origin, right, up, forward, vertical_fov: 1.0, aspect: None }
+    }
+
+    fn scene() -> Scene {
+        Scene::default().with(|scene| {
+            scene.triangles = vec![Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y], 0)];
+            scene.cameras = vec![camera(0.0)];
+        })
+    }
+
+    fn checksums(scene: &Scene) -> [String; 2] {
+        [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned)
+    }
+
+    #[test]
+    fn a_changed_scene_has_the_checksums_of_a_new_one() {
+        let mut scene = scene();
+        let before = checksums(&scene);
+        scene.triangles[0].vertices[0].z = 1.0;
+        let after = checksums(&scene);
+        assert!(before.iter().zip(&after).all(|(before, after)| before != after), "{before:?}, {after:?}");
+        let new = self::scene().with(|scene| scene.triangles[0].vertices[0].z = 1.0);
+        assert_eq!(after, checksums(&new));
+    }
+
+    #[test]
+    fn cameras_that_are_set_are_those_of_the_scene_and_change_no_other_checksum() {
+        let mut scene = scene();
+        let [before, without_cameras] = checksums(&scene);
+        scene.set_cameras(vec![camera(1.0)]);
+        let moved = self::scene().with(|scene| scene.cameras = vec![camera(1.0)]);
+        assert_eq!((checksums(&scene), &scene.cameras), (checksums(&moved), &moved.cameras));
+        assert_ne!(scene.checksum(), before);
+        assert_eq!(scene.checksum_without_cameras(), without_cameras);
     }
 }

@@ -30,14 +30,14 @@ pub struct Material {
     pub blends: bool,
     /// Alpha of the base colour factor, 0 to 1.
     pub alpha: f32,
-    /// Base colour texture, an index into [`Scene::textures`](super::Scene::textures): its colour (sRGB)
-    /// multiplies the base colour or the diffuse albedo, its alpha multiplies `alpha`.
+    /// Base colour texture, an index into [`Scene::textures`](super::SceneContents::textures): its colour
+    /// (sRGB) multiplies the base colour or the diffuse albedo, its alpha multiplies `alpha`.
     pub base_texture: Option<u32>,
-    /// Metallic-roughness texture, an index into [`Scene::textures`](super::Scene::textures): its green
-    /// (linear) multiplies the roughness, its blue (linear) the metalness.
+    /// Metallic-roughness texture, an index into [`Scene::textures`](super::SceneContents::textures): its
+    /// green (linear) multiplies the roughness, its blue (linear) the metalness.
     pub metallic_roughness_texture: Option<u32>,
-    /// Emissive texture (sRGB), an index into [`Scene::textures`](super::Scene::textures), which multiplies
-    /// the emission.
+    /// Emissive texture (sRGB), an index into [`Scene::textures`](super::SceneContents::textures), which
+    /// multiplies the emission.
     pub emissive_texture: Option<u32>,
     /// True to add the light that is scattered several times between microfacets, which glTF's model leaves
     /// out.
@@ -166,14 +166,14 @@ impl Material {
         metallic < 1.0 || self.metallic_roughness_texture.is_some()
     }
 
-    /// Indices of the textures in use, in [`Scene::textures`](super::Scene::textures).
+    /// Indices of the textures in use, in [`Scene::textures`](super::SceneContents::textures).
     pub fn textures(&self) -> impl Iterator<Item = u32> {
         let own = [self.base_texture, self.metallic_roughness_texture, self.emissive_texture];
         own.into_iter().flatten().chain(self.layers.iter().flat_map(|layers| layers.textures()))
     }
 
-    /// Index in [`Scene::textures`](super::Scene::textures) of the normal texture whose coordinates define
-    /// tangents; `None` without a normal map.
+    /// Index in [`Scene::textures`](super::SceneContents::textures) of the normal texture whose coordinates
+    /// define tangents; `None` without a normal map.
     pub fn tangent_texture(&self) -> Option<u32> {
         self.layers.as_ref().and_then(|layers| layers.tangent_texture())
     }

@@ -6,12 +6,12 @@ use photoncard_shared::layout::TexelFormat;
 pub const MAX_SIDE: u32 = 16_384;
 
 /// Maximum number of texels of all images of a scene together, and of an environment.
-pub const MAX_TEXELS: u64 = 1 << 28;
+pub(crate) const MAX_TEXELS: u64 = 1 << 28;
 
 /// Mapping of an image to surfaces: transform of coordinates, wrap modes and filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
-    /// Index into [`Scene::images`](super::Scene::images).
+    /// Index into [`Scene::images`](super::SceneContents::images).
     pub image: u32,
     /// Index of the set of texture coordinates in [`VertexAttributes`](super::VertexAttributes): 0 or 1.
     pub set: u32,

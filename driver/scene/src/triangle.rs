@@ -13,9 +13,9 @@ pub const NO_TANGENTS: u32 = u32::MAX;
 pub struct Triangle {
     /// Positions of the corners, metres.
     pub vertices: [Vec3; 3],
-    /// Index into [`Scene::materials`](super::Scene::materials).
+    /// Index into [`Scene::materials`](super::SceneContents::materials).
     pub material: u32,
-    /// Index into [`Scene::attributes`](super::Scene::attributes), or [`NO_ATTRIBUTES`].
+    /// Index into [`Scene::attributes`](super::SceneContents::attributes), or [`NO_ATTRIBUTES`].
     pub attributes: u32,
 }
 
@@ -50,7 +50,7 @@ pub struct VertexAttributes {
     /// Linear RGBA of the corners; white without `COLOR_0`. It multiplies the base colour or diffuse albedo,
     /// and alpha.
     pub colours: [[f32; 4]; 3],
-    /// Index into [`Scene::tangents`](super::Scene::tangents), or [`NO_TANGENTS`].
+    /// Index into [`Scene::tangents`](super::SceneContents::tangents), or [`NO_TANGENTS`].
     pub tangents: u32,
 }
 
@@ -69,7 +69,7 @@ impl VertexAttributes {
     };
 
     /// Unit normals of the corners; the geometric normal of a flat triangle.
-    pub fn normals_of(&self, triangle: &Triangle) -> [Vec3; 3] {
+    pub(crate) fn normals_of(&self, triangle: &Triangle) -> [Vec3; 3] {
         self.normals.unwrap_or_else(|| [triangle.scaled_normal().normalize_or_zero(); 3])
     }
 }

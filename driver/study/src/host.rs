@@ -11,7 +11,7 @@ use photoncard_map::photon_map::{
     MappedImage, PhotonMapSize, PhotonSettings, PhotonTimes, TracedPhotons, map_photons, map_traced,
 };
 use photoncard_render::{RenderError, RenderSettings};
-use photoncard_scene::Scene;
+use photoncard_scene::{Scene, SceneContents};
 use photoncard_shared::address::LINE_BYTES;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
@@ -19,40 +19,41 @@ use serde_json::json;
 
 use super::error::StudyError;
 use super::laboratory::{StudyObserver, load_scene};
+use super::point::identity;
 use super::store::PointStore;
 
 /// Displacement of moving lights, relative to the scene's diagonal.
-pub const LIGHT_STEP: f32 = 0.01;
+pub(crate) const LIGHT_STEP: f32 = 0.01;
 
 /// Host's work for the photon map of one scene, and the effects of changes of its light.
 #[derive(Clone, Debug, Deserialize, Serialize)]
-pub struct HostFrame {
+pub(crate) struct HostFrame {
     /// Size of the card image, bytes.
-    pub image_bytes: u64,
+    pub(crate) image_bytes: u64,
     /// Size of the photon map in the card image.
-    pub map: PhotonMapSize,
+    pub(crate) map: PhotonMapSize,
     /// Number of threads used.
-    pub threads: usize,
+    pub(crate) threads: usize,
     /// Time to trace photons, seconds.
-    pub tracing: f64,
+    pub(crate) tracing: f64,
     /// Time to build the map and the other sections of the image, seconds.
-    pub building: f64,
+    pub(crate) building: f64,
     /// Time to measure distances and disc fractions, seconds.
-    pub measuring: f64,
+    pub(crate) measuring: f64,
     /// Effects of the measured changes.
-    pub changes: Vec<Changed>,
+    pub(crate) changes: Vec<Changed>,
 }
 
 impl HostFrame {
     /// Total time, seconds.
-    pub fn seconds(&self) -> f64 {
+    pub(crate) fn seconds(&self) -> f64 {
         self.tracing + self.building + self.measuring
     }
 }
 
 /// Change of a scene's light between two frames.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub enum Change {
+pub(crate) enum Change {
     /// The emission of all lights is halved.
     Dimmed,
     /// All lights move by [`LIGHT_STEP`].
@@ -63,17 +64,17 @@ pub enum Change {
 
 /// Lines that a change affects.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
-pub struct Changed {
+pub(crate) struct Changed {
     /// The change of light.
-    pub change: Change,
+    pub(crate) change: Change,
     /// Size of all changed lines, bytes.
-    pub bytes: u64,
+    pub(crate) bytes: u64,
     /// Size of all lines of the new image, bytes.
-    pub of: u64,
+    pub(crate) of: u64,
 }
 
 /// Measures the host's work, and keeps the results in a [store](super::store).
-pub struct HostBench<'a> {
+pub(crate) struct HostBench<'a> {
     scenes: PathBuf,
     store: PointStore,
     pool: ThreadPool,
@@ -85,7 +86,7 @@ impl<'a> HostBench<'a> {
     ///
     /// # Errors
     /// If the folder cannot be created, or the threads cannot be started.
-    pub fn new(
+    pub(crate) fn new(
         folder: &Path,
         scenes: &Path,
         threads: Option<usize>,
@@ -100,7 +101,7 @@ impl<'a> HostBench<'a> {
     /// # Errors
     /// If the scene cannot be read, its photons cannot be mapped, the result cannot be stored, or the
     /// observer stops the study.
-    pub fn measure(
+    pub(crate) fn measure(
         &mut self,
         file: &str,
         settings: &RenderSettings,
@@ -109,7 +110,7 @@ impl<'a> HostBench<'a> {
         let scene = load_scene(&self.scenes, file)?;
         let threads = self.pool.current_num_threads();
         let key = json!({
-            "identity": settings.identity_with(&scene.checksum()), "scene": file, "threads": threads, "changes": changes,
+            "identity": identity(settings, scene.checksum()), "scene": file, "threads": threads, "changes": changes,
         });
         let name = format!("host-{}", file.split('.').next().unwrap_or_default());
         if let Some(known) = self.store.get(&name, &key) {
@@ -190,7 +191,7 @@ fn move_lights(scene: &mut Scene) {
     let lower = corners().fold(Vec3::INFINITY, Vec3::min);
     let upper = corners().fold(Vec3::NEG_INFINITY, Vec3::max);
     let step = Vec3::X * (LIGHT_STEP * lower.distance(upper));
-    let Scene { triangles, materials, .. } = scene;
+    let SceneContents { triangles, materials, .. } = &mut **scene;
     for triangle in triangles {
         let material = materials.get(triangle.material as usize);
         if material.is_some_and(|material| material.emission.max_element() > 0.0) {

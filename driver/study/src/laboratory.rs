@@ -7,8 +7,7 @@ use std::path::{Path, PathBuf};
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::{MappedImage, check_image, check_packed, map_photons};
 use photoncard_render::RenderError;
-use photoncard_scene::Scene;
-use photoncard_scene::gltf;
+use photoncard_scene::{Scene, gltf};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -34,7 +33,7 @@ pub trait StudyObserver: Sync {
 
 /// Result of measuring a point. The variant depends on its [`Task`].
 #[derive(Clone, Debug, Deserialize, Serialize)]
-pub enum Outcome {
+pub(crate) enum Outcome {
     /// Result of [`Task::Traffic`].
     Traffic(Measurement),
     /// Result of [`Task::Quality`].
@@ -78,23 +77,17 @@ impl Results {
     }
 }
 
-/// Measures points, and keeps their outcomes in a [store](super::store).
+/// Measures points, and keeps their outcomes in a folder.
 pub struct Laboratory<'a> {
     scenes: PathBuf,
     store: PointStore,
     pool: ThreadPool,
     observer: &'a dyn StudyObserver,
-    loaded: HashMap<String, LoadedScene>,
+    loaded: HashMap<String, Scene>,
     /// Card image of the last point. The next point may share it.
     last: Option<LastImage>,
     /// Last reference. Points with other images but the same photons may share it.
     reference: Option<SceneReference>,
-}
-
-struct LoadedScene {
-    scene: Scene,
-    /// Checksum of the scene ([`Scene::checksum`]), which represents its content in keys.
-    digest: String,
 }
 
 struct LastImage {
@@ -163,15 +156,14 @@ impl<'a> Laboratory<'a> {
 
     /// Adds a scene with a name. It replaces the file with this name in the folder of scenes.
     pub fn add(&mut self, name: &str, scene: Scene) {
-        let digest = scene.checksum();
-        self.loaded.insert(name.to_owned(), LoadedScene { scene, digest });
+        self.loaded.insert(name.to_owned(), scene);
     }
 
     /// Loads the scene of a file, before a point's assignments are applied.
     ///
     /// # Errors
     /// If the file is missing or cannot be read.
-    fn load(&mut self, file: &str) -> Result<&LoadedScene, StudyError> {
+    fn load(&mut self, file: &str) -> Result<&Scene, StudyError> {
         if !self.loaded.contains_key(file) {
             let scene = load_scene(&self.scenes, file)?;
             self.add(file, scene);
@@ -202,7 +194,7 @@ impl<'a> Laboratory<'a> {
     }
 
     fn key(&mut self, point: &Point) -> Result<Value, StudyError> {
-        Ok(point.key(&self.load(&point.scene)?.digest))
+        Ok(point.key(self.load(&point.scene)?.checksum()))
     }
 
     fn measure_one(&mut self, point: &Point) -> Result<Outcome, StudyError> {
@@ -213,6 +205,9 @@ impl<'a> Laboratory<'a> {
         let bench =
             Bench { scene: &last.scene, mapped: &last.mapped, pool: &self.pool, is_stopped: &is_stopped };
         let outcome = match &point.task {
+            Task::Traffic { caches, .. } if point.is_along_curve => {
+                Outcome::Traffic(bench.along_curve(&point.settings, caches)?)
+            }
             Task::Traffic { chip, caches, sample, least_tiles } => {
                 Outcome::Traffic(bench.traffic(&point.settings, *chip, caches, *sample, *least_tiles)?)
             }
@@ -239,7 +234,7 @@ impl<'a> Laboratory<'a> {
         }
         // The previous image is dropped first: two images may not fit into memory.
         self.last = None;
-        let mut scene = self.load(&point.scene)?.scene.clone();
+        let mut scene = self.load(&point.scene)?.clone();
         for assignment in &point.assignments {
             scene.apply(assignment)?;
         }
@@ -311,6 +306,7 @@ mod tests {
                 schedule: Schedule { tile: Some(tile), ..Schedule::default() },
                 ..RenderSettings::default()
             },
+            is_along_curve: false,
             task: Task::Quality { tiles: 1, reference_rays: 1 },
         }
     }

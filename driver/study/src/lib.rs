@@ -1,9 +1,9 @@
 //! Studies: measurements of the shipped scenes with one setting varied, reports on them, and predictions for
 //! machines that do not exist yet.
 //!
-//! A study is a list of [`Point`]s and a function from their [`Results`] to a [`Report`]. [`run`] measures
-//! the points in a [`Laboratory`], which keeps their outcomes, and writes the report.
-//! [`photoncard_render::cost_model`] predicts the number of chips that a frame rate needs; [`load_balance`]
+//! A study is a list of [`Point`]s and a function from their [`Results`] to a report. [`run`] measures the
+//! points in a [`Laboratory`], which keeps their outcomes, and writes the report.
+//! [`photoncard_render::cost_model`] predicts the number of chips that a frame rate needs; `load_balance`
 //! simulates how evenly tiles load them.
 #![forbid(unsafe_code)]
 
@@ -13,35 +13,39 @@ mod figures;
 mod host;
 mod index;
 mod laboratory;
-pub mod load_balance;
+mod load_balance;
 mod measure;
 mod point;
 mod provenance;
 mod quality;
-pub mod report;
+mod report;
 mod sample;
 mod scale;
-pub mod store;
+mod store;
 mod studies;
+mod whole_frame;
 
 use std::path::{Path, PathBuf};
 
 pub use self::axes::{Axis, AxisError, MAX_POINTS};
 pub use self::error::StudyError;
 pub use self::figures::check;
-pub use self::host::{Change, Changed, HostBench, HostFrame, LIGHT_STEP};
-pub use self::laboratory::{Laboratory, Outcome, Results, StudyObserver};
-pub use self::measure::{Bench, Measurement, ReadSums, TileMeasurement};
-pub use self::point::{ImageKey, Point, Task};
-pub use self::quality::{Quality, Reference, TileDeviation};
-use self::report::{Provenance, Report};
-pub use self::sample::{Estimate, SampleRate, choose};
+use self::host::HostBench;
+pub use self::laboratory::{Laboratory, Results, StudyObserver};
+pub use self::measure::{Measurement, ReadSums, TileMeasurement};
+pub use self::point::{ALONG_CURVE, ImageKey, Point, Task};
+pub use self::quality::{Quality, TileDeviation};
+use self::report::Report;
+pub use self::report::{Cell, Figure, Provenance, ReportError, human};
+pub use self::sample::{Estimate, SampleRate};
 pub use self::scale::Scale;
 use self::scale::machine_row;
+pub use self::store::StoreError;
 pub use self::studies::{Study, Sweep};
+pub use self::whole_frame::{FrameOutcome, WholeFrame};
 use photoncard_picture::choice::Choice;
 use photoncard_render::cost_model::Machine;
-use photoncard_scene::Scene;
+use photoncard_scene::{Scene, SceneContents};
 
 /// Options of [`run`]: the studies, their scale, and the folders that they read and write.
 #[derive(Clone, Debug)]
@@ -62,7 +66,7 @@ pub struct StudyOptions {
     pub provenance: Provenance,
 }
 
-/// Measures and reports the studies, and writes their key figures into [`FIGURES`](report::FIGURES). Finished
+/// Measures and reports the studies, and writes their key figures into `figures.csv`. Finished
 /// points are kept in the folder `points` of [`StudyOptions::out`], where a later run finds them.
 ///
 /// # Errors
@@ -118,7 +122,8 @@ pub fn run_sweep(options: SweepOptions, observer: &dyn StudyObserver) -> Result<
     for point in sweep.points() {
         point.check()?;
         point.settings.camera(&scene)?;
-        let mut materials = Scene { materials: scene.materials.clone(), ..Scene::default() };
+        let mut materials =
+            Scene::from(SceneContents { materials: scene.materials.clone(), ..SceneContents::default() });
         point.assignments.iter().try_for_each(|assignment| materials.apply(assignment))?;
     }
     let mut laboratory = Laboratory::new(&out, Path::new(""), threads, observer)?;

@@ -6,7 +6,6 @@ use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::contents::Contents;
 use photoncard_render::emulator::direct::{RenderedTile, render_tiles_apart, render_tiles_in_flight};
 use photoncard_render::emulator::memory_model::{CacheSettings, MemoryTraffic};
-use photoncard_render::emulator::whole_frame::{CurveJob, render_along_curve};
 use photoncard_render::{RenderError, RenderSettings};
 use photoncard_scene::Scene;
 use photoncard_shared::address::{STRUCTURES, Structure};
@@ -16,6 +15,7 @@ use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
 use super::sample::{Chosen, Estimate, SampleRate, choose};
+use super::whole_frame::WholeFrame;
 
 /// Reads of one structure of card memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -75,7 +75,7 @@ impl TileMeasurement {
     }
 
     /// Reads of one structure.
-    pub fn reads_of(&self, structure: Structure) -> ReadSums {
+    pub(crate) fn reads_of(&self, structure: Structure) -> ReadSums {
         self.sum(|other| other == structure)
     }
 
@@ -115,7 +115,7 @@ impl Measurement {
     }
 
     /// Bytes of the scene fetched from DRAM.
-    pub fn scene_bytes(&self) -> Estimate {
+    pub(crate) fn scene_bytes(&self) -> Estimate {
         self.total(|tile| tile.scene().dram_bytes as f64)
     }
 
@@ -126,15 +126,15 @@ impl Measurement {
 }
 
 /// Bench of emulated chips: a scene, its card image, and threads that emulate the chips.
-pub struct Bench<'a> {
+pub(crate) struct Bench<'a> {
     /// Scene of the bench.
-    pub scene: &'a Scene,
+    pub(crate) scene: &'a Scene,
     /// Card image of the scene, with its photon map.
-    pub mapped: &'a MappedImage,
+    pub(crate) mapped: &'a MappedImage,
     /// Threads, each of which emulates one chip. Their stacks must have room for a chip while it is built.
-    pub pool: &'a ThreadPool,
+    pub(crate) pool: &'a ThreadPool,
     /// Function that returns whether to stop. It is polled before each tile.
-    pub is_stopped: &'a (dyn Fn() -> bool + Sync),
+    pub(crate) is_stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Bench<'_> {
@@ -142,7 +142,7 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// If the settings' camera is not possible in the scene.
-    pub fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
+    pub(crate) fn frame(&self, settings: &RenderSettings) -> Result<FrameParameters, RenderError> {
         let camera = settings.camera(self.scene)?;
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
@@ -152,7 +152,7 @@ impl Bench<'_> {
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.
-    pub fn render(
+    pub(crate) fn render(
         &self,
         chip: EmulatedKind,
         frame: &FrameParameters,
@@ -164,13 +164,12 @@ impl Bench<'_> {
     }
 
     /// Measures the work and memory traffic of a frame, from a sample of its tiles. All tiles are rendered if
-    /// several are in flight, or if the order is [of the whole
-    /// frame](photoncard_cards::scheduler::GatherOrder::is_of_whole_frame).
+    /// several are in flight.
     ///
     /// # Errors
     /// If the scene has no camera with the name in the settings, the card image is malformed, or the bench is
     /// stopped.
-    pub fn traffic(
+    pub(crate) fn traffic(
         &self,
         settings: &RenderSettings,
         chip: EmulatedKind,
@@ -179,10 +178,7 @@ impl Bench<'_> {
         least_tiles: usize,
     ) -> Result<Measurement, RenderError> {
         let frame = self.frame(settings)?;
-        let all = tiles(settings.window(), settings.tile_side(&[chip.budget()]), settings.schedule.order);
-        if settings.schedule.order.is_of_whole_frame() {
-            return self.whole_frame(&frame, &all, caches);
-        }
+        let all = all_tiles(settings, chip);
         if settings.schedule.order.has_queue() && frame.in_flight.min(chip.budget().in_flight) > 1 {
             return self.in_flight(chip, &frame, &all, caches);
         }
@@ -228,20 +224,29 @@ impl Bench<'_> {
         })
     }
 
-    fn whole_frame(
+    /// Measures the work and memory traffic of a frame whose gathers are done along one Hilbert curve, on
+    /// reference chips.
+    ///
+    /// # Errors
+    /// As [`Self::traffic`], and if the frame has too many gathers.
+    pub(crate) fn along_curve(
         &self,
-        frame: &FrameParameters,
-        tiles: &[Tile],
+        settings: &RenderSettings,
         caches: &CacheSettings,
     ) -> Result<Measurement, RenderError> {
-        let chips = self.pool.current_num_threads();
-        let job = CurveJob { image: &self.mapped.image, frame, tiles, chips };
-        let outcome = render_along_curve(job, Some(caches), &[], &|_, _| !(self.is_stopped)())?;
-        let whole = TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic);
+        let frame = &self.frame(settings)?;
+        let tiles = &all_tiles(settings, EmulatedKind::Reference);
+        let &Self { mapped: MappedImage { image, .. }, pool, is_stopped, .. } = self;
+        let outcome = WholeFrame { image, frame, tiles, caches, pool, is_stopped }.render()?;
         Ok(Measurement {
-            tiles: vec![whole],
+            tiles: vec![TileMeasurement::new(0, 1, outcome.counters, &outcome.traffic)],
             rendered: tiles.len(),
-            map: PhotonMapSize::of(&self.mapped.image),
+            map: PhotonMapSize::of(image),
         })
     }
+}
+
+/// All tiles of a picture on chips of a kind.
+fn all_tiles(settings: &RenderSettings, chip: EmulatedKind) -> Vec<Tile> {
+    tiles(settings.window(), settings.tile_side(&[chip.budget()]), settings.schedule.order)
 }

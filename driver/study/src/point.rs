@@ -3,13 +3,17 @@
 use photoncard_picture::choice::Choice;
 use photoncard_render::emulator::EmulatedKind;
 use photoncard_render::emulator::memory_model::CacheSettings;
-use photoncard_render::{PhotonMaps, RenderError, RenderSettings};
+use photoncard_render::{NamedSettings, PROGRAM, PhotonMaps, RenderError, RenderSettings};
+use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Value, json};
 
 use super::sample::SampleRate;
 
 /// Maximum number of characters of a scene's name within the name of a point's file.
 const MAX_SCENE_NAME: usize = 60;
+
+/// Name of the order of gathers along one curve through the whole frame.
+pub const ALONG_CURVE: &str = "hilbert";
 
 /// A measurement of a scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,6 +24,9 @@ pub struct Point {
     pub assignments: Vec<String>,
     /// Settings of the render.
     pub settings: RenderSettings,
+    /// True to do all gathers of the frame along one Hilbert curve instead of in the order of the settings.
+    /// No chip has room for them: it is the bound with which orders are compared.
+    pub is_along_curve: bool,
     /// Quantity to measure.
     pub task: Task,
 }
@@ -33,9 +40,8 @@ pub enum Task {
         chip: EmulatedKind,
         /// Caches between chip and DRAM.
         caches: CacheSettings,
-        /// Fraction of the tiles to render. The order
-        /// [`Hilbert`](photoncard_cards::scheduler::GatherOrder::Hilbert), and several tiles in flight,
-        /// render the whole frame regardless.
+        /// Fraction of the tiles to render. A frame [along a curve](Point::is_along_curve), or with several
+        /// tiles in flight, is rendered as a whole regardless.
         sample: SampleRate,
         /// Minimum number of tiles to render, if the picture has that many.
         least_tiles: usize,
@@ -63,11 +69,10 @@ impl Point {
     /// # Errors
     /// The first setting that is not possible.
     pub fn check(&self) -> Result<(), RenderError> {
-        let RenderSettings { schedule, .. } = &self.settings;
-        if schedule.order.is_of_whole_frame() && self.chip() != EmulatedKind::Reference {
+        if self.is_along_curve && self.chip() != EmulatedKind::Reference {
             return Err(RenderError::Setting {
                 option: "--order",
-                value: schedule.order.name().to_owned(),
+                value: ALONG_CURVE.to_owned(),
                 reason: format!(
                     "{} has no room for the gathers of a frame, and only reference chips leave them to the host",
                     self.chip().name()
@@ -82,6 +87,16 @@ impl Point {
         self.settings.check_budget(&self.chip().budget())
     }
 
+    /// Name of the order of gathers.
+    fn order(&self) -> &'static str {
+        if self.is_along_curve { ALONG_CURVE } else { self.settings.schedule.order.name() }
+    }
+
+    /// Returns whether gathers wait in a chip's queue.
+    pub(super) fn has_queue(&self) -> bool {
+        !self.is_along_curve && self.settings.schedule.order.has_queue()
+    }
+
     /// Name of the point's file: task, scene and order. Points that differ only in other settings have the
     /// same name.
     pub fn name(&self) -> String {
@@ -92,18 +107,19 @@ impl Point {
         let scene = self.scene.split('.').next().unwrap_or_default().chars().take(MAX_SCENE_NAME);
         let portable = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
         let scene: String = scene.map(portable).collect();
-        format!("{task}-{scene}-{}", self.settings.schedule.order.name())
+        format!("{task}-{scene}-{}", self.order())
     }
 
     /// Key of the point in the store: everything that the result depends on. `scene` is the scene's checksum.
     pub fn key(&self, scene: &str) -> Value {
         let mut key = json!({
-            "identity": self.settings.identity_with(scene),
+            "identity": identity(&self.settings, scene),
             "work": self.settings.of_work(),
             "chip": self.chip().budget(),
             "scene": self.scene,
             "set": self.assignments,
         });
+        key["work"]["order"] = self.order().into();
         key["task"] = match &self.task {
             Task::Traffic { chip: _, caches, sample, least_tiles } => {
                 json!({"traffic": {"caches": caches.to_string(), "sample": sample, "least_tiles": least_tiles}})
@@ -125,6 +141,15 @@ impl Point {
             photons: photons.clone(),
         }
     }
+}
+
+/// Everything that pixels of a scene with this checksum depend on, with the settings as they are stated.
+pub(super) fn identity(settings: &RenderSettings, scene: &str) -> NamedSettings {
+    let mut identity = settings.of_pixels();
+    identity.insert("program".to_owned(), json!(PROGRAM));
+    identity.insert("layout".to_owned(), json!(LAYOUT_VERSION));
+    identity.insert("scene-checksum".to_owned(), json!(scene));
+    identity
 }
 
 /// Everything that a point's card image depends on.

@@ -56,7 +56,7 @@ impl Quality {
     }
 
     /// Root mean square of the reference's noise, relative to its mean.
-    pub fn reference_noise(&self) -> f64 {
+    pub(crate) fn reference_noise(&self) -> f64 {
         self.relative(self.total().noise)
     }
 
@@ -68,7 +68,7 @@ impl Quality {
 
     /// Omits one tile.
     #[must_use]
-    pub fn without(&self, tile: usize) -> Self {
+    pub(crate) fn without(&self, tile: usize) -> Self {
         let others = self.tiles.iter().enumerate().filter(|(index, _)| *index != tile);
         Self { tiles: others.map(|(_, error)| *error).collect() }
     }
@@ -106,7 +106,7 @@ struct ReferencePixel {
 /// It is the mean, weighted by rays, of two renders with `n` and `m` rays and different strata. If their
 /// errors are independent and their variances are `v / n` and `v / m`, the squared difference of the two is
 /// `v (1 / n + 1 / m)` on average, and the variance of their mean is `v / (n + m)`.
-pub struct Reference {
+pub(crate) struct Reference {
     /// Settings with which the reference was rendered.
     settings: RenderSettings,
     /// Pixels of each tile; `None` for an excluded pixel.
@@ -127,7 +127,7 @@ impl Reference {
     /// # Errors
     /// If the settings' camera is not possible in the scene, the card image is malformed, or the bench is
     /// stopped.
-    pub fn new(
+    pub(crate) fn new(
         bench: &Bench,
         settings: &RenderSettings,
         tiles: usize,
@@ -154,7 +154,7 @@ impl Reference {
     }
 
     /// Returns whether [`Self::new`] would create an equal reference from photons of the same scene.
-    pub fn is_of(&self, settings: &RenderSettings, tiles: usize, rays: u32) -> bool {
+    pub(crate) fn is_of(&self, settings: &RenderSettings, tiles: usize, rays: u32) -> bool {
         self.tiles.len() == tiles && self.settings == Self::settings(settings, rays)
     }
 
@@ -172,7 +172,7 @@ impl Reference {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn compare(&self, bench: &Bench, settings: &RenderSettings) -> Result<Quality, RenderError> {
+    pub(crate) fn compare(&self, bench: &Bench, settings: &RenderSettings) -> Result<Quality, RenderError> {
         let rendered = indirect(bench, &comparable(settings), self.tiles.len())?;
         let tiles = self.tiles.iter().zip(rendered);
         Ok(Quality { tiles: tiles.map(|(reference, pixels)| error(reference, &pixels)).collect() })

@@ -30,7 +30,7 @@ impl SampleRate {
 
     /// Number of tiles to render out of `total`: the fraction, rounded up, but at least `least` and at most
     /// `total`.
-    pub fn count(self, total: usize, least: usize) -> usize {
+    pub(crate) fn count(self, total: usize, least: usize) -> usize {
         let share = (total as u64 * u64::from(self.numerator)).div_ceil(u64::from(self.denominator));
         (share as usize).max(least).min(total)
     }
@@ -56,16 +56,16 @@ impl FromStr for SampleRate {
 
 /// A tile chosen for a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Chosen {
+pub(crate) struct Chosen {
     /// The tile.
-    pub tile: Tile,
+    pub(crate) tile: Tile,
     /// Weight of the tile: number of tiles in the stretch that it represents.
-    pub stands_for: usize,
+    pub(crate) stands_for: usize,
 }
 
 /// Chooses `count` of the tiles, spread over the picture, and returns them in the picture's order; all tiles
 /// if `count` is larger.
-pub fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
+pub(crate) fn choose(tiles: &[Tile], count: usize) -> Vec<Chosen> {
     let count = count.min(tiles.len());
     let mut sorted = tiles.to_vec();
     let middle = |tile: &Tile| (2 * tile.x + tile.width, 2 * tile.y + tile.height);
@@ -109,7 +109,7 @@ impl Estimate {
     /// this is the interval of a simple random sample of a finite population. A sample that is spread over
     /// the picture has smaller errors than a random one, so that the interval is rather too wide than too
     /// narrow. A single value that represents more than itself has an infinite half-width.
-    pub fn of_total(sample: &[(f64, usize)]) -> Self {
+    pub(crate) fn of_total(sample: &[(f64, usize)]) -> Self {
         let value = sample.iter().map(|&(value, stands_for)| value * stands_for as f64).sum();
         let spread =
             sample.iter().map(|&(_, weight)| (weight * weight.saturating_sub(1)) as f64).sum::<f64>();
@@ -127,7 +127,7 @@ impl Estimate {
     }
 
     /// Multiplies the estimate by `factor`, for another unit.
-    pub fn scaled(self, factor: f64) -> Self {
+    pub(crate) fn scaled(self, factor: f64) -> Self {
         Self { value: self.value * factor, half_width: self.half_width * factor.abs() }
     }
 }

@@ -77,7 +77,7 @@ impl Scale {
 
     /// Returns true if all points have the settings of the dissertation's nominal frame. Only figures at such
     /// a scale may be compared with published ones.
-    pub fn is_nominal(&self) -> bool {
+    pub(crate) fn is_nominal(&self) -> bool {
         let frame =
             |scale: &Self| (scale.side, scale.photons, scale.neighbors, scale.gather_rays, scale.shadow_rays);
         frame(self) == frame(&Self::FULL)
@@ -146,7 +146,7 @@ impl Scale {
 
     /// Settings of [`Self::all_on`] with the dissertation's tiles of 16x16 pixels, of which a frame has
     /// enough for many chips.
-    pub fn all_on_in_small_tiles(&self) -> RenderSettings {
+    pub(crate) fn all_on_in_small_tiles(&self) -> RenderSettings {
         self.all_on().with(|s| s.schedule.tile = Some(TILE))
     }
 
@@ -159,7 +159,7 @@ impl Scale {
     pub fn traffic_behind(&self, scene: &str, settings: RenderSettings, caches: CacheSettings) -> Point {
         let chip = EmulatedKind::Reference;
         let task = Task::Traffic { chip, caches, sample: self.sample, least_tiles: self.least_tiles };
-        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
+        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
     /// Point that measures the traffic of all tiles on one chip of kind `chip`, which has them in flight,
@@ -183,7 +183,7 @@ impl Scale {
     /// Point that measures the error of [`Self::quality_tiles`] tiles.
     pub fn quality(&self, scene: &str, settings: RenderSettings) -> Point {
         let task = Task::Quality { tiles: self.quality_tiles, reference_rays: self.reference_rays };
-        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, task }
+        Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
     /// Names and values of the settings that all points share, for a report's provenance.
@@ -213,7 +213,7 @@ impl Scale {
 
     /// Number of gathers of a frame in which every gather ray of every pixel ends in one: `side^2 N_FG`, 26.2
     /// million at the nominal values.
-    pub fn nominal_gathers(&self) -> f64 {
+    pub(crate) fn nominal_gathers(&self) -> f64 {
         f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
     }
 }

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use thiserror::Error;
 
-use super::report::name;
+use super::report::is_portable;
 
 /// Name of the points' folder within the study's folder.
 const POINTS: &str = "points";
@@ -56,7 +56,7 @@ pub enum StoreError {
 
 /// A folder of finished points.
 #[derive(Debug)]
-pub struct PointStore {
+pub(crate) struct PointStore {
     folder: PathBuf,
     notices: Vec<String>,
 }
@@ -75,7 +75,7 @@ impl PointStore {
     ///
     /// # Errors
     /// If the folder cannot be created.
-    pub fn open(folder: &Path) -> Result<Self, StoreError> {
+    pub(crate) fn open(folder: &Path) -> Result<Self, StoreError> {
         let folder = folder.join(POINTS);
         match fs::create_dir_all(&folder) {
             Ok(()) => Ok(Self { folder, notices: Vec::new() }),
@@ -87,7 +87,7 @@ impl PointStore {
     ///
     /// A file that cannot be read, is damaged or edited, or has another key counts as missing and adds to the
     /// [notices](Self::notices).
-    pub fn get<T: DeserializeOwned>(&mut self, name: &str, key: &Value) -> Option<T> {
+    pub(crate) fn get<T: DeserializeOwned>(&mut self, name: &str, key: &Value) -> Option<T> {
         let path = self.path(name, key).ok()?;
         let read = match fs::metadata(&path).map(|found| kind_of(found.file_type())) {
             // Reading a pipe would block.
@@ -117,7 +117,7 @@ impl PointStore {
     /// # Errors
     /// If the name has other characters than letters, digits, `-` and `.`, the result cannot be represented
     /// in JSON, or the file cannot be written.
-    pub fn put<T: Serialize>(&self, name: &str, key: &Value, result: &T) -> Result<(), StoreError> {
+    pub(crate) fn put<T: Serialize>(&self, name: &str, key: &Value, result: &T) -> Result<(), StoreError> {
         let path = self.path(name, key)?;
         let not_json = |source| StoreError::NotJson { name: name.to_owned(), source };
         let result = serde_json::to_value(result).map_err(not_json)?;
@@ -129,12 +129,12 @@ impl PointStore {
     }
 
     /// Sentences about the files that [`Self::get`] could not use.
-    pub fn notices(&self) -> &[String] {
+    pub(crate) fn notices(&self) -> &[String] {
         &self.notices
     }
 
     fn path(&self, name: &str, key: &Value) -> Result<PathBuf, StoreError> {
-        if !name::is_portable(name) {
+        if !is_portable(name) {
             return Err(StoreError::BadName { name: name.to_owned() });
         }
         let hash = fnv1a(key.to_string().bytes());

@@ -6,7 +6,9 @@ use std::time::Duration;
 
 use photoncard_driver::render::{Integrator, Picture, RenderSettings};
 use photoncard_driver::scene::Camera;
-use photoncard_driver::session::{Assignment, Event, Job, PixelLimits, Session, SessionError, Upload};
+use photoncard_driver::session::{
+    Assignment, Event, Job, PixelLimits, Restart, Session, SessionError, Upload,
+};
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
 use photoncard_shared::counters::Counters;
@@ -100,7 +102,7 @@ impl Bench {
     }
 
     fn greet_again(&mut self) {
-        self.session.greet_again(self.now);
+        self.session.restart(Restart::Lost, self.now);
         self.collect();
     }
 

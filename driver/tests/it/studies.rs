@@ -12,10 +12,9 @@ use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::render::{Unobserved, render};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scheduler::GatherOrder;
-use photoncard_driver::study::report::Provenance;
 use photoncard_driver::study::{
-    Axis, AxisError, Laboratory, Point, Quality, SampleRate, Scale, Study, StudyError, StudyObserver,
-    StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
+    Axis, AxisError, Laboratory, Point, Provenance, Quality, SampleRate, Scale, Study, StudyError,
+    StudyObserver, StudyOptions, Sweep, SweepOptions, Task, run, run_sweep,
 };
 
 /// Observer that counts measured points, and stops the study after a number of them.
@@ -174,10 +173,11 @@ fn all_tiles_add_up_to_the_render() {
     let observer = Counting::up_to(usize::MAX);
     let mut laboratory = Laboratory::new(folder.path(), &scenes(), Some(2), &observer).unwrap();
     let scene = gltf::load(&scenes().join("cornell.gltf")).unwrap();
-    for settings in
-        [tiny().all_on(), tiny().settings(GatherOrder::Naive), tiny().settings(GatherOrder::Hilbert)]
+    let sorted = tiny().settings(GatherOrder::Sort);
+    for (settings, is_along_curve) in
+        [(tiny().all_on(), false), (tiny().settings(GatherOrder::Naive), false), (sorted, true)]
     {
-        let point = tiny().whole("cornell.gltf", settings.clone());
+        let point = Point { is_along_curve, ..tiny().whole("cornell.gltf", settings.clone()) };
         let results = laboratory.measure("sum", std::slice::from_ref(&point)).unwrap();
         let measured = results.traffic(&point);
         let statistics = render(&scene, &settings, &Unobserved).unwrap().statistics;
@@ -187,12 +187,7 @@ fn all_tiles_add_up_to_the_render() {
             (measured.total(|tile| tile.counters.records as f64), statistics.records),
             (measured.total(|tile| tile.counters.photons_tested as f64), statistics.photons_tested),
         ] {
-            assert_eq!(
-                (total.value, total.half_width),
-                (expected as f64, 0.0),
-                "{:?}",
-                settings.schedule.order
-            );
+            assert_eq!((total.value, total.half_width), (expected as f64, 0.0), "{point:?}");
         }
         let [raw, dram] = [measured.raw_bytes(), measured.photon_map_bytes()];
         assert!(raw.value > 0.0 && dram.value > 0.0 && raw.half_width == 0.0 && dram.half_width == 0.0);
@@ -348,11 +343,11 @@ fn kinds_of_chips_differ_in_traffic_and_are_checked_for_their_room() {
         micro_traffic.total(drains).value > reference.total(drains).value,
         "a smaller queue is drained more often"
     );
-    for (settings, option) in [
-        (sorted.clone().with(|s| s.schedule.tile = Some(64)), "--tile"),
-        (sorted.with(|s| s.schedule.order = GatherOrder::Hilbert), "--order"),
+    for (point, option) in [
+        (on(micro, sorted.clone().with(|s| s.schedule.tile = Some(64))), "--tile"),
+        (Point { is_along_curve: true, ..on(micro, sorted) }, "--order"),
     ] {
-        let error = laboratory.measure("chips", &[on(micro, settings)]).unwrap_err();
+        let error = laboratory.measure("chips", &[point]).unwrap_err();
         assert!(error.is_input() && error.to_string().starts_with(option), "{error}");
     }
 }

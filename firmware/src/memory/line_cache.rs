@@ -4,6 +4,7 @@
 //! [`super::Counted`] it simulates the fetches of a chip with a cache of this shape. It holds data in both
 //! cases, so that hits are equal by construction, and a wrong line would be visible in the picture.
 
+use core::fmt;
 use core::ops::Range;
 
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
@@ -43,6 +44,20 @@ pub enum ShapeError {
     /// The size is 0, not a whole number of sets, or above [`CacheShape::MAX_BYTES`].
     Bytes,
 }
+
+impl fmt::Display for ShapeError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::LineBytes => {
+                "the lines of the cache are no whole number of card memory lines, or too large"
+            }
+            Self::Ways => "the cache has no ways, or more than lines",
+            Self::Bytes => "the cache is empty, no whole number of sets, or too large",
+        })
+    }
+}
+
+impl core::error::Error for ShapeError {}
 
 impl CacheShape {
     /// Maximum size of a cache, bytes.

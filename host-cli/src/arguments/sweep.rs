@@ -6,7 +6,7 @@ use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::quality::Quality;
 use photoncard_driver::render::RenderSettings;
-use photoncard_driver::study::{Axis, MAX_POINTS, Point, Scale, Task};
+use photoncard_driver::study::{ALONG_CURVE, Axis, MAX_POINTS, Point, Scale, Task};
 
 use super::choice::choice;
 use super::integrator::IntegratorOptions;
@@ -27,7 +27,8 @@ pub(crate) struct SweepArguments {
         value_parser = axis,
         help = format!(
             "Vary an option over values; may be repeated: every combination is measured, up to {MAX_POINTS}. Values with commas are \
-             separated by semicolons. A cache may be a SIZE or SIZE/LINE/WAYS of the photon map's"
+             separated by semicolons. A cache may be a SIZE or SIZE/LINE/WAYS of the photon map's. order={ALONG_CURVE} does all gathers of \
+             a frame along a Hilbert curve, which no chip has room for: the bound of all orders"
         )
     )]
     pub(crate) vary: Vec<Axis>,
@@ -95,7 +96,8 @@ impl SweepArguments {
             sample: self.output.sample,
             least_tiles: Scale::FULL.least_tiles,
         };
-        Point { scene: name.to_owned(), assignments: self.scene.assignments.clone(), settings, task }
+        let (scene, assignments) = (name.to_owned(), self.scene.assignments.clone());
+        Point { scene, assignments, settings, is_along_curve: false, task }
     }
 
     /// Options of the picture.

@@ -10,8 +10,6 @@ use super::render::RenderOptions;
 impl RenderOptions {
     /// Sentences about the options without effect on a render of `scene`.
     pub(crate) fn without_effect(&self, scene: &Scene) -> Vec<String> {
-        let order = self.schedule.order;
-        let name = order.name();
         let settings = self.settings();
         let without_specular =
             "without a caustic map: nothing in the scene is a mirror, glass or glossy".to_owned();
@@ -45,11 +43,6 @@ impl RenderOptions {
                 without_specular,
             ),
             (self.photons.caustic_neighbors.is_some() && !has_map, "--caustic-neighbors", without_map),
-            (
-                self.cards.faults.is_some() && order.is_of_whole_frame(),
-                "--faults",
-                format!("with --order {name}, which sends nothing over links"),
-            ),
         ];
         let of_rays = self.integrator.without_effect(&self.quality.settings().integrator);
         let said = cases
@@ -63,13 +56,11 @@ impl RenderOptions {
 
     /// Options that only other gather orders have. Each entry is whether it has no effect, its name, and the
     /// reason.
-    fn of_order(&self) -> [(bool, &'static str, String); 4] {
+    fn of_order(&self) -> [(bool, &'static str, String); 3] {
         let order = self.schedule.order;
         let no_bins = format!("with --order {}, which has no direction bins", order.name());
         let no_queue = format!("with --order {}, by which no gathers wait on a chip", order.name());
-        let at_once = format!("with --order {}, whose tiles are finished together", order.name());
         [
-            (self.samples.keep_samples && order.is_of_whole_frame(), "--keep-samples", at_once),
             (self.schedule.bins.is_some() && !order.has_bins(), "--bins", no_bins),
             (self.schedule.queue.is_some() && !order.has_queue(), "--queue", no_queue.clone()),
             (self.schedule.in_flight.is_some() && !order.has_queue(), "--in-flight", no_queue),

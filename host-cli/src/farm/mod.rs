@@ -4,12 +4,10 @@
 //! prepared again is compared with the existing one, existing parts are not rendered again, and unfinished
 //! parts are continued. Engines differ only in what calls the steps.
 
-mod flamenco;
+mod engines;
 mod job;
 mod openjd;
-mod parallel;
 mod script;
-mod slurm;
 mod words;
 
 use self::job::Job;
@@ -22,9 +20,9 @@ pub(crate) fn run(command: &FarmCommand) -> Result<(), Failure> {
     let job = |options: &FarmOptions| Job::new(options, std::env::args_os().skip(3));
     let text = match command {
         FarmCommand::Openjd(options) => openjd::template(&job(options)?),
-        FarmCommand::Slurm(options) => slurm::script(&job(options)?),
-        FarmCommand::Flamenco(options) => flamenco::script(&job(options)?),
-        FarmCommand::Parallel(options) => parallel::script(&job(options)?),
+        FarmCommand::Slurm(options) => engines::slurm(&job(options)?),
+        FarmCommand::Flamenco(options) => engines::flamenco(&job(options)?),
+        FarmCommand::Parallel(options) => engines::parallel(&job(options)?),
     };
     write_out(&text)
 }

@@ -1,7 +1,6 @@
 //! Progress of a render or of a card's self-test: a bar on a terminal, elsewhere a line for each tenth of a
 //! phase.
 
-pub(crate) mod openjd;
 pub(crate) mod remaining;
 
 use std::error::Error;
@@ -16,10 +15,10 @@ use photoncard_driver::render::{CardError, Observer, Phase};
 use serde_json::Value;
 use signal_hook::consts::{SIGINT, SIGTERM};
 
-use self::openjd::Percent;
 use self::remaining::Remaining;
 use crate::arguments::ProgressForm;
-use crate::console::say;
+use crate::console::{print, say};
+use crate::failure::Failure;
 #[cfg(target_os = "linux")]
 use crate::hang_up;
 
@@ -262,6 +261,36 @@ fn name(phase: Phase) -> &'static str {
         Phase::Tiles => "tiles",
         Phase::SelfTest => "memory",
     }
+}
+
+/// Progress of the phase that takes most of a command's time, in the syntax of Open Job Description:
+/// `openjd_progress: PERCENT` on standard output.
+struct Percent {
+    phase: Phase,
+    told: Mutex<Option<u64>>,
+}
+
+impl Percent {
+    /// Creates a progress of zero percent.
+    fn of(phase: Phase) -> Self {
+        Self { phase, told: Mutex::default() }
+    }
+
+    /// Prints progress of `phase`, if that is the reported phase and the percentage has increased.
+    fn tell(&self, phase: Phase, done: u64, total: u64) {
+        let percent = 100 * done.min(total) / total.max(1);
+        let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
+        if phase == self.phase && told.is_none_or(|told| told < percent) {
+            *told = Some(percent);
+            // A reader that is gone does not end the work.
+            let _ = print(&[format!("openjd_progress: {percent}")]);
+        }
+    }
+}
+
+/// Prints a failure in the syntax of Open Job Description.
+pub(crate) fn fail_openjd(failure: &Failure) {
+    let _ = print(&[format!("openjd_fail: {}", failure.line())]);
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use photoncard_driver::parts::Parts;
 use photoncard_driver::render::{NamedSettings, RenderSettings};
-use photoncard_driver::scene::FixedScene;
+use photoncard_driver::scene::Scene;
 use photoncard_driver::{exr, tone_mapping};
 use serde_json::Value;
 
@@ -29,13 +29,13 @@ pub(super) fn is_finished(
     options: &RenderOptions,
     outputs: &OutputOptions,
     settings: &RenderSettings,
-    scene: &FixedScene,
+    scene: &Scene,
     inputs: &NamedSettings,
 ) -> bool {
     if !may_be(outputs) {
         return false;
     }
-    let mut stated = settings.identity_of(scene);
+    let mut stated = settings.identity(scene);
     stated.insert("aov".to_owned(), Value::from(settings.picture.layers.to_string()));
     stated.extend(inputs.clone());
     let found: Vec<&str> =

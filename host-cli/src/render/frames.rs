@@ -145,7 +145,7 @@ impl<'a> Sequence<'a> {
         let scene = moments.scene();
         progress.begin_frame();
         let Some(rest) = rest.take() else {
-            return Ok((renderer.render_fixed(scene, settings, progress)?, None));
+            return Ok((renderer.render(scene, settings, progress)?, None));
         };
         let found = std::cell::RefCell::new(None);
         let choose = |packed: &PackedScene| {
@@ -159,7 +159,7 @@ impl<'a> Sequence<'a> {
             *found.borrow_mut() = Some((fit, chosen.clone()));
             Ok(chosen)
         };
-        let rendering = renderer.render_chosen_fixed(scene, settings, &choose, progress)?;
+        let rendering = renderer.render_chosen(scene, settings, &choose, progress)?;
         let found: Option<(Option<Fit>, (PhotonMaps, Integrator))> = found.into_inner();
         let Some((fit, (photons, integrator))) = found else { return Ok((rendering, None)) };
         (settings.photons, settings.integrator) = (photons, integrator);

@@ -20,7 +20,7 @@ use photoncard_driver::pack::PackedScene;
 use photoncard_driver::render::{
     Ending, Passes, Phase, RenderError, RenderSettings, Renderer, render_chosen,
 };
-use photoncard_driver::scene::{FixedScene, Scene};
+use photoncard_driver::scene::Scene;
 
 use self::darkness::Circumstances;
 use self::end::{End, at_once};
@@ -67,7 +67,6 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
         let Some(aim) = options.samples.aim() else {
             return Ok((render_chosen(&scene, &settings, &choose, &progress)?, None));
         };
-        let scene = FixedScene::from(&scene);
         let passes = Renderer::default().render_until(&scene, &settings, &choose, aim, &progress)?;
         let Passes { rendering, noise, count, ending } = passes;
         let samples = rendering.statistics.samples;

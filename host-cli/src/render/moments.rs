@@ -1,7 +1,7 @@
 //! Scenes of consecutive frames.
 
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::scene::{FixedScene, Scene};
+use photoncard_driver::scene::Scene;
 
 use super::steps::assigned;
 use crate::arguments::{FrameOptions, SceneOptions};
@@ -14,7 +14,7 @@ pub(super) struct Moments<'a> {
     frames: &'a FrameOptions,
     input: Input,
     /// Scene of the last frame. It starts at rest if only cameras move.
-    scene: FixedScene<'static>,
+    scene: Scene,
     is_still: bool,
 }
 
@@ -29,7 +29,7 @@ impl<'a> Moments<'a> {
         check_animations(&input)?;
         let is_still = input.file.only_cameras_move(frames.animations()).map_err(Failure::input)?;
         let rest = assigned(options, input.at_rest()?)?;
-        let scene = if is_still { rest.clone() } else { Scene::default() }.into();
+        let scene = if is_still { rest.clone() } else { Scene::default() };
         Ok((Self { options, frames, input, scene, is_still }, rest))
     }
 
@@ -39,7 +39,7 @@ impl<'a> Moments<'a> {
     }
 
     /// Scene of the last frame.
-    pub(super) fn scene(&self) -> &FixedScene<'static> {
+    pub(super) fn scene(&self) -> &Scene {
         &self.scene
     }
 
@@ -47,7 +47,7 @@ impl<'a> Moments<'a> {
     pub(super) fn move_to(&mut self, number: u32) -> Result<(), Failure> {
         let moment = self.frames.moment(number);
         if !self.is_still {
-            self.scene = assigned(self.options, self.input.at(&moment)?)?.into();
+            self.scene = assigned(self.options, self.input.at(&moment)?)?;
             return Ok(());
         }
         let cameras = self.input.file.cameras_at(&moment).map_err(Failure::input)?;

@@ -7,7 +7,7 @@ use miette::{MietteDiagnostic, Report};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::render::{Chosen, Phase, PreparedScene, RenderSettings};
-use photoncard_driver::scene::{FixedScene, Scene};
+use photoncard_driver::scene::Scene;
 use serde_json::{Map, Value, json};
 
 use super::messages;
@@ -32,8 +32,7 @@ fn prepare_rest(options: &PrepareOptions) -> Result<(), Failure> {
     check(options, &options.output)?;
     let scene = assigned(&options.scene, input::load(&options.scene, options.card.budget().dram_bytes)?)?;
     let preparation = Preparation::new(options, &scene)?;
-    let fixed = FixedScene::from(&scene);
-    let prepared = preparation.of(&fixed, &|packed| preparation.choose(&scene, packed))?;
+    let prepared = preparation.of(&scene, &|packed| preparation.choose(&scene, packed))?;
     preparation.write(&prepared, &options.output)
 }
 
@@ -125,7 +124,7 @@ impl<'a> Preparation<'a> {
 
     fn of(
         &self,
-        scene: &FixedScene,
+        scene: &Scene,
         choose: &(dyn Fn(&PackedScene) -> Chosen + Sync),
     ) -> Result<PreparedScene, Failure> {
         let Self { options, settings, progress, .. } = self;

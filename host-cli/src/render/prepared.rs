@@ -130,7 +130,7 @@ impl OpenScene {
             return Ok(());
         }
         progress.begin_frame();
-        let result = on_threads(options.threads, || renderer.render_fixed(scene, &settings, progress))?;
+        let result = on_threads(options.threads, || renderer.render(scene, &settings, progress))?;
         progress.finish();
         let result = result.inspect_err(|error| end_early(error, progress, outputs));
         let rendering = result.map_err(|error| match (frame, error) {

@@ -10,8 +10,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use photoncard_driver::cost_model::Machine;
-use photoncard_driver::study::report::Provenance;
-use photoncard_driver::study::{Scale, StudyError, StudyObserver, StudyOptions, run as study, run_sweep};
+use photoncard_driver::study::{
+    Provenance, Scale, StudyError, StudyObserver, StudyOptions, run as study, run_sweep,
+};
 
 use crate::arguments::{Selection, StudyArguments, StudyCommand, StudyOutput};
 use crate::console::say;

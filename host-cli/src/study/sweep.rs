@@ -9,8 +9,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::scene::Scene;
-use photoncard_driver::study::report::Provenance;
-use photoncard_driver::study::{AxisError, Point, Sweep, SweepOptions, Task};
+use photoncard_driver::study::{ALONG_CURVE, AxisError, Point, Provenance, Sweep, SweepOptions, Task};
 
 use crate::arguments::{
     Arguments, CACHE, Command, StudyArguments, StudyCommand, StudyOutput, SweepArguments,
@@ -41,7 +40,7 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     // Assignments are settings of the points.
     let inputs = input::provenance(&arguments.scene).into_iter().filter(|(name, _)| name != "set");
     let mut settings: Vec<_> = inputs.map(|(name, value)| (name, value.to_string())).collect();
-    settings.push(("scene-checksum".to_owned(), scene.checksum()));
+    settings.push(("scene-checksum".to_owned(), scene.checksum().to_owned()));
     let provenance = Provenance { settings, ..provenance };
     let StudyOutput { out, threads, .. } = &arguments.output;
     let (out, threads, machine) = (out.clone(), *threads, arguments.machine.machine());
@@ -56,9 +55,12 @@ fn point(
     notices: &mut BTreeSet<String>,
 ) -> Result<Point, Failure> {
     let (caches, others): (Vec<_>, Vec<_>) = values.iter().copied().partition(|(name, _)| *name == CACHE);
+    let (curve, others): (Vec<_>, Vec<_>) =
+        others.into_iter().partition(|value| *value == ("order", ALONG_CURVE));
     let replaced = replaced(&others).map_err(|error| refused(&others, &reason(&error)))?;
     let arguments = replaced.as_ref().unwrap_or(arguments);
     let mut point = arguments.point(&input::name(&arguments.scene));
+    point.is_along_curve = !curve.is_empty();
     if let (Some((_, text)), Task::Traffic { caches: behind, .. }) = (caches.first(), &mut point.task) {
         *behind = cache(text).map_err(|reason| refused(&caches, &reason))?;
     }

@@ -9,7 +9,7 @@ use std::time::Duration;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::quality::{Fit, Quality};
 use photoncard_driver::render::{Observer, Phase, RenderError, RenderSettings};
-use photoncard_driver::scene::FixedScene;
+use photoncard_driver::scene::Scene;
 
 /// Result of pilot renders; `None` if no setting depends on the scene.
 pub(super) type Found = Result<Option<Fit>, RenderError>;
@@ -29,7 +29,7 @@ impl Fitting {
     /// # Errors
     /// If the thread cannot be started.
     pub(super) fn start(
-        scene: Arc<FixedScene<'static>>,
+        scene: Arc<Scene>,
         quality: Quality,
         settings: RenderSettings,
         threads: Option<usize>,

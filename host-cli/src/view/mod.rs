@@ -1,19 +1,17 @@
 //! `photoncard view`: a page of the browser that shows a scene while it is rendered.
 //!
 //! - `refinement`: order of the pictures: a state machine.
-//! - `wish`, `passes`, `command_line`: the requested picture: its settings, those of coarse pictures, and the
-//!   command that renders it.
+//! - `wish`, `command_line`: the requested picture: its settings, and the command that renders it.
 //! - `canvas`, `pages`, `cards`: tiles of the newest wish; the next message to each page; states of the
 //!   cards.
 //! - `request`, `describe`: messages of a page, and messages to it.
 //! - `state`: all of these as one state, without threads, clock, input or output.
-//! - `hub`, `painter`, `fitting`, `returning`: the state under a lock, the threads that render and that run
-//!   pilot renders, and the one that looks for lost cards.
+//! - `hub`, `painter`, `fitting`: the state under a lock, and the threads that render and that run pilot
+//!   renders.
 //! - `http`, `gate`, `page_files`, `socket`, `server`: requests, access control, the page's files,
 //!   web sockets.
-//! - `saving`, `browser`: pictures that a page saves, and the browser that shows it.
+//! - `saving`: pictures that a page saves.
 
-mod browser;
 mod canvas;
 mod cards;
 mod command_line;
@@ -26,10 +24,8 @@ mod page_files;
 mod pages;
 mod painter;
 mod painting;
-mod passes;
 mod refinement;
 mod request;
-mod returning;
 mod saving;
 mod server;
 mod socket;
@@ -41,11 +37,12 @@ mod wish;
 use std::fmt::Write;
 use std::io::ErrorKind;
 use std::net::{SocketAddr, TcpListener};
+use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::time::Duration;
 
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::render::{CardAddress, Picture, RenderSettings};
+use photoncard_driver::render::{CardAddress, Picture, RenderSettings, card_ping};
 use photoncard_driver::scene::Scene;
 
 use self::describe::SceneFacts;
@@ -66,6 +63,10 @@ use crate::render::on_threads;
 
 /// Interval at which the end of the view is checked.
 const ATTENTION: Duration = Duration::from_millis(50);
+/// Time between two polls of the list of lost cards.
+const LOOK: Duration = Duration::from_millis(200);
+/// Time that a card takes to notice that its host has gone, and to accept another one.
+const CHANGE_OF_HOSTS: Duration = Duration::from_millis(100);
 
 /// Shows a scene until an interrupt.
 pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
@@ -96,7 +97,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     // The threads of pages end with the process.
     std::thread::spawn(move || server::serve(&listener, &gate, &served));
     std::thread::scope(|scope| {
-        scope.spawn(|| returning::look_for_cards(&hub));
+        scope.spawn(|| look_for_cards(&hub));
         let painter = Painter::new(&hub, scene, options);
         let painted = scope.spawn(|| on_threads(options.threads, || painter.run()));
         while !hub.is_over() {
@@ -185,9 +186,41 @@ fn announce(options: &ViewOptions, address: SocketAddr, gate: &Gate) -> Result<(
     }
     print(&[gate.url()])?;
     if options.open
-        && let Err(error) = browser::open(&gate.url())
+        && let Err(error) = open_in_browser(&gate.url())
     {
         say(format_args!("photoncard: no browser could be opened: {error}; open the address yourself"));
     }
     Ok(())
+}
+
+/// Opens an address in the browser of this machine.
+///
+/// # Errors
+/// If the program that opens addresses cannot be started.
+fn open_in_browser(url: &str) -> std::io::Result<()> {
+    let [program, arguments @ ..] = match std::env::consts::OS {
+        "macos" => ["open", "", "", ""],
+        // The empty text is the window's title.
+        "windows" => ["cmd", "/c", "start", "\"\""],
+        _ => ["xdg-open", "", "", ""],
+    };
+    let mut command = Command::new(program);
+    command.args(arguments.iter().filter(|argument| !argument.is_empty())).arg(url);
+    let mut child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
+    // The program ends as soon as it has told the browser; nobody waits for it.
+    let _ = std::thread::Builder::new().name("browser".into()).spawn(move || child.wait());
+    Ok(())
+}
+
+/// Reconnects lost cards until the view is over. Each is greeted after a pause that doubles, until it
+/// answers.
+fn look_for_cards(hub: &Hub) {
+    while !hub.is_over() {
+        std::thread::sleep(LOOK);
+        let Some((number, address)) = hub.change(|view, now| view.cards.next_to_try(now)) else { continue };
+        if card_ping(&address, 1).is_ok() {
+            std::thread::sleep(CHANGE_OF_HOSTS);
+            hub.card_returns(number);
+        }
+    }
 }

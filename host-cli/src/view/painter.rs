@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use photoncard_driver::quality::Quality;
 use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer, Rendering};
-use photoncard_driver::scene::{FixedScene, Scene};
+use photoncard_driver::scene::Scene;
 use photoncard_driver::sink::{FinishedTile, TileSink};
 use photoncard_shared::message::Tile;
 
@@ -25,7 +25,7 @@ pub(super) struct Painter<'a> {
     quality: Quality,
     renderer: Renderer,
     threads: Option<usize>,
-    scene: Arc<FixedScene<'static>>,
+    scene: Arc<Scene>,
     /// Running pilot renders of the scene, which continue beside pictures.
     fitting: Option<Fitting>,
     /// Assignments that are applied to the scene; `None` before the first picture.
@@ -42,7 +42,7 @@ impl<'a> Painter<'a> {
             quality: *quality,
             threads: *threads,
             renderer: Renderer::default(),
-            scene: Arc::new(scene.into()),
+            scene: Arc::new(scene),
             fitting: None,
             assigned: None,
         }
@@ -75,11 +75,9 @@ impl<'a> Painter<'a> {
         self.assigned = None;
         self.fitting.take().into_iter().for_each(Fitting::stop);
         // No pilot renders share the scene any more.
-        let scene = std::mem::replace(&mut self.scene, Arc::new(Scene::default().into()));
-        let mut scene =
-            Arc::try_unwrap(scene).map_or_else(|scene| Scene::clone(&scene), FixedScene::into_scene);
+        let mut scene = Arc::unwrap_or_clone(std::mem::take(&mut self.scene));
         let applied = self.hub.change(|view, _| view.apply(&task.wish, &mut scene));
-        self.scene = Arc::new(scene.into());
+        self.scene = Arc::new(scene);
         applied?;
         self.assigned = Some(assignments);
         Ok(())
@@ -135,7 +133,7 @@ impl<'a> Painter<'a> {
         };
         let mut samples = 1;
         let easel = Easel::new(self.hub, task, samples);
-        let mut rendering = self.renderer.render_fixed(&self.scene, &with(samples), &easel)?;
+        let mut rendering = self.renderer.render(&self.scene, &with(samples), &easel)?;
         while samples < asked.samples {
             let origin = Origin { samples, ..task.origin };
             self.hub.change(|view, _| view.refine(origin, &rendering.statistics));

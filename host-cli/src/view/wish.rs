@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::quality::{Fit, Stated};
 use photoncard_driver::render::{CardAddress, RenderError, RenderSettings};
-use photoncard_driver::scene::{Environment, Scene};
+use photoncard_driver::scene::{Environment, Scene, SceneContents};
 
 use super::request::Setting;
 
@@ -143,7 +143,7 @@ impl Sketch {
             let brightest = map.texels.as_flattened().iter().copied().fold(0.0, f32::max);
             Environment { width: 1, height: 1, texels: vec![[brightest; 3]], strength: map.strength }
         });
-        Self(Scene {
+        Self(Scene::from(SceneContents {
             triangles: triangles.copied().collect(),
             materials: scene.materials.clone(),
             lights: scene.lights.clone(),
@@ -151,8 +151,8 @@ impl Sketch {
             offset: scene.offset,
             generator: scene.generator.clone(),
             environment,
-            ..Scene::default()
-        })
+            ..SceneContents::default()
+        }))
     }
 
     /// Sketch with the assignments of a wish applied.

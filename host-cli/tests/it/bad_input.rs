@@ -212,7 +212,6 @@ fn options_for_emulated_cards_are_refused_for_others() {
             (["--counters", "--card", "emulated:1"], ["only the memory", "leave --counters and --cache out"]),
             (["--cache=unified=64K/128/4", "--card", "emulated:1"], ["only the memory", card]),
             (["--trace=out.din.gz", "--tile", "8"], ["--trace", "use --card emulated:1"]),
-            (["--order=hilbert", "--tile", "8"], ["--order hilbert", "use --card emulated:CHIPS"]),
         ] {
             refused(&room, "scene.gltf", &[&options[..], &["--card", card]].concat(), &words);
         }

@@ -73,7 +73,6 @@ fn counters_add_up_and_change_no_picture() {
         ("small", "photon=1K/128/2,scene=2K/256/2,index=hash", &["--card", "emulated:2"]),
         ("unified", "unified=4K/512/8", &["--card", "emulated-micro:1", "--counters"]),
         ("jensen", "photon=1536/128/4,scene=75K/128/4", &["--photon-map", "jensen"]),
-        ("curve", "unified=32K/128/256", &["--order", "hilbert"]),
         ("records", "unified=8K/128/1", &["--irradiance-cache", "on"]),
         ("precomputed", "photon=8K/128/4,scene=8K/128/4", &["--radiance", "precomputed"]),
     ] {
@@ -221,7 +220,6 @@ fn a_trace_of_several_chips_is_refused() {
     for (options, words) in [
         (&["--card", "emulated:2"][..], ["several chips", "--card emulated:1"]),
         (&["--card", "emulated:1", "--card", "emulated:1"], ["several chips", "--card emulated:1"]),
-        (&["--card", "emulated:1", "--order", "hilbert"], ["--order hilbert", "such as sort"]),
         (
             &["--card", "emulated:1", "--trace-labels", "--trace-format", "ramulator"],
             ["has no labels", "--trace-format dinero"],

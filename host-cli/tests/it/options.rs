@@ -22,8 +22,6 @@ fn options_without_effect_are_reported() {
             &["--in-flight=1", "--order=naive"],
             "--in-flight has no effect with --order naive, by which no gathers wait",
         ),
-        (&["--queue=9", "--order=hilbert"], "--queue has no effect with --order hilbert"),
-        (&["--faults=flips=1e-9", "--order=hilbert"], "--faults has no effect with --order hilbert"),
         (
             &["--caustic-neighbors=9"],
             "--caustic-neighbors has no effect without a caustic map: nothing in the scene",

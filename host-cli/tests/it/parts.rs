@@ -39,7 +39,7 @@ fn the_merged_picture_equals_the_file_of_one_render() {
         for (number, own) in [
             ("1/3", &["--card", "emulated:1", "--order", "naive"][..]),
             ("2/3", &["--card", "emulated-micro:2", "--tile", "5"]),
-            ("3/3", &["--order", "hilbert"]),
+            ("3/3", &["--order", "hash"]),
         ] {
             let name = format!("a.{}.part", &number[..1]);
             let outcome = part(&room, &[options, own].concat(), number, &name);

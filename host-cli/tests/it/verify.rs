@@ -47,7 +47,6 @@ fn impossible_verification_is_refused_with_a_remedy() {
         (&["--verify", "0", "--card", "emulated:2"], "above 0 and at most 1"),
         (&["--verify", "nan", "--card", "emulated:2"], "above 0 and at most 1"),
         (&["--verify", "1", "--card", "emulated:2", "--counters"], "leave --counters"),
-        (&["--verify", "1", "--card", "emulated:2", "--order", "hilbert"], "--order sort"),
     ] {
         let room = Room::new();
         let outcome = room.run(&[&["render", &cornell, "-o", "a.exr"][..], &PICTURE, options].concat());

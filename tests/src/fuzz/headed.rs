@@ -61,14 +61,8 @@ impl Files {
         let RenderSettings { photons, integrator, .. } = settings();
         let choose = |_: &_| Ok((photons.clone(), integrator.clone()));
         let scene = everything();
-        let prepared = PreparedScene::new(
-            &(&scene).into(),
-            &settings(),
-            &[REFERENCE],
-            &choose,
-            Default::default(),
-            &Unobserved,
-        );
+        let prepared =
+            PreparedScene::new(&scene, &settings(), &[REFERENCE], &choose, Default::default(), &Unobserved);
         let path = folder.path().join("scene.card");
         prepared.expect("the scene is sound").write(&path).expect("there is room for a scene");
         Self { name: "prepared", seeds: vec![fs::read(path).expect("a scene")], folder, read: read_prepared }

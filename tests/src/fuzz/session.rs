@@ -7,7 +7,7 @@ use std::time::Duration;
 use photoncard_driver::dispatcher::Dispatcher;
 use photoncard_driver::film::{Film, PixelValue, SumFormat, Window};
 use photoncard_driver::scheduler::Scheduler;
-use photoncard_driver::session::{Job, PixelLimits, Session, SessionError, Upload};
+use photoncard_driver::session::{Job, PixelLimits, Restart, Session, SessionError, Upload};
 use photoncard_firmware::kind::MICRO;
 use photoncard_shared::address::Line;
 use photoncard_shared::budget::Budget;
@@ -165,7 +165,7 @@ impl Ends<'_> {
     fn goes_on(&mut self, result: &Result<(), SessionError>) -> bool {
         let may_pass = result.as_ref().err().is_some_and(SessionError::may_pass);
         if may_pass {
-            self.session.greet_again(self.now);
+            self.session.restart(Restart::Lost, self.now);
         }
         let collected = self.dispatcher.collect(0, &mut self.session, self.now);
         collected.is_ok() && (may_pass || result.is_ok())

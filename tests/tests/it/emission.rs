@@ -171,6 +171,7 @@ fn far_cubes() -> Scene {
         let at = move |corner: Vec3| corner * HALF + Vec3::X * x;
         outside()
             .triangles
+            .clone()
             .into_iter()
             .map(move |triangle| Triangle { vertices: triangle.vertices.map(at), ..triangle })
     };
@@ -277,7 +278,7 @@ fn sun_over_a_mirror(lamp: f32) -> Scene {
         outer_cosine: 0.8,
     };
     let spot = light(spot, COLOUR.map(|intensity| intensity * lamp));
-    Scene { lights: vec![sun, spot], ..scene(triangles, materials, camera(Vec3::Y, Vec3::Y)) }
+    scene(triangles, materials, camera(Vec3::Y, Vec3::Y)).with(|scene| scene.lights = vec![sun, spot])
 }
 
 /// Few paths are traced for caustics that contribute almost no light. The stored photons still have the power

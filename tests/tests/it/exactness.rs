@@ -1,14 +1,19 @@
 //! Renders that differ only in ordering, tile size, chips or threads have identical pixels.
 
+use std::sync::Mutex;
+
 use photoncard_driver::film::{Film, LayerSums, PixelSums, Window};
 use photoncard_driver::layer::Layers;
-use photoncard_driver::photon_map::PhotonLayout;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::photon_map::{PhotonLayout, map_photons};
 use photoncard_driver::render::{
-    CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling, Schedule,
-    Unobserved, render,
+    CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Rendering, Sampling,
+    Schedule,
 };
 use photoncard_driver::scene::{Scene, gltf};
-use photoncard_driver::scheduler::GatherOrder;
+use photoncard_driver::scheduler::{GatherOrder, tiles};
+use photoncard_driver::sink::TileSink;
+use photoncard_driver::study::WholeFrame;
 use photoncard_firmware::kind::{ChipKind, FixedCapacity, MICRO, REFERENCE, Reference};
 use photoncard_tests::everything::everything;
 use photoncard_tests::render_or_panic;
@@ -41,7 +46,7 @@ fn sums(film: &Film) -> Vec<PixelSums> {
 
 /// Settings on which no pixel may depend.
 fn variants() -> Vec<RenderSettings> {
-    use GatherOrder::{DirectionBins, Hash, Hilbert, Naive, Sort, Tiled};
+    use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
     let tile = 16;
     let schedules = [
         (tile, Naive, None, None),
@@ -55,7 +60,6 @@ fn variants() -> Vec<RenderSettings> {
         (tile, Hash, None, None),
         (9, Sort, None, Some(1)),
         (tile, Sort, Some(3), Some(2)),
-        (tile, Hilbert, None, None),
     ];
     let scheduled = schedules.map(|(tile, order, bins, queue)| RenderSettings {
         schedule: Schedule { tile: Some(tile), order, bins, queue, in_flight: None, ..Schedule::default() },
@@ -71,7 +75,6 @@ fn variants() -> Vec<RenderSettings> {
         (&["emulated-large:2", "emulated:1"], 8, Hash, Some(300)),
         (&["emulated:7"], 4, Tiled, None),
         (&["emulated-micro:2", "emulated:1"], tile, Tiled, None),
-        (&["emulated:3"], 7, Hilbert, None),
     ];
     let dealt = cards.map(|(cards, tile, order, queue)| RenderSettings {
         schedule: Schedule {
@@ -131,7 +134,7 @@ fn layer_sums(film: &Film) -> Vec<LayerSums> {
     film.sums().map(|sums| sums.layers.unwrap_or_default()).collect()
 }
 
-/// Gather orders of chips, without `hilbert` of the host.
+/// Gather orders of chips.
 const CHIPS_ORDERS: [GatherOrder; 5] = {
     use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
     [Naive, Tiled, DirectionBins, Hash, Sort]
@@ -317,14 +320,36 @@ fn samples_rounded_to_the_next_pixel_are_exact() {
     }
 }
 
+/// Frames of a study, whose gathers the host does.
 #[test]
-fn a_frame_along_one_curve_is_for_emulated_reference_chips_alone() {
-    let settings = settings().with(|s| {
-        s.schedule.order = GatherOrder::Hilbert;
-        s.cards.addresses = vec![card("emulated-micro:1")];
-    });
-    let error = render(&glossy(), &settings, &Unobserved).err().expect("is refused");
-    assert!(error.is_input() && error.to_string().contains("--order hilbert"), "{error}");
+fn gathers_along_one_curve_through_a_frame_bring_the_light_of_any_order() {
+    let scene = everything();
+    let packed = || PackedScene::new(&scene).unwrap();
+    let mapped = map_photons(packed(), &settings().photon_settings(&scene), &|_| true).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+    let caches = "photon=16K/128/4,scene=16K/128/4".parse().unwrap();
+    for (irradiance_error, layers) in
+        [(None, Layers::NONE), (Some(0.025), Layers::NONE), (None, Layers::all())]
+    {
+        let settings = settings().with(|s| {
+            s.integrator.irradiance_error = irradiance_error;
+            s.picture.layers = layers;
+        });
+        let frame = settings.frame(&settings.camera(&scene).unwrap(), mapped.max_distance, mapped.caustics);
+        let tiles = tiles(settings.window(), 7, GatherOrder::Sort);
+        let (image, frame) = (&mapped.image, &frame);
+        let whole =
+            WholeFrame { image, frame, tiles: &tiles, caches: &caches, pool: &pool, is_stopped: &|| false };
+        let along_curve = whole.render().unwrap();
+        let film = Mutex::new(settings.film(packed().sum_scale()).unwrap());
+        along_curve.tiles.iter().for_each(|tile| film.put(tile));
+        let film = film.into_inner().unwrap();
+        let Rendering { film: expected, statistics, .. } = render_or_panic(&scene, &settings);
+        assert!(film.sums().eq(expected.sums()), "{:?}", (irradiance_error, settings.picture.layers));
+        if irradiance_error.is_none() {
+            assert_eq!(along_curve.counters.gathers, statistics.gathers);
+        }
+    }
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn far_camera(direction: Vec3) -> Camera {
 }
 
 fn under_a_white_sky(scene: Scene) -> Scene {
-    Scene { environment: Some(Environment::constant(Vec3::ONE)), ..scene }
+    scene.with(|scene| scene.environment = Some(Environment::constant(Vec3::ONE)))
 }
 
 /// Horizontal plate, seen at the given cosine to its normal.
@@ -115,7 +115,7 @@ fn a_groove_of_glossy_metal_reflects_a_distant_light() {
             kind: PunctualKind::Directional { direction },
             intensity: Vec3::ONE,
         };
-        let lit = Scene { lights: vec![sun], ..groove(roughness, 2.0) };
+        let lit = groove(roughness, 2.0).with(|scene| scene.lights = vec![sun]);
         let many = settings().with(|s| s.photons.caustic_photons = Some(1_000_000));
         let found = mean(&radiances(&render_or_panic(&lit, &many).film));
         assert!((found / expected - 1.0).abs() < 0.03, "{roughness}: {found} of {expected}");

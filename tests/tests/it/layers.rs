@@ -237,7 +237,8 @@ fn a_caustic_below_a_coat_is_dimmed_by_the_coat() {
             kind: PunctualKind::Directional { direction: Vec3::NEG_Y },
             intensity: Vec3::ONE,
         };
-        let lit = Scene { lights: vec![sun], ..scene(triangles, vec![floor, glass(0.0, false)], view) };
+        let lit =
+            scene(triangles, vec![floor, glass(0.0, false)], view).with(|scene| scene.lights = vec![sun]);
         shown(&lit)
     };
     let bare = look(dielectric(0.5, 0.0, none()));

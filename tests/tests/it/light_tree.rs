@@ -198,7 +198,7 @@ fn samples_of_the_environment_have_its_stated_density() {
     let mut texels = vec![[0.1; 3]; 64 * 32];
     texels[5 * 64 + 7] = [500.0; 3];
     let environment = Some(Environment { width: 64, height: 32, texels, strength: 1.0 });
-    let scene = Scene { environment, lights: Vec::new(), ..hall(3) };
+    let scene = hall(3).with(|scene| (scene.environment, scene.lights) = (environment, Vec::new()));
     let packed = PackedScene::new(&scene).unwrap();
     let (image, mut memory) = packed.view();
     let share = image.header.lights.environment;

@@ -30,7 +30,7 @@ fn bare_floor(place: Vec3) -> Scene {
 
 fn lit_by(kind: PunctualKind, intensity: f32, place: Vec3) -> Scene {
     let light = PunctualLight { name: "light".into(), kind, intensity: Vec3::splat(intensity) };
-    Scene { lights: vec![light], ..bare_floor(place) }
+    bare_floor(place).with(|scene| scene.lights = vec![light])
 }
 
 /// Settings with `shadow_rays` and `gather_rays` per sample.
@@ -110,7 +110,7 @@ fn a_directional_light_lights_by_the_cosine_at_every_point() {
 #[test]
 fn a_floor_under_a_constant_environment_shows_its_albedo() {
     let environment = Some(Environment::constant(Vec3::splat(3.0)));
-    let scene = Scene { environment, ..bare_floor(Vec3::ZERO) };
+    let scene = bare_floor(Vec3::ZERO).with(|scene| scene.environment = environment);
     let expected = 3.0 * f64::from(ALBEDO);
     check(&scene, &settings(64, 0), expected, 0.01);
     // Without shadow rays gather rays carry this light, cosine-weighted: exactly.
@@ -133,7 +133,8 @@ fn the_eye_sees_the_environment() {
         Vec3::new((theta.sin() * phi.sin()) as f32, theta.cos() as f32, -(theta.sin() * phi.cos()) as f32);
     let view = Camera { vertical_fov: 0.001, ..camera(Vec3::Y, direction) };
     let environment = Some(sky());
-    let scene = Scene { environment, cameras: vec![view], ..bare_floor(Vec3::ZERO) };
+    let scene =
+        bare_floor(Vec3::ZERO).with(|scene| (scene.environment, scene.cameras) = (environment, vec![view]));
     let film = render_or_panic(&scene, &settings(1, 1)).film;
     for pixel in radiances(&film) {
         for (found, expected) in pixel.into_iter().zip([0.25, 0.5, 1.0]) {

@@ -180,16 +180,12 @@ fn counting_changes_no_picture() {
         GatherOrder::DirectionBins,
         GatherOrder::Hash,
         GatherOrder::Sort,
-        GatherOrder::Hilbert,
     ];
     for order in orders {
         for photon_layout in [PhotonLayout::Jensen, PhotonLayout::Lines] {
             for (card, text) in
                 [("emulated:2", SPLIT), ("emulated-micro:2", UNIFIED), ("emulated:2", UNIFIED)]
             {
-                if order == GatherOrder::Hilbert && card != "emulated:2" {
-                    continue;
-                }
                 let caches = Some(caches(text));
                 let cards = vec![card.parse().unwrap()];
                 let counted = settings().with(|s| {

@@ -7,7 +7,7 @@ use std::time::Duration;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::partial::PartialSettings;
 use photoncard_driver::render::{Aim, CardAddress, Ending, RenderSettings, Renderer, Rendering, Unobserved};
-use photoncard_driver::scene::FixedScene;
+use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_shared::message::Radiance;
 use photoncard_tests::everything::everything;
@@ -34,14 +34,14 @@ fn cards(text: &str) -> Vec<CardAddress> {
 /// Renders until the picture has `samples` samples, starting from `before` if given.
 fn pass(
     renderer: &mut Renderer,
-    scene: &FixedScene,
+    scene: &Scene,
     settings: &RenderSettings,
     (samples, before): (u32, Option<Rendering>),
 ) -> Rendering {
     let settings = settings.clone().with(|s| s.integrator.samples = samples);
     let result = match before {
         Some(Rendering { film, .. }) => renderer.refine(scene, &settings, Arc::new(film), &Unobserved),
-        None => renderer.render_fixed(scene, &settings, &Unobserved),
+        None => renderer.render(scene, &settings, &Unobserved),
     };
     let Ok(rendering) = result else { panic!("{}", result.err().unwrap()) };
     rendering
@@ -91,7 +91,6 @@ proptest! {
     #[test]
     fn passes_of_any_division_equal_one_render(technique in technique(), passes in passes()) {
         let scene = everything();
-        let scene = FixedScene::from(&scene);
         let mut renderer = Renderer::default();
         let mut picture = None;
         let mut samples = 0;
@@ -123,7 +122,6 @@ fn with_records() -> RenderSettings {
 #[test]
 fn records_are_gathered_once_while_camera_scene_settings_and_cards_stay() {
     let scene = everything();
-    let scene = FixedScene::from(&scene);
     for on in [
         "emulated:1",
         "emulated-large:1",
@@ -156,7 +154,6 @@ fn records_are_gathered_once_while_camera_scene_settings_and_cards_stay() {
 #[test]
 fn records_are_gathered_again_on_other_cards_and_for_another_camera() {
     let scene = everything();
-    let scene = FixedScene::from(&scene);
     let settings = with_records();
     let mut renderer = Renderer::default();
     let first = pass(&mut renderer, &scene, &settings, (1, None));
@@ -182,18 +179,6 @@ fn records_are_gathered_again_on_other_cards_and_for_another_camera() {
     }
     let at_once = render_or_panic(&everything(), &settings.with(|s| s.integrator.samples = 6)).film;
     assert!(picture.expect("a pass").film.sums().eq(at_once.sums()));
-}
-
-#[test]
-fn gathers_of_a_whole_frame_may_be_done_in_a_pass() {
-    let scene = everything();
-    let scene = FixedScene::from(&scene);
-    let along_curve = settings().with(|s| s.schedule.order = GatherOrder::Hilbert);
-    let mut renderer = Renderer::default();
-    let first = pass(&mut renderer, &scene, &settings(), (2, None));
-    let all = pass(&mut renderer, &scene, &along_curve, (3, Some(first)));
-    let expected = render_or_panic(&everything(), &settings().with(|s| s.integrator.samples = 3)).film;
-    assert!(all.film.sums().eq(expected.sums()));
 }
 
 #[test]
@@ -241,7 +226,6 @@ fn a_picture_with_kept_samples_continues_even_after_a_stop() {
 #[test]
 fn a_picture_is_refined_only_by_samples_of_equal_settings() {
     let scene = everything();
-    let scene = FixedScene::from(&scene);
     let mut renderer = Renderer::default();
     let two = settings().with(|s| s.integrator.samples = 2);
     let film = Arc::new(pass(&mut renderer, &scene, &two, (2, None)).film);
@@ -258,7 +242,6 @@ fn a_picture_is_refined_only_by_samples_of_equal_settings() {
 #[test]
 fn passes_until_an_aim_equal_a_render_of_their_samples() {
     let scene = everything();
-    let scene = FixedScene::from(&scene);
     for (aim, is_cached) in [
         (Aim { noise: Some(0.2), time: None }, false),
         (Aim { noise: None, time: Some(Duration::from_millis(1)) }, true),

@@ -13,7 +13,7 @@ use photoncard_driver::render::{
     CardAddress, CardSet, Integrator, MemoryUse, PatternTest, PhotonMaps, Picture, RenderSettings, Renderer,
     Unobserved, card_info, card_self_test,
 };
-use photoncard_driver::scene::{FixedScene, gltf};
+use photoncard_driver::scene::gltf;
 use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::Dram;
@@ -215,7 +215,7 @@ fn keeps_irradiance_records(name: &str, address: &CardAddress) {
     let mut renderer = Renderer::default();
     let first = remote.clone().with(|s| s.integrator.samples = 1);
     let first = renderer.render(&scene, &first, &Unobserved).unwrap_or_else(|error| panic!("{error}"));
-    let all = renderer.refine(&FixedScene::from(&scene), &remote, Arc::new(first.film), &Unobserved);
+    let all = renderer.refine(&scene, &remote, Arc::new(first.film), &Unobserved);
     let all = all.unwrap_or_else(|error| panic!("{error}"));
     assert!(all.film.sums().eq(expected.film.sums()), "{name}");
     let records = expected.statistics.records;

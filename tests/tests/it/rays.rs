@@ -118,7 +118,7 @@ fn brute_force(image: &SceneImage, memory: &mut Lines, ray: &Ray) -> Option<Hit>
 #[test]
 fn hits_on_every_processor_equal_those_of_brute_force() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell-glossy.gltf");
-    let cornell = gltf::load(path.as_ref()).expect("a shipped scene loads").triangles;
+    let cornell = gltf::load(path.as_ref()).expect("a shipped scene loads").triangles.clone();
     let cornell = cornell.into_iter().map(|triangle| Triangle { material: 0, ..triangle }).collect();
     let far = Vec3::new(1000.0, -3000.0, 0.1);
     let scenes = [

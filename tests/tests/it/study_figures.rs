@@ -6,8 +6,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use photoncard_driver::study::report::{Figure, human};
-use photoncard_driver::study::{Laboratory, StudyObserver, check};
+use photoncard_driver::study::{Figure, Laboratory, StudyObserver, check, human};
 use serde::Deserialize;
 
 /// Line of the CSV.

@@ -16,5 +16,5 @@ pub use loopback::{LoopbackPort, loopback};
 #[cfg(not(target_family = "wasm"))]
 pub use system::{
     HostPort, LinkError, ListedPort, ListenAddress, Listener, RemoteAddress, SerialLink, StreamPort,
-    connect_tcp, connect_unix, host_name, list_serial_ports, open_serial, tcp_address,
+    connect_tcp, connect_unix, host_name, list_serial_ports, open_serial,
 };

@@ -23,7 +23,6 @@ mod dealing;
 mod ending;
 mod entry;
 mod error;
-mod homes;
 #[cfg(test)]
 mod tests;
 mod tiles;
@@ -320,7 +319,7 @@ impl Scheduler {
 
     /// Gives up a card that sent wrong messages, or wrong pixels of tile `about`. Returns its tiles that no
     /// other card has confirmed, which the sinks must revoke. None of them may be in transit to the sinks.
-    pub fn expel(&mut self, card: CardNumber, about: Option<Tile>) -> Vec<Tile> {
+    pub(crate) fn expel(&mut self, card: CardNumber, about: Option<Tile>) -> Vec<Tile> {
         self.set_standing(card, Standing::GivenUp);
         self.cards[card].lie = about;
         self.cards[card].counters = Counters::ZERO;

@@ -17,9 +17,6 @@ pub enum GatherOrder {
     Hash,
     /// Rays by direction bins. Gathers wait in the queue, sorted along a Hilbert curve.
     Sort,
-    /// All gathers of the frame along one Hilbert curve. Only emulated chips support it, because the host
-    /// does the gathers.
-    Hilbert,
 }
 
 choices!(GatherOrder {
@@ -28,8 +25,6 @@ choices!(GatherOrder {
     DirectionBins = "dirbin": "Rays of one direction bin for all pixels of a tile, then of the next bin",
     Hash = "hash": "By direction bins; gathers wait and are sorted by a spatial hash of their positions",
     Sort = "sort": "By direction bins; gathers wait and are sorted along a Hilbert curve",
-    Hilbert = "hilbert":
-        "All gathers of the frame along a Hilbert curve, on emulated cards alone: the bound to compare with",
 });
 
 impl GatherOrder {
@@ -38,19 +33,13 @@ impl GatherOrder {
         match self {
             Self::Naive | Self::Tiled | Self::DirectionBins => Drain::Immediate,
             Self::Hash => Drain::Hash,
-            Self::Sort | Self::Hilbert => Drain::Sort,
+            Self::Sort => Drain::Sort,
         }
     }
 
     /// Returns whether gathers wait in a chip's queue.
     pub fn has_queue(self) -> bool {
         matches!(self, Self::Hash | Self::Sort)
-    }
-
-    /// Returns whether the gathers of the whole frame are sorted together. The host then does them, and all
-    /// tiles finish at the end.
-    pub fn is_of_whole_frame(self) -> bool {
-        self == Self::Hilbert
     }
 
     /// Returns whether rays are cast by direction bins.

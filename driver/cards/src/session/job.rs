@@ -1,4 +1,4 @@
-//! Input and output of a session: jobs, assignments and events.
+//! Input, output and states of a session: jobs, assignments, restarts and events.
 
 use std::sync::Arc;
 
@@ -27,6 +27,15 @@ pub struct Assignment {
     pub is_suspect: bool,
 }
 
+/// Reason to greet a card with a new session number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Restart {
+    /// The session begins, or the card has other work to do. Its tiles are dropped.
+    NewWork,
+    /// The card was reset or silent, or its link was closed. Its tiles are returned as events.
+    Lost,
+}
+
 /// Event that a session reports.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "most events are finished tiles, and few wait")]
@@ -46,4 +55,24 @@ pub enum Event {
     Computed(Vec<u8>),
     /// Progress or result of a memory test.
     MemoryTested(MemoryTest),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum State {
+    /// The hello is sent.
+    Greeting,
+    /// The card has answered the greeting, and has no job.
+    Ready,
+    /// Checksums of the card's chunks are requested.
+    Comparing,
+    /// Lines of the image are being sent.
+    Loading,
+    /// All lines are sent.
+    Accepting,
+    /// Parameters of the frame are sent.
+    Framing,
+    /// The card has image and frame, and accepts tiles.
+    Rendering,
+    /// A part of the self-test is requested.
+    Testing,
 }

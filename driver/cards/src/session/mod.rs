@@ -8,20 +8,16 @@
 mod channel;
 mod clock;
 mod error;
-mod failures;
 mod job;
-mod link_bytes;
-mod load;
 mod pixel_limits;
 mod replies;
 mod self_test;
-mod state;
 mod tiles;
 mod upload;
 
+pub use channel::LinkBytes;
 pub use error::SessionError;
-pub use job::{Assignment, Event, Job};
-pub use link_bytes::LinkBytes;
+pub use job::{Assignment, Event, Job, Restart};
 pub use pixel_limits::PixelLimits;
 pub use upload::Upload;
 pub use upload::changed_runs;
@@ -35,13 +31,12 @@ use photoncard_shared::message::{self, Command, MemoryUse, OPERAND_BYTES};
 use photoncard_shared::transport::Event as LineEvent;
 
 use self::channel::Channel;
-use self::clock::Clock;
+use self::clock::{Clock, Failures};
 use self::error::check_versions;
-use self::failures::Failures;
-use self::load::{Comparison, Load};
+use self::job::State;
 use self::self_test::Request;
-use self::state::State;
 use self::tiles::TilesInFlight;
+use self::upload::{Comparison, Load};
 
 /// Maximum number of tiles on a card, whatever its budget. More would be delayed if the card were lost.
 const MAX_CREDITS: u32 = 16;
@@ -98,7 +93,7 @@ impl Session {
             is_flushed: false,
             unheard_bytes: 0,
         };
-        session.greet_card();
+        session.restart(Restart::NewWork, now);
         session
     }
 
@@ -133,7 +128,7 @@ impl Session {
             (State::Greeting, _) => {}
             (State::Ready, _) => self.begin_load(),
             (State::Rendering, Some(before)) => self.go_on_from(&before.upload, now),
-            _ => self.greet_anew(now),
+            _ => self.restart(Restart::NewWork, now),
         }
     }
 
@@ -141,7 +136,9 @@ impl Session {
     /// frame.
     fn go_on_from(&mut self, held: &Upload, now: Duration) {
         let Some(job) = &self.job else { return };
-        let Some(runs) = job.upload.missing_from(held.checksum()) else { return self.greet_anew(now) };
+        let Some(runs) = job.upload.missing_from(held.checksum()) else {
+            return self.restart(Restart::NewWork, now);
+        };
         let is_held = job.upload.checksum() == held.checksum();
         self.channel.drop_commands();
         self.stale_replies = std::mem::take(&mut self.tiles).most_replies();
@@ -303,7 +300,10 @@ impl Session {
                     self.clock.heard(now);
                     self.unheard_bytes = bytes.len() as u64;
                 }
-                Some(LineEvent::Unknown) if self.clock.has_heard() => self.reset(now)?,
+                Some(LineEvent::Unknown) if self.clock.has_heard() => {
+                    self.count_reset()?;
+                    self.restart(Restart::Lost, now);
+                }
                 // The greeting was lost.
                 Some(LineEvent::Unknown) => self.channel.transport.send_again(),
             }
@@ -343,7 +343,9 @@ impl Session {
         }
         // A card that holds another host's session of equal number treats the hello as a repeated frame.
         if self.state == State::Greeting && self.clock.is_greeted_in_vain(now) {
-            return self.reset(now);
+            self.count_reset()?;
+            self.restart(Restart::Lost, now);
+            return Ok(());
         }
         if self.clock.must_ask(now) {
             self.channel.transport.probe();
@@ -373,40 +375,31 @@ impl Session {
         self.tiles.give_back(at_work, &mut self.events);
     }
 
-    /// Greets the card again with a new session number, after its link was closed or the card was silent. Its
-    /// tiles are returned.
-    pub fn greet_again(&mut self, now: Duration) {
-        self.left_suspect = self.tiles.is_at_suspect();
-        self.give_back();
-        self.channel.bytes.resets += 1;
-        self.greet_anew(now);
-    }
-
-    /// Greets the card with a new session number. The card drops its work.
-    fn greet_anew(&mut self, now: Duration) {
+    /// Greets the card with a new session number, by which it drops its work.
+    pub fn restart(&mut self, reason: Restart, now: Duration) {
+        if reason == Restart::Lost {
+            self.left_suspect = self.tiles.is_at_suspect();
+            self.give_back();
+            self.channel.bytes.resets += 1;
+        }
         self.tiles = TilesInFlight::default();
         self.clock = Clock::new(now);
-        self.greet_card();
+        self.unheard_bytes = 0;
+        self.state = State::Greeting;
+        self.stale_replies = 0;
+        self.channel.greet();
     }
 
-    /// Greets a card again that does not know the session, or that answers the greeting without a hello.
-    fn reset(&mut self, now: Duration) -> Result<(), SessionError> {
+    /// Counts the reset of a card that does not know the session, or that answers the greeting without a
+    /// hello.
+    fn count_reset(&mut self) -> Result<(), SessionError> {
         self.failures.forget_lines();
-        self.fail()?;
-        self.greet_again(now);
-        Ok(())
+        self.fail()
     }
 
     /// Counts a failure of the card, unless it was working on a tile at which cards have crashed before.
     fn fail(&mut self) -> Result<(), SessionError> {
         if self.tiles.is_at_suspect() { Ok(()) } else { self.failures.count() }
-    }
-
-    fn greet_card(&mut self) {
-        self.unheard_bytes = 0;
-        self.state = State::Greeting;
-        self.stale_replies = 0;
-        self.channel.greet();
     }
 
     fn send(&mut self, command: &Command) {

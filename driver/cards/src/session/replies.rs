@@ -4,8 +4,8 @@ use photoncard_shared::budget::Budget;
 use photoncard_shared::message::{Fault, FaultCode, Reply};
 
 use super::error::check_budget;
-use super::load::Comparison;
-use super::state::State;
+use super::job::State;
+use super::upload::Comparison;
 use super::{Event, Session, SessionError};
 
 impl Session {

@@ -78,7 +78,7 @@ impl Mean {
 mod tests {
     use glam::Vec2;
 
-    use photoncard_scene::{Encoding, Texture};
+    use photoncard_scene::{Encoding, SceneContents, Texture};
 
     use super::*;
 
@@ -94,12 +94,12 @@ mod tests {
         let image =
             Image { name: "spark".into(), width: side, height: side, texels, encoding: Encoding::Srgb };
         let corners = [Vec2::ZERO, Vec2::X, Vec2::ONE];
-        Scene {
+        Scene::from(SceneContents {
             attributes: vec![VertexAttributes { coordinates: [corners; 2], ..VertexAttributes::NONE }],
             textures: vec![Texture::new(0)],
             images: vec![image],
-            ..Scene::default()
-        }
+            ..SceneContents::default()
+        })
     }
 
     fn mean(scene: &Scene) -> f64 {

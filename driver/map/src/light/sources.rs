@@ -243,7 +243,7 @@ impl AllSources {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use photoncard_scene::{Environment, PunctualKind, PunctualLight};
+    use photoncard_scene::{Environment, PunctualKind, PunctualLight, SceneContents};
 
     #[test]
     fn sources_are_chosen_in_proportion_to_their_power() {
@@ -252,11 +252,11 @@ mod tests {
             kind: PunctualKind::Point { position: Vec3::ZERO },
             intensity: Vec3::splat(intensity),
         };
-        let scene = Scene {
+        let scene = Scene::from(SceneContents {
             lights: vec![light(1.0), light(3.0)],
             environment: Some(Environment::constant(Vec3::ZERO)),
-            ..Scene::default()
-        };
+            ..SceneContents::default()
+        });
         let sources = Sources::new(&scene, &Lights::new(&scene));
         assert!((sources.power / (16.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
         let at = |number: f64| sources.choose((number * 2.0_f64.powi(64)) as u64).expect("there are some");

@@ -356,7 +356,8 @@ mod tests {
             photoncard_scene::Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y].map(|v| v * 0.1 + Vec3::X * x), 0)
         };
         let triangles: Vec<_> = (0..100).map(|i| triangle(i as f32)).collect();
-        let scene = Scene { triangles, materials: vec![mirror], ..Scene::default() };
+        let scene =
+            Scene::default().with(|scene| (scene.triangles, scene.materials) = (triangles, vec![mirror]));
         let targets = Targets::specular(&scene);
         assert_eq!(targets.spheres.len(), MAX_SPHERES);
         assert!(targets.spheres.iter().all(|sphere| sphere.radius < 4.0));

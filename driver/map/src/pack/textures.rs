@@ -95,7 +95,7 @@ fn wrap(wrap: Wrap) -> layout::Wrap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use photoncard_scene::{Encoding, Texture};
+    use photoncard_scene::{Encoding, SceneContents, Texture};
 
     fn image(width: u32, height: u32) -> Image {
         let texels = (0..width * height).map(u32::to_le_bytes).collect();
@@ -106,7 +106,7 @@ mod tests {
     fn every_texel_is_at_the_position_that_its_texture_computes() {
         let images = vec![image(13, 6), image(1, 1), image(8, 4), image(3, 70)];
         let textures = [0, 3, 1, 2, 3].map(Texture::new).to_vec();
-        let scene = Scene { images, textures, ..Scene::default() };
+        let scene = Scene::from(SceneContents { images, textures, ..SceneContents::default() });
         let lines: Vec<Line> = lines(&scene, None).collect();
         for (texture, record) in scene.textures.iter().zip(records(&scene, None).expect("few")) {
             let Image { width, height, texels, .. } = &scene.images[texture.image as usize];

@@ -100,7 +100,7 @@ mod tests {
     use glam::Vec3;
     use photoncard_firmware::kind::REFERENCE;
 
-    use photoncard_scene::{Encoding, Image, Material, Reflection, Scene, Texture, Triangle};
+    use photoncard_scene::{Encoding, Image, Material, Reflection, Scene, SceneContents, Texture, Triangle};
 
     use super::*;
     use crate::photon_map::map_photons;
@@ -111,13 +111,13 @@ mod tests {
         let image =
             Image { name: "noise".into(), width: side, height: side, texels, encoding: Encoding::Srgb };
         let black = Reflection::Phong { diffuse: Vec3::ZERO, specular: Vec3::ZERO, exponent: 0.0 };
-        let scene = Scene {
+        let scene = Scene::from(SceneContents {
             triangles: vec![Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y], 0)],
             materials: vec![Material::new("black", black)],
             images: vec![image],
             textures: vec![Texture::new(0)],
-            ..Scene::default()
-        };
+            ..SceneContents::default()
+        });
         PackedScene::new(&scene).expect("it is small")
     }
 

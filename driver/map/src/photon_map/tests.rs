@@ -11,7 +11,7 @@ fn shipped(name: &str) -> Scene {
 
 /// The house under a uniform sky.
 fn house() -> Scene {
-    Scene { environment: Some(Environment::constant(Vec3::ONE)), ..shipped("house.glb") }
+    shipped("house.glb").with(|scene| scene.environment = Some(Environment::constant(Vec3::ONE)))
 }
 
 /// Settings of small maps, for the camera of a scene or for any camera.

@@ -99,7 +99,7 @@ impl Prediction {
     }
 
     /// Tiles per second of one chip: the lower of its two rates.
-    pub fn tiles_per_second(&self) -> f64 {
+    pub(crate) fn tiles_per_second(&self) -> f64 {
         self.bandwidth_tiles_per_second.min(self.computation_tiles_per_second)
     }
 

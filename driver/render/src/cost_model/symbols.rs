@@ -114,7 +114,7 @@ impl Symbols {
     };
 
     /// `R_FG = 1 - R_IC`: fraction of the pixels with a final gather.
-    pub fn gathering_share(&self) -> f64 {
+    pub(crate) fn gathering_share(&self) -> f64 {
         1.0 - self.interpolated_share
     }
 

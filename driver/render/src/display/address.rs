@@ -1,12 +1,12 @@
-//! Address of a display server, the argument of `--display-server`.
+//! Address of a display server, the argument of `--display-server`, and errors of the server.
 
-use std::fmt;
 use std::str::FromStr;
+use std::{fmt, io};
 
 use photoncard_cards::link::host_name;
 
 /// Default port of tev.
-pub const DEFAULT_PORT: u16 = 14158;
+const DEFAULT_PORT: u16 = 14158;
 
 /// Address of a display server in the form `HOST:PORT`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -44,6 +44,38 @@ impl FromStr for DisplayAddress {
         };
         Ok(Self { host: host_name(host)?, port })
     }
+}
+
+/// Error that prevents a picture, or a part of it, from being shown. The render continues.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DisplayError {
+    /// The server cannot be reached.
+    #[error(
+        "cannot reach the display server at {address}: {source}; start tev there, or leave --display-server out"
+    )]
+    Connect {
+        /// Address of the server.
+        address: DisplayAddress,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+    /// The connection has ended.
+    #[error("the display server at {address} is gone: {source}")]
+    Gone {
+        /// Address of the server.
+        address: DisplayAddress,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+    /// The server did not take all packets in time.
+    #[error("the display server at {address} takes no more: {packets} packets of the picture are not shown")]
+    Slow {
+        /// Number of packets that the server did not take.
+        address: DisplayAddress,
+        /// Packets that the server has not taken.
+        packets: usize,
+    },
 }
 
 #[cfg(test)]

@@ -2,18 +2,16 @@
 //! as they are finished.
 //!
 //! The protocol is that of tev, a viewer for pictures of high dynamic range (<https://github.com/Tom94/tev>),
-//! which other renderers support too. [`packet`] creates its packets, [`Display`] sends them. The server
+//! which other renderers support too. `packet` creates its packets, [`Display`] sends them. The server
 //! never answers. A server that cannot be reached, disconnects or is slow is reported once. It neither stops
 //! a render nor delays its tiles.
 
 mod address;
-mod error;
-pub mod packet;
+mod packet;
 mod queue;
 mod sender;
 #[cfg(test)]
 mod tests;
 
-pub use address::{DEFAULT_PORT, DisplayAddress};
-pub use error::DisplayError;
+pub use address::{DisplayAddress, DisplayError};
 pub use sender::{Display, DisplaySettings};

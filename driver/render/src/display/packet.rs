@@ -18,12 +18,12 @@ use photoncard_picture::printable::printable;
 use photoncard_shared::message::Tile;
 
 /// Operation that creates an image, or replaces the image with the same name.
-pub const CREATE_IMAGE: u8 = 4;
+pub(crate) const CREATE_IMAGE: u8 = 4;
 /// Operation that replaces the values of a rectangle in some channels.
-pub const UPDATE_IMAGE: u8 = 6;
+pub(crate) const UPDATE_IMAGE: u8 = 6;
 
 /// Creates a packet that creates a black image of `width` x `height` pixels and gives it the viewer's focus.
-pub fn create_image(image: &str, [width, height]: [u32; 2], channels: &[&str]) -> Vec<u8> {
+pub(crate) fn create_image(image: &str, [width, height]: [u32; 2], channels: &[&str]) -> Vec<u8> {
     let mut packet = Packet::new(CREATE_IMAGE, true, image);
     packet.numbers([width, height]);
     packet.names(channels);
@@ -32,7 +32,7 @@ pub fn create_image(image: &str, [width, height]: [u32; 2], channels: &[&str]) -
 
 /// Creates a packet that replaces a rectangle of an image. `values` are the channels of each pixel in turn,
 /// row by row.
-pub fn update_image(
+pub(crate) fn update_image(
     image: &str,
     rectangle: &Tile,
     channels: &[&str],

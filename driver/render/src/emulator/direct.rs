@@ -1,5 +1,4 @@
-//! Chips without cards and links: renders tiles straight from a card image, for studies and for whole-frame
-//! reordering.
+//! Chips without cards and links: renders tiles straight from a card image, for studies.
 
 use photoncard_firmware::chip::{Chip, FinishedPixel, PixelView, Progress};
 use photoncard_firmware::fixed_point::ColourSum;
@@ -112,7 +111,10 @@ pub fn render_tiles_in_flight(
 }
 
 /// [`render_tile`] of an image, in memory that is modelled if there are `caches`.
-pub(super) fn render_tile_of(
+///
+/// # Errors
+/// As [`render_tile`].
+pub fn render_tile_of(
     chip: &mut EmulatedChip,
     image: &CardImage,
     caches: Option<&CacheSettings>,

@@ -19,7 +19,7 @@ use super::memory_model::{MeasuredMemory, MemoryTraffic};
 
 /// The host's card image; empty before [`Self::give`].
 #[derive(Clone, Default)]
-pub struct SharedImage(Arc<OnceLock<Given>>);
+pub(crate) struct SharedImage(Arc<OnceLock<Given>>);
 
 /// An image, and its checksum if that is already known.
 struct Given {
@@ -30,7 +30,7 @@ struct Given {
 impl SharedImage {
     /// Shares the image with the cards. Later calls have no effect. Cards that hold the image need not
     /// compute a known checksum again.
-    pub fn give(&self, image: Arc<CardImage>, checksum: Option<u64>) {
+    pub(crate) fn give(&self, image: Arc<CardImage>, checksum: Option<u64>) {
         // Cards that receive another image store it themselves.
         let _ = self.0.set(Given { image, checksum });
     }

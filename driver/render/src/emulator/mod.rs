@@ -10,7 +10,6 @@ pub mod memory_model;
 mod tile_lines;
 pub mod trace;
 mod traced;
-pub mod whole_frame;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -29,11 +28,11 @@ use photoncard_shared::link::Port;
 use photoncard_shared::transport::WINDOW;
 
 use self::dram::EmulatedDram;
-pub use self::dram::SharedImage;
+pub(crate) use self::dram::SharedImage;
 pub use self::emulated::{Emulated, EmulatedChip};
 pub use self::measured::Measured;
 use self::memory_model::{CacheSettings, CacheSpec, MeasuredMemory, MemoryTraffic};
-pub use self::tile_lines::TileLines;
+pub(crate) use self::tile_lines::TileLines;
 use self::tile_lines::TileMeter;
 use self::trace::TraceFile;
 use self::traced::Traced;
@@ -132,23 +131,23 @@ const LINK_CAPACITY: usize = 64 << 10;
 const WOKEN_AT: usize = WINDOW * MAX_FRAME / 3;
 
 /// Model of an emulated card's memory.
-pub struct MemoryModel {
+pub(crate) struct MemoryModel {
     /// Caches between chip and DRAM.
-    pub caches: CacheSettings,
+    pub(crate) caches: CacheSettings,
     /// File to which the chip's reads are written, if any.
-    pub trace: Option<TraceFile>,
+    pub(crate) trace: Option<TraceFile>,
 }
 
 /// Record of a modelled memory, made when its card ends.
-pub struct MemoryRecord {
+pub(crate) struct MemoryRecord {
     /// Traffic during the card's whole life.
-    pub traffic: MemoryTraffic,
+    pub(crate) traffic: MemoryTraffic,
     /// Unfinished trace of the reads.
-    pub trace: Option<TraceFile>,
+    pub(crate) trace: Option<TraceFile>,
 }
 
 /// A running emulated card. Its thread ends when the port is dropped.
-pub struct EmulatedCard {
+pub(crate) struct EmulatedCard {
     thread: Option<JoinHandle<Option<MemoryRecord>>>,
     port: Option<LoopbackPort>,
     trace_has_failed: Option<Arc<AtomicBool>>,
@@ -163,7 +162,7 @@ impl EmulatedCard {
     ///
     /// # Errors
     /// If the card's thread cannot be started.
-    pub fn start(
+    pub(crate) fn start(
         kind: EmulatedKind,
         model: Option<MemoryModel>,
         shared: SharedImage,
@@ -185,7 +184,7 @@ impl EmulatedCard {
 
     /// Takes the empty memory of a card into which nothing was loaded, so that an image can be given to it by
     /// reference; `None` from the second call on, and for a modelled memory.
-    pub fn take_empty_memory(&mut self) -> Option<SharedImage> {
+    pub(crate) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         self.held.take()
     }
 
@@ -193,17 +192,17 @@ impl EmulatedCard {
     ///
     /// # Panics
     /// Never: the port exists until the card is dropped.
-    pub fn port(&mut self) -> &mut LoopbackPort {
+    pub(crate) fn port(&mut self) -> &mut LoopbackPort {
         self.port.as_mut().expect("the port lives as long as the card")
     }
 
     /// Returns whether writing the trace failed.
-    pub fn trace_has_failed(&self) -> bool {
+    pub(crate) fn trace_has_failed(&self) -> bool {
         self.trace_has_failed.as_ref().is_some_and(|failed| failed.load(Ordering::Relaxed))
     }
 
     /// Number of DRAM lines read for each tile that the card has rendered, if its memory is modelled.
-    pub fn tile_lines(&self) -> &TileLines {
+    pub(crate) fn tile_lines(&self) -> &TileLines {
         &self.tile_lines
     }
 
@@ -211,7 +210,7 @@ impl EmulatedCard {
     ///
     /// # Panics
     /// If the chip panicked.
-    pub fn finish(mut self) -> Option<MemoryRecord> {
+    pub(crate) fn finish(mut self) -> Option<MemoryRecord> {
         drop(self.port.take());
         let record = self.thread.take()?.join();
         record.unwrap_or_else(|panic| std::panic::resume_unwind(panic))

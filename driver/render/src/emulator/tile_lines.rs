@@ -14,7 +14,7 @@ use super::trace::TraceFile;
 
 /// Number of DRAM lines by tile, for the tiles that a card has rendered.
 #[derive(Clone, Debug, Default)]
-pub struct TileLines(Arc<Mutex<HashMap<u32, u64>>>);
+pub(crate) struct TileLines(Arc<Mutex<HashMap<u32, u64>>>);
 
 impl TileLines {
     fn note(&self, tile: u32, lines: u64) {
@@ -23,7 +23,7 @@ impl TileLines {
 
     /// Takes the number of lines of a tile that the card has rendered; `None` if its memory is not modelled.
     /// If several tiles are in flight, a tile counts the lines since the previous one ended.
-    pub fn take(&self, tile: u32) -> Option<u64> {
+    pub(crate) fn take(&self, tile: u32) -> Option<u64> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).remove(&tile)
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use photoncard_map::pack::CardImage;
 use photoncard_map::photon_map::PhotonsFor;
-use photoncard_scene::{Camera, FixedScene};
+use photoncard_scene::{Camera, Scene};
 use photoncard_shared::address::Line;
 use photoncard_shared::checksum::Checksum;
 use photoncard_shared::message::CausticGather;
@@ -14,8 +14,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use super::scene::{PreparedScene, View, is_camera};
-use crate::preparation::Prepared;
 use crate::renderer::Kept;
+use crate::work::Prepared;
 use crate::{Integrator, PROGRAM, PhotonMaps, RenderSettings};
 
 /// Head of the file.
@@ -94,13 +94,13 @@ impl Head {
         }
         let settings = RenderSettings { photons, integrator, ..RenderSettings::default() };
         let prepared = Prepared { image: Arc::new(image), max_distance, caustics, paths, guiding: None };
+        let scene = Scene::of_cameras(cameras, offset.into(), self.scene, self.is_specular);
         let kept = Kept {
-            scene: self.scene[1].clone(),
-            photons: settings.photon_settings_if(self.is_specular),
+            scene: scene.checksum_without_cameras().to_owned(),
+            photons: settings.photon_settings(&scene),
             prepared,
         };
         let RenderSettings { photons, integrator, .. } = settings;
-        let scene = FixedScene::of_cameras(cameras, offset.into(), self.scene, self.is_specular);
         Ok(PreparedScene { scene, photons, integrator, kept, frames, notes })
     }
 }

@@ -11,12 +11,11 @@
 //!
 //! The lines are read into memory and checked there, so that later changes of the file have no effect.
 
-mod error;
 mod file;
 mod head;
 mod scene;
 #[cfg(test)]
 mod tests;
 
-pub use self::error::PreparedError;
+pub use self::file::PreparedError;
 pub use self::scene::PreparedScene;

@@ -6,19 +6,18 @@ use glam::Vec3;
 use photoncard_map::pack::PackedScene;
 use photoncard_map::photon_map::PhotonsFor;
 use photoncard_picture::choice::Choice;
-use photoncard_scene::{Camera, FixedScene};
+use photoncard_scene::{Camera, Scene};
 use photoncard_shared::budget::Budget;
 use serde_json::{Map, Value};
 
-use crate::executor::BudgetCheck;
 use crate::renderer::{Chosen, Kept, Renderer, Source};
-use crate::times::Times;
+use crate::work::{BudgetCheck, Times};
 use crate::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
 
 /// A scene with its photon map, as a card image, and the settings that the image depends on.
 pub struct PreparedScene {
     /// Cameras of the scene, and known properties of the rest.
-    pub(super) scene: FixedScene<'static>,
+    pub(super) scene: Scene,
     pub(super) photons: PhotonMaps,
     pub(super) integrator: Integrator,
     pub(super) kept: Kept,
@@ -40,7 +39,7 @@ impl PreparedScene {
     /// # Errors
     /// As [`Renderer::render_chosen`].
     pub fn new(
-        scene: &FixedScene,
+        scene: &Scene,
         settings: &RenderSettings,
         budgets: &[Budget],
         choose: &dyn Fn(&PackedScene) -> Chosen,
@@ -58,7 +57,7 @@ impl PreparedScene {
         let fit = &mut |check: BudgetCheck| budgets.iter().try_for_each(check);
         let kept = source.prepare(scene, &settings, fit, &mut times, observer)?;
         let RenderSettings { photons, integrator, .. } = settings;
-        let scene = FixedScene::of_cameras(
+        let scene = Scene::of_cameras(
             scene.cameras.clone(),
             scene.offset,
             [scene.checksum(), scene.checksum_without_cameras()].map(str::to_owned),
@@ -69,7 +68,7 @@ impl PreparedScene {
 
     /// Adds a frame with the cameras of `scene`. Returns false, and adds no frame, if anything but the
     /// cameras differs from the prepared scene.
-    pub fn add_frame(&mut self, number: u32, scene: &FixedScene) -> bool {
+    pub fn add_frame(&mut self, number: u32, scene: &Scene) -> bool {
         let is_same = scene.checksum_without_cameras() == self.scene.checksum_without_cameras();
         if is_same {
             let view = View { cameras: scene.cameras.clone(), checksum: scene.checksum().to_owned() };
@@ -84,15 +83,15 @@ impl PreparedScene {
     }
 
     /// Cameras of a frame, like [`Self::scene`]; `None` if there is no such frame.
-    pub fn frame(&self, number: u32) -> Option<FixedScene<'static>> {
+    pub fn frame(&self, number: u32) -> Option<Scene> {
         let View { cameras, checksum } = self.frames.get(&number)?;
         let checksums = [checksum, self.scene.checksum_without_cameras()].map(str::to_owned);
         let offset = self.scene.offset;
-        Some(FixedScene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
+        Some(Scene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
     }
 
     /// Cameras of the scene, without its other contents.
-    pub fn scene(&self) -> &FixedScene<'static> {
+    pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
@@ -113,7 +112,7 @@ impl PreparedScene {
         RenderSettings { photons, integrator, ..settings }
     }
 
-    /// Creates a renderer that has the card image. [`Renderer::render_fixed`] renders [`Self::scene`] and
+    /// Creates a renderer that has the card image. [`Renderer::render`] renders [`Self::scene`] and
     /// [`Self::frame`] with it, with settings from [`Self::settings`].
     pub fn renderer(&self) -> Renderer {
         Renderer::with_image(self.kept.clone())

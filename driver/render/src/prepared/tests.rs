@@ -6,8 +6,7 @@ use photoncard_firmware::sampler::hash;
 use photoncard_map::pack::PackedScene;
 use photoncard_picture::film::Film;
 use photoncard_picture::heading::Heading;
-use photoncard_scene::Scene;
-use photoncard_scene::gltf;
+use photoncard_scene::{Scene, gltf};
 use serde_json::{Value, json};
 
 use super::file::KIND;
@@ -33,8 +32,7 @@ fn prepared(folder: &Path) -> PathBuf {
     let choose = |_: &PackedScene| Ok((photons.clone(), integrator.clone()));
     let notes = json!({ "name": "cornell" }).as_object().unwrap().clone();
     let (scene, other) = (scene(), RenderSettings::default());
-    let prepared =
-        PreparedScene::new(&(&scene).into(), &other, &[REFERENCE], &choose, notes, &Unobserved).unwrap();
+    let prepared = PreparedScene::new(&scene, &other, &[REFERENCE], &choose, notes, &Unobserved).unwrap();
     let path = folder.join("scene.card");
     prepared.write(&path).unwrap();
     path
@@ -56,7 +54,7 @@ fn a_prepared_scene_gives_the_same_pictures_as_its_scene() {
     for at in [None, Some([0.3, 0.4, 3.0])] {
         let settings = own.clone().with(|settings| settings.picture.camera_at = at);
         let expected = render(&scene(), &settings, &Unobserved).unwrap();
-        let found = renderer.render_fixed(cameras, &settings, &Unobserved).unwrap();
+        let found = renderer.render(cameras, &settings, &Unobserved).unwrap();
         assert_eq!(sums(&found.film), sums(&expected.film));
         let [found, expected] = [found, expected].map(|rendering| rendering.statistics);
         assert_eq!(found.provenance.pixels, expected.provenance.pixels);
@@ -80,7 +78,7 @@ fn later_changes_of_the_file_change_no_picture() {
         // Writes into the file that is open, as `rsync --inplace` does.
         fs::write(&path, later).unwrap();
         let own = prepared.settings(settings());
-        let found = prepared.renderer().render_fixed(prepared.scene(), &own, &Unobserved).unwrap();
+        let found = prepared.renderer().render(prepared.scene(), &own, &Unobserved).unwrap();
         assert!(sums(&found.film) == expected, "{name}");
     }
 }
@@ -95,13 +93,13 @@ fn a_prepared_scene_gives_the_same_frames_as_its_scene() {
     moved.cameras[0].origin.x += 0.25;
     let mut other = moved.clone();
     other.triangles.pop();
-    assert!(of_rest.add_frame(7, &(&moved).into()) && !of_rest.add_frame(8, &(&other).into()));
+    assert!(of_rest.add_frame(7, &moved) && !of_rest.add_frame(8, &other));
     of_rest.write(&path).unwrap();
     let prepared = PreparedScene::open(&path).unwrap();
     assert_eq!(prepared.frames().collect::<Vec<_>>(), [7]);
     assert!(prepared.frame(8).is_none());
     let (found, expected) = (prepared.frame(7).unwrap(), moved);
-    let found = prepared.renderer().render_fixed(&found, &settings(), &Unobserved).unwrap();
+    let found = prepared.renderer().render(&found, &settings(), &Unobserved).unwrap();
     let expected = render(&expected, &settings(), &Unobserved).unwrap();
     assert_eq!(sums(&found.film), sums(&expected.film));
     assert_eq!(found.statistics.provenance.pixels, expected.statistics.provenance.pixels);

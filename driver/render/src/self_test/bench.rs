@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use photoncard_cards::session::{Event, Session};
 use photoncard_shared::link::Port;
 
-use crate::exchange::exchange;
 use crate::greeting::GreetingError;
+use crate::open_card::exchange;
 use crate::{CardError, Observer};
 
 /// A card under test.

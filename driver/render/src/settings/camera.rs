@@ -105,7 +105,7 @@ mod tests {
             vertical_fov: 1.0,
             aspect: Some(1.5),
         };
-        Scene { cameras: vec![camera], ..Scene::default() }
+        Scene::default().with(|scene| scene.cameras = vec![camera])
     }
 
     fn camera(change: impl FnOnce(&mut Picture)) -> Result<Camera, RenderError> {

@@ -34,15 +34,14 @@ impl RenderSettings {
         check_chips(self.cards.addresses.iter().map(CardAddress::emulated_chips).sum())?;
         self.check_trace()?;
         self.check_memory_model()?;
-        self.check_verification()?;
-        self.check_resume()
+        self.check_verification()
     }
 
     /// Checks the settings against the budget of each card.
     ///
     /// # Errors
     /// As [`Self::check_budget`].
-    pub fn check_budgets(&self, budgets: &[Budget]) -> Result<(), RenderError> {
+    pub(crate) fn check_budgets(&self, budgets: &[Budget]) -> Result<(), RenderError> {
         budgets.iter().try_for_each(|budget| self.check_budget(budget))
     }
 
@@ -154,12 +153,6 @@ impl RenderSettings {
                 "leave --trace-labels out, or use --trace-format dinero",
             );
         }
-        if self.schedule.order.is_of_whole_frame() {
-            return refuse(
-                "with --order hilbert no one chip reads the photon map",
-                "use another --order, such as sort",
-            );
-        }
         if !is_one_emulated_chip(&self.cards.addresses) {
             let one_chip: Vec<_> =
                 EmulatedKind::ALL.iter().map(|kind| format!("--card {}:1", kind.name())).collect();
@@ -185,24 +178,6 @@ impl RenderSettings {
                 remedy: "use --card emulated:CHIPS, or leave --counters and --cache out".into(),
             }),
         }
-    }
-
-    /// Checks that a render can be resumed, if requested. An order of the whole frame completes all tiles at
-    /// the end, so that there are none to resume from.
-    ///
-    /// # Errors
-    /// If a render in such an order is to be resumed.
-    fn check_resume(&self) -> Result<(), RenderError> {
-        let resumes = self.outputs.partial.as_ref().is_some_and(|partial| partial.resume);
-        if !(resumes && self.schedule.order.is_of_whole_frame()) {
-            return Ok(());
-        }
-        Err(RenderError::Setting {
-            option: "--resume",
-            value: "with --order hilbert".into(),
-            reason: "that order completes all tiles at the end, and keeps none".into(),
-            remedy: "use another --order, the picture is the same; or leave --resume out".into(),
-        })
     }
 }
 

@@ -4,7 +4,7 @@
 //! The lists destructure the groups field by field, so that no new field can be forgotten.
 
 use photoncard_picture::choice::Choice;
-use photoncard_scene::{FixedScene, Scene};
+use photoncard_scene::Scene;
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde_json::{Map, Value, json};
 
@@ -122,21 +122,11 @@ impl RenderSettings {
 
     /// Everything that the pixels of a scene depend on: program, scene and settings.
     pub fn identity(&self, scene: &Scene) -> NamedSettings {
-        self.identity_of(&scene.into())
-    }
-
-    /// Does [`Self::identity`] for a scene that does not change between pictures.
-    pub fn identity_of(&self, scene: &FixedScene) -> NamedSettings {
-        self.resolved_if(scene.is_specular()).identity_with(scene.checksum())
-    }
-
-    /// Does [`Self::identity`] for [resolved](Self::resolved) settings and a scene with this checksum.
-    pub fn identity_with(&self, checksum: &str) -> NamedSettings {
-        let mut identity = self.of_pixels();
+        let mut identity = self.resolved(scene).of_pixels();
         identity.extend(named([
             ("program", json!(PROGRAM)),
             ("layout", json!(LAYOUT_VERSION)),
-            ("scene-checksum", json!(checksum)),
+            ("scene-checksum", json!(scene.checksum())),
         ]));
         identity
     }

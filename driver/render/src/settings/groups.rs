@@ -249,8 +249,7 @@ impl Default for CardSet {
 /// Destinations of finished tiles besides the film. No pixel depends on them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TileOutputs {
-    /// File in which finished tiles are kept until the picture is written; `None` to keep none. It is not
-    /// possible with the order [`Hilbert`](GatherOrder::Hilbert), which finishes all tiles at the end.
+    /// File in which finished tiles are kept until the picture is written; `None` to keep none.
     pub partial: Option<PartialSettings>,
     /// Viewer that shows tiles as soon as they are finished; `None` for no viewer.
     pub display: Option<DisplaySettings>,

@@ -18,7 +18,7 @@ use photoncard_cards::scheduler::tiles;
 use photoncard_map::photon_map::{PhotonSettings, PhotonsFor};
 use photoncard_picture::film::{Film, FilmError, Window};
 use photoncard_picture::sums::SumFormat;
-use photoncard_scene::{Camera, FixedScene, Scene};
+use photoncard_scene::{Camera, Scene};
 
 /// Settings of a render, in groups. Each field is an option of the command line.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -110,11 +110,10 @@ impl RenderSettings {
         self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| self.cards.own_caches()))
     }
 
-    /// Number of photons in the caustic map; 0 for no map. It depends on whether the scene has specular
-    /// surfaces.
-    fn caustic_photons(&self, is_specular: bool) -> usize {
+    /// Number of photons in the caustic map; 0 for no map, as in a scene without specular surfaces.
+    fn caustic_photons(&self, scene: &Scene) -> usize {
         let asked = self.photons.caustic_photons.unwrap_or(DEFAULT_CAUSTIC_PHOTONS);
-        if is_specular { asked } else { 0 }
+        if scene.is_specular() { asked } else { 0 }
     }
 
     /// Canonical settings, equal for all settings that give this scene equal pixels. The number of caustic
@@ -122,12 +121,7 @@ impl RenderSettings {
     /// caustic map, the number of its neighbours is the default.
     #[must_use]
     pub fn resolved(&self, scene: &Scene) -> Self {
-        self.resolved_if(scene.is_specular())
-    }
-
-    /// Does [`Self::resolved`]. `is_specular` states whether the scene has specular surfaces.
-    pub(super) fn resolved_if(&self, is_specular: bool) -> Self {
-        let caustic_photons = self.caustic_photons(is_specular);
+        let caustic_photons = self.caustic_photons(scene);
         self.clone().with(|settings| {
             settings.photons.caustic_photons = Some(caustic_photons);
             settings.photons.photons_for = settings.photons.photons_for.resolved();
@@ -137,27 +131,16 @@ impl RenderSettings {
         })
     }
 
-    /// Parameters of the photon maps of a scene.
+    /// Parameters of the photon maps of a scene. If the scene lacks the camera of the settings, the
+    /// parameters name no camera.
     pub fn photon_settings(&self, scene: &Scene) -> PhotonSettings {
-        self.photon_settings_of(&scene.into())
-    }
-
-    /// Parameters of the photon maps of a scene that does not change between pictures. If the scene lacks
-    /// the camera of the settings, the parameters name no camera.
-    pub(super) fn photon_settings_of(&self, scene: &FixedScene) -> PhotonSettings {
         let camera = match self.photons.photons_for {
             PhotonsFor::Scene | PhotonsFor::Auto => None,
             PhotonsFor::Camera => self.camera(scene).ok().map(|camera| self.pinhole(&camera)),
         };
-        PhotonSettings { camera, ..self.photon_settings_if(scene.is_specular()) }
-    }
-
-    /// Parameters of photon maps without a camera. `is_specular` states whether the scene has specular
-    /// surfaces.
-    pub(super) fn photon_settings_if(&self, is_specular: bool) -> PhotonSettings {
         PhotonSettings {
-            camera: None,
-            caustic_photons: self.caustic_photons(is_specular),
+            camera,
+            caustic_photons: self.caustic_photons(scene),
             caustic_neighbors: self.photons.caustic_neighbors,
             seed: self.integrator.seed,
             photons: self.photons.count,
@@ -261,7 +244,7 @@ mod tests {
         let seen_from = |origin: Vec3| {
             let name = "camera".to_owned();
             let camera = Camera { name, origin, right, up, forward, vertical_fov: 1.0, aspect: None };
-            Scene { cameras: vec![camera], ..Scene::default() }
+            Scene::default().with(|scene| scene.cameras = vec![camera])
         };
         for (photons_for, is_of_camera) in [(PhotonsFor::Scene, false), (PhotonsFor::Camera, true)] {
             let settings = RenderSettings::default().with(|s| s.photons.photons_for = photons_for);

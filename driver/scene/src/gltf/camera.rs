@@ -46,7 +46,8 @@ impl<'a> CameraPlacer<'a> {
         let name = self.name(index, node);
         let (Checked::Valid(Type::Perspective), Some(perspective)) = (source.type_, &source.perspective)
         else {
-            scene.orthographic.push((scene.cameras.len(), name.clone()));
+            let before = scene.cameras.len();
+            scene.orthographic.push((before, name.clone()));
             notices.orthographic.push(name);
             return Ok(());
         };

@@ -12,7 +12,8 @@ use super::specular_glossiness::{Conversion, Grid};
 use super::uri::{decode_data, is_data, locate};
 use crate::error::SceneError;
 use crate::raster::{Deep, Fault, Kind};
-use crate::{Encoding, Image, MAX_TEXELS};
+use crate::texture::MAX_TEXELS;
+use crate::{Encoding, Image};
 
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
 const CONVERT: &str = "convert the image to PNG, JPEG or WebP";

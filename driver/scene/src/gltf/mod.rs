@@ -85,7 +85,7 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 
 /// Loads the default scene of a glTF file, or its first.
 ///
-/// [`Scene::notices`] names the features of the file that are not rendered.
+/// [`Scene::notices`](crate::SceneContents::notices) names the features of the file that are not rendered.
 ///
 /// # Errors
 /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory,

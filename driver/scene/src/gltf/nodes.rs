@@ -72,7 +72,7 @@ pub(super) fn cameras(
             placer.place(camera.value(), index, &world, &mut scene, &mut notices)?;
         }
     }
-    Ok(scene.cameras)
+    Ok(std::mem::take(&mut scene.cameras))
 }
 
 struct Placer<'a> {

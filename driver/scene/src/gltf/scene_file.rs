@@ -18,20 +18,19 @@ use super::settings::LoadSettings;
 use super::texture::Textures;
 use super::{camera, material, nodes, solid_glass, touching_glass, variants};
 use crate::error::SceneError;
-use crate::{Camera, LightUnits, Scene};
+use crate::{Camera, LightUnits, Scene, SceneContents};
 
 /// Open glTF file. Materials and images are read once, geometry for each moment.
 ///
 /// ```
 /// # use std::path::Path;
-/// use photoncard_scene::FixedScene;
 /// use photoncard_scene::gltf::{LoadSettings, Moment, SceneFile};
 /// # fn main() -> Result<(), photoncard_scene::error::SceneError> {
 /// let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/cornell-moving.glb");
 /// let file = SceneFile::open(&path, &LoadSettings::default())?;
 /// let pan = Moment { animations: vec!["pan".into()], seconds: 0.5 };
 /// assert!(file.only_cameras_move(&pan.animations)?);
-/// let mut scene = FixedScene::from(file.at_rest()?);
+/// let mut scene = file.at_rest()?;
 /// scene.set_cameras(file.cameras_at(&pan)?);
 /// assert_eq!(scene.cameras[0].origin.to_array(), [0.3, 0.1, 3.9]);
 /// let play = file.at(&Moment { animations: vec!["play".into()], seconds: 0.5 })?;
@@ -73,7 +72,8 @@ impl SceneFile {
 
     /// Evaluates the default scene of the file, or its first, without animations.
     ///
-    /// [`Scene::notices`] names the features of the file that are not rendered.
+    /// [`Scene::notices`](crate::SceneContents::notices) names the features of the file that are not
+    /// rendered.
     ///
     /// # Errors
     /// If a node is invalid, the scene exceeds the cards' memory, or it has no triangle with an area.
@@ -218,7 +218,12 @@ fn bare_scene(document: &Document, room: &mut Room) -> Result<(Scene, Vec<String
     let mut textures = Textures::new(document);
     let materials = material::load(document, &mut textures)?;
     let generator = document.root.asset.generator.clone();
-    let mut scene = Scene { materials, variants: variants::names(document), generator, ..Scene::default() };
+    let mut scene = Scene::from(SceneContents {
+        materials,
+        variants: variants::names(document),
+        generator,
+        ..SceneContents::default()
+    });
     let mut unreadable = Vec::new();
     textures.finish(&source, room, &mut scene, &mut unreadable)?;
     Ok((scene, unreadable))

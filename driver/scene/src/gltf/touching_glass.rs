@@ -137,7 +137,8 @@ mod tests {
         let triangles = faces.into_iter().zip(0..);
         let triangles =
             triangles.map(|(face, index)| Triangle::new(face.map(|corner| corners[corner]), index / 4));
-        Scene { triangles: triangles.collect(), materials: media.into(), ..Scene::default() }
+        Scene::default()
+            .with(|scene| (scene.triangles, scene.materials) = (triangles.collect(), media.into()))
     }
 
     #[test]

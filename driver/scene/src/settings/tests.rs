@@ -3,13 +3,15 @@
 use glam::Vec3;
 
 use crate::error::SceneError;
-use crate::{Environment, Material, PunctualKind, PunctualLight, Reflection, Scene, Transmission};
+use crate::{
+    Environment, Material, PunctualKind, PunctualLight, Reflection, Scene, SceneContents, Transmission,
+};
 
 fn scene() -> Scene {
     let material = |name: &str| Material::lambertian(name, Vec3::splat(0.5));
     let mut materials = ["floor", "wall.left", "a=b", "floor"].map(material).to_vec();
     materials.push(Material::new("metal", METAL));
-    Scene { materials, ..Scene::default() }
+    Scene::from(SceneContents { materials, ..SceneContents::default() })
 }
 
 const METAL: Reflection = Reflection::MetallicRoughness {
@@ -160,7 +162,7 @@ fn lit() -> Scene {
         at("pair", PunctualKind::Point { position }),
     ];
     let environment = Environment::constant(Vec3::new(0.5, 1.0, 2.0));
-    Scene { lights, environment: Some(environment), ..scene() }
+    scene().with(|scene| (scene.lights, scene.environment) = (lights, Some(environment)))
 }
 
 #[test]
@@ -189,7 +191,7 @@ fn a_light_with_a_place_is_moved() {
 #[test]
 fn the_strength_of_the_environment_is_replaced() {
     let mut scene = lit();
-    let before = scene.checksum();
+    let before = scene.checksum().to_owned();
     for (strength, is_lit) in [("3", true), ("0", false), ("2.5", true)] {
         scene.apply(&format!("environment.strength={strength}")).unwrap();
         let environment = scene.environment.as_ref().unwrap();
@@ -229,7 +231,7 @@ fn bad_settings_of_lights_are_refused_with_a_remedy() {
         assert_eq!((&scene.lights, &scene.environment), (&untouched.lights, &untouched.environment));
         assert_eq!(scene.materials, untouched.materials);
     }
-    let mut dark = Scene { environment: None, ..lit() };
+    let mut dark = lit().with(|scene| scene.environment = None);
     let error = dark.apply("environment.strength=1").unwrap_err().to_string();
     assert!(error.contains("no environment"), "{error}");
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::Vec3;
 use miette::{Diagnostic, SourceCode};
 use photoncard_scene::error::SceneError;
-use photoncard_scene::{Environment, Scene, gltf};
+use photoncard_scene::{Environment, gltf};
 use serde_json::{Value, json};
 
 use crate::support::{glb, load_bytes, load_changed, load_with, triangle_bytes, triangle_json};
@@ -252,7 +252,7 @@ fn scenes_without_light_or_geometry_are_refused() {
 fn a_scene_without_light_loads_and_is_then_refused() {
     let dark = load_changed(|json| json["materials"][0]["emissiveFactor"] = json!([0, 0, 0])).unwrap();
     check(&dark.check_light().unwrap_err(), &["no light"]);
-    let lit = Scene { environment: Some(Environment::constant(Vec3::ONE)), ..dark };
+    let lit = dark.with(|scene| scene.environment = Some(Environment::constant(Vec3::ONE)));
     assert!(lit.check_light().is_ok());
 }
 

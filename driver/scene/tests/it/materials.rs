@@ -245,7 +245,7 @@ fn a_variant_chooses_materials() {
     let used = |variant| {
         let scene = load_variant(&json, variant).unwrap();
         assert_eq!((scene.variants.join(" "), scene.notices.len()), ("day night".to_owned(), 0));
-        (scene.materials[scene.triangles[0].material as usize].name.clone(), scene.checksum())
+        (scene.materials[scene.triangles[0].material as usize].name.clone(), scene.checksum().to_owned())
     };
     let [stated, day, night] = [None, Some("day"), Some("night")].map(used);
     assert_eq!((stated.0.as_str(), night.0.as_str()), ("lamp", "other"));

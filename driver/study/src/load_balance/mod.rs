@@ -8,46 +8,43 @@
 //! Times are whole nanoseconds, and simultaneous events happen in the order of the chips, so that a
 //! simulation gives the same result on every machine.
 
-mod order;
-
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::time::Duration;
 
-use photoncard_shared::counters::Counters;
-use photoncard_shared::message::PIXEL_BYTES;
-
-pub use self::order::TileOrder;
 use photoncard_cards::scheduler::Scheduler;
+use photoncard_firmware::sampler::hash;
 use photoncard_picture::sink::FinishedTile;
 use photoncard_picture::sums::SumFormat;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{PIXEL_BYTES, Tile};
 
 /// Model of the chips' links. One host serves all of them, one message at a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LinkModel {
+pub(crate) struct LinkModel {
     /// Time that the host takes for a tile command, seconds.
-    pub command_seconds: f64,
+    pub(crate) command_seconds: f64,
     /// Time that the host takes for the result of a tile (pixels and final message), seconds.
-    pub result_seconds: f64,
+    pub(crate) result_seconds: f64,
     /// Latency of any message, seconds.
-    pub latency_seconds: f64,
+    pub(crate) latency_seconds: f64,
 }
 
 /// Number of chips, their credits and their links.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setup {
+pub(crate) struct Setup {
     /// Number of chips.
-    pub chips: usize,
+    pub(crate) chips: usize,
     /// Maximum number of unanswered tile commands per chip
     /// ([`Budget::tiles`](photoncard_shared::budget::Budget::tiles)).
-    pub credits: usize,
+    pub(crate) credits: usize,
     /// Model of the links.
-    pub link: LinkModel,
+    pub(crate) link: LinkModel,
 }
 
 /// Error of [`simulate`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum LoadBalanceError {
+pub(crate) enum LoadBalanceError {
     /// The picture has no tiles.
     #[error("there are no tiles to deal; give the cost of one at least")]
     NoTiles,
@@ -65,50 +62,40 @@ pub enum LoadBalanceError {
 }
 
 /// Maximum time of a tile or a message, seconds. With it, sums of nanoseconds stay exact.
-pub const MAX_SECONDS: f64 = 1e9;
+pub(crate) const MAX_SECONDS: f64 = 1e9;
 
 /// Result of a simulation. Times are seconds since the host began to assign tiles.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Balance {
+pub(crate) struct Balance {
     /// Time when the host has the last result, seconds.
-    pub makespan_seconds: f64,
+    pub(crate) makespan_seconds: f64,
     /// Time to render all tiles on one chip, without links, seconds.
-    pub work_seconds: f64,
+    pub(crate) work_seconds: f64,
     /// Time when each chip is done with its last tile, seconds; 0 for a chip without tiles.
-    pub chip_seconds: Vec<f64>,
+    pub(crate) chip_seconds: Vec<f64>,
     /// Time that the host spent on messages, seconds.
-    pub host_seconds: f64,
+    pub(crate) host_seconds: f64,
     /// Maximum number of tiles that were assigned and unanswered at the same time, over all chips.
-    pub most_in_flight: usize,
+    pub(crate) most_in_flight: usize,
     /// Index of the chip that rendered each tile, in the picture's order.
-    pub chip_of_tile: Vec<usize>,
+    pub(crate) chip_of_tile: Vec<usize>,
 }
 
 impl Balance {
     /// Speed-up over one chip without links: `work / makespan`.
-    pub fn speedup(&self) -> f64 {
+    pub(crate) fn speedup(&self) -> f64 {
         if self.makespan_seconds > 0.0 { self.work_seconds / self.makespan_seconds } else { 1.0 }
     }
 
     /// Parallel efficiency, `speedup / chips`: fraction of the chips' time until the makespan that they spend
     /// on rendering.
-    pub fn efficiency(&self) -> f64 {
+    pub(crate) fn efficiency(&self) -> f64 {
         self.speedup() / self.chip_seconds.len() as f64
     }
 
     /// Idle fraction, `1 - efficiency`: chips wait for tiles, or for the last chip.
-    pub fn idle_share(&self) -> f64 {
+    pub(crate) fn idle_share(&self) -> f64 {
         1.0 - self.efficiency()
-    }
-
-    /// Time when the slowest chip is done, seconds.
-    pub fn slowest_chip_seconds(&self) -> f64 {
-        self.chip_seconds.iter().copied().fold(0.0, f64::max)
-    }
-
-    /// Mean over the chips of the time when they are done, seconds.
-    pub fn mean_chip_seconds(&self) -> f64 {
-        self.chip_seconds.iter().sum::<f64>() / self.chip_seconds.len() as f64
     }
 }
 
@@ -118,7 +105,7 @@ impl Balance {
 ///
 /// # Errors
 /// If there are no tiles, no chips or no credits, or a time is negative, above [`MAX_SECONDS`] or NaN.
-pub fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balance, LoadBalanceError> {
+pub(crate) fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result<Balance, LoadBalanceError> {
     let &Setup { chips, credits, link } = setup;
     if costs.is_empty() {
         return Err(LoadBalanceError::NoTiles);
@@ -191,8 +178,7 @@ impl Simulation {
     /// Handles the arrival of a result. The scheduler's clock, which only matters for lost or late cards, is
     /// not used.
     fn receive(&mut self, chip: usize, id: u32) {
-        let finished =
-            FinishedTile::new(order::tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);
+        let finished = FinishedTile::new(tile(id), vec![0; PIXEL_BYTES], SumFormat::ONE, Counters::ZERO);
         if let Some(tile) = finished {
             self.scheduler.answer(chip, tile, Duration::ZERO);
             self.scheduler.complete(id);
@@ -237,6 +223,39 @@ fn nanoseconds(seconds: f64) -> Result<u128, LoadBalanceError> {
 
 fn seconds(nanoseconds: u128) -> f64 {
     nanoseconds as f64 / 1e9
+}
+
+/// Order in which tiles are assigned to chips.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum TileOrder {
+    /// Row by row, as the driver assigns them.
+    #[default]
+    Picture,
+    /// Random permutation with this seed.
+    Random(u32),
+    /// Descending cost (Graham 1969). Costs are only known after the render, so that this is a bound and not
+    /// a policy.
+    LongestFirst,
+}
+
+impl TileOrder {
+    /// Tiles with these costs, in this order. A tile's number is its index in `costs`.
+    fn tiles(self, costs: &[u128]) -> Vec<Tile> {
+        let mut tiles: Vec<Tile> = (0_u32..).zip(costs).map(|(id, _)| tile(id)).collect();
+        match self {
+            Self::Picture => {}
+            // The hash is a bijection, so that there are no ties.
+            Self::Random(seed) => tiles.sort_by_key(|tile| (hash(hash(seed) ^ tile.id), tile.id)),
+            // The sort is stable: tiles of equal cost stay in the picture's order.
+            Self::LongestFirst => tiles.sort_by_key(|tile| Reverse(costs[tile.id as usize])),
+        }
+        tiles
+    }
+}
+
+/// Tile number `id`. Its rectangle is not used.
+fn tile(id: u32) -> Tile {
+    Tile { id, x: id, y: 0, width: 1, height: 1 }
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 use super::table::{Cell, Column, Table};
 
 /// Name of the file with the key figures of a run.
-pub const FIGURES: &str = "figures.csv";
+pub(crate) const FIGURES: &str = "figures.csv";
 
 /// A key figure of a study.
 #[derive(Clone, Debug, PartialEq)]
@@ -23,13 +23,18 @@ pub struct Figure {
 
 impl Figure {
     /// Creates a figure without an interval.
-    pub fn new(name: impl Into<String>, scene: &str, value: impl Into<Cell>, unit: &'static str) -> Self {
+    pub(crate) fn new(
+        name: impl Into<String>,
+        scene: &str,
+        value: impl Into<Cell>,
+        unit: &'static str,
+    ) -> Self {
         Self { name: name.into(), scene: scene.to_owned(), value: value.into(), unit, interval: None }
     }
 
     /// Adds the ends of the confidence interval to the figure.
     #[must_use]
-    pub fn within(self, lower: f64, upper: f64) -> Self {
+    pub(crate) fn within(self, lower: f64, upper: f64) -> Self {
         Self { interval: Some([lower, upper]), ..self }
     }
 }
@@ -63,6 +68,20 @@ pub(crate) fn slug(name: &str) -> String {
     words.map(str::to_ascii_lowercase).collect::<Vec<_>>().join("-")
 }
 
+/// Maximum length of a name, bytes. With an extension and a hash it stays within the 255 bytes that common
+/// file systems allow.
+const LONGEST: usize = 100;
+
+/// Returns whether `name` is a valid file name on every system: 1 to 100 letters, digits, `-` and `.`, not
+/// starting or ending with a dot.
+pub(crate) fn is_portable(name: &str) -> bool {
+    let is_allowed = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'-' || byte == b'.';
+    (1..=LONGEST).contains(&name.len())
+        && name.bytes().all(is_allowed)
+        && !name.starts_with('.')
+        && !name.ends_with('.')
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -80,5 +99,16 @@ mod tests {
                         verdict,atrium,\"pays, \"\"twice\"\"\",,,\r\nsum,,12,bytes,,\r\n";
         assert_eq!(figures_csv(&figures), expected);
         assert_eq!(slug("All techniques, lines; cache error 0.1"), "all-techniques-lines-cache-error-0.1");
+    }
+
+    #[test]
+    fn only_plain_names_are_portable() {
+        for name in ["figure-6.17", "a", "Table-7.1"] {
+            assert!(is_portable(name), "{name}");
+        }
+        let long = "a".repeat(LONGEST + 1);
+        for name in ["", ".", "..", ".hidden", "a.", "a/b", "a\\b", "a b", "ä", "a:b", long.as_str()] {
+            assert!(!is_portable(name), "{name}");
+        }
     }
 }

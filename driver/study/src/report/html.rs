@@ -11,33 +11,33 @@ const STYLE: &str = include_str!("style.css");
 
 /// A report on a study.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Report {
+pub(crate) struct Report {
     /// Title of the page.
-    pub title: String,
+    pub(crate) title: String,
     /// Warning at the top of the page, if any.
-    pub banner: Option<String>,
+    pub(crate) banner: Option<String>,
     /// Paragraphs before the first section.
-    pub introduction: Vec<String>,
+    pub(crate) introduction: Vec<String>,
     /// Sections in reading order.
-    pub sections: Vec<Section>,
+    pub(crate) sections: Vec<Section>,
     /// Provenance of the numbers.
-    pub provenance: Provenance,
+    pub(crate) provenance: Provenance,
     /// Key figures. They are not on the page.
-    pub figures: Vec<Figure>,
+    pub(crate) figures: Vec<Figure>,
 }
 
 /// A part of a report under one heading.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Section {
+pub(crate) struct Section {
     /// Text of the heading.
-    pub heading: String,
+    pub(crate) heading: String,
     /// Blocks in reading order.
-    pub blocks: Vec<Block>,
+    pub(crate) blocks: Vec<Block>,
 }
 
 /// A part of a section.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Block {
+pub(crate) enum Block {
     /// Plain text.
     Paragraph(String),
     /// A link to a page in this folder or a folder below.
@@ -82,7 +82,7 @@ impl Report {
     /// Adds a banner to the report. Titles of plots then say that they are of a trial, because the plots'
     /// files can be used separately.
     #[must_use]
-    pub fn marked(mut self, banner: String) -> Self {
+    pub(crate) fn marked(mut self, banner: String) -> Self {
         self.banner = Some(banner);
         for block in self.sections.iter_mut().flat_map(|section| &mut section.blocks) {
             if let Block::Plot { plot, .. } = block {
@@ -94,7 +94,7 @@ impl Report {
 
     /// Encodes the report as a self-contained HTML page with links to the tables and plots beside it. The
     /// page is also well-formed XML.
-    pub fn to_html(&self) -> String {
+    pub(crate) fn to_html(&self) -> String {
         let title = escape(&self.title);
         let mut html = format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\"/>\n\

@@ -6,30 +6,30 @@
 mod figure;
 mod html;
 mod markup;
-pub(crate) mod name;
 pub(crate) mod number;
 mod plot;
 mod table;
 
 use std::collections::HashSet;
-use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 use thiserror::Error;
 
-pub use self::figure::{FIGURES, Figure};
-pub(crate) use self::figure::{figures_csv, slug};
-pub use self::html::{Block, Provenance, Report, Section};
+pub use self::figure::Figure;
+pub(crate) use self::figure::{FIGURES, figures_csv, is_portable, slug};
+pub use self::html::Provenance;
+pub(crate) use self::html::{Block, Report, Section};
 pub use self::number::human;
-pub use self::plot::{Panel, Plot, Point, Series, XAxis, XScale, YAxis, YScale};
-pub use self::table::{Cell, Column, Table};
+pub(crate) use self::plot::{Panel, Plot, Point, Series, XAxis, XScale, YAxis, YScale};
+pub use self::table::Cell;
+pub(crate) use self::table::{Column, Table};
 use photoncard_picture::output::{self, OutputError};
 
 /// File name of the page.
 const PAGE: &str = "index.html";
 
-/// Error of [`write()`].
+/// Error of writing a report.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReportError {
@@ -71,11 +71,11 @@ pub enum ReportError {
 /// # Errors
 /// If a name has other characters than letters, digits, `-` and `.`, or two files would have names that are
 /// equal or differ only in case; nothing is written then. If the folder or a file cannot be written.
-pub fn write(folder: &Path, report: &Report) -> Result<(), ReportError> {
+pub(crate) fn write(folder: &Path, report: &Report) -> Result<(), ReportError> {
     let blocks = || report.sections.iter().flat_map(|section| &section.blocks);
     for block in blocks() {
         if let Block::Table { name, .. } | Block::Plot { name, .. } = block
-            && !name::is_portable(name)
+            && !is_portable(name)
         {
             return Err(ReportError::BadName { name: name.clone() });
         }

@@ -15,7 +15,7 @@ const NUMBER: &str = "number";
 
 /// A titled table with one unit per column.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub(crate) struct Table {
     title: String,
     columns: Vec<Column>,
     rows: Vec<Vec<Cell>>,
@@ -23,11 +23,11 @@ pub struct Table {
 
 /// Head of a column.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Column {
+pub(crate) struct Column {
     /// Name of the quantity.
-    pub name: String,
+    pub(crate) name: String,
     /// Unit of the quantity; empty if it has none.
-    pub unit: String,
+    pub(crate) unit: String,
 }
 
 /// A cell of a table.
@@ -50,14 +50,14 @@ pub enum Cell {
 
 impl Column {
     /// A column of a name and a unit.
-    pub fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
+    pub(crate) fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { name: name.into(), unit: unit.into() }
     }
 }
 
 impl Cell {
     /// Cell with a measured value and the half-width of its confidence interval, both in the column's unit.
-    pub fn interval(value: f64, half_width: f64) -> Self {
+    pub(crate) fn interval(value: f64, half_width: f64) -> Self {
         Self::Real { value, half_width: Some(half_width) }
     }
 
@@ -143,7 +143,7 @@ impl<T: Into<Cell>> From<Option<T>> for Cell {
 
 impl Table {
     /// Creates a table without rows.
-    pub fn new(title: impl Into<String>, columns: Vec<Column>) -> Self {
+    pub(crate) fn new(title: impl Into<String>, columns: Vec<Column>) -> Self {
         Self { title: title.into(), columns, rows: Vec::new() }
     }
 
@@ -151,31 +151,21 @@ impl Table {
     ///
     /// # Panics
     /// If the row does not have one cell per column.
-    pub fn push(&mut self, row: Vec<Cell>) {
+    pub(crate) fn push(&mut self, row: Vec<Cell>) {
         assert_eq!(row.len(), self.columns.len(), "a row of the table '{}'", self.title);
         self.rows.push(row);
     }
 
     /// The title.
-    pub fn title(&self) -> &str {
+    pub(crate) fn title(&self) -> &str {
         &self.title
-    }
-
-    /// Heads of the columns, from left to right.
-    pub fn columns(&self) -> &[Column] {
-        &self.columns
-    }
-
-    /// Rows, from top to bottom. Each has as many cells as there are columns.
-    pub fn rows(&self) -> &[Vec<Cell>] {
-        &self.rows
     }
 
     /// Encodes the table as CSV (RFC 4180), with a header `name (unit)` and numbers in full precision.
     ///
     /// A column with half-widths is followed by a column of the half-widths. Values that are not finite are
     /// written `NaN`, `inf` and `-inf`.
-    pub fn to_csv(&self) -> String {
+    pub(crate) fn to_csv(&self) -> String {
         let with_half_width: Vec<bool> =
             (0..self.columns.len()).map(|column| self.has_half_width(column)).collect();
         let mut header = Vec::new();
@@ -202,7 +192,7 @@ impl Table {
 
     /// Encodes the table as an HTML element `table`, without its title. Integers are written in full, other
     /// numbers with four significant digits.
-    pub fn to_html(&self) -> String {
+    pub(crate) fn to_html(&self) -> String {
         let mut html = "<table>\n<thead><tr>".to_owned();
         for (index, column) in self.columns.iter().enumerate() {
             let unit = match column.unit.as_str() {

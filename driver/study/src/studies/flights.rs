@@ -11,8 +11,7 @@ use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{Block, Table};
 use super::super::scale::Scale;
-use super::present::{GIGA, columns, table, text};
-use super::scenes::SCENES;
+use super::present::{GIGA, SCENES, columns, table, text};
 
 /// A chip, and the number of tiles that it has in flight.
 #[derive(Clone, Copy)]

@@ -9,8 +9,7 @@ use super::super::report::{Block, Figure, Table, slug};
 use super::super::sample::{Estimate, Ratio};
 use super::super::scale::{Scale, WIDEST_TILE};
 use super::flights::LARGE_IN_FLIGHT;
-use super::present::{GIGA, columns, gigabytes, key, say, table, text};
-use super::scenes::{ATRIUM, CORNELL};
+use super::present::{ATRIUM, CORNELL, GIGA, columns, gigabytes, key, say, table, text};
 
 /// A simple and a large scene: file and name in the report.
 const SCENES: [(&str, &str); 2] = [(CORNELL, "Cornell box"), (ATRIUM, "atrium")];

@@ -11,12 +11,10 @@ use super::super::point::Point;
 use super::super::report::{self, Block, Report, Table, XScale, YScale};
 use super::super::sample::SampleRate;
 use super::super::scale::Scale;
-use super::arithmetic;
 use super::balance::chip_counts;
-use super::present::{columns, how_it_counts, page, panel, plot, say, section, series, table, text};
-use super::scenes::SCENES;
-use super::times;
+use super::present::{SCENES, columns, how_it_counts, page, panel, plot, say, section, series, table, text};
 use super::workload::{self, of_frame};
+use super::{arithmetic, times};
 
 /// Frame rate that the study aims at, frames per second.
 const RATE: f64 = 30.0;

@@ -14,8 +14,9 @@ use super::super::report::{self, Block, Cell, Figure, Report, Table, XScale, YSc
 use super::super::scale::Scale;
 use super::arithmetic::{self, CountedFrame};
 use super::balance::{CREDITS, ORDERS, chip_counts, curves, deal};
-use super::present::{columns, how_it_counts, key, page, panel, plot, say, section, series, table, text};
-use super::scenes::SCENES;
+use super::present::{
+    SCENES, columns, how_it_counts, key, page, panel, plot, say, section, series, table, text,
+};
 use super::workload::{self, cost, of_frame, tile_seconds};
 
 /// Maximum number of chips in the plots.

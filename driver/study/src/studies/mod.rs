@@ -11,7 +11,6 @@ mod overlap;
 mod present;
 mod reordering;
 mod scaling;
-mod scenes;
 mod sweep;
 mod techniques;
 mod times;
@@ -55,7 +54,7 @@ choices!(Study {
 
 impl Study {
     /// Points that the study measures.
-    pub fn points(self, scale: &Scale) -> Vec<Point> {
+    pub(crate) fn points(self, scale: &Scale) -> Vec<Point> {
         match self {
             Self::Reordering => reordering::points(scale),
             Self::Figure617 => glossy_floor::points(scale),
@@ -70,7 +69,11 @@ impl Study {
     ///
     /// # Errors
     /// As [`HostBench::measure`].
-    pub fn host_frames(self, scale: &Scale, bench: &mut HostBench) -> Result<Vec<HostFrame>, StudyError> {
+    pub(crate) fn host_frames(
+        self,
+        scale: &Scale,
+        bench: &mut HostBench,
+    ) -> Result<Vec<HostFrame>, StudyError> {
         match self {
             Self::Interactive => interactive::host_frames(scale, bench),
             _ => Ok(Vec::new()),
@@ -82,7 +85,7 @@ impl Study {
     ///
     /// # Panics
     /// If `results` lack one of the [points](Self::points) of this scale.
-    pub fn report(self, scale: &Scale, results: &Results, host: &[HostFrame]) -> Report {
+    pub(crate) fn report(self, scale: &Scale, results: &Results, host: &[HostFrame]) -> Report {
         let report = match self {
             Self::Reordering => reordering::report(scale, results),
             Self::Figure617 => glossy_floor::report(scale, results),

@@ -11,8 +11,7 @@ use super::super::laboratory::Results;
 use super::super::point::Point;
 use super::super::report::{self, Block, Cell, Table, XScale, YScale};
 use super::super::scale::Scale;
-use super::present::{columns, panel, plot, series, table, text};
-use super::scenes::CORNELL;
+use super::present::{CORNELL, columns, panel, plot, series, table, text};
 use super::times::{TimedFrame, table_shares};
 
 /// Policies in the tables: how the queue is drained, and how arithmetic is shared.

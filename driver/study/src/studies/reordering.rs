@@ -8,17 +8,23 @@ use photoncard_render::emulator::memory_model::{CacheSettings, CacheSpec};
 
 use super::super::laboratory::Results;
 use super::super::measure::Measurement;
-use super::super::point::Point;
+use super::super::point::{ALONG_CURVE, Point};
 use super::super::report::{Block, Cell, Column, Report, Series, Table, XScale, YScale};
 use super::super::sample::Estimate;
 use super::super::scale::{Scale, WIDEST_TILE};
 use super::overlap;
 use super::present::{
-    GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section, series,
-    table, text,
+    CORNELL, GIGA, cell, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, say, section,
+    series, table, text,
 };
-use super::scenes::CORNELL;
 use super::times::{self, TimedFrame};
+
+/// Order of a row: one of a chip's, or none for all gathers of the frame along one curve.
+type Order = Option<GatherOrder>;
+
+fn name(order: Order) -> &'static str {
+    order.map_or(ALONG_CURVE, Choice::name)
+}
 
 /// Orders of gathers that a chip supports.
 const ORDERS: [GatherOrder; 5] = [
@@ -64,9 +70,10 @@ fn behind(photon: CacheSpec) -> CacheSettings {
     CacheSettings::Split { photon, scene: CacheSpec { index: photon.index, ..CacheSpec::SCENE } }
 }
 
-fn point(scale: &Scale, order: GatherOrder, layout: PhotonLayout, caches: CacheSettings) -> Point {
-    let settings = scale.settings(order).with(|s| s.photons.layout = layout);
-    scale.traffic_behind(CORNELL, settings, caches)
+fn point(scale: &Scale, order: Order, layout: PhotonLayout, caches: CacheSettings) -> Point {
+    let settings = scale.settings(order.unwrap_or(GatherOrder::Sort)).with(|s| s.photons.layout = layout);
+    let point = scale.traffic_behind(CORNELL, settings, caches);
+    Point { is_along_curve: order.is_none(), ..point }
 }
 
 /// Point with sorted gathers in tiles of `tile` x `tile` pixels.
@@ -83,12 +90,12 @@ pub(super) fn points(scale: &Scale) -> Vec<Point> {
     for order in ORDERS {
         let caches = sizes(scale).into_iter().map(of_size);
         let caches = caches.chain(associativities().map(|(_, caches)| caches));
-        points.extend(caches.map(|caches| point(scale, order, PhotonLayout::Jensen, caches)));
-        points.push(point(scale, order, PhotonLayout::Lines, CacheSettings::default()));
+        points.extend(caches.map(|caches| point(scale, Some(order), PhotonLayout::Jensen, caches)));
+        points.push(point(scale, Some(order), PhotonLayout::Lines, CacheSettings::default()));
     }
     points.extend(LAYOUTS.into_iter().flat_map(|layout| TILES.map(|tile| sorted(scale, layout, tile))));
     points.extend(overlap::points(scale, &lines()));
-    points.extend(LAYOUTS.map(|layout| point(scale, GatherOrder::Hilbert, layout, CacheSettings::default())));
+    points.extend(LAYOUTS.map(|layout| point(scale, None, layout, CacheSettings::default())));
     points
 }
 
@@ -130,13 +137,13 @@ pub(super) fn report(scale: &Scale, results: &Results) -> Report {
 fn by_order<'a>(
     title: &str,
     heads: &[(&str, &str)],
-    nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement,
-    cells: impl Fn(GatherOrder, PhotonLayout, &Measurement) -> Vec<Cell>,
+    nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement,
+    cells: impl Fn(Order, PhotonLayout, &Measurement) -> Vec<Cell>,
 ) -> Table {
     let mut table = Table::new(title, columns(&[&[("order", ""), ("photon map", "")], heads].concat()));
-    for order in ORDERS.into_iter().chain([GatherOrder::Hilbert]) {
+    for order in ORDERS.map(Some).into_iter().chain([None]) {
         for layout in LAYOUTS {
-            let mut row = vec![order.name().into(), layout.name().into()];
+            let mut row = vec![name(order).into(), layout.name().into()];
             row.extend(cells(order, layout, nominal(order, layout)));
             table.push(row);
         }
@@ -144,8 +151,8 @@ fn by_order<'a>(
     table
 }
 
-fn orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
-    let naive = nominal(GatherOrder::Naive, PhotonLayout::Jensen).photon_map_bytes().value;
+fn orders<'a>(nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Table {
+    let naive = nominal(Some(GatherOrder::Naive), PhotonLayout::Jensen).photon_map_bytes().value;
     let heads =
         [("gathers", "million"), ("raw", "GB"), ("from DRAM", "GB"), ("less than naive, jensen", "times")];
     let title = "Photon map traffic of a frame, cache 128 KB, lines of 128 bytes, 4 ways";
@@ -160,9 +167,9 @@ fn orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -
 fn by_tile<'a>(
     scale: &Scale,
     results: &Results,
-    nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement,
+    nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement,
 ) -> Table {
-    let naive = nominal(GatherOrder::Naive, PhotonLayout::Jensen);
+    let naive = nominal(Some(GatherOrder::Naive), PhotonLayout::Jensen);
     let of_gather = |measured: &Measurement| measured.photon_map_bytes().value / measured.gathers().value;
     let heads = [
         ("side of a tile", "pixels"),
@@ -187,7 +194,7 @@ fn by_tile<'a>(
     table
 }
 
-fn by_time<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
+fn by_time<'a>(scale: &Scale, nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Table {
     let heads = times::heads(&scale.machine);
     let heads: Vec<_> = heads.iter().map(|(name, unit)| (name.as_str(), *unit)).collect();
     by_order("Time of one chip for the frame", &heads, nominal, |order, layout, measured| {
@@ -196,7 +203,7 @@ fn by_time<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'
     })
 }
 
-fn by_gather<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
+fn by_gather<'a>(scale: &Scale, nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Table {
     let heads = [
         ("raw", "bytes a gather"),
         ("from DRAM", "bytes a gather"),
@@ -212,9 +219,9 @@ fn by_gather<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> 
     })
 }
 
-fn plot_of_orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Block {
-    let orders: Vec<_> = ORDERS.into_iter().chain([GatherOrder::Hilbert]).collect();
-    let names = orders.iter().map(|&order| order.name().to_owned()).collect();
+fn plot_of_orders<'a>(nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Block {
+    let orders: Vec<_> = ORDERS.map(Some).into_iter().chain([None]).collect();
+    let names = orders.iter().map(|&order| name(order).to_owned()).collect();
     let mut lines = Vec::new();
     for layout in LAYOUTS {
         let of = |bytes: fn(&Measurement) -> Estimate| {
@@ -238,11 +245,8 @@ fn plot_of_orders<'a>(nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measur
 }
 
 /// Paragraph on the fraction of the rays that end in a gather.
-fn share_of_gathers<'a>(
-    scale: &Scale,
-    nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement,
-) -> String {
-    let naive = nominal(GatherOrder::Naive, PhotonLayout::Jensen);
+fn share_of_gathers<'a>(scale: &Scale, nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> String {
+    let naive = nominal(Some(GatherOrder::Naive), PhotonLayout::Jensen);
     let gathers = naive.gathers().value;
     let rays = naive.total(|tile| tile.counters.gather_rays as f64).value;
     let all = scale.nominal_gathers();
@@ -267,7 +271,7 @@ fn comparison(scale: &Scale) -> String {
     )
 }
 
-fn published<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> &'a Measurement) -> Table {
+fn published<'a>(scale: &Scale, nominal: &impl Fn(Order, PhotonLayout) -> &'a Measurement) -> Table {
     let heads = [
         ("quantity", ""),
         ("published, 512x512 pixels", "GB"),
@@ -285,19 +289,19 @@ fn published<'a>(scale: &Scale, nominal: &impl Fn(GatherOrder, PhotonLayout) -> 
         table.push(vec![
             quantity.into(),
             (published / GIGA).into(),
-            order.name().into(),
+            name(order).into(),
             layout.name().into(),
             gigabytes(bytes),
             Cell::from(at_all.value / GIGA),
         ]);
     };
-    use GatherOrder::{DirectionBins, Hash, Hilbert, Naive, Sort};
-    row("raw, naive", raw, Naive, PhotonLayout::Jensen, true);
+    use GatherOrder::{DirectionBins, Hash, Naive, Sort};
+    row("raw, naive", raw, Some(Naive), PhotonLayout::Jensen, true);
     for order in [DirectionBins, Hash, Sort] {
-        row("from DRAM, practical orders", practical, order, PhotonLayout::Jensen, false);
+        row("from DRAM, practical orders", practical, Some(order), PhotonLayout::Jensen, false);
     }
     for layout in LAYOUTS {
-        row("from DRAM, frame along a Hilbert curve", bound, Hilbert, layout, false);
+        row("from DRAM, frame along a Hilbert curve", bound, None, layout, false);
     }
     table
 }
@@ -310,7 +314,7 @@ fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, C
     for order in ORDERS {
         let mut row = vec![order.name().into()];
         row.extend(caches.iter().map(|&(_, caches)| {
-            let point = point(scale, order, PhotonLayout::Jensen, caches);
+            let point = point(scale, Some(order), PhotonLayout::Jensen, caches);
             gigabytes(results.traffic(&point).photon_map_bytes())
         }));
         table.push(row);
@@ -322,7 +326,7 @@ fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, C
 fn lines_by_caches(scale: &Scale, results: &Results, caches: &[(f64, CacheSettings)]) -> Vec<Series> {
     let line = |order: GatherOrder| {
         let points = caches.iter().map(|&(x, caches)| {
-            let point = point(scale, order, PhotonLayout::Jensen, caches);
+            let point = point(scale, Some(order), PhotonLayout::Jensen, caches);
             gigabyte_point(x, results.traffic(&point).photon_map_bytes())
         });
         series(order.name(), points.collect())

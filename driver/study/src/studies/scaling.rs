@@ -12,14 +12,13 @@ use super::super::point::Point;
 use super::super::report::{Block, Column, Report, Table, XScale, YScale};
 use super::super::scale::Scale;
 use super::balance::{CREDITS, chip_counts, curves, deal};
-use super::flights;
-use super::headlines;
 use super::machine::symbols;
 use super::present::{
-    columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table, text,
+    CORNELL, columns, gigabyte_point, gigabytes, how_it_counts, page, panel, plot, section, series, table,
+    text,
 };
-use super::scenes::CORNELL;
 use super::workload::tile_seconds;
+use super::{flights, headlines};
 
 /// A line of a plot: its name, and its settings, one of which a sweep varies.
 type Line = (&'static str, fn(&Scale) -> RenderSettings);

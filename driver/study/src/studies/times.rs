@@ -45,8 +45,7 @@ impl TimedFrame {
             dram_bytes: total(&|tile| tile.photon_map().dram_bytes),
             flops: flops(ChipPart::GatherUnit),
         };
-        let schedule = &point.settings.schedule;
-        let has_queue = schedule.order.has_queue();
+        let has_queue = point.has_queue();
         let drains = total(&|tile| tile.counters.drains);
         let drained = if has_queue && drains > 0.0 {
             (gathers.tasks / drains).round() as u64

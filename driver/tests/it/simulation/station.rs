@@ -5,7 +5,7 @@ use std::time::Duration;
 use photoncard_driver::dispatcher::Dispatcher;
 use photoncard_driver::emulator::Emulated;
 use photoncard_driver::scheduler::{CardNumber, SchedulerError, Standing};
-use photoncard_driver::session::{Session, SessionError};
+use photoncard_driver::session::{Restart, Session, SessionError};
 use photoncard_firmware::card::Card;
 use photoncard_shared::frame::{Frame, FrameReader};
 use photoncard_shared::message::{self, Command};
@@ -207,7 +207,7 @@ impl Station {
         }
         if error.may_pass() {
             self.is_lost = true;
-            self.session.greet_again(now);
+            self.session.restart(Restart::Lost, now);
         } else {
             self.session.give_back();
         }

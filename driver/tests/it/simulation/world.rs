@@ -9,7 +9,7 @@ use photoncard_driver::film::Film;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Schedule};
-use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
+use photoncard_driver::scene::{Camera, Material, Scene, SceneContents, Triangle};
 use photoncard_driver::scheduler::{GatherOrder, Scheduler, tiles};
 use photoncard_driver::session::{Job, PixelLimits, Upload};
 use photoncard_firmware::card::Card;
@@ -45,12 +45,12 @@ fn scene() -> Scene {
         vertical_fov: 1.0,
         aspect: None,
     };
-    Scene {
+    Scene::from(SceneContents {
         triangles: quads.concat(),
         materials: vec![material(0.7, 0.0), material(0.0, 5.0)],
         cameras: vec![camera],
-        ..Scene::default()
-    }
+        ..SceneContents::default()
+    })
 }
 
 fn settings() -> RenderSettings {

@@ -5,7 +5,7 @@ use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
 use std::time::Duration;
 
 use photoncard_driver::film::{FilmPixel, PixelLayers, PixelValue, SumFormat, Window};
-use photoncard_driver::scene::{Camera, Material, Scene, Triangle};
+use photoncard_driver::scene::{Camera, Material, Scene, SceneContents, Triangle};
 use photoncard_driver::scheduler::{GatherOrder, tiles};
 use photoncard_driver::sink::FinishedTile;
 use photoncard_shared::message::Tile;
@@ -74,12 +74,12 @@ fn scene() -> Scene {
         vertical_fov: 0.8,
         aspect: None,
     };
-    Scene {
+    Scene::from(SceneContents {
         triangles: vec![triangle(0.0, 0), triangle(1.0, 1)],
         materials: vec![Material::lambertian("floor", Vec3::splat(0.5)), lamp],
         cameras: vec![camera],
-        ..Scene::default()
-    }
+        ..SceneContents::default()
+    })
 }
 
 /// Bits of every pixel of a wish's picture.

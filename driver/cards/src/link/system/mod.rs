@@ -5,7 +5,6 @@ mod host_port;
 mod listener;
 mod remote_address;
 mod serial;
-mod serial_list;
 mod socket;
 mod stream;
 
@@ -18,12 +17,11 @@ pub use error::LinkError;
 pub use host_port::HostPort;
 pub use listener::{ListenAddress, Listener};
 pub use remote_address::RemoteAddress;
-pub use serial::{SerialLink, open_serial};
-pub use serial_list::{ListedPort, list_serial_ports};
+pub use serial::{ListedPort, SerialLink, list_serial_ports, open_serial};
 pub use socket::connect_tcp;
 #[cfg(unix)]
 pub use socket::connect_unix;
-pub use socket::{host_name, tcp_address};
+pub use socket::host_name;
 pub use stream::StreamPort;
 #[cfg(not(unix))]
 pub use unsupported::connect_unix;

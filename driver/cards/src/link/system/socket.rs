@@ -24,7 +24,7 @@ pub fn connect_tcp(host: &str, port: u16) -> Result<StreamPort<TcpStream>, LinkE
 }
 
 /// Formats a TCP address as an argument of `--card`.
-pub fn tcp_address(host: &str, port: u16) -> String {
+pub(crate) fn tcp_address(host: &str, port: u16) -> String {
     if host.contains(':') { format!("tcp:[{host}]:{port}") } else { format!("tcp:{host}:{port}") }
 }
 

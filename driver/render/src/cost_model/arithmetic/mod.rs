@@ -6,12 +6,10 @@
 //! floating-point instructions, where each operation is a function call (`tests/operations.sh`);
 //! `tests/tests/it/operations.rs` counts them again. A vector lane counts only if its result is used.
 
-mod operations;
 mod step;
 mod table;
 
-pub use operations::Operations;
-pub use step::{ChipPart, Step, Unit, Work};
+pub use step::{ChipPart, Operations, Step, Unit, Work};
 pub use table::OPERATIONS;
 
 use photoncard_picture::choice::Choice;

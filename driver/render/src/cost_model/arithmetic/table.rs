@@ -2,8 +2,7 @@
 
 use photoncard_picture::choice::Choice;
 
-use super::operations::Operations;
-use super::step::Step;
+use super::step::{Operations, Step};
 
 /// Operations per step, in the order of [`Step::ALL`]: means over tiles of several scenes.
 #[rustfmt::skip] // One step a line.

@@ -4,32 +4,33 @@ use super::super::number;
 
 /// A pair of axes, and the series drawn over them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// Title of the panel; may be empty.
-    pub title: String,
+    pub(crate) title: String,
     /// Horizontal axis.
-    pub x: XAxis,
+    pub(crate) x: XAxis,
     /// Vertical axis.
-    pub y: YAxis,
+    pub(crate) y: YAxis,
     /// Series drawn in the panel.
-    pub series: Vec<Series>,
+    pub(crate) series: Vec<Series>,
 }
 
 /// Horizontal axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct XAxis {
+pub(crate) struct XAxis {
     /// Name of the quantity.
-    pub label: String,
+    pub(crate) label: String,
     /// Unit of the quantity; empty if it has none.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Mapping of values to positions.
-    pub scale: XScale,
+    pub(crate) scale: XScale,
 }
 
 /// Mapping of horizontal values to positions.
 #[derive(Clone, Debug, PartialEq)]
-pub enum XScale {
+pub(crate) enum XScale {
     /// Linear scale.
+    #[cfg_attr(not(test), expect(dead_code, reason = "the plainest scale, which tests draw"))]
     Linear,
     /// Logarithmic scale with labels at powers of two.
     Log2,
@@ -41,19 +42,20 @@ pub enum XScale {
 
 /// Vertical axis.
 #[derive(Clone, Debug, PartialEq)]
-pub struct YAxis {
+pub(crate) struct YAxis {
     /// Name of the quantity.
-    pub label: String,
+    pub(crate) label: String,
     /// Unit of the quantity; empty if it has none.
-    pub unit: String,
+    pub(crate) unit: String,
     /// Mapping of values to positions.
-    pub scale: YScale,
+    pub(crate) scale: YScale,
 }
 
 /// Mapping of vertical values to positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum YScale {
+pub(crate) enum YScale {
     /// Linear scale over the range of the data.
+    #[cfg_attr(not(test), expect(dead_code, reason = "the plainest scale, which tests draw"))]
     Linear,
     /// Linear scale over a range that includes zero.
     LinearFromZero,
@@ -63,33 +65,33 @@ pub enum YScale {
 
 /// A named line.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Series {
+pub(crate) struct Series {
     /// Name in the legend. A series with an empty name is not in the legend.
-    pub name: String,
+    pub(crate) name: String,
     /// Points, in the order in which the line joins them.
-    pub points: Vec<Point>,
+    pub(crate) points: Vec<Point>,
 }
 
 /// A point in the units of the axes. Values that are not finite are not drawn, and neither are values of zero
 /// or less on a logarithmic axis; a note below the plot reports them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Point {
+pub(crate) struct Point {
     /// Horizontal value.
-    pub x: f64,
+    pub(crate) x: f64,
     /// Vertical value.
-    pub y: f64,
+    pub(crate) y: f64,
     /// Half-width of the confidence interval of `y`: the extent of the error bar in either direction.
-    pub half_width: Option<f64>,
+    pub(crate) half_width: Option<f64>,
 }
 
 impl Point {
     /// A point without an error bar.
-    pub fn new(x: f64, y: f64) -> Self {
+    pub(crate) fn new(x: f64, y: f64) -> Self {
         Self { x, y, half_width: None }
     }
 
     /// A point with an error bar from `y - half_width` to `y + half_width`.
-    pub fn with_half_width(x: f64, y: f64, half_width: f64) -> Self {
+    pub(crate) fn with_half_width(x: f64, y: f64, half_width: f64) -> Self {
         Self { x, y, half_width: Some(half_width) }
     }
 }

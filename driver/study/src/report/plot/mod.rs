@@ -16,7 +16,7 @@ mod text;
 mod tests;
 
 use self::content::axis_label;
-pub use self::content::{Panel, Point, Series, XAxis, XScale, YAxis, YScale};
+pub(crate) use self::content::{Panel, Point, Series, XAxis, XScale, YAxis, YScale};
 use self::data::{LeftOut, Reason};
 use self::legend::Legend;
 use self::panel::Drawing;
@@ -33,20 +33,20 @@ const PANEL_WIDTH: f64 = 390.0;
 /// A figure: panels side by side that share a legend. Series with the same name have the same style in all
 /// panels.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Plot {
+pub(crate) struct Plot {
     /// Title of the figure.
-    pub title: String,
+    pub(crate) title: String,
     /// Caption that explains the figure; may be empty.
-    pub caption: String,
+    pub(crate) caption: String,
     /// Panels from left to right.
-    pub panels: Vec<Panel>,
+    pub(crate) panels: Vec<Panel>,
     /// True if panels with the same vertical scale share one vertical range.
-    pub shares_y_range: bool,
+    pub(crate) shares_y_range: bool,
 }
 
 impl Plot {
     /// Encodes the plot as a stand-alone SVG document, which can also be embedded in HTML.
-    pub fn to_svg(&self) -> String {
+    pub(crate) fn to_svg(&self) -> String {
         let names = self.series_names();
         let (drawings, left_out) = self.drawings(&names);
         let panels_width: f64 = drawings.iter().map(Drawing::width).sum();

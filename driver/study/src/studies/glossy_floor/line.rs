@@ -8,7 +8,7 @@ use super::super::super::laboratory::Results;
 use super::super::super::point::Point;
 use super::super::super::sample::Estimate;
 use super::super::super::scale::Scale;
-use super::super::scenes::GLOSSY;
+use super::super::present::GLOSSY;
 
 /// A line of the figure: order of the gathers, and sampling of the rays.
 pub(super) type Line = (GatherOrder, Sampling);

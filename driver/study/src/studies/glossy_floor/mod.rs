@@ -15,10 +15,9 @@ use super::super::report::{Figure, Panel, Report, Table, XScale, YScale, slug};
 use super::super::sample::Estimate;
 use super::super::scale::Scale;
 use super::present::{
-    GIGA, columns, gigabyte_point, gigabytes, how_it_counts, key, page, panel, plot, say, section, series,
-    table, text,
+    GIGA, GLOSSY, columns, gigabyte_point, gigabytes, how_it_counts, key, page, panel, plot, say, section,
+    series, table, text,
 };
-use super::scenes::GLOSSY;
 
 /// Panels of the figure: without and with the irradiance cache.
 const PANELS: [(bool, &str); 2] =

@@ -9,8 +9,7 @@ use super::super::super::point::{Point, Task};
 use super::super::super::report::{Block, Figure, Table, slug};
 use super::super::super::sample::{Estimate, SampleRate};
 use super::super::super::scale::Scale;
-use super::super::present::{columns, gigabytes, key, say, table, text};
-use super::super::scenes::GLOSSY;
+use super::super::present::{GLOSSY, columns, gigabytes, key, say, table, text};
 use super::line::{self, LINES, Line, change, exponents, line_name, spread};
 
 /// Height of the strip at the picture's lower edge: the picture's height divided by this number.
@@ -20,13 +19,13 @@ const NEARLY_FLAT: f64 = 1.1;
 
 /// Point that renders all tiles of the strip, without the irradiance cache.
 fn point(scale: &Scale, line: Line, exponent: u32) -> Point {
-    let Point { scene, assignments, mut settings, mut task } = line::point(scale, line, false, exponent);
+    let mut point = line::point(scale, line, false, exponent);
     let full = Window::full(scale.side, scale.side);
-    settings.picture.crop = Some(Window { y0: scale.side - scale.side / DIVISOR, ..full });
-    if let Task::Traffic { sample, .. } = &mut task {
+    point.settings.picture.crop = Some(Window { y0: scale.side - scale.side / DIVISOR, ..full });
+    if let Task::Traffic { sample, .. } = &mut point.task {
         *sample = SampleRate::ALL;
     }
-    Point { scene, assignments, settings, task }
+    point
 }
 
 pub(super) fn points(scale: &Scale) -> Vec<Point> {

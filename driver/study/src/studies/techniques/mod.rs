@@ -14,9 +14,9 @@ use super::super::report::{self, Block, Cell, Figure, Report, Table, XScale, YSc
 use super::super::sample::Ratio;
 use super::super::scale::Scale;
 use super::present::{
-    GIGA, cell, columns, gigabytes, how_it_counts, key, page, panel, plot, say, section, series, table, text,
+    GIGA, SCENES, cell, columns, gigabytes, how_it_counts, key, page, panel, plot, say, section, series,
+    table, text,
 };
-use super::scenes::SCENES;
 
 pub(super) fn points(scale: &Scale) -> Vec<Point> {
     let mut points = Vec::new();

@@ -1,12 +1,15 @@
-//! Command `photoncard merge`.
+//! Commands `photoncard merge`, `photoncard tonemap` and `photoncard diff`, whose inputs are pictures.
 
 use std::path::Path;
 
+use photoncard_driver::difference::compare;
+use photoncard_driver::exr::{read_rgb, read_with_provenance};
 use photoncard_driver::film::Film;
 use photoncard_driver::parts::{Part, PartError, Parts};
+use photoncard_driver::tone_mapping::{PngError, write_png};
 
-use crate::arguments::{MergeOptions, PictureFormat, PictureOutput};
-use crate::console::{counted, printable_json, say};
+use crate::arguments::{DiffOptions, MergeOptions, PictureFormat, PictureOutput, TonemapOptions};
+use crate::console::{counted, print_json, printable_json, say};
 use crate::failure::Failure;
 use crate::outputs;
 use crate::render::files::{Form, check_standard_output, write_picture};
@@ -16,7 +19,7 @@ use crate::render::{part, video};
 const MAX_COMMANDS: usize = 100;
 
 /// Merges the parts of a picture and writes it.
-pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
+pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
     let MergeOptions { parts: paths, pictures, sample_type, tone, progress } = options;
     if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
         return Err(part::needless());
@@ -30,7 +33,7 @@ pub(crate) fn run(options: &MergeOptions) -> Result<(), Failure> {
     outputs::check(&inputs, &written, &[])?;
     let parts = Parts::open(paths).map_err(Failure::input)?;
     say_missing(&parts);
-    let merged = parts.merge().map_err(failure)?;
+    let merged = parts.merge().map_err(merge_failure)?;
     say_dazzling(&merged.film);
     let provenance =
         serde_json::to_string(&merged.provenance).map_err(|error| Failure::work_error(&error))?;
@@ -62,9 +65,33 @@ fn say_dazzling(film: &Film) {
 }
 
 /// Failure of a merge. A full disk or memory is a failure of the work, all else one of the input.
-fn failure(error: PartError) -> Failure {
+fn merge_failure(error: PartError) -> Failure {
     match error {
         PartError::Film(_) | PartError::Unequal { .. } => Failure::work(error),
         error => Failure::input(error),
     }
+}
+
+/// Tone-maps a picture and writes it.
+pub(crate) fn tonemap(options: &TonemapOptions) -> Result<(), Failure> {
+    let TonemapOptions { input, output, tone } = options;
+    outputs::check(&[(input, "the picture to read")], &[output], &[])?;
+    let (picture, provenance) = read_with_provenance(input).map_err(|error| Failure::input_error(&error))?;
+    let radiance = picture.pixels.iter().copied();
+    let written = write_png(output, picture.size(), radiance, tone.mapping(), provenance.as_deref());
+    written.map_err(|error| match error {
+        PngError::NotANumber { .. } => Failure::input_error(&error),
+        _ => Failure::work_error(&error),
+    })
+}
+
+/// Prints the difference between two pictures as JSON.
+pub(crate) fn diff(options: &DiffOptions) -> Result<(), Failure> {
+    let read = |path| read_rgb(path).map_err(|error| Failure::input_error(&error));
+    let reference = read(&options.reference)?;
+    let image = read(&options.image)?;
+    let difference = compare(&reference, &image, options.block, options.exclude_above)
+        .map_err(|error| Failure::input_error(&error))?;
+    let text = serde_json::to_string_pretty(&difference).map_err(|error| Failure::work_error(&error))?;
+    print_json(&text)
 }

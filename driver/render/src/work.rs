@@ -1,0 +1,144 @@
+//! Work of a picture: its card image, the work of the cards, the outcome, and the time of each phase.
+
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+use photoncard_cards::scheduler::TileCounts;
+use photoncard_cards::session::LinkBytes;
+use photoncard_map::pack::{CardImage, PackedScene};
+use photoncard_map::photon_map::{self, Guiding, MappedImage, PhotonTimes, map_photons};
+use photoncard_picture::film::Film;
+use photoncard_picture::sink::TileSink;
+use photoncard_scene::Scene;
+use photoncard_shared::budget::Budget;
+use photoncard_shared::counters::Counters;
+use photoncard_shared::message::{CausticGather, FrameParameters, Tile};
+use serde::Serialize;
+
+use super::outputs::Outputs;
+use super::{Observer, Phase, RenderError, RenderSettings};
+use crate::emulator::memory_model::MemoryTraffic;
+
+/// Function that checks whether a chip with a budget can render a picture.
+pub(super) type BudgetCheck<'a> = &'a dyn Fn(&Budget) -> Result<(), RenderError>;
+
+/// Function that applies a check to all chips.
+pub(super) type FitChips<'a> = dyn FnMut(BudgetCheck) -> Result<(), RenderError> + 'a;
+
+/// Work that cards get.
+pub(super) struct Work<'a> {
+    pub(super) settings: &'a RenderSettings,
+    pub(super) image: &'a Arc<CardImage>,
+    /// True if the image is from an earlier picture or a prepared scene.
+    pub(super) is_image_kept: bool,
+    pub(super) frame: &'a FrameParameters,
+    /// All tiles of the picture.
+    pub(super) tiles: Vec<Tile>,
+    /// Film of the picture, which is one of the sinks. It contains the tiles of the resumed render.
+    pub(super) film: &'a Mutex<Film>,
+    /// Destinations of finished tiles.
+    pub(super) sinks: Vec<&'a dyn TileSink>,
+    /// Outputs that are polled during the work.
+    pub(super) outputs: &'a Outputs<'a>,
+}
+
+/// Outcome of the work of cards.
+#[derive(Default)]
+pub(super) struct Outcome {
+    /// Counters of the work.
+    pub(super) counters: Counters,
+    /// Bytes transferred over the link of each card.
+    pub(super) links: Vec<LinkBytes>,
+    /// Memory traffic; `None` if memory is not modelled.
+    pub(super) traffic: Option<MemoryTraffic>,
+    pub(super) cards: usize,
+    /// Number of cards that were given up, left out because of their budget, or never answered the greeting.
+    pub(super) cards_given_up: usize,
+    /// Numbers of tiles that were rendered more than once or taken over.
+    pub(super) tiles: TileCounts,
+    /// Names of cards that rendered dazzling tiles which no other card verified, with the number of such
+    /// tiles. Kept tiles count for [`EARLIER_RENDER`](crate::statistics::EARLIER_RENDER).
+    pub(super) dazzling: Vec<(String, usize)>,
+    /// Error that ended the work. The other fields describe the work until then.
+    pub(super) failure: Option<RenderError>,
+    /// Time until the last card was loaded, seconds.
+    pub(super) load_seconds: f64,
+    /// Time after the last card was loaded, seconds.
+    pub(super) render_seconds: f64,
+}
+
+/// Card image, and the frame parameters that are derived from it.
+#[derive(Clone)]
+pub(super) struct Prepared {
+    pub(super) image: Arc<CardImage>,
+    /// Maximum distance of a gather, metres.
+    pub(super) max_distance: f32,
+    /// Parameters of gathers in the caustic map.
+    pub(super) caustics: Option<CausticGather>,
+    /// Number of paths that were traced for the photons.
+    pub(super) paths: u64,
+    /// Guiding of these paths; `None` if photons are for any camera.
+    pub(super) guiding: Option<Guiding>,
+}
+
+/// Adds the photon maps to a packed scene.
+///
+/// # Errors
+/// If the image does not fit the chips, the photons cannot be traced, or the observer stops the render.
+pub(super) fn prepare(
+    scene: &Scene,
+    packed: PackedScene,
+    settings: &RenderSettings,
+    fit: &mut FitChips,
+    times: &mut Times,
+    observer: &dyn Observer,
+) -> Result<Prepared, RenderError> {
+    let start = Instant::now();
+    let photon_settings = settings.photon_settings(scene);
+    fit(&|budget| Ok(photon_map::check_packed(&packed, &photon_settings, budget)?))?;
+    let total = settings.photons.count as u64;
+    let progress = |stored: usize| {
+        observer.progress(Phase::Photons, stored as u64, total);
+        if stored as u64 == total {
+            observer.progress(Phase::Pack, 0, 1);
+        }
+        !observer.is_stopped()
+    };
+    let mapped = map_photons(packed, &photon_settings, &progress)?;
+    fit(&|budget| Ok(photon_map::check_image(&mapped.image, budget)?))?;
+    let PhotonTimes { tracing, building, measuring, estimating } = mapped.times;
+    times.photons = tracing.as_secs_f64();
+    times.pack += start.elapsed().as_secs_f64() - times.photons;
+    times.photon_map = building.as_secs_f64();
+    times.discs = measuring.as_secs_f64();
+    times.irradiance = estimating.as_secs_f64();
+    let MappedImage { image, max_distance, caustics, paths, guiding, .. } = mapped;
+    Ok(Prepared { image: Arc::new(image), max_distance, caustics, paths, guiding })
+}
+
+/// Times of the phases, seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Times {
+    /// Time to read the scene file.
+    pub scene: f64,
+    /// Time of pilot renders, from which settings are chosen.
+    pub pilot: f64,
+    /// Time to trace photons.
+    pub photons: f64,
+    /// Time to build the hierarchy, the photon map and the card image.
+    pub pack: f64,
+    /// Part of `pack` for the hierarchy and the other sections of the scene.
+    pub hierarchy: f64,
+    /// Part of `pack` for the photon map.
+    pub photon_map: f64,
+    /// Part of `pack` to measure the maximum distance of gathers, and disc fractions.
+    pub discs: f64,
+    /// Part of `pack` for irradiance points, if irradiance is precomputed.
+    pub irradiance: f64,
+    /// Time until the slowest card was loaded.
+    pub load: f64,
+    /// Time of rendering, after the last card was loaded.
+    pub render: f64,
+    /// Total time.
+    pub total: f64,
+}

@@ -1,0 +1,125 @@
+//! Contents of a scene, and their checksum.
+
+use std::fmt::Write;
+
+use glam::DVec3;
+use photoncard_shared::checksum::Checksum;
+
+use crate::camera::Camera;
+use crate::environment::Environment;
+use crate::light::PunctualLight;
+use crate::material::Material;
+use crate::texture::{Image, Texture};
+use crate::triangle::{CornerTangents, Triangle, VertexAttributes};
+
+/// Contents of a [`Scene`](crate::Scene): triangles, materials, textures, lights and cameras in world space,
+/// with all instances expanded.
+#[derive(Clone, Debug, Default)]
+pub struct SceneContents {
+    /// Position of the scene's origin in the coordinates of its file, metres. It is 0 unless the scene lies
+    /// far from the file's origin.
+    pub offset: DVec3,
+    /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
+    pub triangles: Vec<Triangle>,
+    /// Attributes of the triangles that have any: normals, texture coordinates and colours of the corners.
+    pub attributes: Vec<VertexAttributes>,
+    /// Tangents of the triangles whose material has a normal map.
+    pub tangents: Vec<CornerTangents>,
+    /// Materials; the index in [`Triangle::material`] refers to this list.
+    pub materials: Vec<Material>,
+    /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.
+    pub textures: Vec<Texture>,
+    /// Images. One that textures use in two encodings is listed twice.
+    pub images: Vec<Image>,
+    /// Point, spot and directional lights (`KHR_lights_punctual`).
+    pub lights: Vec<PunctualLight>,
+    /// Environment light from infinitely far; `None` in a scene from a glTF file.
+    pub environment: Option<Environment>,
+    /// Cameras in file order. Never empty: a file without cameras gets one that frames the scene.
+    pub cameras: Vec<Camera>,
+    /// Program that wrote the file (`asset.generator`), if it says so.
+    pub generator: Option<String>,
+    /// Names of the file's variants of materials.
+    pub variants: Vec<String>,
+    /// Orthographic cameras of the file, which are not rendered: the number of perspective cameras before
+    /// each, and its name.
+    pub orthographic: Vec<(usize, String)>,
+    /// Sentences about missing contents of the file and about contents that the renderer ignores, each once.
+    pub notices: Vec<String>,
+    /// Notices that matter only to some pictures: index in [`Self::notices`], and the subject.
+    pub concerns: Vec<(usize, Concern)>,
+    /// Sentences about contents of the file that the renderer interprets in another way than they are stated,
+    /// each once.
+    pub remarks: Vec<String>,
+    /// Number of triangles of zero area, which were left out.
+    pub skipped_triangles: usize,
+}
+
+/// Subject of a notice that matters only to pictures that use it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Concern {
+    /// Default view. A picture that states its view does not use it.
+    View,
+    /// Cameras that cannot be used, in a file that has others.
+    OtherCameras,
+    /// Animations. A picture of the scene at rest does not use them.
+    Animations,
+    /// Environment light of the file. A picture may replace it by that of another file.
+    Environment,
+}
+
+impl SceneContents {
+    /// Checksum of the triangles and texels.
+    pub(crate) fn bulk_checksum(&self) -> Checksum {
+        let mut sum = Checksum::default();
+        for triangle in &self.triangles {
+            triangle.vertices.iter().for_each(|vertex| add(&mut sum, &vertex.to_array()));
+            sum.update(&triangle.material.to_le_bytes());
+            sum.update(&triangle.attributes.to_le_bytes());
+        }
+        for attributes in &self.attributes {
+            sum.update(&[u8::from(attributes.normals.is_some())]);
+            attributes.normals.iter().flatten().for_each(|normal| add(&mut sum, &normal.to_array()));
+            attributes.coordinates.iter().flatten().for_each(|place| add(&mut sum, &place.to_array()));
+            add(&mut sum, attributes.colours.as_flattened());
+            sum.update(&attributes.tangents.to_le_bytes());
+        }
+        self.tangents.iter().flatten().for_each(|tangent| add(&mut sum, &tangent.to_array()));
+        for image in &self.images {
+            sum.update(image.texels.as_flattened());
+        }
+        if let Some(environment) = &self.environment {
+            add(&mut sum, environment.texels.as_flattened());
+        }
+        sum
+    }
+
+    /// CRC-32C of all contents that a render reads, as eight hexadecimal digits. `sum` is
+    /// [`Self::bulk_checksum`]; `cameras` replace those of the scene.
+    pub(crate) fn checksum(&self, mut sum: Checksum, cameras: &[Camera]) -> String {
+        sum.update(self.description(cameras).as_bytes());
+        format!("{:08x}", sum.value())
+    }
+
+    /// Text of all contents except triangles, attributes and texels. Its floating-point numbers parse back
+    /// exactly.
+    fn description(&self, cameras: &[Camera]) -> String {
+        let mut text = String::new();
+        let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, cameras, self.textures, self.lights);
+        for image in &self.images {
+            let _ = write!(text, "{} {} {:?}", image.width, image.height, image.encoding);
+        }
+        let _ = write!(text, "{:?}", self.environment.as_ref().map(|map| (map.width, map.height)));
+        if self.offset != DVec3::ZERO {
+            let _ = write!(text, "{:?}", self.offset);
+        }
+        if let Some(map) = self.environment.as_ref().filter(|map| map.strength != 1.0) {
+            let _ = write!(text, "{:?}", map.strength);
+        }
+        text
+    }
+}
+
+fn add(sum: &mut Checksum, values: &[f32]) {
+    values.iter().for_each(|value| sum.update(&value.to_le_bytes()));
+}
