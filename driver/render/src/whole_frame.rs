@@ -73,9 +73,9 @@ fn reference_chips(addresses: &[CardAddress]) -> Result<usize, RenderError> {
         _ => None,
     });
     counts.sum::<Option<usize>>().ok_or_else(|| RenderError::Setting {
-        option: "--order",
+        field: "schedule.order",
         value: "hilbert".into(),
         reason: "it leaves all gathers of the frame to the host, as no chip has room for them".into(),
-        remedy: "use --card emulated:CHIPS, or --order sort".into(),
+        remedy: "use `cards.addresses` emulated:CHIPS, or `schedule.order` sort".into(),
     })
 }

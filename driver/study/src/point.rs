@@ -66,14 +66,14 @@ impl Point {
         let RenderSettings { schedule, .. } = &self.settings;
         if schedule.order.is_of_whole_frame() && self.chip() != EmulatedKind::Reference {
             return Err(RenderError::Setting {
-                option: "--order",
+                field: "schedule.order",
                 value: schedule.order.name().to_owned(),
                 reason: format!(
                     "{} has no room for the gathers of a frame, and only reference chips leave them to the host",
                     self.chip().name()
                 ),
                 remedy: format!(
-                    "use --card {}, or another --order, such as sort",
+                    "use `cards.addresses` {}, or another `schedule.order`, such as sort",
                     EmulatedKind::Reference.name()
                 ),
             });

@@ -6,9 +6,10 @@ use photoncard_driver::quality::Stated;
 use photoncard_driver::render::{Integrator, MIN_IRRADIANCE_ERROR, Sampling};
 
 use super::choice::{choice, switch};
+use super::headings::RAYS;
 
 #[derive(Args)]
-#[command(next_help_heading = "Rays and samples")]
+#[command(next_help_heading = RAYS)]
 pub(crate) struct IntegratorOptions {
     /// Seed of all random numbers
     #[arg(long, default_value_t = Integrator::default().seed, allow_negative_numbers = true, hide_short_help = true)]

@@ -5,6 +5,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::scene::LightUnits;
 
 use super::choice::choice;
+use super::headings::SCENE;
 
 #[derive(Args, Clone)]
 pub(crate) struct LightOptions {
@@ -14,7 +15,7 @@ pub(crate) struct LightOptions {
         value_name = "UNITS",
         default_value = LightUnits::default().name(),
         value_parser = choice::<LightUnits>(),
-        help_heading = "Scene",
+        help_heading = SCENE,
         hide_short_help = true
     )]
     pub(crate) light_units: LightUnits,

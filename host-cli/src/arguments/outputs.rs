@@ -10,10 +10,11 @@ use photoncard_driver::partial::PartialSettings;
 use super::choice::choice;
 use super::files::{PictureFormat, PictureOutput, TextOutput, picture, text};
 use super::frames::numbered;
+use super::headings::OUTPUTS;
 use super::tone::ToneOptions;
 
 #[derive(Args, Clone)]
-#[command(next_help_heading = "Outputs")]
+#[command(next_help_heading = OUTPUTS)]
 pub(crate) struct OutputOptions {
     /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated [default:
     /// SCENE's name with .png]
@@ -31,17 +32,20 @@ pub(crate) struct OutputOptions {
     pub(crate) resume: bool,
     /// Type of the EXR's samples; Z and gathers are always float [default: float]
     #[arg(long, value_parser = choice::<SampleFormat>(), hide_short_help = true)]
-    pub(super) sample_type: Option<SampleFormat>,
+    sample_type: Option<SampleFormat>,
     #[command(flatten)]
     pub(crate) tone: ToneOptions,
     /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port:
     /// 14158]
     #[arg(long, value_name = "HOST:PORT", hide_short_help = true)]
-    pub(super) display_server: Option<DisplayAddress>,
+    display_server: Option<DisplayAddress>,
     /// Write statistics of the render as JSON; - for standard output
     #[arg(long, value_name = "OUT.json", value_parser = text())]
     pub(crate) stats: Option<TextOutput>,
 }
+
+/// Reason for which options of an EXR have no effect.
+pub(super) const WITHOUT_EXR: &str = "without -o OUT.exr";
 
 impl OutputOptions {
     /// Returns whether the render continues with finished tiles or frames of an earlier one.
@@ -94,8 +98,25 @@ impl OutputOptions {
         self.sample_type.unwrap_or(SampleFormat::Float)
     }
 
+    /// Options of picture formats that are not written, each with whether it has no effect, its name, and the
+    /// reason.
+    pub(super) fn without_effect(&self) -> [(bool, &'static str, String); 3] {
+        let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !self.has(format));
+        let of_png = "without -o OUT.png".to_owned();
+        [
+            (self.tone.exposure.is_some() && no_png, "--exposure", of_png.clone()),
+            (self.tone.curve.is_some() && no_png, "--tonemap", of_png),
+            (self.sample_type.is_some() && no_exr, "--sample-type", WITHOUT_EXR.to_owned()),
+        ]
+    }
+
+    /// Returns whether a layer that is stored would be seen: by a file or by a viewer.
+    pub(super) fn have_layers(&self) -> bool {
+        self.display_server.is_some() || self.has(PictureFormat::Part) || self.has(PictureFormat::Exr)
+    }
+
     /// Returns whether a picture of this format is written.
-    pub(super) fn has(&self, format: PictureFormat) -> bool {
+    fn has(&self, format: PictureFormat) -> bool {
         self.pictures.iter().any(|picture| picture.format == format)
     }
 

@@ -1,40 +1,30 @@
 //! Option of a render whose input is a prepared scene.
 
-use clap::Args;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
+use clap::{Args, Command, Id};
+
+use super::frames::FrameOptions;
+use super::headings::SCENE;
+use super::integrator::IntegratorOptions;
+use super::photons::PhotonOptions;
+use super::samples::SampleOptions;
+use super::scene::SceneOptions;
+use super::steps::Step;
 
 /// Ids of the options that belong to `photoncard prepare`.
-pub(crate) const OF_PREPARATION: [&str; 29] = [
-    "assignments",
-    "energy_compensation",
-    "variant",
-    "light_units",
-    "environment",
-    "environment_rotation",
-    "strict",
-    "quality",
-    "photons",
-    "photon_map",
-    "neighbors",
-    "caustic_photons",
-    "caustic_neighbors",
-    "max_distance",
-    "radiance",
-    "seed",
-    "gather_rays",
-    "shadow_rays",
-    "spp",
-    "planned_spp",
-    "sampling",
-    "irradiance_cache",
-    "ic_error",
-    "adaptive",
-    "time",
-    "noise",
-    "keep_samples",
-    "animations",
-    "fps",
-];
+fn of_preparation() -> impl Iterator<Item = Id> {
+    let groups = [
+        SceneOptions::augment_args,
+        FrameOptions::augment_args,
+        PhotonOptions::augment_args,
+        IntegratorOptions::augment_args,
+        SampleOptions::augment_args,
+    ];
+    let all = groups.iter().fold(Command::new("prepare"), |command, add| add(command));
+    let prepared = all.get_arguments().filter(|option| Step::of(option) == Step::Prepare);
+    let prepared: Vec<Id> = prepared.map(|option| option.get_id().clone()).collect();
+    prepared.into_iter().chain(["quality".into()])
+}
 
 #[derive(Args)]
 pub(crate) struct PreparedOption {
@@ -43,7 +33,7 @@ pub(crate) struct PreparedOption {
     /// The scene, its photons, rays and samples are those that were stated to photoncard prepare. Options of
     /// the picture and of its camera are stated as for a glTF file. Of frames that were prepared --frames
     /// states those to render, and SCENE has a run of # where there is a file for each.
-    #[arg(long, help_heading = "Scene", conflicts_with_all = OF_PREPARATION)]
+    #[arg(long, help_heading = SCENE, conflicts_with_all = of_preparation())]
     pub(crate) prepared: bool,
 }
 

@@ -7,30 +7,31 @@ use photoncard_driver::render::Schedule;
 use photoncard_driver::scheduler::GatherOrder;
 
 use super::choice::choice;
+use super::headings::ORDER;
 
 #[derive(Args)]
-#[command(next_help_heading = "Order of the work")]
+#[command(next_help_heading = ORDER)]
 pub(crate) struct ScheduleOptions {
     /// Side of a tile, pixels [default: the widest that all cards have room for, for several cards halved
     /// until each has four tiles, down to 16]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) tile: Option<u32>,
+    tile: Option<u32>,
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = Schedule::default().order.name(), value_parser = choice::<GatherOrder>(), hide_short_help = true)]
     pub(super) order: GatherOrder,
     /// Direction bins of the gather rays, for orders with bins [default: 99]
     #[arg(long, hide_short_help = true)]
-    pub(super) bins: Option<u32>,
+    bins: Option<u32>,
     /// Gathers that may wait on a chip, for orders with a queue [default: the chip's capacity]
     #[arg(long, hide_short_help = true)]
-    pub(super) queue: Option<u32>,
+    queue: Option<u32>,
     /// Tiles in flight on a chip, whose gathers may wait in the queue together [default: the chip's capacity]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) in_flight: Option<u32>,
+    in_flight: Option<u32>,
 }
 
 #[derive(Args)]
-#[command(next_help_heading = "Order of the work")]
+#[command(next_help_heading = ORDER)]
 pub(crate) struct PartOptions {
     /// Render the K-th of N parts of the picture alone, to -o OUT.part; photoncard merge makes the picture of
     /// all
@@ -42,6 +43,19 @@ pub(crate) struct PartOptions {
 }
 
 impl ScheduleOptions {
+    /// Options that only other gather orders have, each with whether it has no effect, its name, and the
+    /// reason.
+    pub(super) fn without_effect(&self) -> [(bool, &'static str, String); 3] {
+        let Self { order, .. } = self;
+        let no_bins = format!("with --order {}, which has no direction bins", order.name());
+        let no_queue = format!("with --order {}, by which no gathers wait on a chip", order.name());
+        [
+            (self.bins.is_some() && !order.has_bins(), "--bins", no_bins),
+            (self.queue.is_some() && !order.has_queue(), "--queue", no_queue.clone()),
+            (self.in_flight.is_some() && !order.has_queue(), "--in-flight", no_queue),
+        ]
+    }
+
     /// Settings of these options.
     pub(super) fn settings(&self) -> Schedule {
         Schedule {

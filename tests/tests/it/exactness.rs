@@ -324,7 +324,7 @@ fn a_frame_along_one_curve_is_for_emulated_reference_chips_alone() {
         s.cards.addresses = vec![card("emulated-micro:1")];
     });
     let error = render(&glossy(), &settings, &Unobserved).err().expect("is refused");
-    assert!(error.is_input() && error.to_string().contains("--order hilbert"), "{error}");
+    assert!(error.is_input() && error.to_string().contains("`schedule.order` hilbert"), "{error}");
 }
 
 #[test]

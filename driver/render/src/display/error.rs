@@ -10,7 +10,7 @@ use super::DisplayAddress;
 pub enum DisplayError {
     /// The server cannot be reached.
     #[error(
-        "cannot reach the display server at {address}: {source}; start tev there, or leave --display-server out"
+        "cannot reach the display server at {address}: {source}; start tev there, or leave `outputs.display` out"
     )]
     Connect {
         /// Address of the server.
