@@ -8,8 +8,6 @@ use photoncard_driver::render::NamedSettings;
 use photoncard_driver::scene::gltf::Moment;
 use serde_json::json;
 
-use super::headings::FRAMES;
-
 /// Default frames per second, that of Blender.
 const FPS: f64 = 24.0;
 /// Maximum frames per second.
@@ -18,7 +16,7 @@ const MAX_FPS: f64 = 100_000.0;
 const MAX_FRAME: u32 = 999_999;
 
 #[derive(Args)]
-#[command(next_help_heading = FRAMES)]
+#[command(next_help_heading = "Frames")]
 pub(crate) struct FrameOptions {
     /// Frames of the scene's animations: 1-240, several ranges 1-10,20, or every tenth frame 1-240x10
     ///

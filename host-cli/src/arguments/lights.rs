@@ -5,7 +5,6 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::scene::LightUnits;
 
 use super::choice::choice;
-use super::headings::SCENE;
 
 #[derive(Args, Clone)]
 pub(crate) struct LightOptions {
@@ -15,7 +14,7 @@ pub(crate) struct LightOptions {
         value_name = "UNITS",
         default_value = LightUnits::default().name(),
         value_parser = choice::<LightUnits>(),
-        help_heading = SCENE,
+        help_heading = "Scene",
         hide_short_help = true
     )]
     pub(crate) light_units: LightUnits,

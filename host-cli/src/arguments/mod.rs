@@ -5,7 +5,6 @@ mod choice;
 mod farm;
 mod files;
 mod frames;
-mod headings;
 mod integrator;
 mod lights;
 #[cfg(feature = "study")]
@@ -21,7 +20,6 @@ mod render;
 mod samples;
 mod scene;
 mod schedule;
-mod steps;
 #[cfg(feature = "study")]
 mod study;
 #[cfg(feature = "study")]
@@ -57,10 +55,10 @@ pub(crate) use self::lights::LightOptions;
 pub(crate) use self::merge::MergeOptions;
 pub(crate) use self::outputs::OutputOptions;
 pub(crate) use self::prepare::PrepareOptions;
+pub(crate) use self::prepared::Step;
 pub(crate) use self::progress::ProgressForm;
 pub(crate) use self::render::{RenderOptions, Unfitted};
 pub(crate) use self::scene::SceneOptions;
-pub(crate) use self::steps::Step;
 #[cfg(feature = "study")]
 pub(crate) use self::study::{Selection, StudyArguments, StudyCommand};
 #[cfg(feature = "study")]

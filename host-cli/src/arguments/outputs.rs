@@ -10,11 +10,10 @@ use photoncard_driver::partial::PartialSettings;
 use super::choice::choice;
 use super::files::{PictureFormat, PictureOutput, TextOutput, picture, text};
 use super::frames::numbered;
-use super::headings::OUTPUTS;
 use super::tone::ToneOptions;
 
 #[derive(Args, Clone)]
-#[command(next_help_heading = OUTPUTS)]
+#[command(next_help_heading = "Outputs")]
 pub(crate) struct OutputOptions {
     /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated [default:
     /// SCENE's name with .png]
@@ -43,9 +42,6 @@ pub(crate) struct OutputOptions {
     #[arg(long, value_name = "OUT.json", value_parser = text())]
     pub(crate) stats: Option<TextOutput>,
 }
-
-/// Reason for which options of an EXR have no effect.
-pub(super) const WITHOUT_EXR: &str = "without -o OUT.exr";
 
 impl OutputOptions {
     /// Returns whether the render continues with finished tiles or frames of an earlier one.
@@ -98,16 +94,12 @@ impl OutputOptions {
         self.sample_type.unwrap_or(SampleFormat::Float)
     }
 
-    /// Options of picture formats that are not written, each with whether it has no effect, its name, and the
-    /// reason.
-    pub(super) fn without_effect(&self) -> [(bool, &'static str, String); 3] {
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
         let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !self.has(format));
-        let of_png = "without -o OUT.png".to_owned();
-        [
-            (self.tone.exposure.is_some() && no_png, "--exposure", of_png.clone()),
-            (self.tone.curve.is_some() && no_png, "--tonemap", of_png),
-            (self.sample_type.is_some() && no_exr, "--sample-type", WITHOUT_EXR.to_owned()),
-        ]
+        add(self.tone.exposure.is_some() && no_png, "--exposure", "without -o OUT.png");
+        add(self.tone.curve.is_some() && no_png, "--tonemap", "without -o OUT.png");
+        add(self.sample_type.is_some() && no_exr, "--sample-type", "without -o OUT.exr");
     }
 
     /// Returns whether a layer that is stored would be seen: by a file or by a viewer.

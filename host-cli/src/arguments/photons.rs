@@ -6,10 +6,9 @@ use photoncard_driver::photon_map::PhotonLayout;
 use photoncard_driver::render::{PhotonMaps, Radiance};
 
 use super::choice::choice;
-use super::headings::PHOTONS;
 
 #[derive(Args)]
-#[command(next_help_heading = PHOTONS)]
+#[command(next_help_heading = "Photon maps")]
 pub(crate) struct PhotonOptions {
     /// Photons stored in the map [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true)]
@@ -51,29 +50,21 @@ impl PhotonOptions {
         self.photons.is_some()
     }
 
-    /// Options, each with whether it has no effect, its name, and the reason.
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
     pub(super) fn without_effect(
         &self,
         is_specular: bool,
         gather_rays: u32,
-    ) -> [(bool, &'static str, String); 3] {
-        let no_specular =
-            "without a caustic map: nothing in the scene is a mirror, glass or glossy".to_owned();
+        add: &mut impl FnMut(bool, &str, &str),
+    ) {
+        let no_specular = "without a caustic map: nothing in the scene is a mirror, glass or glossy";
         let is_off = self.caustic_photons == Some(0);
-        let no_map = if is_off { "with --caustic-photons 0".to_owned() } else { no_specular.clone() };
-        [
-            (
-                self.radiance == Radiance::Precomputed && gather_rays == 0,
-                "--radiance precomputed",
-                "with --gather-rays 0".to_owned(),
-            ),
-            (
-                self.caustic_photons.is_some_and(|photons| photons > 0) && !is_specular,
-                "--caustic-photons",
-                no_specular,
-            ),
-            (self.caustic_neighbors.is_some() && (!is_specular || is_off), "--caustic-neighbors", no_map),
-        ]
+        let no_map = if is_off { "with --caustic-photons 0" } else { no_specular };
+        let is_precomputed = self.radiance == Radiance::Precomputed;
+        add(is_precomputed && gather_rays == 0, "--radiance precomputed", "with --gather-rays 0");
+        let is_stated = self.caustic_photons.is_some() && !is_off;
+        add(is_stated && !is_specular, "--caustic-photons", no_specular);
+        add(self.caustic_neighbors.is_some() && (!is_specular || is_off), "--caustic-neighbors", no_map);
     }
 
     /// Settings of these options. `base` supplies those that are not stated.

@@ -7,7 +7,6 @@ use photoncard_driver::render::{Filter, Picture};
 use photoncard_driver::scene::Camera;
 
 use super::choice::choice;
-use super::headings::PICTURE;
 
 /// Default length of the longer side, pixels.
 const SIDE: u32 = 512;
@@ -41,7 +40,7 @@ impl Size {
 }
 
 #[derive(Args)]
-#[command(next_help_heading = PICTURE)]
+#[command(next_help_heading = "Picture and camera")]
 pub(crate) struct PictureOptions {
     /// Width and height of the picture, pixels; or 800 on the longer side, 1080p, or 50% [default: 512 on the
     /// longer side]

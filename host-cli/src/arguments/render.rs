@@ -12,7 +12,6 @@ use photoncard_driver::scene::Scene;
 use super::cards::CardOptions;
 use super::choice::choice;
 use super::frames::FrameOptions;
-use super::headings::{ORDER, PHOTONS};
 use super::integrator::IntegratorOptions;
 use super::outputs::OutputOptions;
 use super::photons::PhotonOptions;
@@ -45,7 +44,7 @@ pub(crate) struct RenderOptions {
     /// outside of a house. The picture's expected value stays. With auto a pilot measures what that gains,
     /// unless all that it would choose is stated. Pictures of several cameras, such as frames and prepared
     /// scenes, share photons for the scene.
-    #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::Auto.name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = PHOTONS, hide_short_help = true)]
+    #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::Auto.name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
     photons_for: PhotonsFor,
     #[command(flatten)]
     pub(super) integrator: IntegratorOptions,
@@ -60,7 +59,7 @@ pub(crate) struct RenderOptions {
     #[command(flatten)]
     pub(crate) outputs: OutputOptions,
     /// Threads for the host's own work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = ORDER, hide_short_help = true)]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
     pub(crate) threads: Option<usize>,
     /// Show no progress; what is ignored or missing in the scene is told
     #[arg(long)]

@@ -5,10 +5,8 @@ use std::time::Duration;
 use clap::Args;
 use photoncard_driver::render::Aim;
 
-use super::headings::RAYS;
-
 #[derive(Args)]
-#[command(next_help_heading = RAYS)]
+#[command(next_help_heading = "Rays and samples")]
 pub(crate) struct SampleOptions {
     /// Add samples until so much time has passed since the start: 90, 60s, 5m or 2h
     ///

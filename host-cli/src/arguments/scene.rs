@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::Args;
 use photoncard_driver::scene::{LightUnits, Material, Reflection, Scene};
 
-use super::headings::SCENE;
 use super::lights::LightOptions;
 use crate::environment::EnvironmentOption;
 
@@ -19,16 +18,16 @@ pub(crate) struct SceneOptions {
     /// Properties of a material are diffuse, specular, exponent, metallic, roughness, transmission, ior,
     /// thickness, alpha and emission; those of a point, spot or directional light are colour, intensity and
     /// position. environment.strength is a factor of the environment.
-    #[arg(long = "set", value_name = "ASSIGNMENT", help_heading = SCENE, hide_short_help = true)]
+    #[arg(long = "set", value_name = "ASSIGNMENT", help_heading = "Scene", hide_short_help = true)]
     pub(crate) assignments: Vec<String>,
     /// Add the light that rough metals and coats reflect several times between their microfacets
     ///
     /// Blender does so by default; glTF's model leaves this light out, and a metal of roughness 1 is less
     /// than half as bright.
-    #[arg(long, help_heading = SCENE, hide_short_help = true)]
+    #[arg(long, help_heading = "Scene", hide_short_help = true)]
     pub(crate) energy_compensation: bool,
     /// Variant of the scene's materials, by its name [default: the materials that its meshes state]
-    #[arg(long, value_name = "NAME", help_heading = SCENE, hide_short_help = true)]
+    #[arg(long, value_name = "NAME", help_heading = "Scene", hide_short_help = true)]
     pub(crate) variant: Option<String>,
     #[command(flatten)]
     pub(crate) lights: LightOptions,
@@ -37,35 +36,27 @@ pub(crate) struct SceneOptions {
     /// The top of the map is +y. Its middle is -z, and +x in files of Blender, as there. Of an EXR of DWA
     /// compression the last bits depend on the vector instructions of the processor: for a farm of several
     /// kinds store it with ZIP.
-    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true, help_heading = SCENE)]
+    #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true, help_heading = "Scene")]
     pub(crate) environment: Option<EnvironmentOption>,
     /// Turn the environment map about +y, counter-clockwise seen from above [default: 0]
     ///
     /// A rotation of A degrees about Z in Blender's Mapping node is -A.
-    #[arg(long, value_name = "DEGREES", requires = "environment", allow_negative_numbers = true, value_parser = degrees, help_heading = SCENE, hide_short_help = true)]
+    #[arg(long, value_name = "DEGREES", requires = "environment", allow_negative_numbers = true, value_parser = degrees, help_heading = "Scene", hide_short_help = true)]
     pub(crate) environment_rotation: Option<f32>,
     /// Fail if anything in the scene is ignored or missing, such as a texture
-    #[arg(long, help_heading = SCENE, hide_short_help = true)]
+    #[arg(long, help_heading = "Scene", hide_short_help = true)]
     pub(crate) strict: bool,
 }
 
 impl SceneOptions {
-    /// Options, each with whether it has no effect on `scene`, its name, and the reason.
-    pub(super) fn without_effect(&self, scene: &Scene) -> [(bool, &'static str, String); 2] {
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    pub(super) fn without_effect(&self, scene: &Scene, add: &mut impl FnMut(bool, &str, &str)) {
         let has_lobe =
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });
-        [
-            (
-                self.lights.light_units != LightUnits::Auto && scene.lights.is_empty(),
-                "--light-units",
-                "without point, spot or directional lights in the file".to_owned(),
-            ),
-            (
-                self.energy_compensation && !scene.materials.iter().any(has_lobe),
-                "--energy-compensation",
-                "without a metallic-roughness material".to_owned(),
-            ),
-        ]
+        let no_lights = self.lights.light_units != LightUnits::Auto && scene.lights.is_empty();
+        add(no_lights, "--light-units", "without point, spot or directional lights in the file");
+        let no_lobe = self.energy_compensation && !scene.materials.iter().any(has_lobe);
+        add(no_lobe, "--energy-compensation", "without a metallic-roughness material");
     }
 }
 

@@ -7,10 +7,9 @@ use photoncard_driver::render::Schedule;
 use photoncard_driver::scheduler::GatherOrder;
 
 use super::choice::choice;
-use super::headings::ORDER;
 
 #[derive(Args)]
-#[command(next_help_heading = ORDER)]
+#[command(next_help_heading = "Order of the work")]
 pub(crate) struct ScheduleOptions {
     /// Side of a tile, pixels [default: the widest that all cards have room for, for several cards halved
     /// until each has four tiles, down to 16]
@@ -31,7 +30,7 @@ pub(crate) struct ScheduleOptions {
 }
 
 #[derive(Args)]
-#[command(next_help_heading = ORDER)]
+#[command(next_help_heading = "Order of the work")]
 pub(crate) struct PartOptions {
     /// Render the K-th of N parts of the picture alone, to -o OUT.part; photoncard merge makes the picture of
     /// all
@@ -43,17 +42,14 @@ pub(crate) struct PartOptions {
 }
 
 impl ScheduleOptions {
-    /// Options that only other gather orders have, each with whether it has no effect, its name, and the
-    /// reason.
-    pub(super) fn without_effect(&self) -> [(bool, &'static str, String); 3] {
-        let Self { order, .. } = self;
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
+        let Self { order, bins, queue, in_flight, tile: _ } = self;
         let no_bins = format!("with --order {}, which has no direction bins", order.name());
         let no_queue = format!("with --order {}, by which no gathers wait on a chip", order.name());
-        [
-            (self.bins.is_some() && !order.has_bins(), "--bins", no_bins),
-            (self.queue.is_some() && !order.has_queue(), "--queue", no_queue.clone()),
-            (self.in_flight.is_some() && !order.has_queue(), "--in-flight", no_queue),
-        ]
+        add(bins.is_some() && !order.has_bins(), "--bins", &no_bins);
+        add(queue.is_some() && !order.has_queue(), "--queue", &no_queue);
+        add(in_flight.is_some() && !order.has_queue(), "--in-flight", &no_queue);
     }
 
     /// Settings of these options.
@@ -64,9 +60,7 @@ impl ScheduleOptions {
             bins: self.bins,
             queue: self.queue,
             in_flight: self.in_flight,
-            focus: None,
-            part: None,
-            keep_records: false,
+            ..Schedule::default()
         }
     }
 }

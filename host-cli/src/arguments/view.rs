@@ -10,7 +10,6 @@ use photoncard_driver::render::RenderSettings;
 
 use super::cards::CardOptions;
 use super::choice::choice;
-use super::headings::ORDER;
 use super::integrator::IntegratorOptions;
 use super::photons::PhotonOptions;
 use super::picture::PictureOptions;
@@ -45,7 +44,7 @@ pub(crate) struct ViewOptions {
     #[command(flatten)]
     pub(crate) cards: CardOptions,
     /// Threads for the host's own work [default: one per core]
-    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = ORDER, hide_short_help = true)]
+    #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
     pub(crate) threads: Option<usize>,
     /// Print nothing but the page's address
     #[arg(long)]

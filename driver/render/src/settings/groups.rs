@@ -57,7 +57,6 @@ impl Picture {
         self.camera_at.is_some() && self.look_at.is_some()
     }
 
-    /// Options of the group.
     pub(super) fn options(&self) -> Vec<Setting> {
         let Self { width, height, crop, camera, camera_at, look_at, fov, layers, filter } = self;
         let size = (Some(json!([width, height])), Some(format!("{width}x{height}")));
@@ -120,7 +119,6 @@ pub struct PhotonMaps {
 }
 
 impl PhotonMaps {
-    /// Options of the group.
     pub(super) fn options(&self) -> Vec<Setting> {
         let Self {
             count,
@@ -192,7 +190,6 @@ impl Integrator {
         self.planned_samples.unwrap_or(self.samples)
     }
 
-    /// Options of the group.
     pub(super) fn options(&self) -> Vec<Setting> {
         let Self {
             seed,
@@ -208,7 +205,8 @@ impl Integrator {
         let is_planned = irradiance_error.is_some() && self.planned() != *samples;
         let planned = (is_planned.then(|| json!(self.planned())), optional(*planned_samples).1);
         let cache = if irradiance_error.is_some() { "on" } else { "off" };
-        let adaptive = adaptive_threshold.map_or("off".to_owned(), |threshold| threshold.to_string());
+        let (threshold, argument) = optional(*adaptive_threshold);
+        let adaptive = (threshold, argument.or(Some("off".to_owned())));
         vec![
             setting(Pixels, "integrator.seed", "seed", value(seed)),
             setting(Pixels, "integrator.samples", "spp", value(samples)),
@@ -223,12 +221,7 @@ impl Integrator {
                 "irradiance-cache",
                 (None, Some(cache.to_owned())),
             ),
-            setting(
-                Pixels,
-                "integrator.adaptive_threshold",
-                "adaptive",
-                (Some(json!(adaptive_threshold)), Some(adaptive)),
-            ),
+            setting(Pixels, "integrator.adaptive_threshold", "adaptive", adaptive),
         ]
     }
 }
@@ -249,7 +242,7 @@ impl Default for Integrator {
 }
 
 /// Order of the work. No pixel depends on it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Schedule {
     /// Side of a tile, pixels; `None` to choose it by cards and picture
     /// ([`tile_side`](super::RenderSettings::tile_side)).
@@ -275,7 +268,6 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// Options of the group.
     pub(super) fn options(&self) -> Vec<Setting> {
         let Self { tile, order, bins, queue, in_flight, focus: _, part: _, keep_records: _ } = self;
         vec![
@@ -285,21 +277,6 @@ impl Schedule {
             setting(Work, "schedule.queue", "queue", optional(*queue)),
             setting(Work, "schedule.in_flight", "in-flight", optional(*in_flight)),
         ]
-    }
-}
-
-impl Default for Schedule {
-    fn default() -> Self {
-        Self {
-            tile: None,
-            order: GatherOrder::Sort,
-            bins: None,
-            queue: None,
-            in_flight: None,
-            focus: None,
-            part: None,
-            keep_records: false,
-        }
     }
 }
 
@@ -320,7 +297,6 @@ pub struct CardSet {
 }
 
 impl CardSet {
-    /// Options of the group.
     pub(super) fn options(&self) -> Vec<Setting> {
         let Self { addresses, faults, verify, caches: _, trace: _ } = self;
         let addresses: Vec<_> = addresses.iter().map(ToString::to_string).collect();
@@ -388,7 +364,6 @@ pub struct TileOutputs {
 }
 
 impl TileOutputs {
-    /// Options of the group.
     pub(super) fn options(&self) -> Vec<Setting> {
         let Self { partial: _, display: _ } = self;
         vec![

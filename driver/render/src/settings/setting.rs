@@ -7,7 +7,6 @@ use serde_json::{Value, json};
 
 /// Results that depend on a setting.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
 pub enum Changes {
     /// Pixels.
     Pixels,
@@ -20,8 +19,7 @@ pub enum Changes {
 }
 
 /// Setting of a render, with the option of the command line that states it.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
+#[derive(Clone, Debug)]
 pub struct Setting {
     /// Results that depend on the setting.
     pub changes: Changes,
@@ -38,7 +36,7 @@ pub struct Setting {
 /// Value of a setting for provenance, and as an argument.
 type Stated = (Option<Value>, Option<String>);
 
-/// Value that stands in no provenance.
+/// No value: an error names the field, and nothing depends on it, or another row has its value.
 pub(super) const UNSTATED: Stated = (None, None);
 
 /// Row of a setting.
