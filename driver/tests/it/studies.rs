@@ -348,11 +348,11 @@ fn kinds_of_chips_differ_in_traffic_and_are_checked_for_their_room() {
         micro_traffic.total(drains).value > reference.total(drains).value,
         "a smaller queue is drained more often"
     );
-    for (settings, option) in [
-        (sorted.clone().with(|s| s.schedule.tile = Some(64)), "schedule.tile"),
-        (sorted.with(|s| s.schedule.order = GatherOrder::Hilbert), "schedule.order"),
+    for (settings, field) in [
+        (sorted.clone().with(|s| s.schedule.tile = Some(64)), "`schedule.tile`"),
+        (sorted.with(|s| s.schedule.order = GatherOrder::Hilbert), "`schedule.order`"),
     ] {
         let error = laboratory.measure("chips", &[on(micro, settings)]).unwrap_err();
-        assert!(error.is_input() && error.to_string().starts_with(option), "{error}");
+        assert!(error.is_input() && error.to_string().starts_with(field), "{error}");
     }
 }
