@@ -3,8 +3,11 @@
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use clap::{Arg, Args, Command, Id};
 
-use super::prepare::PrepareOptions;
+use super::frames::FrameOptions;
+use super::integrator::IntegratorOptions;
+use super::photons::PhotonOptions;
 use super::samples::SampleOptions;
+use super::scene::SceneOptions;
 
 /// Steps that take an option.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,10 +44,18 @@ impl Step {
 }
 
 /// Ids of the options that belong to `photoncard prepare`.
-fn of_preparation() -> Vec<Id> {
-    let options = SampleOptions::augment_args(PrepareOptions::augment_args(Command::new("prepare")));
-    let prepared = options.get_arguments().filter(|option| Step::of(option) == Step::Prepare);
-    prepared.map(|option| option.get_id().clone()).collect()
+fn of_preparation() -> impl Iterator<Item = Id> {
+    let groups = [
+        SceneOptions::augment_args,
+        FrameOptions::augment_args,
+        PhotonOptions::augment_args,
+        IntegratorOptions::augment_args,
+        SampleOptions::augment_args,
+    ];
+    let all = groups.iter().fold(Command::new("prepare"), |command, add| add(command));
+    let prepared = all.get_arguments().filter(|option| Step::of(option) == Step::Prepare);
+    let prepared: Vec<Id> = prepared.map(|option| option.get_id().clone()).collect();
+    prepared.into_iter().chain(["quality".into()])
 }
 
 #[derive(Args)]

@@ -204,7 +204,8 @@ impl Integrator {
         // Rays are divided among the planned samples with the irradiance cache alone.
         let is_planned = irradiance_error.is_some() && self.planned() != *samples;
         let planned = (is_planned.then(|| json!(self.planned())), optional(*planned_samples).1);
-        let cache = if irradiance_error.is_some() { "on" } else { "off" };
+        let switch = if irradiance_error.is_some() { "on" } else { "off" };
+        let cache = (None, Some(switch.to_owned()));
         let (threshold, argument) = optional(*adaptive_threshold);
         let adaptive = (threshold, argument.or(Some("off".to_owned())));
         vec![
@@ -215,12 +216,7 @@ impl Integrator {
             setting(Pixels, "integrator.shadow_rays", "shadow-rays", value(shadow_rays)),
             setting(Pixels, "integrator.sampling", "sampling", name(*sampling)),
             setting(Pixels, "integrator.irradiance_error", "ic-error", optional(*irradiance_error)),
-            setting(
-                Pixels,
-                "integrator.irradiance_error",
-                "irradiance-cache",
-                (None, Some(cache.to_owned())),
-            ),
+            setting(Pixels, "integrator.irradiance_error", "irradiance-cache", cache),
             setting(Pixels, "integrator.adaptive_threshold", "adaptive", adaptive),
         ]
     }
