@@ -16,10 +16,7 @@ pub(crate) fn with_flags(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
-    use crate::arguments::Arguments;
 
     #[test]
     fn fields_of_errors_become_flags() {
@@ -27,15 +24,5 @@ mod tests {
             "`integrator.samples` 0 is not possible: `a` (`integrator.irradiance_error`, `cards.caches`)";
         let expected = "--spp 0 is not possible: `a` (--ic-error, --counters or --cache)";
         assert_eq!(with_flags(text), expected);
-    }
-
-    #[test]
-    fn every_setting_has_an_option_of_a_render() {
-        let command = Arguments::command();
-        let render = command.find_subcommand("render").unwrap();
-        for Setting { field, option, .. } in RenderSettings::default().options() {
-            let is_it = |argument: &clap::Arg| argument.get_long() == Some(option);
-            assert!(render.get_arguments().any(is_it), "{field} is stated by no option --{option}");
-        }
     }
 }

@@ -54,8 +54,8 @@ pub(super) fn value(value: &(impl ToString + Serialize)) -> Stated {
 }
 
 /// Value of an option that is left out for `None`.
-pub(super) fn optional<T: ToString + Serialize>(value: Option<T>) -> Stated {
-    (Some(json!(value)), value.as_ref().map(T::to_string))
+pub(super) fn optional(value: Option<impl ToString + Serialize>) -> Stated {
+    (Some(json!(value)), value.map(|value| value.to_string()))
 }
 
 pub(super) fn name(choice: impl Choice) -> Stated {
