@@ -135,4 +135,18 @@ mod tests {
             assert!(farm.get_arguments().any(|argument| argument.get_id() == name), "{name}");
         }
     }
+
+    #[test]
+    fn a_prepared_scene_takes_no_option_of_its_preparation() {
+        let mut command = Arguments::command();
+        command.build();
+        let farm = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm")).unwrap();
+        let prepared = farm.get_arguments().find(|option| option.get_id() == "prepared").unwrap();
+        let conflicts = farm.get_arg_conflicts_with(prepared);
+        let of_jobs = farm.get_arguments().filter(|option| !OF_NO_JOB.contains(&option.get_id().as_str()));
+        for option in of_jobs {
+            let is_refused = conflicts.iter().any(|other| other.get_id() == option.get_id());
+            assert_eq!(is_refused, Step::of(option) == Step::Prepare, "{}", option.get_id());
+        }
+    }
 }
