@@ -32,8 +32,9 @@ page=docs/gallery.md
 {
     echo "# Gallery"
     echo
-    echo "Pictures of \`photoncard render\` by its default quality, written by [\`docs/gallery.sh\`](gallery.sh) with $("$photoncard" --version | head -n 1),"
-    echo "on $(nproc) cores; CPU seconds of all threads, from reading the scene to the picture's file."
+    echo "For those who want to see what it renders, and how long that takes: pictures by the default quality, written by"
+    echo "[\`docs/gallery.sh\`](gallery.sh) with $("$photoncard" --version | head -n 1) on $(nproc) cores. CPU seconds are of all threads, from reading the scene to"
+    echo "the picture's file."
 } >"$page.partial"
 while IFS='|' read -r title name scene options; do
     [ -e "$scene" ] || {

@@ -2,15 +2,16 @@
 # Rooms that others made (Benedikt Bitterli's collection, in Mitsuba's XML) beside Mitsuba's path tracer: errors
 # of means over blocks of 12x12 pixels.
 #
-#   tests/peers/rooms.sh PHOTONCARD [--map | --furnace] [--seeds N] [NAME ..] [-- OPTION ..]
+#   tests/peers/rooms.sh PHOTONCARD [--whole | --map | --furnace] [--seeds N] [NAME ..] [-- OPTION ..]
 #
-# All surfaces but glass are made Lambertian, so that both programs have the same. --map looks at the photon
+# All surfaces but glass are made Lambertian, so that both programs have the same; --whole keeps gloss and
+# metals, as glTF has them. --map looks at the photon
 # map's estimate directly, --furnace at that in a room whose surfaces are white, under an even sky: it is 1, and
 # needs no reference. References are rendered once, in minutes each. ROOMS may name the folder of the rooms;
 # without it they are fetched. PNGs are left in target/peers/rooms: reference, picture, errors of blocks.
 set -euo pipefail
 [ $# -ge 1 ] && [ -x "$1" ] || {
-    echo "usage: $0 PHOTONCARD [--map | --furnace] [NAME ..] [-- OPTION ..]" >&2
+    echo "usage: $0 PHOTONCARD [--whole | --map | --furnace] [NAME ..] [-- OPTION ..]" >&2
     exit 2
 }
 photoncard=$(realpath "$1")

@@ -24,6 +24,12 @@ def write(path):
     """Writes the room's file."""
     triangles = {WALL: [], WOOD: [], LAMP: []}
     furnish(triangles)
+    materials = [material([0.8, 0.78, 0.74]), material([0.6, 0.45, 0.3]), material([0.0] * 3, 1.0)]
+    write_scene(path, triangles, materials, CAMERAS)
+
+
+def write_scene(path, triangles, materials, cameras, sun=None):
+    """Writes a scene: triangles by material, and the irradiance and the direction of a sun."""
     data = bytearray()
     document = {
         "asset": {"version": "2.0"},
@@ -33,16 +39,14 @@ def write(path):
         "meshes": [],
         "nodes": [],
         "cameras": [],
-        "materials": [
-            material([0.8, 0.78, 0.74], 0.0),
-            material([0.6, 0.45, 0.3], 0.0),
-            material([0.0, 0.0, 0.0], 1.0),
-        ],
+        "materials": materials,
     }
     for kind, corners in triangles.items():
         add_mesh(document, data, kind, np.array(corners, "<f4").reshape(-1, 3))
-    for camera in CAMERAS:
+    for camera in cameras:
         add_camera(document, *camera)
+    if sun is not None:
+        add_sun(document, *sun)
     document["scenes"] = [{"nodes": list(range(len(document["nodes"])))}]
     document["buffers"] = [{"byteLength": len(data)}]
     text = json.dumps(document).encode()
@@ -84,9 +88,10 @@ def quad(triangles, corners):
     triangles.extend([(first, second, third), (first, third, fourth)])
 
 
-def material(colour, emission):
+def material(colour, emission=0.0, double_sided=False):
     """A Lambertian material."""
     return {
+        "doubleSided": double_sided,
         "pbrMetallicRoughness": {"baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0},
         "emissiveFactor": [emission] * 3,
         "extensions": LAMBERTIAN,
@@ -115,15 +120,27 @@ def add_mesh(document, data, kind, corners):
 
 def add_camera(document, name, eye, target, angle):
     """Adds a node with a camera of square pictures."""
-    eye, target = np.array(eye), np.array(target)
-    forward = (target - eye) / np.linalg.norm(target - eye)
+    matrix = looking(np.array(eye), np.array(target) - np.array(eye))
+    document["nodes"].append({"name": name, "camera": len(document["cameras"]), "matrix": matrix})
+    perspective = {"yfov": math.radians(angle), "aspectRatio": 1.0, "znear": 0.001}
+    document["cameras"].append({"type": "perspective", "name": name, "perspective": perspective})
+
+
+def add_sun(document, irradiance, direction):
+    """Adds a node with a directional light."""
+    document["extensionsUsed"].append("KHR_lights_punctual")
+    lights = [{"type": "directional", "intensity": irradiance}]
+    document["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
+    light = {"KHR_lights_punctual": {"light": 0}}
+    document["nodes"].append({"extensions": light, "matrix": looking(np.zeros(3), np.array(direction))})
+
+
+def looking(place, direction):
+    """The matrix of a node whose -z has a direction, by columns."""
+    forward = direction / np.linalg.norm(direction)
     right = np.cross(forward, (0.0, 1.0, 0.0))
     right /= np.linalg.norm(right)
     world = np.eye(4)
     world[:3, :3] = np.stack([right, np.cross(right, forward), -forward], axis=1)
-    world[:3, 3] = eye
-    document["nodes"].append(
-        {"name": name, "camera": len(document["cameras"]), "matrix": world.T.ravel().tolist()}
-    )
-    perspective = {"yfov": math.radians(angle), "aspectRatio": 1.0, "znear": 0.001}
-    document["cameras"].append({"type": "perspective", "name": name, "perspective": perspective})
+    world[:3, 3] = place
+    return world.T.ravel().tolist()

@@ -13,7 +13,8 @@ SPECULAR, TRANSMISSION = "KHR_materials_specular", "KHR_materials_transmission"
 
 def reflection(source, material, part):
     """The reflection of a material as part of a surface, with holes where it is cut out."""
-    front = smooth(material) or rough(material) or phong(material) or lambertian(source, material, part)
+    front = smooth(material) or frosted(material) or rough(source, material, part) or phong(material)
+    front = front or lambertian(source, material, part)
     has_two_sides = material.get("doubleSided") and TRANSMISSION not in material.get("extensions", {})
     bsdf = {"type": "twosided", "front": front} if has_two_sides else front
     if material.get("alphaMode", "OPAQUE") == "OPAQUE":
@@ -26,12 +27,12 @@ def smooth(material):
     metallic_roughness = material["pbrMetallicRoughness"]
     if SPECULAR in material.get("extensions", {}) or metallic_roughness.get("roughnessFactor", 1.0) > 0.0:
         return None
-    base_colour = base_factor(material)[:3]
+    base = base_factor(material)[:3]
     if metallic_roughness.get("metallicFactor", 1.0) == 1.0:
-        if min(base_colour) < 1.0:
+        if min(base) < 1.0:
             raise ValueError(f"{material['name']}: Mitsuba has no mirror with Schlick's reflectance, only a white one")
         return {"type": "conductor", "material": "none"}
-    if extension(material, TRANSMISSION).get("transmissionFactor", 0.0) != 1.0 or min(base_colour) < 1.0:
+    if extension(material, TRANSMISSION).get("transmissionFactor", 0.0) != 1.0 or min(base) < 1.0:
         raise ValueError(f"{material['name']}: what is smooth and no metal is read here only as clear glass")
     if extension(material, "KHR_materials_volume").get("thicknessFactor", 0.0) == 0.0:
         return {"type": "thindielectric", "int_ior": refraction(material), "ext_ior": 1.0}
@@ -45,7 +46,20 @@ def smooth(material):
     return {"type": "absorbing_body", "nested": surface, "absorption": mi.ScalarColor3f(coefficient)}
 
 
-def rough(material):
+def frosted(material):
+    """Clear solid glass with a rough surface, or nothing if the material is another."""
+    transmission = extension(material, TRANSMISSION).get("transmissionFactor", 0.0)
+    if transmission == 0.0:
+        return None
+    is_solid = extension(material, "KHR_materials_volume").get("thicknessFactor", 0.0) > 0.0
+    if transmission != 1.0 or not is_solid or absorption(material).any() or min(base_factor(material)[:3]) < 1.0:
+        raise ValueError(f"{material['name']}: what is rough and transmits is read here only as clear solid glass")
+    alpha = material["pbrMetallicRoughness"].get("roughnessFactor", 1.0) ** 2
+    surface = {"type": "roughdielectric", "distribution": "ggx", "alpha": alpha}
+    return surface | {"int_ior": refraction(material), "ext_ior": 1.0}
+
+
+def rough(source, material, part):
     """glTF's metallic-roughness model, or nothing if the material is Lambertian."""
     is_metallic = material["pbrMetallicRoughness"].get("metallicFactor", 1.0) != 0.0
     if extension(material, SPECULAR).get("specularFactor", 1.0) == 0.0 and not is_metallic:
@@ -55,11 +69,11 @@ def rough(material):
 
     mi.register_bsdf("metallic_roughness", MetallicRoughness)
     metallic_roughness = material["pbrMetallicRoughness"]
-    if metallic_roughness.get("metallicFactor", 1.0) not in (0.0, 1.0) or "baseColorTexture" in metallic_roughness:
-        raise ValueError(f"{material['name']}: what is neither a metal nor a dielectric, or textured, is not read here")
+    if metallic_roughness.get("metallicFactor", 1.0) not in (0.0, 1.0):
+        raise ValueError(f"{material['name']}: what is neither a metal nor a dielectric is not read here")
     return {
         "type": "metallic_roughness",
-        "base_colour": mi.ScalarColor3f([float(value) for value in base_factor(material)[:3]]),
+        "base_colour": base_colour(source, material, part),
         "metallic": float(metallic_roughness.get("metallicFactor", 1.0)),
         "roughness": float(metallic_roughness.get("roughnessFactor", 1.0)),
         "ior": float(refraction(material)),
@@ -83,16 +97,19 @@ def phong(material):
 
 
 def lambertian(source, material, part):
+    """Lambertian reflection."""
+    return {"type": "diffuse", "reflectance": base_colour(source, material, part)}
+
+
+def base_colour(source, material, part):
     """The base colour: a factor, by a texture or the colours of vertices."""
     factor = np.array(base_factor(material)[:3])
     info = material["pbrMetallicRoughness"].get("baseColorTexture")
     if part.colours is not None:
         if info is not None or (factor != 1.0).any():
             raise ValueError(f"{material['name']}: Mitsuba does not multiply the colours of vertices")
-        return {"type": "diffuse", "reflectance": {"type": "mesh_attribute", "name": VERTEX_COLOUR}}
-    if info is not None:
-        return {"type": "diffuse", "reflectance": textures.colour(source.texture(info), factor)}
-    return {"type": "diffuse", "reflectance": colour(factor)}
+        return {"type": "mesh_attribute", "name": VERTEX_COLOUR}
+    return colour(factor) if info is None else textures.colour(source.texture(info), factor)
 
 
 def opacity(source, material):

@@ -14,20 +14,27 @@ class MetallicRoughness(mi.BSDF):
 
     def __init__(self, props):
         mi.BSDF.__init__(self, props)
-        base_colour, metallic = mi.Color3f(props["base_colour"]), mi.Float(props["metallic"])
+        self.base_colour, self.metallic = props.get_texture("base_colour"), props["metallic"]
         ior = props["ior"]
-        dielectric = ((ior - 1.0) / (ior + 1.0)) ** 2
-        self.normal_reflectance = dr.lerp(mi.Color3f(dielectric), base_colour, metallic)
-        self.diffuse = base_colour * (1.0 - metallic)
+        self.dielectric = ((ior - 1.0) / (ior + 1.0)) ** 2
         # glTF 2.0, B.2.3: alpha is the square of the roughness.
         alpha = props["roughness"] ** 2
         self.facets = mi.MicrofacetDistribution(mi.MicrofacetType.GGX, alpha, True)
-        specular, diffuse = dr.max(self.normal_reflectance), dr.max(self.diffuse)
+        mean = self.base_colour.mean()
+        specular, diffuse = self.normal_reflectance(mean), self.diffuse(mean)
         # Far more is reflected at grazing angles than straight on.
-        self.facet_share = dr.maximum(specular / (specular + diffuse), 0.25)
+        self.facet_share = dr.maximum(specular / dr.maximum(specular + diffuse, 1e-6), 0.25)
         front = mi.BSDFFlags.FrontSide
         self.m_components = [mi.BSDFFlags.GlossyReflection | front, mi.BSDFFlags.DiffuseReflection | front]
         self.m_flags = self.m_components[0] | self.m_components[1]
+
+    def normal_reflectance(self, base_colour):
+        """Reflectance straight on."""
+        return dr.lerp(self.dielectric, base_colour, self.metallic)
+
+    def diffuse(self, base_colour):
+        """Albedo of the Lambertian part under no facets."""
+        return base_colour * (1.0 - self.metallic)
 
     def sample(self, ctx, si, sample1, sample2, active):
         takes_facet = sample1 < self.facet_share
@@ -48,13 +55,15 @@ class MetallicRoughness(mi.BSDF):
         active &= (si.wi.z > 0.0) & (wo.z > 0.0)
         half = dr.normalize(si.wi + wo)
         grazing = dr.power(1.0 - dr.abs(dr.dot(si.wi, half)), 5.0)
-        fresnel = self.normal_reflectance + (1.0 - self.normal_reflectance) * grazing
+        base_colour = self.base_colour.eval(si, active)
+        straight = self.normal_reflectance(base_colour)
+        fresnel = straight + (1.0 - straight) * grazing
         # Correlated by height (Heitz 2014): Mitsuba's own G is the product.
         masking, shadowing = (dr.maximum(self.facets.smith_g1(way, half), 1e-6) for way in (si.wi, wo))
         visible = 1.0 / (1.0 / masking + 1.0 / shadowing - 1.0)
         facets = self.facets.eval(half) * visible / (4.0 * si.wi.z)
         # A metal has no diffuse part, so one Fresnel term serves both: that of the dielectric, where there is one.
-        through = self.diffuse * (1.0 - fresnel) / dr.pi * wo.z
+        through = self.diffuse(base_colour) * (1.0 - fresnel) / dr.pi * wo.z
         return dr.select(active, fresnel * facets + through, 0.0)
 
     def pdf(self, ctx, si, wo, active):

@@ -6,7 +6,8 @@ Two pictures of different seeds are rendered. Columns, in % and of channels apar
 - noise: root mean square of half of what the blocks of the two pictures differ by.
 
 With --map the picture is the photon map's own estimate, by a plate of metal before the camera (`plate.py`),
-its mean over more seeds. With --furnace every surface is white under an even sky, and that estimate is 1
+its mean over more seeds. Surfaces are Lambertian; with --whole they have the gloss, metals and glass that their
+files state, as glTF has them. With --furnace every surface is white under an even sky, and that estimate is 1
 wherever light reaches: there is no reference, and rooms that are nearly closed are too noisy.
 """
 
@@ -65,6 +66,7 @@ def parse():
     parser.add_argument("--folder", type=Path, required=True, help="where files go")
     parser.add_argument("--map", action="store_true", help="see above")
     parser.add_argument("--furnace", action="store_true", help="see above")
+    parser.add_argument("--whole", action="store_true", help="see above")
     parser.add_argument("--seeds", type=int, help="pictures [default: 2, of a map 8]")
     parser.add_argument("--passes", type=int, default=16, help="of 128 samples of a reference, at most")
     arguments = parser.parse_args(words)
@@ -77,13 +79,17 @@ def shows_map(arguments):
     return arguments.map or arguments.furnace
 
 
+def kind(arguments):
+    """The version of the rooms that is rendered, and the folder of its files."""
+    return "furnace" if arguments.furnace else "whole" if arguments.whole else "lambertian"
+
+
 def convert(arguments, name):
     """The glTF file of a room, made if it is missing."""
-    kind = "furnace" if arguments.furnace else "lambertian"
-    path = arguments.folder / kind / f"{name}.glb"
+    path = arguments.folder / kind(arguments) / f"{name}.glb"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        options = ["--furnace", "--flat", "--no-glass"] if arguments.furnace else []
+        options = {"furnace": ["--lambertian", "--furnace", "--flat", "--no-glass"], "lambertian": ["--lambertian"], "whole": []}
         run(
             [
                 sys.executable,
@@ -91,8 +97,7 @@ def convert(arguments, name):
                 arguments.rooms / name / "scene.xml",
                 "--output",
                 path,
-                "--lambertian",
-                *options,
+                *options[kind(arguments)],
             ]
         )
     return path
@@ -114,7 +119,7 @@ def environment(arguments, scene):
 
 def reference(arguments, scene):
     """Mitsuba's picture, rendered if it is missing."""
-    path = arguments.folder / "references" / f"{scene.stem}.exr"
+    path = scene.parent / "references" / f"{scene.stem}.exr"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
         width, height = size(scene)

@@ -99,15 +99,15 @@ impl Sums {
 }
 
 impl Guide {
-    /// Builds a guide from samples; `None` if none of them is useful.
-    pub(super) fn new(mut samples: Vec<Sample>) -> Option<Self> {
-        let all = Sums::of(&samples);
+    /// Builds a guide from samples, and changes their order; `None` if none of them is useful.
+    pub(super) fn new(samples: &mut [Sample]) -> Option<Self> {
+        let all = Sums::of(samples);
         if !(all.squares > 0.0 && all.squares.is_finite()) {
             return None;
         }
         let mut builder = Builder { boxes: Vec::new(), uses: Vec::new() };
         let mean_square = all.squares / all.weight;
-        let total = builder.divide(&mut samples, [0; DIMENSIONS], 1.0, mean_square);
+        let total = builder.divide(samples, [0; DIMENSIONS], 1.0, mean_square);
         let Builder { mut boxes, uses } = builder;
         let mut guided_use = 0.0;
         for (part, (volume, mean)) in boxes.iter_mut().zip(&uses) {
@@ -259,7 +259,7 @@ mod tests {
     fn guide() -> Guide {
         let sample =
             |point| Sample { point, use_of_path: use_of(point), squares: use_of(point).powi(2), weight: 1.0 };
-        Guide::new(points(20_000).map(sample).collect()).expect("some are of use")
+        Guide::new(&mut points(20_000).map(sample).collect::<Vec<_>>()).expect("some are of use")
     }
 
     #[test]
@@ -299,6 +299,6 @@ mod tests {
     #[test]
     fn samples_without_use_give_no_guide() {
         let sample = |point| Sample { point, use_of_path: 0.0, squares: 0.0, weight: 1.0 };
-        assert!(Guide::new(points(1000).map(sample).collect()).is_none());
+        assert!(Guide::new(&mut points(1000).map(sample).collect::<Vec<_>>()).is_none());
     }
 }

@@ -43,9 +43,9 @@ const MAX_SPREAD_BY_AIM: f64 = 1.1;
 const MIN_GAIN_BY_AIM: f64 = 2.0;
 /// Difference between the seeds of a map and of the first pilot round for its guide.
 const GUIDE_SEED: u32 = 0x7feb_352d;
-/// Number of pilot rounds for a guide. Each round is guided by the one before, because paths through a small
+/// Number of pilot rounds for a guide. Each round is guided by all before it, because paths through a small
 /// window are rare in the first round.
-const GUIDE_ROUNDS: u32 = 3;
+const GUIDE_ROUNDS: u32 = 4;
 /// Number of photons of the map per path of a pilot round.
 const PHOTONS_PER_GUIDE_PATH: u64 = 8;
 /// Minimum number of tasks of a round. The pilots that compare paths with and without aim have as many.
@@ -145,8 +145,8 @@ pub(super) fn more_useful<'s>(
     importons: &ImportonGrid,
 ) -> Result<Tracer<'s>, Fault> {
     let pilot = |tracer: &Tracer| -> Result<f64, Fault> {
-        let samples = samples(&tracer.with_seed(!tracer.seed), packed, importons, MIN_GUIDE_TASKS)?;
-        let spread = Guide::new(samples).map_or(f64::INFINITY, |guide| guide.spread());
+        let mut samples = samples(&tracer.with_seed(!tracer.seed), packed, importons, MIN_GUIDE_TASKS)?;
+        let spread = Guide::new(&mut samples).map_or(f64::INFINITY, |guide| guide.spread());
         Ok(spread * f64::from(tracer.path_unit))
     };
     let [of_first, of_second] = [pilot(&tracers[0])?, pilot(&tracers[1])?];
@@ -164,12 +164,13 @@ pub(super) fn guide(
 ) -> Result<Option<(Guide, Guiding)>, Fault> {
     let tasks =
         (photons as u64 / PHOTONS_PER_GUIDE_PATH / PATHS_PER_TASK).clamp(MIN_GUIDE_TASKS, MAX_GUIDE_TASKS);
-    let mut guide = None;
+    let (mut guide, mut all) = (None, Vec::new());
     for round in 0..GUIDE_ROUNDS {
         // Paths of another seed: weights that depended on the photons of the map would bias it.
         let seed = tracer.seed ^ hash(GUIDE_SEED + round);
         let pilot = tracer.with_seed(seed).guided(guide.as_ref());
-        guide = Guide::new(samples(&pilot, packed, importons, tasks)?);
+        all.extend(samples(&pilot, packed, importons, tasks)?);
+        guide = Guide::new(&mut all);
     }
     Ok(guide.map(|guide| {
         let pilot_paths = u64::from(GUIDE_ROUNDS) * tasks * PATHS_PER_TASK;

@@ -58,7 +58,7 @@ impl StoredPhoton {
     }
 
     /// Power, in the map's units.
-    fn colour(self) -> [f32; 3] {
+    pub(crate) fn colour(self) -> [f32; 3] {
         let [a, b, c, d, ..] = self.content();
         Rgbe([a, b, c, d]).decode()
     }
@@ -88,11 +88,16 @@ impl StoredPhoton {
     #[must_use]
     pub(crate) fn with_power_of(self, other: Self) -> Self {
         let sum = Vec3::from(self.colour()) + Vec3::from(other.colour());
-        let mut content = self.content();
         // Random bits that neither power depends on.
-        let dither = hash(self.place as u32 ^ hash(other.place as u32));
+        self.with_colour(sum, hash(self.place as u32 ^ hash(other.place as u32)))
+    }
+
+    /// The photon with another power, in the map's units. `dither` is random.
+    #[must_use]
+    pub(crate) fn with_colour(self, colour: Vec3, dither: u32) -> Self {
+        let mut content = self.content();
         let [power @ .., _, _, _, _] = &mut content;
-        *power = Rgbe::encode(sum.to_array(), dither).0;
+        *power = Rgbe::encode(colour.to_array(), dither).0;
         Self { content: u64::from_le_bytes(content), ..self }
     }
 

@@ -10,6 +10,7 @@ mod kd_tree;
 mod kernels;
 mod leaves;
 mod neighbors;
+mod outliers;
 mod radius;
 mod settings;
 mod size;
@@ -141,10 +142,13 @@ pub fn map_traced(
     settings: &PhotonSettings,
     progress: &(dyn Fn(usize) -> bool + Sync),
 ) -> Result<MappedImage, PhotonError> {
-    let TracedPhotons { photons, paths, guiding, caustic, importons } = traced;
+    let TracedPhotons { mut photons, paths, guiding, caustic, importons } = traced;
     let mut times = PhotonTimes::default();
     let start = Instant::now();
     let cell = photons.grid().cell;
+    if guiding.is_some() {
+        outliers::spread(&mut photons, &packed).map_err(PhotonError::Unsound)?;
+    }
     let mut image = store_photons(packed, photons, settings.neighbors)?;
     times.building = start.elapsed();
     let start = Instant::now();

@@ -12,7 +12,7 @@ const MIN_DIRECTION_COSINE: f32 = 0.8;
 /// Minimum cosine between the normals of photons of one surface.
 const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
 /// Number of photons in a leaf.
-const LEAF: usize = 12;
+pub(super) const LEAF: usize = 12;
 /// Fraction of a distance within which the photons of a leaf share it.
 const SHARED_SHARE: f32 = 0.3;
 
@@ -96,6 +96,11 @@ impl Places {
         Self { places, levels }
     }
 
+    /// Returns true if two photons are of one surface and light.
+    pub(super) fn are_alike(&self, first: usize, second: usize) -> bool {
+        self.places[first].is_like(&self.places[second])
+    }
+
     /// Distance of each photon's neighbour number `number`, counted from 1, among photons of its surface and
     /// light; `limit` if there are fewer within it. A photon can have the distance of a nearby photon: if two
     /// photons are [`SHARED_SHARE`] of such a distance apart, the distances differ by at most that fraction.
@@ -125,6 +130,13 @@ impl Places {
     /// Distance of one photon's neighbour number `number`, counted from 1, among photons of its surface and
     /// light; `limit` if there are fewer within it.
     fn distance_of_neighbor(&self, index: usize, number: usize, limit: f32) -> f32 {
+        let nearest = self.nearest(index, number, limit);
+        nearest.get(number - 1).map_or(limit, |(squared, _)| squared.sqrt())
+    }
+
+    /// Nearest photons of a photon's surface and light, `number` at most and nearer than `limit`: squared
+    /// distances in ascending order, and indices.
+    pub(super) fn nearest(&self, index: usize, number: usize, limit: f32) -> Vec<(f32, usize)> {
         let own = &self.places[index];
         let mut limit = limit * limit;
         // Bits of the least squared distances, the greatest on top: they are ordered as the distances.
@@ -148,18 +160,23 @@ impl Places {
             for (other, place) in (node * LEAF..).zip(self.places[node * LEAF..].iter().take(LEAF)) {
                 let squared = place.position.distance_squared(own.position);
                 if squared < limit && other != index && own.is_like(place) {
+                    let found = (squared.to_bits(), other);
                     if nearest.len() < number {
-                        nearest.push(squared.to_bits());
+                        nearest.push(found);
                     } else if let Some(mut greatest) = nearest.peek_mut() {
-                        *greatest = squared.to_bits();
+                        *greatest = found;
                     }
                     if nearest.len() == number {
-                        limit = nearest.peek().map_or(limit, |&greatest| f32::from_bits(greatest));
+                        limit = nearest.peek().map_or(limit, |&(greatest, _)| f32::from_bits(greatest));
                     }
                 }
             }
         }
-        limit.sqrt()
+        nearest
+            .into_sorted_vec()
+            .into_iter()
+            .map(|(squared, other)| (f32::from_bits(squared), other))
+            .collect()
     }
 }
 

@@ -316,7 +316,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
             remedy: "leave one of the two out, or export the scene again: in glTF each key stands once",
         });
     }
-    let strict = foreign::decode(|| Ok(serde_json::from_str(text)), || not_gltf(CONTRADICTION))?;
+    let strict = foreign::decode(|| Ok(json::Root::from_str(text)), || not_gltf(CONTRADICTION))?;
     match strict {
         Ok(root) => Ok((root, Shortened::default())),
         Err(error) if error.is_data() => {
@@ -342,7 +342,7 @@ fn parse_amended(
         return Err(other_kinds::version_1(path));
     }
     let shortened = schema::amend(&mut document);
-    let root = serde_json::from_str(&document.to_string()).map_err(|_| {
+    let root = json::Root::from_str(&document.to_string()).map_err(|_| {
         let (item, reason) = schema::violation(&document);
         let remedy = "export the scene again, or correct this item of the file: it violates glTF's schema";
         SceneError::Invalid { location: Location::new(path, item), reason, remedy }
