@@ -7,10 +7,12 @@ use std::io::{ErrorKind, Write, stderr, stdout};
 use photoncard_driver::printable::printable;
 
 use crate::failure::Failure;
+use crate::flags::with_flags;
 
-/// Writes a line to standard error. Errors of the stream are ignored.
+/// Writes a line to standard error, with flags in place of the fields that errors of the library name. Errors
+/// of the stream are ignored.
 pub(crate) fn say(line: Arguments) {
-    let _ = writeln!(stderr(), "{}", printable(&line.to_string()));
+    let _ = writeln!(stderr(), "{}", printable(&with_flags(&line.to_string())));
 }
 
 /// Writes a failure to standard error on lines of its own. Its report escapes foreign text.

@@ -8,6 +8,8 @@ use miette::{Diagnostic, MietteDiagnostic, Report};
 use photoncard_driver::printable::printable;
 use photoncard_driver::render::RenderError;
 
+use crate::flags::with_flags;
+
 /// Failure of a command.
 pub(crate) enum Failure {
     /// Invalid arguments or unreadable input: status 2.
@@ -65,7 +67,7 @@ impl Failure {
         match self {
             Self::Input(report) | Self::Work(report) => {
                 let causes: Vec<String> = report.chain().map(ToString::to_string).collect();
-                printable(&causes.join(": ")).into_owned()
+                printable(&with_flags(&causes.join(": "))).into_owned()
             }
             Self::Stopped(text) => (*text).to_owned(),
         }

@@ -7,6 +7,7 @@
 //! |---|---|
 //! | `console`, `report` | the standard streams, with foreign text escaped; layout of errors |
 //! | `failure` | errors with their exit status |
+//! | `flags` | flags in place of fields, which errors of the library name |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `input` | scene and environment of a render |
 //! | `notices` | contents of a scene that are ignored |
@@ -27,6 +28,7 @@ mod documents;
 mod environment;
 mod failure;
 mod farm;
+mod flags;
 #[cfg(target_os = "linux")]
 mod hang_up;
 mod input;

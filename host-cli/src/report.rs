@@ -9,6 +9,8 @@ use clap::builder::styling::{AnsiColor, Style};
 use miette::{Diagnostic, ReportHandler};
 use photoncard_driver::printable::printable;
 
+use crate::flags::with_flags;
+
 /// Width of the mark before an excerpt, columns.
 const EXCERPT_MARK: usize = 5;
 
@@ -97,7 +99,7 @@ impl Layout {
     }
 }
 
-/// Escaped messages of an error and its causes. A cause is left out if the message before it ends with it.
+/// Escaped messages of an error and its causes, with flags in place of fields. A cause is left out if the message before it ends with it.
 fn messages(error: &dyn Diagnostic) -> Vec<String> {
     let mut texts = vec![escaped(error)];
     let mut cause: Option<&dyn Error> =
@@ -156,7 +158,7 @@ fn around(line: &str, at: usize, mark: usize, width: usize) -> (String, usize) {
 }
 
 fn escaped(text: impl Display) -> String {
-    printable(&text.to_string()).into_owned()
+    printable(&with_flags(&text.to_string())).into_owned()
 }
 
 #[cfg(test)]

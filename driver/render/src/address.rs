@@ -88,7 +88,7 @@ pub(super) fn check_chips(chips: usize) -> Result<(), RenderError> {
         return Ok(());
     }
     Err(RenderError::Setting {
-        option: "--card",
+        field: "cards.addresses",
         value: format!("with {chips} chips in all"),
         reason: format!("one process emulates at most {MAX_CHIPS}"),
         remedy: "use fewer chips".into(),

@@ -343,14 +343,17 @@ impl RenderSettings {
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
             ["a share of the tiles is above 0 and at most 1", "give a number such as 0.02"]
         } else if self.cards.count() < 2 {
-            ["a tile is verified by a second card", "give two --card or more, or --card emulated:2"]
+            [
+                "a tile is verified by a second card",
+                "give two `cards.addresses` or more, or `cards.addresses` emulated:2",
+            ]
         } else if self.modelled_caches().is_some() {
-            ["reads of memory are counted once for each tile", "leave --counters, --cache and --trace out"]
+            ["reads of memory are counted once for each tile", "leave out `cards.caches`, and `cards.trace`"]
         } else {
             return Ok(());
         };
         let (value, reason, remedy) = (share.to_string(), reason.into(), remedy.into());
-        Err(RenderError::Setting { option: "--verify", value, reason, remedy })
+        Err(RenderError::Setting { field: "cards.verify", value, reason, remedy })
     }
 
     /// Minimum number of cards that a render needs.

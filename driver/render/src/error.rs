@@ -61,12 +61,13 @@ impl CardError {
 #[derive(Debug, thiserror::Error, miette::Diagnostic)]
 pub enum RenderError {
     /// A setting is not possible.
-    #[error("{option} {value} is not possible: {reason}")]
+    #[error("`{field}` {value} is not possible: {reason}")]
     #[diagnostic(help("{remedy}"))]
     Setting {
-        /// Option of the command line.
-        option: &'static str,
-        /// Value of the option.
+        /// Path of its field in [`RenderSettings`](crate::RenderSettings), such as `integrator.samples`. Texts
+        /// of errors have such paths between backticks.
+        field: &'static str,
+        /// Value of the field.
         value: String,
         /// Description of the fault.
         reason: String,
@@ -79,7 +80,7 @@ pub enum RenderError {
     Scene(#[from] SceneError),
     /// The size of the picture or its crop window is not possible.
     #[error(transparent)]
-    #[diagnostic(help("change --size or --crop"))]
+    #[diagnostic(help("change `picture.width` or `picture.crop`"))]
     Film(#[from] FilmError),
     /// The scene does not fit the card.
     #[error(transparent)]
@@ -125,7 +126,7 @@ pub enum RenderError {
     },
     /// A tile must be verified, but only one card is left.
     #[error("no second card is left to verify the tile {tile}")]
-    #[diagnostic(help("go on with --resume and another card, or without --verify"))]
+    #[diagnostic(help("go on with `outputs.partial.resume` and another card, or without `cards.verify`"))]
     Unverified {
         /// Tile in the form of the argument of `--crop`.
         tile: String,
@@ -133,8 +134,8 @@ pub enum RenderError {
     /// Cards crash at some tiles. All other tiles are done.
     #[error("cards were lost again and again at work on the tiles {tiles}; all others are done")]
     #[diagnostic(help(
-        "each is X0,X1,Y0,Y1 as --crop takes it: watch the card's own messages while it renders one of them alone, or go on with \
-         --resume and another kind of card"
+        "each is X0,X1,Y0,Y1 as `picture.crop` takes it: watch the card's own messages while it renders one of them alone, or \
+         go on with `outputs.partial.resume` and another kind of card"
     ))]
     Unrendered {
         /// Tiles in the form of arguments of `--crop`.

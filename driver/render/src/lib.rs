@@ -46,8 +46,8 @@ pub use self_test::{
     ArithmeticTest, PatternTest, SelfTest, WrongResult, WrongResults, card_self_test, self_test_on,
 };
 pub use settings::{
-    CardSet, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM, PhotonMaps,
-    Picture, RenderSettings, Schedule, TileOutputs,
+    CardSet, Changes, DEFAULT_CAUSTIC_PHOTONS, Integrator, MIN_IRRADIANCE_ERROR, NamedSettings, PROGRAM,
+    PhotonMaps, Picture, RenderSettings, Schedule, Setting, TileOutputs,
 };
 pub use statistics::{EARLIER_RENDER, LinkStatistics, Rays, Statistics};
 pub use work::Times;

@@ -192,7 +192,7 @@ impl Renderer {
 fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
     let samples = settings.integrator.samples;
     move |error| RenderError::Setting {
-        option: "--spp",
+        field: "integrator.samples",
         value: samples.to_string(),
         reason: error.to_string(),
         remedy: "go on from a finished picture of fewer samples and of equal settings".into(),

@@ -71,14 +71,14 @@ impl Point {
     pub fn check(&self) -> Result<(), RenderError> {
         if self.is_along_curve && self.chip() != EmulatedKind::Reference {
             return Err(RenderError::Setting {
-                option: "--order",
+                field: "schedule.order",
                 value: ALONG_CURVE.to_owned(),
                 reason: format!(
                     "{} has no room for the gathers of a frame, and only reference chips leave them to the host",
                     self.chip().name()
                 ),
                 remedy: format!(
-                    "use --card {}, or another --order, such as sort",
+                    "use `cards.addresses` {}, or another `schedule.order`, such as sort",
                     EmulatedKind::Reference.name()
                 ),
             });

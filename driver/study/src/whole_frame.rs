@@ -184,12 +184,12 @@ fn rays_of_pixel(frame: &FrameParameters) -> u64 {
 /// Error of a frame that may have more gathers than can be kept.
 fn too_many(gathers: u64) -> RenderError {
     RenderError::Setting {
-        option: "--order",
+        field: "schedule.order",
         value: "hilbert".into(),
         reason: format!(
             "the frame may have {gathers} gathers, and at most {MAX_GATHERS} are kept at once, as memory allows"
         ),
-        remedy: "render a part with --crop, fewer --spp or --gather-rays, or use --order sort".into(),
+        remedy: "render a part with `picture.crop`, fewer `integrator.samples` or `integrator.gather_rays`, or use `schedule.order` sort".into(),
     }
 }
 

@@ -163,9 +163,9 @@ macro_rules! small {
 #[test]
 fn a_card_of_a_small_budget_is_left_out_beside_another_and_named() {
     let cases: [(Answer, &str); 4] = [
-        (small!(neighbors: 7), "--neighbors 100 is not possible"),
-        (small!(gather_rays: 3, samples: 2), "--gather-rays 10 is not possible"),
-        (small!(tile_pixels: 0), "--tile 1 is not possible"),
+        (small!(neighbors: 7), "`photons.neighbors` 100 is not possible"),
+        (small!(gather_rays: 3, samples: 2), "`integrator.gather_rays` 10 is not possible"),
+        (small!(tile_pixels: 0), "`schedule.tile` 1 is not possible"),
         (small!(dram_bytes: 20_000), "bytes"),
     ];
     for (answer, said) in cases {

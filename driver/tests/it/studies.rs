@@ -343,11 +343,11 @@ fn kinds_of_chips_differ_in_traffic_and_are_checked_for_their_room() {
         micro_traffic.total(drains).value > reference.total(drains).value,
         "a smaller queue is drained more often"
     );
-    for (point, option) in [
-        (on(micro, sorted.clone().with(|s| s.schedule.tile = Some(64))), "--tile"),
-        (Point { is_along_curve: true, ..on(micro, sorted) }, "--order"),
+    for (point, field) in [
+        (on(micro, sorted.clone().with(|s| s.schedule.tile = Some(64))), "`schedule.tile`"),
+        (Point { is_along_curve: true, ..on(micro, sorted) }, "`schedule.order`"),
     ] {
         let error = laboratory.measure("chips", &[point]).unwrap_err();
-        assert!(error.is_input() && error.to_string().starts_with(option), "{error}");
+        assert!(error.is_input() && error.to_string().starts_with(field), "{error}");
     }
 }

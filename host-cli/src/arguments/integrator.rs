@@ -97,20 +97,14 @@ impl IntegratorOptions {
         self.irradiance_cache.unwrap_or(base.irradiance_error.is_some())
     }
 
-    /// Options, each with whether it has no effect, its name, and the reason.
-    pub(super) fn without_effect(&self, base: &Integrator) -> [(bool, &'static str, String); 3] {
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    pub(super) fn without_effect(&self, base: &Integrator, add: &mut impl FnMut(bool, &str, &str)) {
         let is_cached = self.is_cached(base);
-        let has_no_rays = self.gather_rays == Some(0);
-        let not_cached = "without --irradiance-cache on".to_owned();
-        [
-            (self.planned_spp.is_some() && !is_cached, "--planned-spp", not_cached.clone()),
-            (self.ic_error.is_some() && !is_cached, "--ic-error", not_cached),
-            (
-                self.irradiance_cache == Some(true) && has_no_rays,
-                "--irradiance-cache on",
-                "with --gather-rays 0".to_owned(),
-            ),
-        ]
+        let not_cached = "without --irradiance-cache on";
+        add(self.planned_spp.is_some() && !is_cached, "--planned-spp", not_cached);
+        add(self.ic_error.is_some() && !is_cached, "--ic-error", not_cached);
+        let has_no_rays = self.irradiance_cache == Some(true) && self.gather_rays == Some(0);
+        add(has_no_rays, "--irradiance-cache on", "with --gather-rays 0");
     }
 }
 

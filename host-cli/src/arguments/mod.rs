@@ -55,7 +55,7 @@ pub(crate) use self::lights::LightOptions;
 pub(crate) use self::merge::MergeOptions;
 pub(crate) use self::outputs::OutputOptions;
 pub(crate) use self::prepare::PrepareOptions;
-pub(crate) use self::prepared::OF_PREPARATION;
+pub(crate) use self::prepared::Step;
 pub(crate) use self::progress::ProgressForm;
 pub(crate) use self::render::{RenderOptions, Unfitted};
 pub(crate) use self::scene::SceneOptions;
@@ -245,6 +245,8 @@ pub(crate) struct DiffOptions {
 
 #[cfg(test)]
 mod tests {
+    use photoncard_driver::render::{RenderSettings, Setting};
+
     use super::*;
 
     #[test]
@@ -324,6 +326,14 @@ mod tests {
             }
         }
         assert!(count > 40 && !takes(&named("tonemap"), "--card"));
+    }
+
+    #[test]
+    fn every_setting_of_a_render_has_an_option() {
+        let render = named("render");
+        for Setting { field, option, .. } in RenderSettings::default().options() {
+            assert!(takes(&render, &format!("--{option}")), "no --{option} states {field}");
+        }
     }
 
     #[test]

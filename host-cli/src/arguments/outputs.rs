@@ -31,13 +31,13 @@ pub(crate) struct OutputOptions {
     pub(crate) resume: bool,
     /// Type of the EXR's samples; Z and gathers are always float [default: float]
     #[arg(long, value_parser = choice::<SampleFormat>(), hide_short_help = true)]
-    pub(super) sample_type: Option<SampleFormat>,
+    sample_type: Option<SampleFormat>,
     #[command(flatten)]
     pub(crate) tone: ToneOptions,
     /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port:
     /// 14158]
     #[arg(long, value_name = "HOST:PORT", hide_short_help = true)]
-    pub(super) display_server: Option<DisplayAddress>,
+    display_server: Option<DisplayAddress>,
     /// Write statistics of the render as JSON; - for standard output
     #[arg(long, value_name = "OUT.json", value_parser = text())]
     pub(crate) stats: Option<TextOutput>,
@@ -94,8 +94,21 @@ impl OutputOptions {
         self.sample_type.unwrap_or(SampleFormat::Float)
     }
 
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
+        let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !self.has(format));
+        add(self.tone.exposure.is_some() && no_png, "--exposure", "without -o OUT.png");
+        add(self.tone.curve.is_some() && no_png, "--tonemap", "without -o OUT.png");
+        add(self.sample_type.is_some() && no_exr, "--sample-type", "without -o OUT.exr");
+    }
+
+    /// Returns whether a layer that is stored would be seen: by a file or by a viewer.
+    pub(super) fn have_layers(&self) -> bool {
+        self.display_server.is_some() || self.has(PictureFormat::Part) || self.has(PictureFormat::Exr)
+    }
+
     /// Returns whether a picture of this format is written.
-    pub(super) fn has(&self, format: PictureFormat) -> bool {
+    fn has(&self, format: PictureFormat) -> bool {
         self.pictures.iter().any(|picture| picture.format == format)
     }
 

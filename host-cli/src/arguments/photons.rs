@@ -15,7 +15,7 @@ pub(crate) struct PhotonOptions {
     photons: Option<usize>,
     /// Layout of the photon map in card memory; it never changes the picture
     #[arg(long, default_value = PhotonMaps::default().layout.name(), value_parser = choice::<PhotonLayout>(), hide_short_help = true)]
-    pub(super) photon_map: PhotonLayout,
+    photon_map: PhotonLayout,
     /// Photons that a gather searches for [default: by --quality]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     neighbors: Option<u32>,
@@ -24,18 +24,18 @@ pub(crate) struct PhotonOptions {
     ///
     /// With 0 gather rays carry this light, with more noise, and that of punctual lights is lost.
     #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) caustic_photons: Option<usize>,
+    caustic_photons: Option<usize>,
     /// Photons that a gather of caustics searches for, at least 8: fewer are sharper, more are smoother
     /// [default: 50]
     #[arg(long, value_name = "K", allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) caustic_neighbors: Option<u32>,
+    caustic_neighbors: Option<u32>,
     /// Maximum distance of a gather in metres, or auto: by the density of the photons
     #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) max_distance: MaxDistance,
+    max_distance: MaxDistance,
     /// Estimate of the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe
     /// always uses density
     #[arg(long, default_value = PhotonMaps::default().radiance.name(), value_parser = choice::<Radiance>(), hide_short_help = true)]
-    pub(super) radiance: Radiance,
+    radiance: Radiance,
 }
 
 #[derive(Clone, Copy)]
@@ -48,6 +48,23 @@ impl PhotonOptions {
     /// Returns whether the number of photons is stated.
     pub(super) fn states_photons(&self) -> bool {
         self.photons.is_some()
+    }
+
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    pub(super) fn without_effect(
+        &self,
+        is_specular: bool,
+        gather_rays: u32,
+        add: &mut impl FnMut(bool, &str, &str),
+    ) {
+        let no_specular = "without a caustic map: nothing in the scene is a mirror, glass or glossy";
+        let is_off = self.caustic_photons == Some(0);
+        let no_map = if is_off { "with --caustic-photons 0" } else { no_specular };
+        let is_precomputed = self.radiance == Radiance::Precomputed;
+        add(is_precomputed && gather_rays == 0, "--radiance precomputed", "with --gather-rays 0");
+        let is_stated = self.caustic_photons.is_some() && !is_off;
+        add(is_stated && !is_specular, "--caustic-photons", no_specular);
+        add(self.caustic_neighbors.is_some() && (!is_specular || is_off), "--caustic-neighbors", no_map);
     }
 
     /// Settings of these options. `base` supplies those that are not stated.

@@ -1,40 +1,62 @@
-//! Option of a render whose input is a prepared scene.
+//! Steps of a render that are commands of their own, and the option for a scene whose preparation is done.
 
-use clap::Args;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
+use clap::{Arg, Args, Command, Id};
+
+use super::frames::FrameOptions;
+use super::integrator::IntegratorOptions;
+use super::photons::PhotonOptions;
+use super::samples::SampleOptions;
+use super::scene::SceneOptions;
+
+/// Steps that take an option.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Step {
+    /// The preparation: the prepared scene depends on the option.
+    Prepare,
+    /// The preparation and the renders of parts.
+    Both,
+    /// The renders of parts.
+    Render,
+    /// The merge of the parts.
+    Merge,
+    /// None: the job itself takes the option.
+    Job,
+}
+
+impl Step {
+    /// Step of an option of `photoncard render`, by its heading.
+    pub(crate) fn of(option: &Arg) -> Self {
+        match option.get_id().as_str() {
+            // Their headings, if they have any, are those of other steps.
+            "quality" => Self::Prepare,
+            "threads" | "quiet" => Self::Both,
+            "display_server" => Self::Render,
+            "frames" | "parts" => Self::Job,
+            _ => match option.get_help_heading() {
+                Some("Scene" | "Frames" | "Photon maps" | "Rays and samples") => Self::Prepare,
+                Some("Picture and camera") => Self::Both,
+                Some("Outputs") => Self::Merge,
+                _ => Self::Render,
+            },
+        }
+    }
+}
 
 /// Ids of the options that belong to `photoncard prepare`.
-pub(crate) const OF_PREPARATION: [&str; 29] = [
-    "assignments",
-    "energy_compensation",
-    "variant",
-    "light_units",
-    "environment",
-    "environment_rotation",
-    "strict",
-    "quality",
-    "photons",
-    "photon_map",
-    "neighbors",
-    "caustic_photons",
-    "caustic_neighbors",
-    "max_distance",
-    "radiance",
-    "seed",
-    "gather_rays",
-    "shadow_rays",
-    "spp",
-    "planned_spp",
-    "sampling",
-    "irradiance_cache",
-    "ic_error",
-    "adaptive",
-    "time",
-    "noise",
-    "keep_samples",
-    "animations",
-    "fps",
-];
+fn of_preparation() -> impl Iterator<Item = Id> {
+    let groups = [
+        SceneOptions::augment_args,
+        FrameOptions::augment_args,
+        PhotonOptions::augment_args,
+        IntegratorOptions::augment_args,
+        SampleOptions::augment_args,
+    ];
+    let all = groups.iter().fold(Command::new("prepare"), |command, add| add(command));
+    let prepared = all.get_arguments().filter(|option| Step::of(option) == Step::Prepare);
+    let prepared: Vec<Id> = prepared.map(|option| option.get_id().clone()).collect();
+    prepared.into_iter().chain(["quality".into()])
+}
 
 #[derive(Args)]
 pub(crate) struct PreparedOption {
@@ -43,7 +65,7 @@ pub(crate) struct PreparedOption {
     /// The scene, its photons, rays and samples are those that were stated to photoncard prepare. Options of
     /// the picture and of its camera are stated as for a glTF file. Of frames that were prepared --frames
     /// states those to render, and SCENE has a run of # where there is a file for each.
-    #[arg(long, help_heading = "Scene", conflicts_with_all = OF_PREPARATION)]
+    #[arg(long, help_heading = "Scene", conflicts_with_all = of_preparation())]
     pub(crate) prepared: bool,
 }
 

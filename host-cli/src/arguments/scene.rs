@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use photoncard_driver::scene::{LightUnits, Material, Reflection, Scene};
 
 use super::lights::LightOptions;
 use crate::environment::EnvironmentOption;
@@ -45,6 +46,18 @@ pub(crate) struct SceneOptions {
     /// Fail if anything in the scene is ignored or missing, such as a texture
     #[arg(long, help_heading = "Scene", hide_short_help = true)]
     pub(crate) strict: bool,
+}
+
+impl SceneOptions {
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    pub(super) fn without_effect(&self, scene: &Scene, add: &mut impl FnMut(bool, &str, &str)) {
+        let has_lobe =
+            |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });
+        let no_lights = self.lights.light_units != LightUnits::Auto && scene.lights.is_empty();
+        add(no_lights, "--light-units", "without point, spot or directional lights in the file");
+        let no_lobe = self.energy_compensation && !scene.materials.iter().any(has_lobe);
+        add(no_lobe, "--energy-compensation", "without a metallic-roughness material");
+    }
 }
 
 fn degrees(text: &str) -> Result<f32, String> {

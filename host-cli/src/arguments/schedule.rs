@@ -14,19 +14,19 @@ pub(crate) struct ScheduleOptions {
     /// Side of a tile, pixels [default: the widest that all cards have room for, for several cards halved
     /// until each has four tiles, down to 16]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) tile: Option<u32>,
+    tile: Option<u32>,
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = Schedule::default().order.name(), value_parser = choice::<GatherOrder>(), hide_short_help = true)]
     pub(super) order: GatherOrder,
     /// Direction bins of the gather rays, for orders with bins [default: 99]
     #[arg(long, hide_short_help = true)]
-    pub(super) bins: Option<u32>,
+    bins: Option<u32>,
     /// Gathers that may wait on a chip, for orders with a queue [default: the chip's capacity]
     #[arg(long, hide_short_help = true)]
-    pub(super) queue: Option<u32>,
+    queue: Option<u32>,
     /// Tiles in flight on a chip, whose gathers may wait in the queue together [default: the chip's capacity]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
-    pub(super) in_flight: Option<u32>,
+    in_flight: Option<u32>,
 }
 
 #[derive(Args)]
@@ -42,6 +42,16 @@ pub(crate) struct PartOptions {
 }
 
 impl ScheduleOptions {
+    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
+        let Self { order, bins, queue, in_flight, tile: _ } = self;
+        let no_bins = format!("with --order {}, which has no direction bins", order.name());
+        let no_queue = format!("with --order {}, by which no gathers wait on a chip", order.name());
+        add(bins.is_some() && !order.has_bins(), "--bins", &no_bins);
+        add(queue.is_some() && !order.has_queue(), "--queue", &no_queue);
+        add(in_flight.is_some() && !order.has_queue(), "--in-flight", &no_queue);
+    }
+
     /// Settings of these options.
     pub(super) fn settings(&self) -> Schedule {
         Schedule {
@@ -50,9 +60,7 @@ impl ScheduleOptions {
             bins: self.bins,
             queue: self.queue,
             in_flight: self.in_flight,
-            focus: None,
-            part: None,
-            keep_records: false,
+            ..Schedule::default()
         }
     }
 }

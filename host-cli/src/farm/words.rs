@@ -1,16 +1,9 @@
 //! Sorts the words of a command line by the steps of a job to which they belong.
 
-use clap::{ArgAction, Command};
+use clap::{Arg, ArgAction, Command};
 
-use crate::arguments::OF_PREPARATION;
+use crate::arguments::Step;
 
-/// Ids of options that preparation and render both need.
-const OF_BOTH: [&str; 10] =
-    ["size", "crop", "camera", "camera_at", "look_at", "fov", "aov", "filter", "threads", "quiet"];
-/// Ids of options of the picture's files.
-const OF_MERGE: [&str; 4] = ["pictures", "sample_type", "exposure", "curve"];
-/// Ids of options of the job itself.
-const OF_JOB: [&str; 2] = ["parts", "frames"];
 /// Ids of options that the job sets itself, or that are not possible in a job.
 const OF_NO_JOB: [&str; 12] = [
     "photons_for",
@@ -67,8 +60,7 @@ impl Words {
             let takes_value = matches!(argument.get_action(), ArgAction::Set | ArgAction::Append);
             let is_whole = has_value || is_short && name.len() > 2;
             let value = if takes_value && !is_whole { given.next() } else { None };
-            let id = argument.get_id().as_str();
-            if let Some(room) = words.room(id).ok_or_else(|| name.to_owned())? {
+            if let Some(room) = words.room(argument).ok_or_else(|| name.to_owned())? {
                 room.extend([word].into_iter().chain(value));
             }
         }
@@ -77,15 +69,17 @@ impl Words {
 
     /// List of words to which an option belongs; `Some(None)` for an option of the job itself, `None` for one
     /// that is not allowed in a job.
-    fn room(&mut self, id: &str) -> Option<Option<&mut Vec<String>>> {
-        Some(Some(match id {
-            _ if OF_NO_JOB.contains(&id) => return None,
-            _ if OF_JOB.contains(&id) => return Some(None),
-            _ if OF_PREPARATION.contains(&id) => &mut self.prepare,
-            _ if OF_BOTH.contains(&id) => &mut self.both,
-            _ if OF_MERGE.contains(&id) => &mut self.merge,
-            _ => &mut self.render,
-        }))
+    fn room(&mut self, option: &Arg) -> Option<Option<&mut Vec<String>>> {
+        if OF_NO_JOB.contains(&option.get_id().as_str()) {
+            return None;
+        }
+        Some(match Step::of(option) {
+            Step::Prepare => Some(&mut self.prepare),
+            Step::Both => Some(&mut self.both),
+            Step::Render => Some(&mut self.render),
+            Step::Merge => Some(&mut self.merge),
+            Step::Job => None,
+        })
     }
 }
 
@@ -132,14 +126,27 @@ mod tests {
         }
     }
 
-    /// Checks that the lists above contain no outdated name.
+    /// Checks that the list above contains no outdated name.
     #[test]
     fn every_listed_name_is_an_option() {
         let command = Arguments::command();
         let farm = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm")).unwrap();
-        let names = OF_BOTH.iter().chain(&OF_MERGE).chain(&OF_JOB).chain(&OF_NO_JOB).chain(&OF_PREPARATION);
-        for name in names {
+        for name in OF_NO_JOB {
             assert!(farm.get_arguments().any(|argument| argument.get_id() == name), "{name}");
+        }
+    }
+
+    #[test]
+    fn a_prepared_scene_takes_no_option_of_its_preparation() {
+        let mut command = Arguments::command();
+        command.build();
+        let farm = command.find_subcommand("farm").and_then(|farm| farm.find_subcommand("slurm")).unwrap();
+        let prepared = farm.get_arguments().find(|option| option.get_id() == "prepared").unwrap();
+        let conflicts = farm.get_arg_conflicts_with(prepared);
+        let of_jobs = farm.get_arguments().filter(|option| !OF_NO_JOB.contains(&option.get_id().as_str()));
+        for option in of_jobs {
+            let is_refused = conflicts.iter().any(|other| other.get_id() == option.get_id());
+            assert_eq!(is_refused, Step::of(option) == Step::Prepare, "{}", option.get_id());
         }
     }
 }

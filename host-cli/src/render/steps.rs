@@ -13,6 +13,7 @@ use super::{files, messages};
 use crate::arguments::{OutputOptions, RenderOptions, SceneOptions, Unfitted};
 use crate::console::say;
 use crate::failure::Failure;
+use crate::flags::with_flags;
 use crate::progress::Progress;
 
 /// Prints where the finished tiles of a failed render are, and writes its statistics so far.
@@ -25,7 +26,7 @@ pub(super) fn end_early(error: &RenderError, progress: &Progress, outputs: &Outp
         say(format_args!("photoncard: finished tiles are kept in {}; --resume goes on", path.display()));
     }
     let mut statistics = progress.take_failed().unwrap_or_else(|| json!({}));
-    statistics["error"] = json!(error.to_string());
+    statistics["error"] = json!(with_flags(&error.to_string()));
     // The error that has ended the render is the one to report.
     if let Err(failure) = files::write_statistics(outputs, serde_json::to_string_pretty(&statistics)) {
         say(format_args!("photoncard: {}", failure.line()));

@@ -19,6 +19,7 @@ use super::refinement::{COARSEST, Refinement, Work};
 use super::request::{Fault, Request, Saving, parse};
 use super::wish::{Sketch, Wish};
 use crate::arguments::SceneOptions;
+use crate::flags::with_flags;
 
 /// Identifier of a connected page.
 pub(super) type PageNumber = u64;
@@ -162,7 +163,7 @@ impl View {
 
     /// Sends an error to all pages.
     pub(super) fn tell_error(&mut self, text: &str) {
-        let message = json!({"type": "error", "text": text}).to_string();
+        let message = json!({"type": "error", "text": with_flags(text)}).to_string();
         self.pages.values_mut().for_each(|page| page.reply(message.clone()));
     }
 
@@ -307,7 +308,7 @@ impl View {
 
     /// Sends a page the position that a pixel shows.
     fn pick(&mut self, number: PageNumber, at: [u32; 2]) -> Result<(), String> {
-        let camera = self.wish.settings.camera(&self.scene).map_err(|error| error.to_string())?;
+        let camera = self.wish.settings.camera(&self.scene).map_err(|error| with_remedy(&error))?;
         let message = match self.canvas.depth(self.refinement.version(), at) {
             None => json!({"type": "picked", "point": null}),
             Some(depth) => {
@@ -413,8 +414,8 @@ impl View {
     }
 }
 
-/// Text of an error, with its remedy.
+/// Text of an error, with its remedy and with flags in place of fields.
 pub(super) fn with_remedy(error: &RenderError) -> String {
     let remedy = miette::Diagnostic::help(error).map_or(String::new(), |help| format!("; {help}"));
-    format!("{error}{remedy}")
+    with_flags(&format!("{error}{remedy}"))
 }

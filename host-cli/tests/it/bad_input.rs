@@ -209,7 +209,7 @@ fn options_for_emulated_cards_are_refused_for_others() {
     room.write_scene("scene.gltf", &scene());
     for card in ["serial:/dev/absent", "tcp:127.0.0.1:1", "unix:absent"] {
         for (options, words) in [
-            (["--counters", "--card", "emulated:1"], ["only the memory", "leave --counters and --cache out"]),
+            (["--counters", "--card", "emulated:1"], ["only the memory", "leave --counters or --cache out"]),
             (["--cache=unified=64K/128/4", "--card", "emulated:1"], ["only the memory", card]),
             (["--trace=out.din.gz", "--tile", "8"], ["--trace", "use --card emulated:1"]),
         ] {

@@ -46,7 +46,7 @@ fn impossible_verification_is_refused_with_a_remedy() {
         (&["--verify", "0.5", "--card", "emulated:1"][..], "a second card"),
         (&["--verify", "0", "--card", "emulated:2"], "above 0 and at most 1"),
         (&["--verify", "nan", "--card", "emulated:2"], "above 0 and at most 1"),
-        (&["--verify", "1", "--card", "emulated:2", "--counters"], "leave --counters"),
+        (&["--verify", "1", "--card", "emulated:2", "--counters"], "leave out --counters or --cache"),
     ] {
         let room = Room::new();
         let outcome = room.run(&[&["render", &cornell, "-o", "a.exr"][..], &PICTURE, options].concat());

@@ -11,7 +11,7 @@ use photoncard_driver::parts::Part;
 use photoncard_driver::photon_map::{PhotonLayout, PhotonsFor};
 use photoncard_driver::render::{
     CardAddress, CardSet, Filter, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
-    Schedule, TileOutputs,
+    Schedule, Setting, TileOutputs,
 };
 use photoncard_driver::scene::Scene;
 use photoncard_driver::scheduler::GatherOrder;
@@ -185,6 +185,18 @@ fn a_setting_is_in_the_identity_of_a_picture_exactly_if_pixels_depend_on_it() {
     }
     // Width and height are one option.
     assert_eq!(settings().of_pixels().len(), differing - 1);
+}
+
+#[test]
+fn options_name_the_fields_that_they_state() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let fields: Vec<_> = changes(folder.path()).into_iter().map(|(field, ..)| field).collect();
+    for Setting { field, option, .. } in settings().options() {
+        let is_it = |name: &&str| {
+            field.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        };
+        assert!(fields.iter().any(is_it), "--{option} states {field}");
+    }
 }
 
 #[test]

@@ -5,7 +5,7 @@ use photoncard_picture::film::Window;
 use photoncard_shared::message::{Drain, Tile};
 
 /// Order of photon gathers. It has no effect on the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GatherOrder {
     /// Pixels along scanlines, each with its rays in the sampler's order.
     Naive,
@@ -16,6 +16,7 @@ pub enum GatherOrder {
     /// Rays by direction bins. Gathers wait in the queue, sorted by a spatial hash of their positions.
     Hash,
     /// Rays by direction bins. Gathers wait in the queue, sorted along a Hilbert curve.
+    #[default]
     Sort,
 }
 

@@ -35,8 +35,8 @@ pub enum SessionError {
     /// Error of a card that returns with another budget, because it or its firmware was replaced.
     #[error("the card has come back with another budget than it had at first")]
     #[diagnostic(help(
-        "leave a card and its firmware as they are while a picture is rendered; to use it as it is now, begin again with \
-         --resume"
+        "leave a card and its firmware as they are while a picture is rendered; to use it as it is now, begin again \
+         with `outputs.partial.resume`"
     ))]
     OtherBudget,
     /// Error of a command that the card reports as failed.
@@ -76,7 +76,7 @@ pub enum SessionError {
     #[error("the card was reset or came no further {0} times without completing a tile")]
     #[diagnostic(help(
         "it may crash at a tile, lack power, or have a line that damages nearly all (--stats counts `damaged_frames`): \
-         watch the card's own messages, check the cable; then try another card, or --crop"
+         watch the card's own messages, check the cable; then try another card, or `picture.crop`"
     ))]
     Failures(u32),
     /// Error of the link.
@@ -92,8 +92,8 @@ pub enum SessionError {
         .tile.x, .tile.x + .tile.width, .tile.y, .tile.y + .tile.height
     )]
     #[diagnostic(help(
-        "the memory of the card may be bad, or its firmware altered: what it has rendered is not used; check it with --verify \
-         beside cards that you trust"
+        "the memory of the card may be bad, or its firmware altered: what it has rendered is not used; check it with \
+         `cards.verify` beside cards that you trust"
     ))]
     Value {
         /// Tile of the pixel.

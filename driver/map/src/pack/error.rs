@@ -23,7 +23,7 @@ pub enum PackError {
     },
     /// The image has more lines than a line address can number.
     #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
-    #[diagnostic(help("lower --photons, use smaller textures, or simplify the scene"))]
+    #[diagnostic(help("lower `photons.count`, use smaller textures, or simplify the scene"))]
     TooLarge {
         /// Size of the image, bytes.
         bytes: u64,

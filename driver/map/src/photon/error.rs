@@ -13,8 +13,8 @@ pub enum PhotonError {
          {max_distance} m"
     )]
     #[diagnostic(help(
-        "leave out geometry that is far away, move the scene to the origin, or choose a greater --max-distance or fewer \
-         --photons"
+        "leave out geometry that is far away, move the scene to the origin, or choose a greater \
+         `photons.max_distance` or fewer `photons.count`"
     ))]
     TooWide {
         /// Side of a cell of the photon grid, metres.

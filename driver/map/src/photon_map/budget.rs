@@ -46,7 +46,7 @@ pub fn check_packed(
     };
     let texels = bytes(packed.image(), SectionKind::Texels);
     let remedy = if room > 0 {
-        lower(&format!("lower --photons to {room} or less"), texels, needed)
+        lower(&format!("lower `photons.count` to {room} or less"), texels, needed)
     } else {
         simplify(scene_bytes, texels)
     };
@@ -65,8 +65,8 @@ pub fn check_image(image: &CardImage, budget: &Budget) -> Result<(), PackError> 
     let of = |kind| bytes(image, kind);
     let photons: u64 = PHOTON_SECTIONS.into_iter().map(of).sum();
     let caustics: u64 = CAUSTIC_SECTIONS.into_iter().map(of).sum();
-    let option = if is_most(caustics, photons) { "--caustic-photons" } else { "--photons" };
-    let remedy = lower(&format!("lower {option}"), of(SectionKind::Texels), needed);
+    let field = if is_most(caustics, photons) { "photons.caustic_photons" } else { "photons.count" };
+    let remedy = lower(&format!("lower `{field}`"), of(SectionKind::Texels), needed);
     Err(PackError::Dram { needed, photons, available, remedy })
 }
 
@@ -145,7 +145,10 @@ mod tests {
         let large = textured(1024);
         assert!(remedy(&large, 0, 1 << 20).contains("4194304 of them texels: use smaller textures"));
         let with_photons = remedy(&large, 100_000, 5 << 20);
-        assert!(with_photons.starts_with("lower --photons to ") && with_photons.contains("smaller textures"));
+        assert!(
+            with_photons.starts_with("lower `photons.count` to ")
+                && with_photons.contains("smaller textures")
+        );
         assert!(!remedy(&textured(64), 1_000_000, 5 << 20).contains("textures"));
     }
 
@@ -155,7 +158,7 @@ mod tests {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/cornell-spheres.glb");
         let scene = photoncard_scene::gltf::load(path.as_ref()).expect("a shipped scene loads");
         for (photons, caustic_photons, expected) in
-            [(500, 3000, "lower --caustic-photons"), (3000, 500, "lower --photons")]
+            [(500, 3000, "lower `photons.caustic_photons`"), (3000, 500, "lower `photons.count`")]
         {
             let settings = PhotonSettings {
                 camera: None,

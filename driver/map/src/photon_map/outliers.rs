@@ -169,11 +169,10 @@ mod tests {
         let floor = [[-1., -1.], [-1., 1.], [1., 1.], [1., -1.]].map(|[x, z]| Vec3::new(x, 0., z));
         let wall = [[0., -1.], [0., 1.], [1., 1.], [1., -1.]].map(|[y, z]| Vec3::new(WALL, y, z));
         let grey = Reflection::Phong { diffuse: Vec3::splat(0.5), specular: Vec3::ZERO, exponent: 0.0 };
-        let scene = Scene {
-            triangles: [quad(floor), quad(wall)].concat(),
-            materials: vec![Material::new("grey", grey)],
-            ..Scene::default()
-        };
+        let scene = Scene::default().with(|scene| {
+            scene.triangles = [quad(floor), quad(wall)].concat();
+            scene.materials = vec![Material::new("grey", grey)];
+        });
         PackedScene::new(&scene).expect("it is small")
     }
 

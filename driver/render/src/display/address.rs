@@ -52,7 +52,7 @@ impl FromStr for DisplayAddress {
 pub enum DisplayError {
     /// The server cannot be reached.
     #[error(
-        "cannot reach the display server at {address}: {source}; start tev there, or leave --display-server out"
+        "cannot reach the display server at {address}: {source}; start tev there, or leave `outputs.display` out"
     )]
     Connect {
         /// Address of the server.

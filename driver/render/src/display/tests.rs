@@ -115,6 +115,6 @@ fn a_display_that_cannot_be_reached_is_reported_once() {
     let display = Display::open(&settings, film.window(), Layers::colour());
     assert!(shown(&display, &film, &tiles) < Duration::from_secs(10));
     let said = failure(&display).unwrap().to_string();
-    assert!(said.contains(&settings.address.to_string()) && said.contains("--display-server"), "{said}");
+    assert!(said.contains(&settings.address.to_string()) && said.contains("outputs.display"), "{said}");
     assert!(display.failure().is_none());
 }

@@ -55,8 +55,8 @@ pub enum PartialError {
     /// Finished tiles would be lost, because the render does not resume.
     #[error("{} has the finished tiles of an earlier render", path.display())]
     #[diagnostic(help(
-        "go on from them with --resume and that render's settings; or remove the file to begin anew, or \
-         choose another output"
+        "go on from them with `outputs.partial.resume` and that render's settings; or remove the file to begin anew, \
+         or choose another output"
     ))]
     Unfinished {
         /// Path of the file.

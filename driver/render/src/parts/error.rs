@@ -49,7 +49,7 @@ pub enum PartError {
     },
     /// Two files of the same part have different pixels.
     #[error("{} and {} are both part {part}, with other pixels: a machine or a card was wrong", first.display(), second.display())]
-    #[diagnostic(help("render the part once more; --verify compares the tiles of two cards"))]
+    #[diagnostic(help("render the part once more; `cards.verify` compares the tiles of two cards"))]
     Unequal {
         /// Part of both files.
         part: Part,

@@ -124,7 +124,7 @@ fn check_cameras(photons_for: PhotonsFor) -> Result<(), RenderError> {
     match photons_for {
         PhotonsFor::Scene | PhotonsFor::Auto => Ok(()),
         PhotonsFor::Camera => Err(RenderError::Setting {
-            option: "--photons-for",
+            field: "photons.photons_for",
             value: photons_for.name().into(),
             reason: "a prepared scene has photons for all its cameras".into(),
             remedy: "leave it out".into(),

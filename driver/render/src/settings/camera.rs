@@ -26,10 +26,10 @@ impl RenderSettings {
         };
         let mut camera = found.clone();
         if let Some(at) = camera_at {
-            camera.origin = placed("--camera-at", *at, scene)?;
+            camera.origin = placed("picture.camera_at", *at, scene)?;
         }
         if let Some(target) = look_at {
-            let target = placed("--look-at", *target, scene)?;
+            let target = placed("picture.look_at", *target, scene)?;
             let forward = (target.as_dvec3() - camera.origin.as_dvec3()).try_normalize();
             let forward = forward.ok_or_else(|| at_the_camera(scene.in_file(target)))?;
             [camera.right, camera.up, camera.forward] = upright(forward).map(DVec3::as_vec3);
@@ -59,7 +59,7 @@ fn field_of_view(degrees: f32) -> Result<f32, RenderError> {
         return Ok(radians);
     }
     Err(RenderError::Setting {
-        option: "--fov",
+        field: "picture.fov",
         value: degrees.to_string(),
         reason: "a vertical field of view is above 0 and below 180 degrees".into(),
         remedy: "give a number such as 40".into(),
@@ -67,14 +67,14 @@ fn field_of_view(degrees: f32) -> Result<f32, RenderError> {
 }
 
 /// Converts coordinates of the scene's file to a position in the scene.
-fn placed(option: &'static str, place: [f64; 3], scene: &Scene) -> Result<Vec3, RenderError> {
+fn placed(field: &'static str, place: [f64; 3], scene: &Scene) -> Result<Vec3, RenderError> {
     let place = DVec3::from_array(place);
     let placed = scene.in_scene(place);
     if placed.is_finite() {
         return Ok(placed);
     }
     Err(RenderError::Setting {
-        option,
+        field,
         value: place.to_string(),
         reason: "a place is three finite numbers of metres".into(),
         remedy: "give X,Y,Z, such as 0,1.5,4".into(),
@@ -84,10 +84,10 @@ fn placed(option: &'static str, place: [f64; 3], scene: &Scene) -> Result<Vec3, 
 fn at_the_camera(target: DVec3) -> RenderError {
     let [x, y, z] = target.to_array();
     RenderError::Setting {
-        option: "--look-at",
+        field: "picture.look_at",
         value: format!("{x},{y},{z}"),
         reason: "the camera itself is there".into(),
-        remedy: "give another place, or move the camera by --camera-at".into(),
+        remedy: "give another place, or move the camera by `picture.camera_at`".into(),
     }
 }
 
@@ -156,17 +156,17 @@ mod tests {
     }
 
     #[test]
-    fn invalid_views_are_refused_with_their_option() {
-        let refused = |option: &str, change: &dyn Fn(&mut Picture)| match camera(change) {
-            Err(RenderError::Setting { option: found, .. }) => assert_eq!(found, option),
+    fn invalid_views_are_refused_with_their_field() {
+        let refused = |field: &str, change: &dyn Fn(&mut Picture)| match camera(change) {
+            Err(RenderError::Setting { field: found, .. }) => assert_eq!(found, field),
             other => panic!("{other:?}"),
         };
         for fov in [0.0, -1.0, 180.0, 179.999_999, 1e-45, f32::NAN, f32::INFINITY] {
-            refused("--fov", &|picture| picture.fov = Some(fov));
+            refused("picture.fov", &|picture| picture.fov = Some(fov));
         }
-        refused("--look-at", &|picture| picture.look_at = Some([1.0, 2.0, 3.0]));
-        refused("--look-at", &|picture| picture.look_at = Some([1.0, f64::NAN, 3.0]));
-        refused("--camera-at", &|picture| picture.camera_at = Some([f64::INFINITY, 0.0, 0.0]));
+        refused("picture.look_at", &|picture| picture.look_at = Some([1.0, 2.0, 3.0]));
+        refused("picture.look_at", &|picture| picture.look_at = Some([1.0, f64::NAN, 3.0]));
+        refused("picture.camera_at", &|picture| picture.camera_at = Some([f64::INFINITY, 0.0, 0.0]));
         let far = |picture: &mut Picture| {
             (picture.camera_at, picture.look_at) =
                 (Some([f32::MAX.into(); 3]), Some([(-f32::MAX).into(); 3]));

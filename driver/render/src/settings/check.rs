@@ -5,7 +5,7 @@ use photoncard_picture::choice::Choice;
 use photoncard_picture::film::Film;
 use photoncard_shared::budget::{Budget, MAX_BINS};
 
-use super::{MIN_IRRADIANCE_ERROR, RenderSettings};
+use super::{MIN_IRRADIANCE_ERROR, Picture, RenderSettings};
 use crate::address::{CardAddress, check_chips, first_remote, is_one_emulated_chip};
 use crate::emulator::EmulatedKind;
 use crate::error::RenderError;
@@ -23,11 +23,14 @@ impl RenderSettings {
     /// # Errors
     /// The first setting that is not possible on any card.
     pub fn check(&self) -> Result<(), RenderError> {
-        within("--size", self.picture.width.max(self.picture.height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
+        let Picture { width, height, .. } = self.picture;
+        let side = if width < height { "picture.height" } else { "picture.width" };
+        within(side, width.max(height) as u64, 1, MAX_PICTURE_SIDE as u64)?;
         Film::check(self.picture.width, self.picture.height, self.window())?;
-        within("--photons", self.photons.count as u64, 1, MAX_PHOTONS as u64)?;
-        within("--caustic-photons", self.photons.caustic_photons.unwrap_or(0) as u64, 0, MAX_PHOTONS as u64)?;
-        within("--bins", self.schedule.bins.unwrap_or(1) as u64, 1, MAX_BINS as u64)?;
+        within("photons.count", self.photons.count as u64, 1, MAX_PHOTONS as u64)?;
+        let caustic_photons = self.photons.caustic_photons.unwrap_or(0) as u64;
+        within("photons.caustic_photons", caustic_photons, 0, MAX_PHOTONS as u64)?;
+        within("schedule.bins", self.schedule.bins.unwrap_or(1) as u64, 1, MAX_BINS as u64)?;
         self.check_irradiance_error()?;
         self.check_max_distance()?;
         self.check_adaptive_threshold()?;
@@ -50,22 +53,22 @@ impl RenderSettings {
     /// # Errors
     /// The first setting that is not possible on this card.
     pub fn check_budget(&self, budget: &Budget) -> Result<(), RenderError> {
-        on_card("--neighbors", self.photons.neighbors, 2, budget.neighbors)?;
+        on_card("photons.neighbors", self.photons.neighbors, 2, budget.neighbors)?;
         if self.photons.caustic_photons != Some(0) {
             let neighbors = self.photons.caustic_neighbors;
-            on_card("--caustic-neighbors", neighbors, MIN_CAUSTIC_NEIGHBORS, budget.neighbors)?;
+            on_card("photons.caustic_neighbors", neighbors, MIN_CAUSTIC_NEIGHBORS, budget.neighbors)?;
         }
-        on_card("--gather-rays", self.integrator.gather_rays, 0, budget.gather_rays)?;
-        on_card("--shadow-rays", self.integrator.shadow_rays, 0, budget.shadow_rays)?;
-        on_card("--spp", self.integrator.samples, 1, budget.samples)?;
-        on_card("--planned-spp", self.integrator.planned(), 1, budget.samples)?;
+        on_card("integrator.gather_rays", self.integrator.gather_rays, 0, budget.gather_rays)?;
+        on_card("integrator.shadow_rays", self.integrator.shadow_rays, 0, budget.shadow_rays)?;
+        on_card("integrator.samples", self.integrator.samples, 1, budget.samples)?;
+        on_card("integrator.planned_samples", self.integrator.planned(), 1, budget.samples)?;
         if self.schedule.queue.is_some() || self.schedule.order.has_queue() {
-            on_card("--queue", self.schedule.queue.unwrap_or(1), 1, budget.gather_queue)?;
+            on_card("schedule.queue", self.schedule.queue.unwrap_or(1), 1, budget.gather_queue)?;
         }
         if let Some(in_flight) = self.schedule.in_flight {
-            on_card("--in-flight", in_flight, 1, budget.in_flight)?;
+            on_card("schedule.in_flight", in_flight, 1, budget.in_flight)?;
         }
-        on_card("--tile", self.schedule.tile.unwrap_or(1), 1, budget.pixels_of_tile(false).isqrt())?;
+        on_card("schedule.tile", self.schedule.tile.unwrap_or(1), 1, budget.pixels_of_tile(false).isqrt())?;
         self.check_tile_with_layers(budget)
     }
 
@@ -73,7 +76,7 @@ impl RenderSettings {
     fn check_irradiance_error(&self) -> Result<(), RenderError> {
         match self.integrator.irradiance_error {
             Some(error) if !(MIN_IRRADIANCE_ERROR..=1.0).contains(&error) => Err(RenderError::Setting {
-                option: "--ic-error",
+                field: "integrator.irradiance_error",
                 value: error.to_string(),
                 reason: format!("an error is a share of the irradiance, {MIN_IRRADIANCE_ERROR} to 1"),
                 remedy: "give a number such as 0.025".into(),
@@ -86,7 +89,7 @@ impl RenderSettings {
     fn check_max_distance(&self) -> Result<(), RenderError> {
         match self.photons.max_distance {
             Some(distance) if !(distance.is_finite() && distance > 0.0) => Err(RenderError::Setting {
-                option: "--max-distance",
+                field: "photons.max_distance",
                 value: distance.to_string(),
                 reason: "a distance is a positive number of metres".into(),
                 remedy: "give a positive number, or `auto`".into(),
@@ -99,7 +102,7 @@ impl RenderSettings {
     fn check_adaptive_threshold(&self) -> Result<(), RenderError> {
         match self.integrator.adaptive_threshold {
             Some(threshold) if !(threshold.is_finite() && threshold > 0.0) => Err(RenderError::Setting {
-                option: "--adaptive",
+                field: "integrator.adaptive_threshold",
                 value: threshold.to_string(),
                 reason: "a threshold is a positive number".into(),
                 remedy: "give a number such as 0.1, or `off`".into(),
@@ -115,19 +118,23 @@ impl RenderSettings {
         if side <= most {
             return Ok(());
         }
-        let leave_out = "leave direct, indirect, caustic and gathers out of --aov: with them a chip keeps four sums a pixel";
+        let leave_out = "leave direct, indirect, caustic and gathers out of `picture.layers`: with them a chip keeps four sums \
+                         a pixel";
         if most == 0 {
             return Err(RenderError::Setting {
-                option: "--aov",
+                field: "picture.layers",
                 value: self.picture.layers.to_string(),
                 reason: "this card has no room for a tile with these layers".into(),
                 remedy: format!("render on another card, or {leave_out}"),
             });
         }
         Err(RenderError::Setting {
-            option: "--tile",
+            field: "schedule.tile",
             value: side.to_string(),
-            reason: format!("with --aov {} it must be 1 to {most} on this card", self.picture.layers),
+            reason: format!(
+                "with `picture.layers` {} it must be 1 to {most} on this card",
+                self.picture.layers
+            ),
             remedy: format!("choose {most} or less, or {leave_out}"),
         })
     }
@@ -141,7 +148,7 @@ impl RenderSettings {
         let refuse = |reason: &str, remedy: &str| {
             let value = trace.path.display().to_string();
             Err(RenderError::Setting {
-                option: "--trace",
+                field: "cards.trace",
                 value,
                 reason: reason.into(),
                 remedy: remedy.into(),
@@ -150,12 +157,12 @@ impl RenderSettings {
         if trace.has_labels && trace.format.is_below_caches() {
             return refuse(
                 "a trace of the DRAM has no labels",
-                "leave --trace-labels out, or use --trace-format dinero",
+                "leave `cards.trace.has_labels` out, or use `cards.trace.format` dinero",
             );
         }
         if !is_one_emulated_chip(&self.cards.addresses) {
             let one_chip: Vec<_> =
-                EmulatedKind::ALL.iter().map(|kind| format!("--card {}:1", kind.name())).collect();
+                EmulatedKind::ALL.iter().map(|kind| format!("`cards.addresses` {}:1", kind.name())).collect();
             return refuse(
                 "several chips read in no one order, and a chip that is not emulated tells nothing of its reads",
                 &format!("use {}", one_chip.join(" or ")),
@@ -172,28 +179,28 @@ impl RenderSettings {
         match first_remote(&self.cards.addresses).filter(|_| self.modelled_caches().is_some()) {
             None => Ok(()),
             Some(address) => Err(RenderError::Setting {
-                option: "--counters",
-                value: format!("with --card {address}"),
+                field: "cards.caches",
+                value: format!("with `cards.addresses` {address}"),
                 reason: "only the memory of cards that are emulated in this process is modelled".into(),
-                remedy: "use --card emulated:CHIPS, or leave --counters and --cache out".into(),
+                remedy: "use `cards.addresses` emulated:CHIPS, or leave `cards.caches` out".into(),
             }),
         }
     }
 }
 
 /// Checks that a value is in a range that all cards share.
-fn within(option: &'static str, value: u64, least: u64, most: u64) -> Result<(), RenderError> {
+fn within(field: &'static str, value: u64, least: u64, most: u64) -> Result<(), RenderError> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
     let reason = format!("it must be {least} to {most}");
     let remedy =
         if value < least { format!("choose {least} or more") } else { format!("choose {most} or less") };
-    Err(RenderError::Setting { option, value: value.to_string(), reason, remedy })
+    Err(RenderError::Setting { field, value: value.to_string(), reason, remedy })
 }
 
 /// Checks that a value is in the range of one card.
-fn on_card(option: &'static str, value: u32, least: u32, most: u32) -> Result<(), RenderError> {
+fn on_card(field: &'static str, value: u32, least: u32, most: u32) -> Result<(), RenderError> {
     if (least..=most).contains(&value) {
         return Ok(());
     }
@@ -210,7 +217,7 @@ fn on_card(option: &'static str, value: u32, least: u32, most: u32) -> Result<()
         let range = if least == most { least.to_string() } else { format!("{least} to {most}") };
         (format!("it must be {range} on this card"), remedy)
     };
-    Err(RenderError::Setting { option, value: value.to_string(), reason, remedy })
+    Err(RenderError::Setting { field, value: value.to_string(), reason, remedy })
 }
 
 #[cfg(test)]
@@ -219,14 +226,12 @@ mod tests {
 
     use photoncard_cards::scheduler::GatherOrder;
 
-    use super::super::{PhotonMaps, Picture, Schedule};
+    use super::super::{PhotonMaps, Schedule};
     use super::*;
 
     fn refusal(settings: &RenderSettings, budget: &Budget) -> (String, String) {
         match settings.check_budget(budget) {
-            Err(RenderError::Setting { option, reason, remedy, .. }) => {
-                (format!("{option}: {reason}"), remedy)
-            }
+            Err(RenderError::Setting { field, reason, remedy, .. }) => (format!("{field}: {reason}"), remedy),
             other => panic!("{other:?}"),
         }
     }
@@ -235,16 +240,16 @@ mod tests {
     fn another_card_is_suggested_where_no_value_fits() {
         let settings = RenderSettings::default();
         settings.check_budget(&REFERENCE).unwrap();
-        for (option, budget) in [
-            ("--neighbors", Budget { neighbors: 0, ..REFERENCE }),
-            ("--neighbors", Budget { neighbors: 1, ..REFERENCE }),
-            ("--spp", Budget { samples: 0, ..REFERENCE }),
-            ("--queue", Budget { gather_queue: 0, ..REFERENCE }),
-            ("--tile", Budget { tile_pixels: 0, ..REFERENCE }),
+        for (field, budget) in [
+            ("photons.neighbors", Budget { neighbors: 0, ..REFERENCE }),
+            ("photons.neighbors", Budget { neighbors: 1, ..REFERENCE }),
+            ("integrator.samples", Budget { samples: 0, ..REFERENCE }),
+            ("schedule.queue", Budget { gather_queue: 0, ..REFERENCE }),
+            ("schedule.tile", Budget { tile_pixels: 0, ..REFERENCE }),
         ] {
             let (reason, remedy) = refusal(&settings, &budget);
-            assert!(reason.starts_with(option) && reason.contains("this card has room for"), "{reason}");
-            assert!(remedy.contains("render on another") && !remedy.contains("choose"), "{option}: {remedy}");
+            assert!(reason.starts_with(field) && reason.contains("this card has room for"), "{reason}");
+            assert!(remedy.contains("render on another") && !remedy.contains("choose"), "{field}: {remedy}");
         }
         let layers = RenderSettings {
             picture: Picture { layers: "all".parse().unwrap(), ..Picture::default() },
@@ -253,7 +258,7 @@ mod tests {
         };
         let (reason, remedy) = refusal(&layers, &Budget { tile_pixels: 1, ..REFERENCE });
         assert!(
-            reason.starts_with("--aov") && remedy.contains("render on another card, or leave"),
+            reason.starts_with("picture.layers") && remedy.contains("render on another card, or leave"),
             "{reason} {remedy}"
         );
     }
@@ -266,7 +271,7 @@ mod tests {
             schedule: Schedule { order: GatherOrder::DirectionBins, ..Schedule::default() },
             ..RenderSettings::default()
         };
-        assert!(refusal(&settings, &few).0.starts_with("--caustic-neighbors"));
+        assert!(refusal(&settings, &few).0.starts_with("photons.caustic_neighbors"));
         settings.with(|s| s.photons.caustic_photons = Some(0)).check_budget(&few).unwrap();
     }
 }

@@ -1,5 +1,6 @@
-//! Groups of settings. Defaults are the dissertation's nominal values (Table 7.1) on one emulated reference
-//! chip.
+//! Groups of settings, each with the options that state its fields. A new field does not compile before
+//! `options` of its group lists it or leaves it out. Defaults are the dissertation's nominal values (Table
+//! 7.1) on one emulated reference chip.
 
 use photoncard_cards::link::LineFaults;
 use photoncard_cards::scheduler::GatherOrder;
@@ -8,7 +9,10 @@ use photoncard_picture::film::Window;
 use photoncard_picture::layer::Layers;
 use photoncard_shared::message::{Filter, Radiance, Sampling};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
+use super::setting::Changes::{Cards, Nothing, Pixels, Work};
+use super::setting::{Setting, UNSTATED, list, name, optional, place, setting, value};
 use crate::address::CardAddress;
 use crate::display::DisplaySettings;
 use crate::emulator::EmulatedKind;
@@ -42,10 +46,35 @@ pub struct Picture {
 }
 
 impl Picture {
+    /// Window of the picture that is rendered.
+    pub(super) fn window(&self) -> Window {
+        self.crop.unwrap_or(Window::full(self.width, self.height))
+    }
+
     /// Returns whether both position and direction of the camera are stated, so that the file's view has no
     /// influence.
     pub fn states_view(&self) -> bool {
         self.camera_at.is_some() && self.look_at.is_some()
+    }
+
+    pub(super) fn options(&self) -> Vec<Setting> {
+        let Self { width, height, crop, camera, camera_at, look_at, fov, layers, filter } = self;
+        let size = (Some(json!([width, height])), Some(format!("{width}x{height}")));
+        let Window { x0, x1, y0, y1 } = self.window();
+        let window = [x0, x1, y0, y1];
+        // The layers of the host are in the identity of no tile.
+        let aov = (Some(json!(layers.of_chip().to_string())), Some(layers.to_string()));
+        vec![
+            setting(Pixels, "picture.width", "size", size),
+            setting(Pixels, "picture.height", "size", UNSTATED),
+            setting(Pixels, "picture.crop", "crop", (Some(json!(window)), crop.map(|_| list(&window)))),
+            setting(Pixels, "picture.camera", "camera", optional(camera.clone())),
+            setting(Pixels, "picture.camera_at", "camera-at", place(*camera_at)),
+            setting(Pixels, "picture.look_at", "look-at", place(*look_at)),
+            setting(Pixels, "picture.fov", "fov", optional(*fov)),
+            setting(Pixels, "picture.layers", "aov", aov),
+            setting(Pixels, "picture.filter", "filter", name(*filter)),
+        ]
     }
 }
 
@@ -87,6 +116,31 @@ pub struct PhotonMaps {
     pub caustic_neighbors: u32,
     /// Source of the reflected radiance at the ends of gather rays.
     pub radiance: Radiance,
+}
+
+impl PhotonMaps {
+    pub(super) fn options(&self) -> Vec<Setting> {
+        let Self {
+            count,
+            photons_for,
+            layout,
+            neighbors,
+            max_distance,
+            caustic_photons,
+            caustic_neighbors,
+            radiance,
+        } = self;
+        vec![
+            setting(Pixels, "photons.count", "photons", value(count)),
+            setting(Pixels, "photons.photons_for", "photons-for", name(photons_for.resolved())),
+            setting(Work, "photons.layout", "photon-map", name(*layout)),
+            setting(Pixels, "photons.neighbors", "neighbors", value(neighbors)),
+            setting(Pixels, "photons.caustic_photons", "caustic-photons", optional(*caustic_photons)),
+            setting(Pixels, "photons.caustic_neighbors", "caustic-neighbors", value(caustic_neighbors)),
+            setting(Pixels, "photons.max_distance", "max-distance", optional(*max_distance)),
+            setting(Pixels, "photons.radiance", "radiance", name(*radiance)),
+        ]
+    }
 }
 
 impl Default for PhotonMaps {
@@ -135,6 +189,37 @@ impl Integrator {
     pub fn planned(&self) -> u32 {
         self.planned_samples.unwrap_or(self.samples)
     }
+
+    pub(super) fn options(&self) -> Vec<Setting> {
+        let Self {
+            seed,
+            samples,
+            planned_samples,
+            gather_rays,
+            shadow_rays,
+            sampling,
+            irradiance_error,
+            adaptive_threshold,
+        } = self;
+        // Rays are divided among the planned samples with the irradiance cache alone.
+        let is_planned = irradiance_error.is_some() && self.planned() != *samples;
+        let planned = (is_planned.then(|| json!(self.planned())), optional(*planned_samples).1);
+        let switch = if irradiance_error.is_some() { "on" } else { "off" };
+        let cache = (None, Some(switch.to_owned()));
+        let (threshold, argument) = optional(*adaptive_threshold);
+        let adaptive = (threshold, argument.or(Some("off".to_owned())));
+        vec![
+            setting(Pixels, "integrator.seed", "seed", value(seed)),
+            setting(Pixels, "integrator.samples", "spp", value(samples)),
+            setting(Pixels, "integrator.planned_samples", "planned-spp", planned),
+            setting(Pixels, "integrator.gather_rays", "gather-rays", value(gather_rays)),
+            setting(Pixels, "integrator.shadow_rays", "shadow-rays", value(shadow_rays)),
+            setting(Pixels, "integrator.sampling", "sampling", name(*sampling)),
+            setting(Pixels, "integrator.irradiance_error", "ic-error", optional(*irradiance_error)),
+            setting(Pixels, "integrator.irradiance_error", "irradiance-cache", cache),
+            setting(Pixels, "integrator.adaptive_threshold", "adaptive", adaptive),
+        ]
+    }
 }
 
 impl Default for Integrator {
@@ -153,7 +238,7 @@ impl Default for Integrator {
 }
 
 /// Order of the work. No pixel depends on it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Schedule {
     /// Side of a tile, pixels; `None` to choose it by cards and picture
     /// ([`tile_side`](super::RenderSettings::tile_side)).
@@ -178,18 +263,16 @@ pub struct Schedule {
     pub keep_records: bool,
 }
 
-impl Default for Schedule {
-    fn default() -> Self {
-        Self {
-            tile: None,
-            order: GatherOrder::Sort,
-            bins: None,
-            queue: None,
-            in_flight: None,
-            focus: None,
-            part: None,
-            keep_records: false,
-        }
+impl Schedule {
+    pub(super) fn options(&self) -> Vec<Setting> {
+        let Self { tile, order, bins, queue, in_flight, focus: _, part: _, keep_records: _ } = self;
+        vec![
+            setting(Work, "schedule.order", "order", name(*order)),
+            setting(Work, "schedule.tile", "tile", optional(*tile)),
+            setting(Work, "schedule.bins", "bins", optional(*bins)),
+            setting(Work, "schedule.queue", "queue", optional(*queue)),
+            setting(Work, "schedule.in_flight", "in-flight", optional(*in_flight)),
+        ]
     }
 }
 
@@ -210,6 +293,26 @@ pub struct CardSet {
 }
 
 impl CardSet {
+    pub(super) fn options(&self) -> Vec<Setting> {
+        let Self { addresses, faults, verify, caches: _, trace: _ } = self;
+        let addresses: Vec<_> = addresses.iter().map(ToString::to_string).collect();
+        let caches = self.modelled_caches().map(|caches| caches.to_string());
+        vec![
+            setting(Cards, "cards.addresses", "card", (Some(json!(addresses)), None)),
+            setting(Cards, "cards.faults", "faults", optional(faults.map(|faults| faults.to_string()))),
+            setting(Cards, "cards.verify", "verify", optional(*verify)),
+            setting(Cards, "cards.caches", "cache", optional(caches)),
+            setting(Nothing, "cards.trace", "trace", UNSTATED),
+            setting(Nothing, "cards.trace.format", "trace-format", UNSTATED),
+            setting(Nothing, "cards.trace.has_labels", "trace-labels", UNSTATED),
+        ]
+    }
+
+    /// Caches of the memory model; `None` if memory is not modelled.
+    pub(super) fn modelled_caches(&self) -> Option<CacheSettings> {
+        self.caches.or_else(|| self.trace.as_ref().map(|_| self.own_caches()))
+    }
+
     /// Number of cards. Each has one chip.
     pub fn count(&self) -> usize {
         self.addresses.iter().map(|address| address.emulated_chips().max(1)).sum()
@@ -253,4 +356,14 @@ pub struct TileOutputs {
     pub partial: Option<PartialSettings>,
     /// Viewer that shows tiles as soon as they are finished; `None` for no viewer.
     pub display: Option<DisplaySettings>,
+}
+
+impl TileOutputs {
+    pub(super) fn options(&self) -> Vec<Setting> {
+        let Self { partial: _, display: _ } = self;
+        vec![
+            setting(Nothing, "outputs.partial.resume", "resume", UNSTATED),
+            setting(Nothing, "outputs.display", "display-server", UNSTATED),
+        ]
+    }
 }

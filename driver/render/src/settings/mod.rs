@@ -4,6 +4,7 @@ mod camera;
 mod check;
 mod dependence;
 mod groups;
+mod setting;
 
 use glam::Vec3;
 pub use photoncard_firmware::card::MIN_IRRADIANCE_ERROR;
@@ -13,6 +14,7 @@ use photoncard_shared::message::{self, CausticGather, FrameParameters, SumScale,
 
 pub use self::dependence::{NamedSettings, PROGRAM};
 pub use self::groups::{CardSet, Integrator, PhotonMaps, Picture, Schedule, TileOutputs};
+pub use self::setting::{Changes, Setting};
 use crate::emulator::memory_model::CacheSettings;
 use photoncard_cards::scheduler::tiles;
 use photoncard_map::photon_map::{PhotonSettings, PhotonsFor};
@@ -61,7 +63,7 @@ impl RenderSettings {
 
     /// Window of the picture that is rendered.
     pub fn window(&self) -> Window {
-        self.picture.crop.unwrap_or(Window::full(self.picture.width, self.picture.height))
+        self.picture.window()
     }
 
     /// Side of the tiles on cards with `budgets`, pixels. It is [`Schedule::tile`] if stated; otherwise the
@@ -107,7 +109,7 @@ impl RenderSettings {
 
     /// Caches of the memory model; `None` if memory is not modelled.
     pub fn modelled_caches(&self) -> Option<CacheSettings> {
-        self.cards.caches.or_else(|| self.cards.trace.as_ref().map(|_| self.cards.own_caches()))
+        self.cards.modelled_caches()
     }
 
     /// Number of photons in the caustic map; 0 for no map, as in a scene without specular surfaces.

@@ -81,7 +81,7 @@ impl LinkError {
 
     /// Error of listing serial ports.
     pub(super) fn list(error: &io::Error) -> Self {
-        Self::other("list", "serial ports", error, "give the port's path: --card serial:PATH")
+        Self::other("list", "serial ports", error, "give the port's path: `cards.addresses` serial:PATH")
     }
 
     fn new(action: &'static str, address: impl Display, reason: &str, remedy: &'static str) -> Self {

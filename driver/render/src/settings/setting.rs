@@ -1,0 +1,72 @@
+//! Row of the table of options: the field of a setting, the option that states it, what depends on it, and its
+//! value.
+
+use photoncard_picture::choice::Choice;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// Results that depend on a setting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Changes {
+    /// Pixels.
+    Pixels,
+    /// A chip's work and memory traffic, but no pixel.
+    Work,
+    /// Cards, their links, and the model of their memory.
+    Cards,
+    /// None of these.
+    Nothing,
+}
+
+/// Setting of a render, with the option of the command line that states it.
+#[derive(Clone, Debug)]
+pub struct Setting {
+    /// Results that depend on the setting.
+    pub changes: Changes,
+    /// Path of the field in [`RenderSettings`](super::RenderSettings), such as `integrator.samples`.
+    pub field: &'static str,
+    /// Name of the option, such as `spp`. Provenance has the value by this name.
+    pub option: &'static str,
+    /// Value for provenance; `None` if it has no influence, or if another row has it.
+    pub value: Option<Value>,
+    /// Argument with which the option states the value; `None` to leave the option out.
+    pub argument: Option<String>,
+}
+
+/// Value of a setting for provenance, and as an argument.
+type Stated = (Option<Value>, Option<String>);
+
+/// No value: an error names the field, and nothing depends on it, or another row has its value.
+pub(super) const UNSTATED: Stated = (None, None);
+
+/// Row of a setting.
+pub(super) fn setting(
+    changes: Changes,
+    field: &'static str,
+    option: &'static str,
+    (value, argument): Stated,
+) -> Setting {
+    Setting { changes, field, option, value, argument }
+}
+
+pub(super) fn value(value: &(impl ToString + Serialize)) -> Stated {
+    (Some(json!(value)), Some(value.to_string()))
+}
+
+/// Value of an option that is left out for `None`.
+pub(super) fn optional(value: Option<impl ToString + Serialize>) -> Stated {
+    (Some(json!(value)), value.map(|value| value.to_string()))
+}
+
+pub(super) fn name(choice: impl Choice) -> Stated {
+    value(&choice.name())
+}
+
+pub(super) fn place(place: Option<[f64; 3]>) -> Stated {
+    (Some(json!(place)), place.map(|place| list(&place)))
+}
+
+/// Numbers with commas between them. They parse to the same bits.
+pub(super) fn list<T: ToString>(values: &[T]) -> String {
+    values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
+}
