@@ -72,7 +72,9 @@ fn main() -> ExitCode {
         Command::Tonemap(options) => tonemap::run(options),
         Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
         Command::Card(CardCommand::List) => card_list::run(),
-        Command::Card(CardCommand::Info { card }) => card::info(card),
+        Command::Card(CardCommand::Info { card, chip }) => {
+            card::info(&card.clone().of_kind(|kind| chip.or(kind)))
+        }
         Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
         Command::Card(CardCommand::Selftest { card, quiet }) => card_self_test::run(card, *quiet),
         Command::Emulate(options) => emulate::run(options),

@@ -1,7 +1,7 @@
 //! Notices about options that have no effect because an option that they need is missing.
 
 use photoncard_driver::choice::Choice;
-use photoncard_driver::render::Radiance;
+use photoncard_driver::render::{CardAddress, Radiance};
 use photoncard_driver::scene::{LightUnits, Material, Reflection, Scene};
 
 use super::files::PictureFormat;
@@ -23,6 +23,7 @@ impl RenderOptions {
         let has_map = scene.is_specular() && self.photons.caustic_photons != Some(0);
         let has_lobe =
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });
+        let is_emulated = |card: &CardAddress| matches!(card, CardAddress::Emulated { .. });
         let cases = [
             (
                 self.scene.lights.light_units != LightUnits::Auto && scene.lights.is_empty(),
@@ -49,6 +50,11 @@ impl RenderOptions {
                 self.cards.faults.is_some() && order.is_of_whole_frame(),
                 "--faults",
                 format!("with --order {name}, which sends nothing over links"),
+            ),
+            (
+                self.cards.chip.is_stated() && !settings.cards.addresses.iter().any(is_emulated),
+                "--chip",
+                "without an emulated card".to_owned(),
             ),
         ];
         let of_rays = self.integrator.without_effect(&self.quality.settings().integrator);
