@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The test command: prepares the machine, then checks format, lints, boards, tests, documentation and packages. Stages run alone by their
-# names: tests/ci.sh [lint|boards|test|docs|packages ...]. A tool that is missing and cannot be installed is a failure or, where said so, a loud skip: never a silent pass.
+# names: tests/ci.sh [lint|boards|test|docs|packages ...]. A tool that is missing and cannot be installed is a failure or, where said so
+# and CI is not set, a loud skip: never a silent pass.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
@@ -51,8 +52,9 @@ install() {
 
 # What cannot be had, for the end.
 skipped=()
-# skip WHAT WHY: says loudly that something is not tested.
+# skip WHAT WHY: says loudly that something is not tested. A service of continuous integration can install everything.
 skip() {
+    [ -z "${CI:-}" ] || fail "$1: $2"
     echo "ci: SKIPPED: $1: $2" >&2
     skipped+=("$1: $2")
 }
@@ -86,7 +88,8 @@ find_browser() {
     skip "the page of the live view" "$PHOTONCARD_SKIP_BROWSER"
 }
 
-# The engines of farms that jobs are tested with: GNU parallel, in whose place a loop can stand, and the runner of Open Job Description.
+# The engines of farms that jobs are tested with: GNU parallel, in whose place a loop can stand, Node.js for the job type of
+# Flamenco, and the runner of Open Job Description.
 install_openjd() {
     local folder=${CARGO_TARGET_DIR:-target}/openjd
     python3 -m venv "$folder" && "$folder/bin/pip" install --quiet openjd-cli==0.8.0 || return 1
@@ -97,6 +100,7 @@ find_farms() {
     local why="it cannot be installed; jobs are printed, but not run by it"
     command -v parallel >/dev/null || install "GNU parallel" parallel || skip "jobs of farms by GNU parallel" "$why"
     unset PHOTONCARD_OPENJD
+    command -v node >/dev/null || install "Node.js" nodejs || skip "jobs of farms by Flamenco" "$why"
     command -v openjd >/dev/null || install_openjd || skip "jobs of farms by Open Job Description (pip install openjd-cli)" "$why"
 }
 
