@@ -105,7 +105,7 @@ fn panics_hangs_and_allocations_are_found_and_replayed() {
         let failures = fuzz(&faulty, &Settings { first: number, ..settings(1, patience) }).failures;
         let [failure] = &failures[..] else { panic!("{failures:?}") };
         assert!(failure.number == number && failure.what.contains(word), "{failure:?}");
-        let path = settings(1, Duration::ZERO).folder.join(format!("faulty-0-{number}.hex"));
-        assert_eq!(std::fs::read_to_string(path).expect("a dump"), format!("{kind:02x}\n"));
+        let path = settings(1, Duration::ZERO).folder.join(format!("faulty-0-{number}.input"));
+        assert_eq!(std::fs::read(path).expect("the input"), [kind]);
     }
 }
