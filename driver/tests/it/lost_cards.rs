@@ -3,7 +3,6 @@ use std::io::{Read, Write};
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::sync::Mutex;
-use std::time::{Duration, Instant};
 
 use photoncard_driver::render::{
     CardError, CardSet, Integrator, Observer, Phase, PhotonMaps, Picture, RenderError, RenderSettings,
@@ -16,18 +15,16 @@ use rustix::net::{AddressFamily, SocketAddrUnix, SocketType, bind, listen, socke
 
 use crate::scripted_card::{Answer, Card, sound};
 
-const PATIENCE: Duration = Duration::from_secs(60);
-
-/// Observer that records lost cards, and stops the render after a number of them or after a minute.
+/// Observer that records lost cards, and stops the render after a number of them. A render that waits for a
+/// lost card hangs, and the limit of the test ends it.
 struct Losses {
     told: Mutex<Vec<String>>,
     most: usize,
-    begin: Instant,
 }
 
 impl Losses {
     fn new(most: usize) -> Self {
-        Self { told: Mutex::default(), most, begin: Instant::now() }
+        Self { told: Mutex::default(), most }
     }
 }
 
@@ -35,7 +32,7 @@ impl Observer for Losses {
     fn progress(&self, _: Phase, _: u64, _: u64) {}
 
     fn is_stopped(&self) -> bool {
-        self.told.lock().unwrap().len() >= self.most || self.begin.elapsed() > PATIENCE
+        self.told.lock().unwrap().len() >= self.most
     }
 
     fn lost(&self, _: &str, error: &CardError) {
@@ -113,8 +110,7 @@ fn a_render_ends_while_a_lost_card_is_tried() {
             serve(stream, sound);
         });
         let losses = Losses::new(usize::MAX);
-        let rendering = render_with(&path, 256, &losses);
-        assert!(rendering.is_ok() && losses.begin.elapsed() < PATIENCE / 2, "{:?}", losses.begin.elapsed());
+        assert!(render_with(&path, 256, &losses).is_ok());
         assert_eq!(losses.told.lock().unwrap().len(), 1);
         first.join().unwrap();
     });
@@ -197,6 +193,6 @@ fn a_card_that_never_renders_holds_up_no_other() {
     });
     let losses = Losses::new(usize::MAX);
     let rendering = render_with(&path, 64, &losses).unwrap();
-    assert!(rendering.film.is_complete() && losses.begin.elapsed() < PATIENCE / 2);
+    assert!(rendering.film.is_complete());
     assert!(losses.told.into_inner().unwrap().is_empty());
 }

@@ -2,19 +2,16 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 use photoncard_driver::render::{
     CardSet, Integrator, Observer, Phase, PhotonMaps, Picture, RenderSettings, render,
 };
 use photoncard_driver::scene::gltf;
 
-const PATIENCE: Duration = Duration::from_secs(60);
-
 /// Observer that panics in the thread of the card that first reports tiles.
+#[derive(Default)]
 struct Panics {
     has_panicked: AtomicBool,
-    begin: Instant,
 }
 
 impl Observer for Panics {
@@ -25,7 +22,7 @@ impl Observer for Panics {
     }
 
     fn is_stopped(&self) -> bool {
-        self.begin.elapsed() > PATIENCE
+        false
     }
 }
 
@@ -40,7 +37,7 @@ fn a_panic_in_the_thread_of_one_card_ends_the_others() {
         cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     };
-    let observer = Panics { has_panicked: AtomicBool::new(false), begin: Instant::now() };
-    let result = catch_unwind(AssertUnwindSafe(|| render(&scene, &settings, &observer).map(drop)));
-    assert!(result.is_err() && observer.begin.elapsed() < PATIENCE, "{:?}", observer.begin.elapsed());
+    // The whole render would take hours.
+    let render = || render(&scene, &settings, &Panics::default()).map(drop);
+    assert!(catch_unwind(AssertUnwindSafe(render)).is_err());
 }

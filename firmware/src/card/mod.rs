@@ -14,7 +14,8 @@ use photoncard_shared::budget::MAX_GATHER_RAYS;
 use photoncard_shared::message::{self, Command, Fault, FaultCode, MemoryUse, Reply};
 use photoncard_shared::transport::Transport;
 
-use self::engine::{Engine, TILE_QUEUE, send};
+pub use self::engine::MAX_TILES;
+use self::engine::{Engine, send};
 pub use self::frame::{MAX_PICTURE_SIDE, MIN_IRRADIANCE_ERROR};
 use crate::chip::Chip;
 use crate::kind::{ChipKind, FixedKind, Micro, Reference, cache_bytes};
@@ -128,5 +129,5 @@ const fn check<K: FixedKind>() {
     );
     assert!(Chip::<K>::TECHNIQUES.is_within(&K::TECHNIQUE_LIMITS), "a technique exceeds its limit");
     assert!(K::BUDGET.gather_rays <= MAX_GATHER_RAYS, "too many gather rays");
-    assert!(K::BUDGET.tiles as usize <= TILE_QUEUE, "too many tiles wait");
+    assert!(K::BUDGET.tiles as usize <= MAX_TILES, "too many tiles wait");
 }

@@ -59,7 +59,7 @@ use crate::vector::max;
 /// Maximum number of coarsest cells that a block may overlap.
 const MAX_ROOTS: usize = 16;
 /// Maximum number of records of a block of one pixel: 4 corners, and 5 further points per division.
-pub(crate) const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
+pub const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
 /// Irradiance records of a block.
 pub struct IrradianceCache<R: Capacity> {

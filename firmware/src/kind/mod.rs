@@ -12,6 +12,7 @@ mod large;
 mod micro;
 mod reference;
 
+pub use crate::irradiance_cache::MIN_RECORDS;
 pub use capacity::{Array, Buffer, Capacity, Entries, FixedCapacity, Map, Vacant};
 pub(crate) use chip_kind::check;
 pub use chip_kind::{ChipKind, FixedKind, TechniqueMemory, cache_bytes, tag_bytes};

@@ -10,6 +10,7 @@ use photoncard_driver::emulator::trace::{TraceFormat, TraceSettings};
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{CardAddress, CardSet};
 
+use super::chip::ChipOption;
 use super::choice::choice;
 use super::files::file;
 
@@ -22,6 +23,8 @@ pub(crate) struct CardOptions {
         help = format!("Where to render: {}; may be repeated [default: a chip a core]", CardAddress::forms())
     )]
     cards: Vec<CardAddress>,
+    #[command(flatten)]
+    pub(super) chip: ChipOption,
     /// Share of the tiles, above 0 and at most 1, that two cards render and that are compared bit for bit
     ///
     /// Of three cards the outvoted one is given up, and others render its tiles.
@@ -61,8 +64,9 @@ impl CardOptions {
     /// Settings of the cards that these options state.
     pub(super) fn settings(&self) -> CardSet {
         let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
+        let addresses = if self.cards.is_empty() { emulated() } else { self.cards.clone() };
         let cards = CardSet {
-            addresses: if self.cards.is_empty() { emulated() } else { self.cards.clone() },
+            addresses: addresses.into_iter().map(|card| card.of_kind(|kind| self.chip.or(kind))).collect(),
             faults: self.faults,
             verify: self.verify,
             caches: self.cache,

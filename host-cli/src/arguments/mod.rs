@@ -1,6 +1,7 @@
 //! Command-line arguments of all commands.
 
 mod cards;
+mod chip;
 mod choice;
 mod farm;
 mod files;
@@ -47,6 +48,7 @@ use photoncard_driver::render::CardAddress;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::PROTOCOL_VERSION;
 
+use self::chip::ChipOption;
 use self::choice::choice;
 pub(crate) use self::farm::{FarmCommand, FarmOptions};
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
@@ -199,6 +201,8 @@ pub(crate) enum CardCommand {
     Info {
         #[arg(long, default_value_t, help = format!("The card: {}", CardAddress::forms()))]
         card: CardAddress,
+        #[command(flatten)]
+        chip: ChipOption,
     },
     /// Greet a card repeatedly, and print the time until each answer
     Ping {
@@ -227,6 +231,8 @@ pub(crate) struct EmulateOptions {
     /// The kind of card
     #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>())]
     pub(crate) card: EmulatedKind,
+    #[command(flatten)]
+    pub(crate) chip: ChipOption,
 }
 
 #[derive(Args)]

@@ -8,6 +8,7 @@ use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::quality::{Quality, Stated};
 use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
 
+use super::chip::ChipOption;
 use super::choice::choice;
 use super::files::file;
 use super::frames::FrameOptions;
@@ -42,7 +43,9 @@ pub(crate) struct PrepareOptions {
     integrator: IntegratorOptions,
     /// Kind of the cards that will render: the card image must fit their memory
     #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>(), help_heading = "Cards")]
-    pub(crate) card: EmulatedKind,
+    card: EmulatedKind,
+    #[command(flatten)]
+    chip: ChipOption,
     /// Threads for the work [default: one per core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true, hide_short_help = true)]
     pub(crate) threads: Option<usize>,
@@ -55,6 +58,11 @@ pub(crate) struct PrepareOptions {
 }
 
 impl PrepareOptions {
+    /// Kind of the cards that will render.
+    pub(crate) fn chip(&self) -> EmulatedKind {
+        self.chip.or(self.card)
+    }
+
     /// Flags of the stated options among those that a quality chooses.
     pub(crate) fn stated(&self) -> Stated {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
@@ -67,7 +75,7 @@ impl PrepareOptions {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),
             integrator: self.integrator.settings(&base.integrator),
-            cards: CardSet { addresses: vec![CardAddress::emulated(self.card)], ..CardSet::default() },
+            cards: CardSet { addresses: vec![CardAddress::emulated(self.chip())], ..CardSet::default() },
             ..RenderSettings::default()
         }
     }

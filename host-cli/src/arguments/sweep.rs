@@ -8,6 +8,7 @@ use photoncard_driver::quality::Quality;
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::study::{ALONG_CURVE, Axis, MAX_POINTS, Point, Scale, Task};
 
+use super::chip::ChipOption;
 use super::choice::choice;
 use super::integrator::IntegratorOptions;
 use super::machine::RateOptions;
@@ -57,6 +58,8 @@ struct SweepSettings {
     /// Kind of the chips
     #[arg(long, default_value = EmulatedKind::Reference.name(), value_parser = choice::<EmulatedKind>(), help_heading = "Cards")]
     card: EmulatedKind,
+    #[command(flatten)]
+    chip: ChipOption,
     /// Caches of the modelled memory, as of a render; several are varied [default:
     /// photon=128K/128/4,scene=75K/128/4]
     #[arg(long = "cache", value_name = "CACHES", help_heading = "Cards")]
@@ -79,7 +82,9 @@ impl SweepArguments {
 
     /// Point of a sweep with these options. It has the first of the caches; `name` is that of the scene.
     pub(crate) fn point(&self, name: &str) -> Point {
-        let SweepSettings { quality, picture, photons, integrator, schedule, card, caches } = &self.settings;
+        let SweepSettings { quality, picture, photons, integrator, schedule, card, chip, caches } =
+            &self.settings;
+        let chip = chip.or(*card);
         let base = quality.settings();
         let settings = RenderSettings {
             picture: picture.settings(&base.picture),
@@ -91,8 +96,8 @@ impl SweepArguments {
         // With several tiles in flight no tile can be measured alone.
         let settings = settings.with(|s| s.schedule.in_flight = s.schedule.in_flight.or(Some(1)));
         let task = Task::Traffic {
-            chip: *card,
-            caches: caches.first().copied().unwrap_or_else(|| card.caches()),
+            chip,
+            caches: caches.first().copied().unwrap_or_else(|| chip.caches()),
             sample: self.output.sample,
             least_tiles: Scale::FULL.least_tiles,
         };

@@ -1,5 +1,6 @@
 //! Notices about options that have no effect because an option that they need is missing.
 
+use photoncard_driver::render::CardAddress;
 use photoncard_driver::scene::Scene;
 
 use super::render::RenderOptions;
@@ -17,6 +18,9 @@ impl RenderOptions {
         self.photons.without_effect(scene.is_specular(), integrator.gather_rays, &mut add);
         self.integrator.without_effect(&base, &mut add);
         self.schedule.without_effect(&mut add);
+        let is_emulated = |card: &CardAddress| matches!(card, CardAddress::Emulated { .. });
+        let has_emulated = self.settings().cards.addresses.iter().any(is_emulated);
+        add(self.cards.chip.is_stated() && !has_emulated, "--chip", "without an emulated card");
         outputs.without_effect(&mut add);
         add(picture.aov.is_some() && !outputs.have_layers(), "--aov", "without -o OUT.exr");
         said

@@ -3,7 +3,7 @@
 
 use std::process::Command;
 
-use crate::support::{Outcome, Room, shipped};
+use crate::support::{Outcome, Room, shipped, skip};
 use serde_json::Value;
 
 /// Folder name that shells and engines misread unless it is quoted.
@@ -105,7 +105,7 @@ fn the_script_of_gnu_parallel_renders_the_picture() {
     if is_there("parallel", "--version") {
         run_script(&room, &script, &[]);
     } else {
-        eprintln!("SKIPPED: GNU parallel is missing, and a loop does its work");
+        skip("GNU parallel is missing, and a loop does its work");
         by_hand(&room, &script);
     }
     check_pictures(&room);
@@ -178,7 +178,7 @@ fn the_template_of_open_job_description_renders_the_picture() {
     assert_eq!((&parameters[0]["type"], &parameters[0]["range"]), (&"CHUNK[INT]".into(), &"1-3".into()));
     let openjd = std::env::var("PHOTONCARD_OPENJD").unwrap_or("openjd".to_owned());
     if !is_there(&openjd, "--version") {
-        eprintln!("SKIPPED: openjd is missing (pip install openjd-cli), and the template is not run");
+        skip("openjd is missing (pip install openjd-cli), and the template is not run");
         return;
     }
     let path = room.path(FOLDER).join("job.json");
@@ -198,7 +198,7 @@ fn the_job_type_of_flamenco_renders_the_picture() {
     let (room, _) = room();
     let script = job(&room, "flamenco");
     if !is_there("node", "--version") {
-        eprintln!("SKIPPED: node is missing, and the job type is not run");
+        skip("node is missing, and the job type is not run");
         return;
     }
     let manager = r#"

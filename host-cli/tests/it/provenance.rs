@@ -42,8 +42,11 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
     ]
 }
 
+/// Example of a file with the capacities of a chip.
+const CHIP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/chip.json");
+
 /// Options on which no pixel depends.
-const OTHERS: [&[&str]; 23] = [
+const OTHERS: [&[&str]; 24] = [
     &["--strict"],
     &["--photon-map", "jensen"],
     &["--tile", "3"],
@@ -52,6 +55,7 @@ const OTHERS: [&[&str]; 23] = [
     &["--queue", "7"],
     &["--in-flight", "1"],
     &["--card", "emulated-micro:2"],
+    &["--chip", CHIP],
     &["--verify", "0.5", "--card", "emulated:2"],
     &["--faults", "flips=1e-6"],
     &["--resume"],

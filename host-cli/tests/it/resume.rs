@@ -6,7 +6,7 @@
 mod hang_up;
 use std::fs;
 use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::support::{Emulator, Room, shipped};
 use serde_json::Value;
@@ -15,8 +15,6 @@ use serde_json::Value;
 const PICTURE: [&str; 6] = ["--size", "128x128", "--photons", "2000", "--gather-rays", "50"];
 /// Size of a tile in the file of finished tiles, bytes.
 const TILE_BYTES: u64 = 8 + 24 + 60 * 256 + 4;
-/// Time limit of every wait, long enough for a busy machine.
-const PATIENCE: Duration = Duration::from_secs(120);
 
 fn arguments<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a str> {
     [&["render", scene, "-o", "a.exr"][..], &PICTURE, options].concat()
@@ -31,10 +29,8 @@ fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     let cornell = shipped("cornell.gltf");
     let mut command = room.command();
     let mut host = command.args(arguments(&cornell, options)).stderr(Stdio::piped()).spawn().unwrap();
-    let start = Instant::now();
     while partial_bytes(room) < tiles * TILE_BYTES {
         assert_eq!(host.try_wait().unwrap(), None, "the render has ended");
-        assert!(start.elapsed() < PATIENCE, "the render does not begin");
         std::thread::sleep(Duration::from_millis(5));
     }
     host

@@ -2,7 +2,8 @@
 //! a number.
 //!
 //! No input may panic, take longer than some seconds, or allocate more than a bound. A coverage-guided fuzzer
-//! would do more, but needs another compiler. A failing input is repeated by its number.
+//! would do more, but needs a build of its own, of instrumented code. A failing input is repeated by its
+//! number.
 
 mod compressed;
 pub(crate) mod environment;

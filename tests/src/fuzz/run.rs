@@ -109,9 +109,8 @@ pub fn fuzz(target: &Arc<dyn Target>, settings: &Settings) -> Report {
     for failure in &mut report.failures {
         let input = target.input(&mut Random::new(target.name(), settings.seed, failure.number));
         let path =
-            settings.folder.join(format!("{}-{}-{}.hex", target.name(), settings.seed, failure.number));
-        let written =
-            std::fs::create_dir_all(&settings.folder).and_then(|()| std::fs::write(&path, hex(&input)));
+            settings.folder.join(format!("{}-{}-{}.input", target.name(), settings.seed, failure.number));
+        let written = std::fs::create_dir_all(&settings.folder).and_then(|()| std::fs::write(&path, &input));
         let place = written.map_or_else(|error| error.to_string(), |()| path.display().to_string());
         let _ = write!(failure.what, " ({} bytes: {place})", input.len());
     }
@@ -177,16 +176,4 @@ fn run(target: &dyn Target, settings: &Settings, at: &AtomicU64) -> Report {
     }
     let _ = std::fs::remove_file(trace);
     report
-}
-
-/// Hexadecimal dump for `xxd -r -p`.
-fn hex(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(bytes.len() * 2 + bytes.len() / 32 + 1);
-    for row in bytes.chunks(32) {
-        for byte in row {
-            let _ = write!(text, "{byte:02x}");
-        }
-        text.push('\n');
-    }
-    text
 }

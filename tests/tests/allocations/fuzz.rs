@@ -83,7 +83,9 @@ impl Target for Faulty {
         match input {
             [0] => panic!("a panic"),
             [1] => drop(std::hint::black_box(vec![1_u8; 1 << 25])),
-            [2] => std::thread::sleep(Duration::from_secs(5)),
+            [2] => loop {
+                std::thread::park();
+            },
             _ => {}
         }
         true
@@ -95,13 +97,15 @@ fn panics_hangs_and_allocations_are_found_and_replayed() {
     let _alone = ALONE.lock();
     let faulty: Arc<dyn Target> = Arc::new(Faulty);
     let input = |number| faulty.input(&mut Random::new("faulty", 0, number))[0];
-    let alone = |number| Settings { first: number, ..settings(1, Duration::from_millis(300)) };
-    for (kind, word) in [(0, "a panic"), (1, "allocated"), (2, "hangs")] {
+    let long = Duration::from_secs(60);
+    for (kind, patience, word) in
+        [(0, long, "a panic"), (1, long, "allocated"), (2, Duration::from_millis(300), "hangs")]
+    {
         let number = (0..).find(|&number| input(number) == kind).expect("an input of the kind");
-        let failures = fuzz(&faulty, &alone(number)).failures;
+        let failures = fuzz(&faulty, &Settings { first: number, ..settings(1, patience) }).failures;
         let [failure] = &failures[..] else { panic!("{failures:?}") };
         assert!(failure.number == number && failure.what.contains(word), "{failure:?}");
-        let path = settings(1, Duration::ZERO).folder.join(format!("faulty-0-{number}.hex"));
-        assert_eq!(std::fs::read_to_string(path).expect("a dump"), format!("{kind:02x}\n"));
+        let path = settings(1, Duration::ZERO).folder.join(format!("faulty-0-{number}.input"));
+        assert_eq!(std::fs::read(path).expect("the input"), [kind]);
     }
 }

@@ -7,7 +7,6 @@ mod caches;
 mod card;
 mod caustics;
 mod density;
-mod dependencies;
 mod emission;
 mod energy;
 mod environment_sun;

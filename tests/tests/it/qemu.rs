@@ -18,7 +18,7 @@ use photoncard_firmware::card::MicroCard;
 use photoncard_firmware::kind::MICRO;
 use photoncard_firmware::memory::Dram;
 use photoncard_tests::everything::everything;
-use photoncard_tests::render_or_panic;
+use photoncard_tests::{render_or_panic, skip};
 
 /// Time limit for building an image and starting a machine.
 const START: Duration = Duration::from_secs(600);
@@ -119,8 +119,7 @@ fn faults() -> Vec<LineFaults> {
 
 fn renders_as_the_emulated_card(name: &str) {
     if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_QEMU") {
-        say(&format!("SKIPPED: {name} is not tested, as PHOTONCARD_SKIP_QEMU is set: {reason}"));
-        return;
+        return skip(&format!("{name} is not tested, as PHOTONCARD_SKIP_QEMU is set: {reason}"));
     }
     let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../scenes/cornell.gltf");
     let scene = gltf::load(&path).expect("a shipped scene loads");

@@ -156,15 +156,15 @@ mod tests {
         std::thread::scope(|scope| {
             let reader = scope.spawn(move || {
                 let mut buffer = [0; 8];
-                let begun = Instant::now();
-                let count = host.read(&mut buffer, Duration::from_secs(60)).unwrap();
-                (begun.elapsed() < Duration::from_secs(30), buffer[..count].to_vec())
+                // A reader that nobody wakes waits until the limit of the test is over.
+                let count = host.read(&mut buffer, Duration::from_secs(100_000)).unwrap();
+                buffer[..count].to_vec()
             });
             card.write(&[1, 2], SOON).unwrap();
             card.write(&[3], SOON).unwrap();
             let waiting = card.read(&mut [0; 1], Duration::from_secs(1));
-            let (was_woken, bytes) = reader.join().unwrap();
-            assert!(was_woken && [1, 2, 3].starts_with(&bytes) && !bytes.is_empty());
+            let bytes = reader.join().unwrap();
+            assert!([1, 2, 3].starts_with(&bytes) && !bytes.is_empty());
             assert!(matches!(waiting, Ok(0) | Err(PortError::Closed)));
         });
     }

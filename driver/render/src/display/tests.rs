@@ -1,7 +1,7 @@
 use std::io::Read;
 use std::net::{TcpListener, TcpStream};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use photoncard_picture::film::{Film, FilmPixel, PixelValue, SumFormat, Window};
 use photoncard_picture::layer::Layers;
@@ -47,11 +47,10 @@ fn failure(display: &Display) -> Option<DisplayError> {
     display.failure().map(|error| *error.downcast().expect("an error of a display"))
 }
 
-fn shown(display: &Display, film: &Film, tiles: &[Tile]) -> Duration {
+/// Shows all tiles of a picture, and finishes it. A display that held up its end would hang the test.
+fn show(display: &Display, film: &Film, tiles: &[Tile]) {
     tiles.iter().for_each(|tile| display.put(&film.finished(tile).unwrap()));
-    let begun = Instant::now();
     display.finish(film);
-    begun.elapsed()
 }
 
 #[test]
@@ -65,7 +64,7 @@ fn every_tile_is_shown_although_few_fit_into_the_queue() {
         packets(listener.accept().unwrap().0)
     });
     let display = Display::with_room_for(100_000, &settings, film.window(), Layers::colour());
-    shown(&display, &film, &tiles);
+    show(&display, &film, &tiles);
     assert!(display.failure().is_none());
     let mut expected: Vec<Vec<u8>> =
         tiles.iter().map(|tile| display.packet(&film.finished(tile).unwrap())).collect();
@@ -79,16 +78,14 @@ fn every_tile_is_shown_although_few_fit_into_the_queue() {
 }
 
 #[test]
-fn a_display_that_never_reads_delays_a_render_only_briefly() {
+fn a_display_that_never_reads_is_given_up_and_reported_once() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     sockopt::set_socket_recv_buffer_size(&listener, 4096).unwrap();
     let (film, tiles) = film(400);
     let display = Display::open(&settings(&listener), film.window(), Layers::colour());
-    let took = shown(&display, &film, &tiles);
-    assert!(took < Duration::from_secs(10), "{took:?}");
+    show(&display, &film, &tiles);
     assert!(matches!(failure(&display), Some(DisplayError::Slow { packets, .. }) if packets > 0));
-    // The failure is reported once, and nothing more is sent.
-    assert!(shown(&display, &film, &tiles) < Duration::from_secs(1));
+    show(&display, &film, &tiles);
     assert!(display.failure().is_none());
 }
 
@@ -102,7 +99,7 @@ fn a_display_that_disconnects_is_reported_once() {
         stream.read_exact(&mut [0; 100]).unwrap();
     });
     let display = Display::open(&settings, film.window(), Layers::colour());
-    assert!(shown(&display, &film, &tiles) < Duration::from_secs(10));
+    show(&display, &film, &tiles);
     viewer.join().unwrap();
     assert!(matches!(failure(&display), Some(DisplayError::Gone { .. })));
     assert!(display.failure().is_none());
@@ -113,7 +110,7 @@ fn a_display_that_cannot_be_reached_is_reported_once() {
     let settings = settings(&TcpListener::bind("127.0.0.1:0").unwrap());
     let (film, tiles) = film(1);
     let display = Display::open(&settings, film.window(), Layers::colour());
-    assert!(shown(&display, &film, &tiles) < Duration::from_secs(10));
+    show(&display, &film, &tiles);
     let said = failure(&display).unwrap().to_string();
     assert!(said.contains(&settings.address.to_string()) && said.contains("outputs.display"), "{said}");
     assert!(display.failure().is_none());

@@ -9,11 +9,11 @@ use photoncard_firmware::photon::{CandidateStorage, Candidates};
 use photoncard_shared::budget::Budget;
 
 /// Kind of chips whose buffers are on the heap.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emulated {
-    budget: Budget,
+    pub(super) budget: Budget,
     /// Gather points whose rays are cast together.
-    points: usize,
+    pub(super) points: usize,
 }
 
 impl Emulated {

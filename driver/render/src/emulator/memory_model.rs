@@ -50,6 +50,11 @@ impl CacheSpec {
         CacheShape::new(self.bytes, self.line_bytes, self.ways, self.index)
     }
 
+    /// Returns whether the size is that of whole sets.
+    pub(super) fn is_possible(&self) -> bool {
+        self.shape().is_ok()
+    }
+
     fn cache(&self) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
         // Only `FromStr` and the constants make shapes, and they make valid ones.
         let shape = self.shape().unwrap_or_else(|error| unreachable!("{self}: {error:?}"));

@@ -1,6 +1,7 @@
 //! Emulated cards: the firmware on threads of this process, one chip per thread, with a loopback link per
 //! chip.
 
+mod chip_file;
 pub mod contents;
 pub mod direct;
 mod dram;
@@ -15,10 +16,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-use photoncard_firmware::card::{Card, sram_bytes};
-use photoncard_firmware::chip::Chip;
+use photoncard_firmware::card::Card;
 use photoncard_firmware::kind::{
-    self, FixedKind as _, Large, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
+    self, ChipKind as _, Large, Micro, Reference, TechniqueMemory, cache_bytes, tag_bytes,
 };
 use photoncard_firmware::memory::CardMemory;
 use photoncard_firmware::serve::serve;
@@ -27,6 +27,7 @@ use photoncard_shared::frame::MAX_FRAME;
 use photoncard_shared::link::Port;
 use photoncard_shared::transport::WINDOW;
 
+pub use self::chip_file::ChipError;
 use self::dram::EmulatedDram;
 pub(crate) use self::dram::SharedImage;
 pub use self::emulated::{Emulated, EmulatedChip};
@@ -37,7 +38,7 @@ use self::tile_lines::TileMeter;
 use self::trace::TraceFile;
 use self::traced::Traced;
 use photoncard_cards::link::{LoopbackPort, loopback};
-use photoncard_picture::choice::choices;
+use photoncard_picture::choice::Choice;
 
 /// Kind of the chip on an emulated card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,31 +49,41 @@ pub enum EmulatedKind {
     Large,
     /// Chip with the budget [`MICRO`](photoncard_firmware::kind::MICRO).
     Micro,
+    /// Chip with the capacities of a file.
+    File(Emulated),
 }
 
-choices!(EmulatedKind {
-    Reference = "emulated": "The reference chip",
-    Large = "emulated-large": "The large chip",
-    Micro = "emulated-micro": "The micro chip",
-});
+impl Choice for EmulatedKind {
+    const ALL: &'static [Self] = &[Self::Reference, Self::Large, Self::Micro];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Reference => "emulated",
+            Self::Large => "emulated-large",
+            Self::Micro => "emulated-micro",
+            Self::File(_) => "chip",
+        }
+    }
+
+    fn about(self) -> &'static str {
+        match self {
+            Self::Reference => "The reference chip",
+            Self::Large => "The large chip",
+            Self::Micro => "The micro chip",
+            Self::File(_) => "The chip of a file",
+        }
+    }
+}
 
 impl EmulatedKind {
     /// On-chip memory of the firmware, including caches and stack, bytes.
     pub fn sram_bytes(self) -> usize {
-        match self {
-            Self::Reference => sram_bytes::<Reference>(),
-            Self::Large => sram_bytes::<Large>(),
-            Self::Micro => sram_bytes::<Micro>(),
-        }
+        self.emulated().sram_bytes()
     }
 
     /// On-chip memory that each technique adds, bytes.
     pub fn techniques(self) -> TechniqueMemory {
-        match self {
-            Self::Reference => Chip::<Reference>::TECHNIQUES,
-            Self::Large => Chip::<Large>::TECHNIQUES,
-            Self::Micro => Chip::<Micro>::TECHNIQUES,
-        }
+        self.emulated().techniques()
     }
 
     /// On-chip memory of the caches' tags, bytes.
@@ -97,16 +108,13 @@ impl EmulatedKind {
             Self::Reference => Emulated::like::<Reference>(),
             Self::Large => Emulated::like::<Large>(),
             Self::Micro => Emulated::like::<Micro>(),
+            Self::File(kind) => kind,
         }
     }
 
     /// Budget of a chip of the kind.
     pub fn budget(self) -> Budget {
-        match self {
-            Self::Reference => Reference::BUDGET,
-            Self::Large => Large::BUDGET,
-            Self::Micro => Micro::BUDGET,
-        }
+        *self.emulated().budget()
     }
 
     /// Caches with the budget's sizes and four ways.

@@ -1,12 +1,8 @@
-//! Damaged scenes are loaded or rejected, quickly and without a panic.
-
-use std::time::{Duration, Instant};
+//! Damaged scenes are loaded or rejected, without a panic.
 
 use crate::support::{glb, load_bytes, load_with, triangle_bytes, triangle_json};
 use proptest::prelude::{ProptestConfig, any, proptest};
 use serde_json::{Value, json};
-
-const PATIENCE: Duration = Duration::from_secs(5);
 
 /// GLB with a node hierarchy, sparse positions, normals and Phong extras.
 fn rich() -> (Value, Vec<u8>) {
@@ -20,12 +16,6 @@ fn rich() -> (Value, Vec<u8>) {
     json["materials"][0]["extras"] =
         json!({"photoncard": {"phong": {"specular": [0.1, 0.1, 0.1], "exponent": 8}}});
     (json, triangle_bytes())
-}
-
-fn is_quick(load: impl FnOnce()) {
-    let start = Instant::now();
-    load();
-    assert!(start.elapsed() < PATIENCE);
 }
 
 /// Replaces the number at index `nth`, modulo their count, in the JSON.
@@ -53,7 +43,7 @@ proptest! {
     #![proptest_config(ProptestConfig { cases: 512, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
-    fn changed_bytes_and_cuts_are_loaded_or_refused_quickly(
+    fn changed_bytes_and_cuts_are_loaded_or_refused(
         flips in proptest::collection::vec((any::<usize>(), any::<u8>()), 1..6),
         cut in any::<usize>(),
         is_cut in any::<bool>(),
@@ -67,11 +57,11 @@ proptest! {
         if is_cut {
             bytes.truncate(cut % bytes.len());
         }
-        is_quick(|| drop(load_bytes("scene.glb", &bytes)));
+        drop(load_bytes("scene.glb", &bytes));
     }
 
     #[test]
-    fn odd_numbers_in_the_json_are_loaded_or_refused_quickly(first in any::<usize>(), second in any::<usize>(), a in 0usize..10, b in 0usize..10) {
+    fn odd_numbers_in_the_json_are_loaded_or_refused(first in any::<usize>(), second in any::<usize>(), a in 0usize..10, b in 0usize..10) {
         let odd = [
             json!(0), json!(-1), json!(1), json!(3), json!(1e300), json!(0.5), json!(u64::MAX), json!(u32::MAX),
             json!(1u64 << 40), json!(3u64 << 20),
@@ -79,6 +69,6 @@ proptest! {
         let (mut json, bin) = rich();
         replace_number(&mut json, first, &odd[a]);
         replace_number(&mut json, second, &odd[b]);
-        is_quick(|| drop(load_with(&json, &bin)));
+        drop(load_with(&json, &bin));
     }
 }

@@ -6,7 +6,6 @@
 //! colours, two bones and tangents.
 
 use std::collections::BTreeSet;
-use std::time::{Duration, Instant};
 
 use miette::Diagnostic;
 use photoncard_scene::error::SceneError;
@@ -30,9 +29,6 @@ const FILES: [[&[u8]; 2]; 2] = [
 
 const TRIANGLES: usize = 24;
 const VERTICES: u64 = 24;
-
-/// Time limit for a scene of some hundred bytes.
-const PATIENCE: Duration = Duration::from_secs(10);
 
 fn primitive(json: &mut Value) -> &mut Value {
     &mut json["meshes"][0]["primitives"][0]
@@ -221,11 +217,9 @@ fn the_memory_of_all_primitives_is_bounded_together() {
 
 /// Tries streams with each byte changed, and cut at every length.
 #[test]
-fn damaged_streams_are_loaded_or_refused_quickly() {
+fn damaged_streams_are_loaded_or_refused() {
     let load = |json: &Value, bytes: Vec<u8>| {
-        let start = Instant::now();
         let loaded = load_parts(&(json.clone(), bytes));
-        assert!(start.elapsed() < PATIENCE);
         loaded.inspect_err(|error| assert!(error.to_string().contains("meshes[0].primitives[0]"), "{error}"))
     };
     for [file, _] in FILES {

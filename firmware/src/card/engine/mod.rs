@@ -23,7 +23,7 @@ use crate::self_test::MemoryTester;
 use crate::self_test::arithmetic::compute_bytes;
 
 /// Maximum number of queued tile commands for all kinds of chips.
-pub(super) const TILE_QUEUE: usize = 8;
+pub const MAX_TILES: usize = 8;
 
 /// Image, frame and tiles of a card: the state that commands change.
 pub(super) struct Engine<K: ChipKind> {
@@ -36,7 +36,7 @@ pub(super) struct Engine<K: ChipKind> {
     checksums: Option<Checksums>,
     frame: Option<FrameParameters>,
     /// Tiles that the chip has not begun.
-    tiles: Deque<Tile, TILE_QUEUE>,
+    tiles: Deque<Tile, MAX_TILES>,
     /// Number of tiles that the chip has begun and whose end was not sent yet.
     begun: usize,
     /// A tile whose pixels were sent, with its counters.

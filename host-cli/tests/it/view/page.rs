@@ -14,7 +14,7 @@ use tungstenite::{Message, WebSocket};
 use crate::support::Room;
 
 /// Time limit of every wait of a test, long enough for a busy machine.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(200);
 
 /// View in another process. Dropping it ends the process.
 pub(crate) struct View {

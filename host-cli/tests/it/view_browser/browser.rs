@@ -11,8 +11,10 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 use tungstenite::{Message, WebSocket};
 
+use crate::support::skip;
+
 /// Time limit for the browser's start and for each of its answers.
-const PATIENCE: Duration = Duration::from_secs(40);
+const PATIENCE: Duration = Duration::from_secs(200);
 /// Names of programs that are Chromium, in order of preference.
 const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
@@ -28,7 +30,7 @@ impl Browser {
     /// Starts Chromium. Returns `None`, and prints why, if the tests are to be skipped.
     pub(crate) fn start() -> Option<Self> {
         if let Ok(reason) = std::env::var("PHOTONCARD_SKIP_BROWSER") {
-            eprintln!("SKIPPED: the page is not tested, as PHOTONCARD_SKIP_BROWSER is set: {reason}");
+            skip(&format!("the page is not tested, as PHOTONCARD_SKIP_BROWSER is set: {reason}"));
             return None;
         }
         let profile = tempfile::tempdir().unwrap();

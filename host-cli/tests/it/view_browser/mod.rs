@@ -42,7 +42,7 @@ const WITHOUT_WEBGL2: &str = "const get = HTMLCanvasElement.prototype.getContext
      function (kind, ...rest) { return kind === 'webgl2' ? null : get.call(this, kind, ...rest); }";
 
 /// Time limit of every step, long enough for a busy machine.
-const LIMIT: Duration = Duration::from_secs(30);
+const LIMIT: Duration = Duration::from_secs(150);
 
 /// Opens the page of a new view, and waits for its first complete picture.
 fn opened(browser: &mut Browser, view: &View) -> Tab {

@@ -1,0 +1,322 @@
+//! Kinds of emulated chips from JSON files, and the on-chip memory that capacities take.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use photoncard_firmware::card::{Card, MAX_TILES};
+use photoncard_firmware::chip::Chip;
+use photoncard_firmware::kind::{
+    ChipKind, Entries, FixedKind, MIN_RECORDS, REFERENCE, Reference, TechniqueMemory, cache_bytes,
+};
+use photoncard_firmware::memory::Dram;
+use photoncard_shared::budget::{
+    Budget, MAX_GATHER_RAYS, MAX_IN_FLIGHT, MAX_TILE_PIXELS, SUMS_WITH_LAYERS, gather_candidates,
+};
+use serde_json::{Value, json};
+
+use super::emulated::Emulated;
+use super::memory_model::CacheSpec;
+
+/// Maximum size of a file, bytes.
+const MAX_BYTES: u64 = 1 << 16;
+/// Maximum of on-chip memory, of which each chip takes as much from the host.
+const MAX_SRAM: u32 = 16 << 20;
+
+/// Capacities in a file, with the ranges that the chip's indices and the host's searches allow. A capacity
+/// that the file does not state is that of the reference chip.
+const RANGES: [(&str, RangeInclusive<u32>); 15] = [
+    ("sram_bytes", 1..=MAX_SRAM),
+    ("dram_bytes", 1 << 20..=u32::MAX),
+    ("photon_cache_bytes", 1..=MAX_SRAM),
+    ("scene_cache_bytes", 1..=MAX_SRAM),
+    ("stack_bytes", 0..=MAX_SRAM),
+    ("tile_pixels", SUMS_WITH_LAYERS..=MAX_TILE_PIXELS),
+    ("neighbors", 2..=REFERENCE.neighbors),
+    ("gather_rays", 1..=MAX_GATHER_RAYS),
+    ("gather_queue", 1..=1 << 20),
+    ("irradiance_records", MIN_RECORDS as u32..=MAX_TILE_PIXELS),
+    ("shadow_rays", 1..=REFERENCE.shadow_rays),
+    ("samples", 1..=REFERENCE.samples),
+    ("tiles", 1..=MAX_TILES as u32),
+    ("in_flight", 1..=MAX_IN_FLIGHT),
+    ("gather_points", MIN_RECORDS as u32..=MAX_TILE_PIXELS),
+];
+
+/// Error of a file with the capacities of a chip.
+#[derive(Debug, thiserror::Error)]
+pub enum ChipError {
+    /// The file cannot be read, or is not text.
+    #[error("it cannot be read: {0}")]
+    Unreadable(#[from] io::Error),
+    /// The file is no JSON object.
+    #[error("it is no JSON object of capacities, which are numbers: {0}")]
+    Syntax(#[from] serde_json::Error),
+    /// A field of the file is no capacity.
+    #[error("{name:?} is none of {}", RANGES.map(|(name, _)| name).join(", "))]
+    Unknown {
+        /// Name of the field.
+        name: String,
+    },
+    /// A capacity is out of its range.
+    #[error("{name} is {value}; use a number from {least} to {most}")]
+    OutOfRange {
+        /// Name of the capacity.
+        name: &'static str,
+        /// Value in the file.
+        value: Value,
+        /// Smallest value.
+        least: u32,
+        /// Largest value.
+        most: u32,
+    },
+    /// A capacity contradicts others.
+    #[error("{name} is {value}; use {rule}")]
+    Contradictory {
+        /// Name of the capacity.
+        name: &'static str,
+        /// Its value.
+        value: u32,
+        /// Values that would do.
+        rule: String,
+    },
+}
+
+impl Emulated {
+    /// Reads a kind from a file.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or the kind is impossible.
+    pub fn read(path: &Path) -> Result<Self, ChipError> {
+        let mut text = String::new();
+        File::open(path)?.take(MAX_BYTES).read_to_string(&mut text)?;
+        Self::from_json(&text)
+    }
+
+    /// Kind with the capacities of a JSON object. Those that it does not state are the reference chip's.
+    ///
+    /// # Errors
+    /// The first capacity that is unknown, out of its range or contradicts others.
+    pub fn from_json(text: &str) -> Result<Self, ChipError> {
+        let stated: BTreeMap<String, Value> = serde_json::from_str(text)?;
+        let mut capacities = Self::like::<Reference>().to_json();
+        for (name, value) in stated {
+            let Some((name, range)) = RANGES.into_iter().find(|(known, _)| *known == name) else {
+                return Err(ChipError::Unknown { name });
+            };
+            let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
+            if !number.is_some_and(|number| range.contains(&number)) {
+                let (least, most) = range.into_inner();
+                return Err(ChipError::OutOfRange { name, value, least, most });
+            }
+            capacities[name] = value;
+        }
+        let points = serde_json::from_value(capacities["gather_points"].take())?;
+        let kind = Self { budget: serde_json::from_value(capacities)?, points };
+        kind.check()?;
+        Ok(kind)
+    }
+
+    /// JSON object with all capacities.
+    pub fn to_json(self) -> Value {
+        let mut fields = json!(self.budget);
+        fields["gather_points"] = self.points.into();
+        fields
+    }
+
+    /// Checks the capacities that depend on others, as the firmware does for kinds that are types.
+    fn check(&self) -> Result<(), ChipError> {
+        let Budget { photon_cache_bytes, scene_cache_bytes, irradiance_records, in_flight, tiles, .. } =
+            self.budget;
+        let contradictory =
+            |name, value, rule: &str| Err(ChipError::Contradictory { name, value, rule: rule.to_owned() });
+        for (name, bytes) in
+            [("photon_cache_bytes", photon_cache_bytes), ("scene_cache_bytes", scene_cache_bytes)]
+        {
+            if !(CacheSpec { bytes, ..CacheSpec::PHOTON }).is_possible() {
+                return contradictory(name, bytes, "a multiple of 512: sets of four lines of 128 bytes");
+            }
+        }
+        if !irradiance_records.is_power_of_two() {
+            return contradictory("irradiance_records", irradiance_records, "a power of two");
+        }
+        if in_flight > tiles {
+            return contradictory("in_flight", in_flight, &format!("at most {tiles}, the number of tiles"));
+        }
+        if self.points < irradiance_records as usize {
+            let rule = format!("at least {irradiance_records}, the number of irradiance_records");
+            return contradictory("gather_points", self.points as u32, &rule);
+        }
+        let (bytes, most) = (self.sram_bytes(), self.budget.sram_bytes);
+        if bytes > most as usize {
+            let rule = format!("at least {bytes}, which buffers, caches and stack take");
+            return contradictory("sram_bytes", most, &rule);
+        }
+        Ok(())
+    }
+
+    /// On-chip memory of the firmware, including caches and stack, bytes.
+    pub fn sram_bytes(&self) -> usize {
+        self.sizes()[0] + cache_bytes(&self.budget) + self.budget.stack_bytes as usize
+    }
+
+    /// On-chip memory that each technique adds, bytes.
+    pub fn techniques(&self) -> TechniqueMemory {
+        let [_, reordering, irradiance_cache, importance_sampling] = self.sizes();
+        TechniqueMemory { reordering, irradiance_cache, importance_sampling }
+    }
+
+    /// Sizes of a board's card with these capacities and of its techniques, bytes. Buffers grow linearly with
+    /// their entries, and so does the chip with its tiles in flight.
+    fn sizes(&self) -> [usize; 4] {
+        let Budget { tile_pixels, neighbors, gather_queue, irradiance_records, in_flight, .. } = self.budget;
+        let [pixels, queue, records, flights] =
+            [tile_pixels, gather_queue, irradiance_records, in_flight].map(|entries| entries as usize);
+        let entries = [pixels, gather_candidates(neighbors), queue, records, self.points];
+        let [one, two] = [extrapolated(&entries, &probes::<1>()), extrapolated(&entries, &probes::<2>())];
+        std::array::from_fn(|i| {
+            let bytes = one[i] + (two[i] - one[i]) * (flights as i64 - 1);
+            (bytes as usize).next_multiple_of(ALIGNMENT)
+        })
+    }
+}
+
+/// Alignment of the chip's buffers, bytes.
+const ALIGNMENT: usize = 8;
+/// Entries of each buffer of the smallest probe; another probe has twice as many of one.
+const PROBED: usize = 64;
+
+/// Sizes with other numbers of entries, by those of the smallest probe and of one probe for each buffer.
+fn extrapolated(entries: &[usize; 5], [base, doubled @ ..]: &[[usize; 4]; 6]) -> [i64; 4] {
+    std::array::from_fn(|i| {
+        let size = |sizes: &[usize; 4]| sizes[i] as i64;
+        let slopes = doubled.iter().map(|sizes| size(sizes) - size(base));
+        let more = entries.iter().map(|&entries| entries as i64 - PROBED as i64);
+        size(base) + slopes.zip(more).map(|(slope, more)| slope * more / PROBED as i64).sum::<i64>()
+    })
+}
+
+/// Sizes of the smallest probe, and of probes with twice as many entries of one buffer.
+const fn probes<const FLIGHTS: usize>() -> [[usize; 4]; 6] {
+    const ONE: usize = PROBED;
+    const TWO: usize = 2 * PROBED;
+    [
+        sizes_of::<Probe<ONE, ONE, ONE, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<TWO, ONE, ONE, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, TWO, ONE, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, TWO, ONE, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, ONE, TWO, ONE, FLIGHTS>>(),
+        sizes_of::<Probe<ONE, ONE, ONE, ONE, TWO, FLIGHTS>>(),
+    ]
+}
+
+const fn sizes_of<K: FixedKind>() -> [usize; 4] {
+    let TechniqueMemory { reordering, irradiance_cache, importance_sampling } = Chip::<K>::TECHNIQUES;
+    [size_of::<Card<K, Dram<'static>>>(), reordering, irradiance_cache, importance_sampling]
+}
+
+/// Kind whose chip is measured and never built: the numbers of entries are pixels, candidates, gathers,
+/// records and points.
+struct Probe<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize>;
+
+impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize> ChipKind
+    for Probe<T, C, G, R, P, F>
+{
+    type TilePixels = Entries<T>;
+    type Candidates = Entries<C>;
+    type GatherQueue = Entries<G>;
+    type IrradianceRecords = Entries<R>;
+    type Points = Entries<P>;
+    type Flights = Entries<F>;
+
+    fn budget(&self) -> &Budget {
+        &REFERENCE
+    }
+}
+
+impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize> FixedKind
+    for Probe<T, C, G, R, P, F>
+{
+    const KIND: Self = Self;
+    const BUDGET: Budget = REFERENCE;
+    const TECHNIQUE_LIMITS: TechniqueMemory = Reference::TECHNIQUE_LIMITS;
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_firmware::card::sram_bytes;
+    use photoncard_firmware::kind::{FixedKind, Large, Micro};
+    use proptest::prelude::{ProptestConfig, any, prop, prop_assert, proptest};
+
+    use super::*;
+
+    fn check_sizes<K: FixedKind>() {
+        let kind = Emulated::like::<K>();
+        assert_eq!((kind.sram_bytes(), kind.techniques()), (sram_bytes::<K>(), Chip::<K>::TECHNIQUES));
+        assert_eq!(Emulated::from_json(&kind.to_json().to_string()).unwrap(), kind);
+    }
+
+    #[test]
+    fn kinds_are_read_as_they_are_written_and_take_what_their_types_take() {
+        check_sizes::<Reference>();
+        check_sizes::<Large>();
+        check_sizes::<Micro>();
+        assert_eq!(Emulated::from_json("{}").unwrap(), Emulated::like::<Reference>());
+        let names = RANGES.map(|(name, _)| name);
+        let fields = Emulated::like::<Reference>().to_json();
+        assert!(fields.as_object().unwrap().keys().all(|name| names.contains(&name.as_str())));
+    }
+
+    #[test]
+    fn impossible_chips_are_refused_with_field_and_range() {
+        for (text, words) in [
+            ("", ["no JSON object", "EOF"]),
+            ("[1]", ["no JSON object", "a map"]),
+            (r#"{"pixels": 1}"#, ["\"pixels\" is none of", "tile_pixels"]),
+            (r#"{"gather_queue": 0}"#, ["gather_queue is 0", "1 to 1048576"]),
+            (r#"{"gather_queue": -1}"#, ["gather_queue is -1", "1 to 1048576"]),
+            (r#"{"gather_queue": "9"}"#, ["gather_queue is \"9\"", "1 to 1048576"]),
+            (r#"{"in_flight": 4294967297}"#, ["in_flight is 4294967297", "1 to 8"]),
+            (r#"{"neighbors": 257}"#, ["neighbors is 257", "2 to 256"]),
+            (r#"{"scene_cache_bytes": 1000}"#, ["scene_cache_bytes is 1000", "multiple of 512"]),
+            (r#"{"irradiance_records": 100}"#, ["irradiance_records is 100", "power of two"]),
+            (r#"{"in_flight": 5}"#, ["in_flight is 5", "at most 4"]),
+            (r#"{"gather_points": 256}"#, ["gather_points is 256", "at least 512"]),
+            (r#"{"gather_queue": 1000000}"#, ["sram_bytes is 1048576", "buffers, caches and stack"]),
+        ] {
+            let said = Emulated::from_json(text).unwrap_err().to_string();
+            assert!(words.iter().all(|word| said.contains(word)), "{text}: {said}");
+        }
+        assert!(matches!(Emulated::read("/dev/zero".as_ref()), Err(ChipError::Syntax(_))));
+        assert!(matches!(Emulated::read("absent".as_ref()), Err(ChipError::Unreadable(_))));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+        #[test]
+        fn texts_are_read_or_refused(text in ".*") {
+            drop(Emulated::from_json(&text));
+        }
+
+        /// Half of the numbers are near the ends of a range.
+        #[test]
+        fn a_chip_that_is_not_refused_fits_and_can_be_built(
+            stated in prop::collection::vec((0..RANGES.len(), any::<u32>(), 0..4_u32, any::<bool>()), 0..6),
+        ) {
+            let mut fields = json!({});
+            for (field, number, step, is_near) in stated {
+                let (name, range) = &RANGES[field];
+                let near = if number % 2 == 0 { range.start() + step } else { range.end() - step.min(*range.end()) };
+                fields[*name] = (if is_near { near } else { number >> (number % 32) }).into();
+            }
+            if let Ok(kind) = Emulated::from_json(&fields.to_string()) {
+                prop_assert!(kind.sram_bytes() <= kind.budget.sram_bytes as usize);
+                prop_assert!(Emulated::from_json(&kind.to_json().to_string()).unwrap() == kind);
+                drop(kind.chip());
+            }
+        }
+    }
+}
