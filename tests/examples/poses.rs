@@ -18,12 +18,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let moment = Moment { animations: arguments.collect(), seconds: seconds.parse()? };
     let file = SceneFile::open(Path::new(&scene), &LoadSettings::default())?;
     let mut out = BufWriter::new(stdout().lock());
-<<<<<<< HEAD
-    let scene = file.at(&moment)?;
-    for triangle in &scene.triangles {
-=======
     for triangle in &file.at(&moment)?.triangles {
->>>>>>> w-rooms2
         let numbers = triangle.vertices.iter().flat_map(glam::Vec3::to_array);
         let numbers: Vec<_> = numbers.map(|number| number.to_string()).collect();
         writeln!(out, "{}", numbers.join(" "))?;
