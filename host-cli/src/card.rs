@@ -242,11 +242,11 @@ mod tests {
             port("/dev/ttyUSB0", "a\u{1b}[2J\nb\u{202e}", "1\t2\\"),
         ];
         let expected = r#"
-    path          USB name               serial number  --card
-    /dev/ttyACM0  Müller's 3" card       066BFF         serial:/dev/ttyACM0@115200
-    /dev/ttyS0    -                      -              serial:/dev/ttyS0@115200
-    /dev/ttyUSB0  a\u{1b}[2J\nb\u{202e}  1\t2\          serial:/dev/ttyUSB0@115200
-    "#;
+path          USB name               serial number  --card
+/dev/ttyACM0  Müller's 3" card       066BFF         serial:/dev/ttyACM0@115200
+/dev/ttyS0    -                      -              serial:/dev/ttyS0@115200
+/dev/ttyUSB0  a\u{1b}[2J\nb\u{202e}  1\t2\          serial:/dev/ttyUSB0@115200
+"#;
         assert_eq!(port_table(&ports), expected.trim().lines().collect::<Vec<_>>());
         let addresses = ports.iter().map(|port| port_row(port)[3].parse());
         assert!(addresses.eq(ports.iter().map(|port| Ok(CardAddress::serial(&port.path)))));
