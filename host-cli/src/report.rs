@@ -99,7 +99,8 @@ impl Layout {
     }
 }
 
-/// Escaped messages of an error and its causes, with flags in place of fields. A cause is left out if the message before it ends with it.
+/// Escaped messages of an error and its causes, with flags in place of fields. A cause is left out if the
+/// message before it ends with it.
 fn messages(error: &dyn Diagnostic) -> Vec<String> {
     let mut texts = vec![escaped(error)];
     let mut cause: Option<&dyn Error> =

@@ -64,8 +64,8 @@ pub enum RenderError {
     #[error("`{field}` {value} is not possible: {reason}")]
     #[diagnostic(help("{remedy}"))]
     Setting {
-        /// Path of its field in [`RenderSettings`](crate::RenderSettings), such as `integrator.samples`. Texts
-        /// of errors have such paths between backticks.
+        /// Path of its field in [`RenderSettings`](crate::RenderSettings), such as `integrator.samples`.
+        /// Texts of errors have such paths between backticks.
         field: &'static str,
         /// Value of the field.
         value: String,

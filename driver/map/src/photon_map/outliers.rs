@@ -1,8 +1,8 @@
 //! Spreads the power of photons that are much stronger than their neighbours.
 //!
-//! The paths of a map for a camera differ in power. A path that the guide takes for useless may bring hundreds
-//! of times the power of the photons around it: a bright spot of the size of a gather. The excess is
-//! distributed over so many neighbours that none of them becomes much brighter. The sum of all powers does
+//! The paths of a map for a camera differ in power. A path that the guide takes for useless may bring
+//! hundreds of times the power of the photons around it: a bright spot of the size of a gather. The excess
+//! is distributed over so many neighbours that none of them becomes much brighter. The sum of all powers does
 //! not change.
 
 use glam::{DVec3, Vec3};
