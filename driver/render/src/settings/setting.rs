@@ -1,5 +1,5 @@
-//! Row of the table of options: the field of a setting, the option that states it, its value, and what depends
-//! on it.
+//! Row of the table of options: the field of a setting, the option that states it, its value, and what
+//! depends on it.
 
 use photoncard_picture::choice::Choice;
 use serde::Serialize;
