@@ -55,6 +55,10 @@ skipped=()
 # skip WHAT WHY: says loudly that something is not tested. A service of continuous integration can install everything.
 skip() {
     [ -z "${CI:-}" ] || fail "$1: $2"
+    go_without "$1" "$2"
+}
+# go_without WHAT WHY: says so loudly, also in CI: a server of others does not answer, and nothing can be installed for it.
+go_without() {
     echo "ci: SKIPPED: $1: $2" >&2
     skipped+=("$1: $2")
 }
@@ -208,19 +212,19 @@ check_packages() {
     step "packages"
     tests/publishable.sh || {
         [ $? = 75 ] || fail "the crates cannot be packed"
-        skip "the rehearsal of 'cargo publish'" "the index of crates.io cannot be had"
+        go_without "the rehearsal of 'cargo publish'" "the index of crates.io cannot be had"
     }
 
     step "dependencies"
     if ! cargo deny --version >/dev/null 2>&1 && ! install_deny; then
-        skip "licences, sources and advisories of dependencies" "cargo-deny is missing; run: cargo install cargo-deny --locked"
+        go_without "licences, sources and advisories of dependencies" "cargo-deny is missing; run: cargo install cargo-deny --locked"
     else
         cargo deny --locked --offline check licenses bans sources
         # The database is on GitHub.
         if timeout 120 cargo deny fetch db; then
             cargo deny --locked --offline check advisories
         else
-            skip "advisories of dependencies" "the advisory database cannot be had (https://github.com/RustSec/advisory-db)"
+            go_without "advisories of dependencies" "the advisory database cannot be had (https://github.com/RustSec/advisory-db)"
         fi
     fi
 }

@@ -40,7 +40,7 @@ pub struct TileDeviation {
     pub reference: f64,
 }
 
-/// Error of a render's indirect light compared with a [`Reference`].
+/// Error of a render's indirect light compared with that of a path tracer.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Errors by tile. All pixels have equal weight.

@@ -99,7 +99,7 @@ pub struct TileCounts {
 pub struct Answered {
     /// Tile to store in the sinks, to be confirmed by [`Scheduler::complete`].
     pub found: Option<FinishedTile>,
-    /// Cards that were outvoted at the tile, to be passed to [`Scheduler::expel`].
+    /// Cards that were outvoted at the tile, to be passed to `Scheduler::expel`.
     pub liars: Vec<CardNumber>,
     /// Error that ends the render; `None` to continue.
     pub fault: Option<SchedulerError>,

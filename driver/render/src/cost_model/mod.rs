@@ -129,7 +129,7 @@ fn controller_flops(workload: &Workload, symbols: &Symbols) -> f64 {
 }
 
 /// Floating-point operations of each unit of the chip, summed over all chips, by the constants of Table 7.1.
-/// [`Arithmetic`](super::arithmetic::Arithmetic) has the operations of this firmware.
+/// [`Arithmetic`] has the operations of this firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Flops {
     /// Operations of all rays.
