@@ -15,7 +15,7 @@
 //! | `outputs` | checks of output files before any work |
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
 //! | `render` (and `prepare`), `farm`, `view`, `scene`, `documents`, `study` | one module for each command |
-//! | `card`, `pictures` | commands on cards (`card`, `emulate`), and on pictures (`merge`, `tonemap`, `diff`) |
+//! | `card`, `pictures` | commands on cards, and on pictures (`merge`, `tonemap`, `diff`) |
 //!
 //! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render
 //! from Rust, use `photoncard_driver` directly.

@@ -3,14 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::{PathBufValueParser, TypedValueParser};
 use photoncard_driver::choice::Choice;
-use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::emulator::trace::{TraceFormat, TraceSettings};
+use photoncard_driver::emulator::{Emulated, EmulatedKind};
 use photoncard_driver::link::LineFaults;
 use photoncard_driver::render::{CardAddress, CardSet};
 
-use super::chip::ChipOption;
 use super::choice::choice;
 use super::files::file;
 
@@ -79,4 +79,28 @@ impl CardOptions {
         let own = self.counters.then(|| cards.own_caches());
         CardSet { caches: cards.caches.or(own), ..cards }
     }
+}
+
+#[derive(Args)]
+pub(crate) struct ChipOption {
+    /// Emulate chips with the capacities in a JSON file, whatever kind --card names
+    #[arg(long, value_name = "CHIP.json", value_parser = kind_of_file(), help_heading = "Cards", hide_short_help = true)]
+    chip: Option<EmulatedKind>,
+}
+
+impl ChipOption {
+    /// The kind of the file, or `kind` without one.
+    pub(crate) fn or(&self, kind: EmulatedKind) -> EmulatedKind {
+        self.chip.unwrap_or(kind)
+    }
+
+    /// Returns whether a file is stated.
+    pub(crate) fn is_stated(&self) -> bool {
+        self.chip.is_some()
+    }
+}
+
+/// Parser of the name of a file with a kind of chips.
+fn kind_of_file() -> impl TypedValueParser<Value = EmulatedKind> {
+    PathBufValueParser::new().try_map(|path| Emulated::read(&path).map(EmulatedKind::File))
 }

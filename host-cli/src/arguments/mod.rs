@@ -1,7 +1,6 @@
 //! Command-line arguments of all commands.
 
 mod cards;
-mod chip;
 mod choice;
 mod farm;
 mod files;
@@ -48,7 +47,7 @@ use photoncard_driver::render::CardAddress;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::PROTOCOL_VERSION;
 
-use self::chip::ChipOption;
+use self::cards::ChipOption;
 use self::choice::choice;
 pub(crate) use self::farm::{FarmCommand, FarmOptions};
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};

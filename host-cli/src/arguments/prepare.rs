@@ -8,7 +8,7 @@ use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::quality::{Quality, Stated};
 use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
 
-use super::chip::ChipOption;
+use super::cards::ChipOption;
 use super::choice::choice;
 use super::files::file;
 use super::frames::FrameOptions;

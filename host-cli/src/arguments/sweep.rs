@@ -8,7 +8,7 @@ use photoncard_driver::quality::Quality;
 use photoncard_driver::render::RenderSettings;
 use photoncard_driver::study::{ALONG_CURVE, Axis, MAX_POINTS, Point, Scale, Task};
 
-use super::chip::ChipOption;
+use super::cards::ChipOption;
 use super::choice::choice;
 use super::integrator::IntegratorOptions;
 use super::machine::RateOptions;

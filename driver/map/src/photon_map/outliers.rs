@@ -115,7 +115,7 @@ impl<'a> Map<'a> {
             let sum: f64 = to.iter().map(|(_, weight)| weight).sum();
             let mean = to.iter().map(|(other, _)| self.power(*other)).sum::<f64>() / to.len() as f64;
             let given = (own - mean).min(MAX_GAIN * sum);
-            // NaN if it sees none of them.
+            // 0 if it sees none of them.
             if given > 0.0 {
                 to.iter_mut().for_each(|(_, weight)| *weight /= sum);
                 gift = Some(Gift { from: photon, power: self.colours[photon] * (given / own), to });
