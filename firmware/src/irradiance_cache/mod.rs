@@ -49,7 +49,7 @@ use heapless::Vec;
 use photoncard_shared::message::{Fault, FrameParameters, Invariant};
 
 use self::gradient::coefficients;
-use self::record::{Content, GatherSums, Record};
+use self::record::{Content, GatherSums, Record, Strongest};
 use self::survey_state::Survey;
 use crate::kind::{Capacity, Map};
 use crate::render::{Context, GatherPoint};
@@ -140,7 +140,8 @@ impl<R: Capacity> IrradianceCache<R> {
         if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
             && let Content::Surveyed(distances) = &record.content
         {
-            record.content = Content::Gathering(GatherSums::new(&coefficients(point, distances)));
+            let sums = GatherSums::new(&coefficients(point, distances));
+            record.content = Content::Gathering(Strongest::NONE, sums);
             return Ok(());
         }
         Err(Invariant::Record.fault())
@@ -153,8 +154,9 @@ impl<R: Capacity> IrradianceCache<R> {
     #[inline]
     pub fn add(&mut self, index: u16, cell: u8, brought: Vec3) -> Result<(), Fault> {
         if let Some((_, Some(record))) = self.records.entry_mut(index as usize)
-            && let Content::Gathering(sums) = &mut record.content
+            && let Content::Gathering(strongest, sums) = &mut record.content
         {
+            strongest.add(cell, brought);
             sums.add(cell, brought);
             return Ok(());
         }
@@ -170,9 +172,11 @@ impl<R: Capacity> IrradianceCache<R> {
         for index in 0..self.records.entries() {
             // A lattice point without a record has nothing to gather.
             let Some((_, Some(record))) = self.records.entry_mut(index) else { continue };
-            let Content::Gathering(sums) = &record.content else { return Err(Invariant::Record.fault()) };
+            let Content::Gathering(strongest, sums) = record.content else {
+                return Err(Invariant::Record.fault());
+            };
             context.counters.records += 1;
-            let irradiance = sums.irradiance(unit, record.distance);
+            let irradiance = sums.limited(&strongest).irradiance(unit, record.distance);
             let reach = libm::sqrtf(allowed) * record.radius;
             record.content = Content::Gathered(irradiance.limited(max(reach, record.distance)));
         }

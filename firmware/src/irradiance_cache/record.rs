@@ -1,6 +1,7 @@
 //! One irradiance record: position, radius of validity, and irradiance with its gradients.
 
 use glam::Vec3;
+use photoncard_shared::layout::Rgbe;
 use photoncard_shared::message::{Fault, Invariant};
 
 use super::gradient::{Coefficients, Distances, rotation};
@@ -18,8 +19,8 @@ pub(super) enum Content {
     Surveying([u16; CELLS]),
     /// After the survey: distances to the surroundings.
     Surveyed(Distances),
-    /// During the gather: sums of radiance.
-    Gathering(GatherSums),
+    /// During the gather: sums of radiance, and the strongest term.
+    Gathering(Strongest, GatherSums),
     /// After the gather: irradiance and gradients.
     Gathered(Irradiance),
 }
@@ -33,6 +34,53 @@ pub(super) struct GatherSums {
     translation: [ColourSum; 2],
     rotation: [ColourSum; 2],
 }
+
+/// Strongest term of a record, and the strength of the second strongest. They do not depend on the order of the
+/// terms. The bytes have no alignment: they lie in front of the sums in [`Content`], and take no memory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Strongest {
+    light: Rgbe,
+    cell: u8,
+    /// Sum of channels, bfloat16.
+    second: [u8; 2],
+}
+
+const _: () = assert!(size_of::<Content>() == size_of::<GatherSums>() + align_of::<GatherSums>());
+
+impl Strongest {
+    /// No term.
+    pub(super) const NONE: Self = Self { light: Rgbe([0; 4]), cell: 0, second: [0; 2] };
+
+    /// Takes account of a term.
+    #[inline]
+    pub(super) fn add(&mut self, cell: u8, light: Vec3) {
+        if upper_half(light.element_sum()) <= self.second() {
+            return;
+        }
+        let term = Self { light: Rgbe::encode(light.to_array(), 0), cell, second: [0; 2] };
+        let [weaker, stronger] = if term.key() > self.key() { [*self, term] } else { [term, *self] };
+        let second = self.second().max(upper_half(weaker.light().element_sum()));
+        *self = Self { second: second.to_ne_bytes(), ..stronger };
+    }
+
+    fn light(&self) -> Vec3 {
+        Vec3::from_array(self.light.decode())
+    }
+
+    fn second(&self) -> u16 {
+        u16::from_ne_bytes(self.second)
+    }
+
+    /// Order of terms: by strength, then by all that distinguishes them. Bits of numbers that are not negative
+    /// have their order.
+    fn key(&self) -> [u32; 3] {
+        [self.light().element_sum().to_bits(), self.cell.into(), u32::from_le_bytes(self.light.0)]
+    }
+}
+
+/// Maximum of a lone strong term, divided by the sum of the other terms. A place that brings so much more than
+/// the directions are sampled for is found by one record in many, and shows as a disc of that record's radius.
+const LONE_SHARE: f32 = 0.25;
 
 impl GatherSums {
     /// Creates sums without terms.
@@ -67,6 +115,18 @@ impl GatherSums {
             translation: self.translation.map(|sum| sum.value() * (unit / distance)),
             rotation: self.rotation.map(|sum| sum.value() * unit),
         }
+    }
+
+    /// Limits the strongest term to the second strongest, or to [`LONE_SHARE`] of the others' sum if that is
+    /// more. The only term is kept.
+    pub(super) fn limited(mut self, strongest: &Strongest) -> Self {
+        let [strength, second] = [strongest.light().element_sum(), from_upper_half(strongest.second())];
+        let others = self.mean.value().element_sum() - strength;
+        let allowed = max(second, LONE_SHARE * others);
+        if second > 0.0 && strength > allowed {
+            self.add(strongest.cell, strongest.light() * (allowed / strength - 1.0));
+        }
+        self
     }
 }
 
@@ -194,5 +254,60 @@ impl Irradiance {
             self.translation = self.translation.map(|component| component * (greatest / length));
         }
         self
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Mean of a record of terms, each of a cell and of channels 1 : 1/2 : 1/4.
+    fn mean(terms: impl IntoIterator<Item = (u8, f32)>) -> Irradiance {
+        let (mut strongest, mut sums) = (Strongest::NONE, GatherSums::new(&[[0.5, 0.25]; CELLS]));
+        for (cell, light) in terms {
+            let light = Vec3::new(1.0, 0.5, 0.25) * light;
+            strongest.add(cell, light);
+            sums.add(cell, light);
+        }
+        sums.limited(&strongest).irradiance(1.0, 1.0)
+    }
+
+    const EVEN: f32 = 1.0 / 128.0;
+
+    fn even() -> impl Iterator<Item = (u8, f32)> {
+        (0..127).map(|ray| (ray % CELLS as u8, EVEN))
+    }
+
+    #[test]
+    fn a_lone_strong_ray_brings_at_most_a_quarter_of_the_others() {
+        let limited = mean(even().chain([(3, 4.0)]));
+        let expected = mean(even().chain([(3, 0.25 * 127.0 * EVEN)]));
+        assert!((limited.mean.x / expected.mean.x - 1.0).abs() < 0.01);
+        for (limited, expected) in
+            [(limited.translation[0], expected.translation[0]), (limited.rotation[1], expected.rotation[1])]
+        {
+            assert!((limited - expected).length() < 0.01, "{limited} {expected}");
+        }
+    }
+
+    #[test]
+    fn rays_that_another_one_confirms_keep_their_light() {
+        let all = |terms: &[(u8, f32)]| terms.iter().map(|&(_, light)| light).sum::<f32>();
+        for strong in [&[(3, 0.1)][..], &[(3, 4.0), (9, 4.0)]] {
+            let terms: std::vec::Vec<_> = even().chain(strong.iter().copied()).collect();
+            assert!((mean(terms.iter().copied()).mean.x / all(&terms) - 1.0).abs() < 1e-6, "{strong:?}");
+        }
+        assert_eq!(mean([(7, 4.0)]).mean.x, 4.0, "the only light");
+    }
+
+    #[test]
+    fn a_record_does_not_depend_on_the_order_of_its_rays() {
+        let mut terms: std::vec::Vec<_> = even().chain([(3, 4.0), (9, 4.0), (4, 5.0), (2, 5.0)]).collect();
+        let expected = mean(terms.iter().copied());
+        for turn in [1, 17, 63, 130] {
+            terms.rotate_left(turn);
+            assert_eq!(mean(terms.iter().copied()), expected);
+            assert_eq!(mean(terms.iter().rev().copied()), expected);
+        }
     }
 }
