@@ -13,9 +13,9 @@ use glam::Vec3;
 use photoncard_shared::layout::{decode_direction, kernel_share};
 use photoncard_shared::message::Fault;
 
-use super::collector::Collector;
+use super::collector::{Collector, Lanes};
 use super::region::All;
-use super::{Candidate, PhotonMap, SameSurface, leaves};
+use super::{Candidate, MIN_NORMAL_COSINE, PhotonMap, SameSurface, leaves};
 use crate::fixed_point::ColourSum;
 use crate::memory::MemoryPort;
 use crate::scene::{DecodedLobe, PartialReflection, SceneImage};
@@ -77,6 +77,8 @@ const MAX_SHADING: f32 = 4.0;
 /// Distance to a box within which a search visits it, cells of the photon grid. It allows for rounding at the
 /// borders of the scene.
 const MARGIN_CELLS: f32 = 2.0;
+/// Slope of the direction to a photon on a flat surface, by the coding of normals.
+const FLAT_SLOPE: f32 = 0.15;
 /// Unit of the kernels' factors, which are 1 over a disc's area as a fraction of the maximum. Fifty photons
 /// with the smallest disc stay below the limit of a [`ColourSum`], and one with the largest disc has a
 /// resolution of twenty bits.
@@ -132,13 +134,18 @@ struct Sums<'a> {
 }
 
 impl Sums<'_> {
+    /// Adds a photon; `way` is the vector from it to the position, metres.
     #[inline(always)]
-    fn add(&mut self, photon: &Candidate) {
+    fn add(&mut self, photon: &Candidate, way: Vec3) {
         let share = kernel_share(photon.disc());
         let from_edge = 1.0 - photon.distance_squared() / (self.max_squared * share);
         // False for NaN as well.
         let is_within = from_edge > 0.0;
-        if !is_within || !self.surface.holds(photon.normal()) {
+        if !is_within {
+            return;
+        }
+        let cosine = self.surface.cosine(photon.normal());
+        if cosine < MIN_NORMAL_COSINE || !self.is_on_surface(photon.distance_squared(), way, cosine) {
             return;
         }
         self.photons += 1;
@@ -149,6 +156,18 @@ impl Sums<'_> {
         if is_lit && !self.reflection.is_lambertian() {
             self.of_lobe.add_light(power * PartialReflection::lobe_factor(&self.lobe, photon.direction()));
         }
+    }
+
+    /// Returns whether a photon may be on the surface; `cosine` is that of the two normals. Two points of a
+    /// sphere whose normals are at an angle `t` lie in a direction at `t / 2` to the tangent plane. Photons
+    /// farther off the plane are on another sheet, such as the far side of a wall.
+    #[inline(always)]
+    fn is_on_surface(&self, distance_squared: f32, way: Vec3, cosine: f32) -> bool {
+        let [_, geometric] = self.normals;
+        let height = geometric.dot(way);
+        let slope_squared = 2.0 * (FLAT_SLOPE * FLAT_SLOPE + (1.0 - cosine) / (1.0 + cosine));
+        let across_squared = max(distance_squared - height * height, 0.0);
+        height * height <= slope_squared * across_squared + self.limit
     }
 
     /// Factor `n.i / g.i`; 0 for light from below the shading normal's horizon.
@@ -171,7 +190,8 @@ impl Collector for Sums<'_> {
     }
 
     #[inline(always)]
-    fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]) {
+    fn insert_lanes(&mut self, isa: impl Isa, count: u32, lanes: &Lanes) {
+        let Lanes { distances, contents, ways: [x, y, z] } = *lanes;
         let mut beyond = [0; LANES];
         for ((beyond, &distance), &content) in beyond.iter_mut().zip(distances).zip(contents) {
             let photon = Candidate { distance, content };
@@ -182,7 +202,9 @@ impl Collector for Sums<'_> {
             let lane = mask.trailing_zeros() as usize;
             mask &= mask - 1;
             let (Some(&distance), Some(&content)) = (distances.get(lane), contents.get(lane)) else { break };
-            self.add(&Candidate::new(f32::from_bits(distance), content.to_le_bytes()));
+            let (Some(&x), Some(&y), Some(&z)) = (x.get(lane), y.get(lane), z.get(lane)) else { break };
+            let photon = Candidate::new(f32::from_bits(distance), content.to_le_bytes());
+            self.add(&photon, Vec3::new(x, y, z));
         }
     }
 }

@@ -14,7 +14,16 @@ pub(super) trait Collector {
     #[inline(always)]
     fn narrow(&mut self, _photon_share: f32) {}
 
-    /// Adds the photons in the first `count` lanes that are within the limit. Lanes hold bits of squared
-    /// distances, and contents.
-    fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]);
+    /// Adds the photons in the first `count` lanes that are within the limit.
+    fn insert_lanes(&mut self, isa: impl Isa, count: u32, lanes: &Lanes);
+}
+
+/// Photons of a leaf, one in each lane.
+pub(super) struct Lanes<'a> {
+    /// Bits of the squared distances, m^2.
+    pub(super) distances: &'a [u32; LANES],
+    /// Contents of the records.
+    pub(super) contents: &'a [u64; LANES],
+    /// Vectors from the photons to the query, by axis, metres.
+    pub(super) ways: [&'a [f32; LANES]; 3],
 }

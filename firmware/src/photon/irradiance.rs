@@ -10,12 +10,12 @@ use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::IrradiancePoint;
 use photoncard_shared::message::Fault;
 
-use super::collector::Collector;
+use super::collector::{Collector, Lanes};
 use super::region::All;
 use super::{Candidate, SameSurface, leaves};
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
-use crate::simd::{self, Isa, Kernel, LANES};
+use crate::simd::{self, Isa, Kernel};
 
 /// Sections with the nodes and the leaves of irradiance points.
 const SECTIONS: [SectionKind; 2] = [SectionKind::IrradianceNodes, SectionKind::IrradianceLeaves];
@@ -101,7 +101,8 @@ impl Collector for NearestPoint {
     }
 
     #[inline(always)]
-    fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]) {
+    fn insert_lanes(&mut self, isa: impl Isa, count: u32, lanes: &Lanes) {
+        let Lanes { distances, contents, .. } = *lanes;
         // No overflow: the bits of infinity are below `u32::MAX`.
         let mut mask = isa.below(distances, self.limit.to_bits() + 1) & !(u32::MAX << count);
         while mask != 0 {

@@ -8,7 +8,7 @@ use photoncard_shared::layout::{
 };
 use photoncard_shared::message::Fault;
 
-use super::collector::Collector;
+use super::collector::{Collector, Lanes};
 use super::region::Filter;
 use crate::memory::MemoryPort;
 use crate::scene::SceneImage;
@@ -116,11 +116,12 @@ fn test_leaf(
             }
         }
     }
-    filter.filter(isa, [&along_x, &along_y, &along_z], &mut distances);
+    let ways = [&along_x, &along_y, &along_z];
+    filter.filter(isa, ways, &mut distances);
     let mut contents = [0; LANES];
     for (content, bytes) in contents.iter_mut().zip(leaf.contents().iter().rev()) {
         *content = u64::from_le_bytes(*bytes);
     }
-    nearest.insert_lanes(isa, photons, &distances, &contents);
+    nearest.insert_lanes(isa, photons, &Lanes { distances: &distances, contents: &contents, ways });
     photons
 }

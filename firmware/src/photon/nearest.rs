@@ -8,7 +8,7 @@
 use photoncard_shared::budget::selected_candidates;
 
 use super::candidates::{Candidate, Candidates};
-use super::collector::Collector;
+use super::collector::{Collector, Lanes};
 use super::select::{Chosen, select};
 use crate::simd::{Isa, LANES};
 
@@ -197,7 +197,8 @@ impl Collector for NearestPhotons<'_> {
     }
 
     #[inline(always)]
-    fn insert_lanes(&mut self, isa: impl Isa, count: u32, distances: &[u32; LANES], contents: &[u64; LANES]) {
+    fn insert_lanes(&mut self, isa: impl Isa, count: u32, lanes: &Lanes) {
+        let Lanes { distances, contents, .. } = *lanes;
         // No overflow: the bits of infinity are below `u32::MAX`.
         let mask = isa.below(distances, self.limit.to_bits() + 1) & !(u32::MAX << count);
         let Candidates { distances: all_distances, contents: all_contents } = &mut self.candidates;

@@ -12,7 +12,8 @@ pub const MIN_NORMAL_COSINE: f32 = 0.75;
 /// last result is cached.
 pub struct SameSurface {
     normal: Vec3,
-    last: (u8, bool),
+    /// Code of the last normal, and its cosine.
+    last: (u8, f32),
     /// Number of normals decoded so far.
     decoded: u32,
 }
@@ -21,7 +22,8 @@ impl SameSurface {
     /// Creates the test for a surface whose normal has this code.
     #[inline(always)]
     pub fn new(code: u8) -> Self {
-        Self { normal: unit(decode_normal(code).into()), last: (code, true), decoded: 0 }
+        let normal = unit(decode_normal(code).into());
+        Self { normal, last: (code, normal.dot(normal)), decoded: 0 }
     }
 
     /// Number of normals decoded so far.
@@ -33,10 +35,16 @@ impl SameSurface {
     /// Returns true if a photon whose normal has this code belongs to the surface.
     #[inline(always)]
     pub fn holds(&mut self, code: u8) -> bool {
+        self.cosine(code) >= MIN_NORMAL_COSINE
+    }
+
+    /// Cosine between the surface's normal and that with a code.
+    #[inline(always)]
+    pub(super) fn cosine(&mut self, code: u8) -> f32 {
         if self.last.0 != code {
             let other = unit(decode_normal(code).into());
             self.decoded += 1;
-            self.last = (code, other.dot(self.normal) >= MIN_NORMAL_COSINE);
+            self.last = (code, other.dot(self.normal));
         }
         self.last.1
     }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{Material, PunctualKind, PunctualLight, Reflection, Scene, Transmission};
-use photoncard_tests::shapes::add_ball;
+use photoncard_tests::shapes::{add_ball, cuboid};
 use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, room, scene};
 
 fn smooth(name: &str, metallic: f32, transmission: Option<Transmission>) -> Material {
@@ -61,4 +61,29 @@ fn sparse_light_beside_a_focus_is_smooth_with_the_mean_of_many_photons() {
         first.as_flattened().iter().zip(second.as_flattened()).map(|(a, b)| f64::from(a - b).powi(2));
     let deviation = (0.5 * squares.sum::<f64>() / (3 * first.len()) as f64).sqrt() / expected;
     assert!(deviation < 0.25, "a deviation of {deviation}");
+}
+
+/// Room with a lamp above a mirror that lies at the foot of a wall, in the gap behind a board or without the
+/// board. The camera sees the board, or the wall behind it.
+fn mirror_behind_a_board(has_board: bool) -> Scene {
+    let materials = vec![lambertian("wall", 0.5), smooth("metal", 1.0, None)];
+    let mut triangles = room([0; 6]);
+    triangles.extend(cuboid(Vec3::new(-0.93, -0.95, 0.0), Vec3::new(0.05, 0.02, 0.9), 1));
+    if has_board {
+        triangles.extend(cuboid(Vec3::new(-0.85, 0.0, 0.0), Vec3::new(0.02, 0.9, 0.95), 0));
+    }
+    let mut view = camera(Vec3::new(0.5, 0.0, 0.0), Vec3::NEG_X);
+    view.vertical_fov = 0.6;
+    let mut scene = scene(triangles, materials, view);
+    let kind = PunctualKind::Point { position: Vec3::new(-0.93, 0.96, 0.2) };
+    scene.lights.push(PunctualLight { name: "lamp".into(), kind, intensity: Vec3::ONE });
+    scene
+}
+
+#[test]
+fn a_board_is_not_lit_by_a_caustic_on_the_wall_behind_it() {
+    let [on_board, on_wall] =
+        [true, false].map(|has_board| mean(&caustics(&mirror_behind_a_board(has_board), 2_000, 1)));
+    assert!(on_wall > 0.0);
+    assert!(on_board < 0.01 * on_wall, "{on_board} beside {on_wall}");
 }
