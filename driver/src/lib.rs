@@ -14,7 +14,7 @@
 //! ```
 //! use std::path::Path;
 //!
-//! use photoncard_driver::exr::{self, SampleFormat};
+//! use photoncard_driver::exr::{self, Content, SampleFormat};
 //! use photoncard_driver::quality::Quality;
 //! use photoncard_driver::render::{Unobserved, render};
 //! use photoncard_driver::scene::gltf;
@@ -31,7 +31,8 @@
 //! let folder = tempfile::tempdir()?;
 //! let path = folder.path().join("cornell.exr");
 //! let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels)?;
-//! exr::write(&path, &rendering.film, &settings.picture.layers, &provenance, SampleFormat::Float)?;
+//! let content = Content { film: &rendering.film, layers: &settings.picture.layers, denoised: None };
+//! exr::write(&path, &content, &provenance, SampleFormat::Float)?;
 //! let picture = exr::read_rgb(&path)?;
 //! assert_eq!((picture.width, picture.height), (16, 16));
 //! assert!(picture.pixels.iter().flatten().sum::<f32>() > 0.0);
@@ -100,12 +101,13 @@
 //!
 //! # Crates
 //!
-//! This crate re-exports the modules of six crates. Each of them imports crates above it in this list;
-//! `photoncard_cards` imports only `photoncard_picture`.
+//! This crate re-exports the modules of seven crates. Each of them imports crates above it in this list;
+//! `photoncard_cards` and `photoncard_denoise` import only `photoncard_picture`.
 //!
 //! - [`photoncard_picture`] ([`film`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`], [`tone_mapping`],
 //!   [`difference`], [`output`], [`printable`], [`choice`]): pixels of a picture and their destinations; its
 //!   files; names of enumerations.
+//! - [`photoncard_denoise`] ([`denoise`]): Open Image Denoise, loaded at run time.
 //! - [`photoncard_scene`] ([`scene`], [`error`]): triangles, materials, textures, lights and cameras of a
 //!   glTF file; its errors.
 //! - [`photoncard_map`] ([`bvh`], [`pack`], [`photon`], [`photon_map`]): bounding volume hierarchy, light
@@ -126,7 +128,7 @@
 //! ```text
 //! scene::gltf -> Scene -> pack -> photon -> photon_map (with density) -> CardImage
 //!     -> session -> link -> card -> link -> session -> dispatcher -> TileSinks: Film, PartialRender, Display
-//! Film -> exr, tone_mapping
+//! Film -> denoise -> exr, tone_mapping
 //! ```
 //!
 //! Terms are defined in `docs/glossary.md`, design decisions are in `docs/architecture.md`, and "how to add"
@@ -134,6 +136,7 @@
 #![forbid(unsafe_code)]
 
 pub use photoncard_cards::{dispatcher, link, scheduler, session};
+pub use photoncard_denoise as denoise;
 pub use photoncard_map::{bvh, pack, photon, photon_map};
 pub use photoncard_picture::{
     choice, difference, exr, film, layer, output, printable, sink, sums, tone_mapping, viewer,

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use photoncard_driver::difference::compare;
-use photoncard_driver::exr::{read_rgb, read_with_provenance};
+use photoncard_driver::exr::{read_rgb, read_shown};
 use photoncard_driver::film::Film;
 use photoncard_driver::parts::{Part, PartError, Parts};
 use photoncard_driver::tone_mapping::{PngError, write_png};
@@ -12,7 +12,7 @@ use crate::arguments::{DiffOptions, MergeOptions, PictureFormat, PictureOutput, 
 use crate::console::{counted, print_json, printable_json, say};
 use crate::failure::Failure;
 use crate::outputs;
-use crate::render::files::{Form, check_standard_output, write_picture};
+use crate::render::files::{Form, check_standard_output, denoised, denoised_by, denoiser, write_picture};
 use crate::render::{part, video};
 
 /// Maximum number of missing parts whose commands are printed.
@@ -20,7 +20,7 @@ const MAX_COMMANDS: usize = 100;
 
 /// Merges the parts of a picture and writes it.
 pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
-    let MergeOptions { parts: paths, pictures, sample_type, tone, progress } = options;
+    let MergeOptions { parts: paths, pictures, sample_type, tone, denoise, progress } = options;
     if pictures.iter().any(|picture| picture.format == PictureFormat::Part) {
         return Err(part::needless());
     }
@@ -31,13 +31,21 @@ pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
     let inputs: Vec<(&Path, &str)> = paths.iter().map(|path| (path.as_path(), "a part")).collect();
     let written: Vec<&Path> = pictures.iter().filter_map(PictureOutput::file).collect();
     outputs::check(&inputs, &written, &[])?;
+    let denoiser = denoiser(*denoise)?;
     let parts = Parts::open(paths).map_err(Failure::input)?;
     say_missing(&parts);
-    let merged = parts.merge().map_err(merge_failure)?;
+    let mut merged = parts.merge().map_err(merge_failure)?;
+    merged.provenance.extend(denoiser.as_ref().map(denoised_by));
     say_dazzling(&merged.film);
     let provenance =
         serde_json::to_string(&merged.provenance).map_err(|error| Failure::work_error(&error))?;
-    let form = Form { layers: merged.layers, sample_type: *sample_type, tone: tone.mapping(), part: None };
+    let form = Form {
+        layers: merged.layers,
+        sample_type: *sample_type,
+        tone: tone.mapping(),
+        denoised: denoised(denoiser.as_ref(), &merged.film, None)?,
+        part: None,
+    };
     for picture in pictures {
         write_picture(picture, &merged.film, &printable_json(&provenance), &form)?;
     }
@@ -76,7 +84,7 @@ fn merge_failure(error: PartError) -> Failure {
 pub(crate) fn tonemap(options: &TonemapOptions) -> Result<(), Failure> {
     let TonemapOptions { input, output, tone } = options;
     outputs::check(&[(input, "the picture to read")], &[output], &[])?;
-    let (picture, provenance) = read_with_provenance(input).map_err(|error| Failure::input_error(&error))?;
+    let (picture, provenance) = read_shown(input).map_err(|error| Failure::input_error(&error))?;
     let radiance = picture.pixels.iter().copied();
     let written = write_png(output, picture.size(), radiance, tone.mapping(), provenance.as_deref());
     written.map_err(|error| match error {

@@ -7,7 +7,7 @@ use exr::prelude::{
     Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels,
     Vec2, WritableImage,
 };
-use photoncard_picture::exr::{ExrError, SampleFormat, is_intact, read_rgb, write};
+use photoncard_picture::exr::{Content, ExrError, SampleFormat, is_intact, read_rgb, write};
 use photoncard_picture::film::{Film, FilmPixel, PixelLayers, PixelValue, SumFormat, SumScale, Window};
 use photoncard_picture::layer::Layers;
 use proptest::prelude::{ProptestConfig, any, proptest};
@@ -47,10 +47,14 @@ fn film() -> Film {
     film
 }
 
+fn content<'a>(film: &'a Film, layers: &'a Layers) -> Content<'a> {
+    Content { film, layers, denoised: None }
+}
+
 fn written(format: SampleFormat, provenance: &str) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("picture.exr");
-    write(&path, &film(), &Layers::default(), provenance, format).unwrap();
+    write(&path, &content(&film(), &Layers::default()), provenance, format).unwrap();
     (folder, path)
 }
 
@@ -210,7 +214,7 @@ fn requested_layers_are_in_the_file() {
     let mut film = Film::new(1, 1, Window::full(1, 1), format).unwrap();
     write_pixel(&mut film, 0, 0, value(3, 5), layers);
     let written = |list: &str, format| {
-        write(&path, &film, &list.parse().unwrap(), "{}", format).unwrap();
+        write(&path, &content(&film, &list.parse().unwrap()), "{}", format).unwrap();
         channels(&path)
     };
     for format in [SampleFormat::Half, SampleFormat::Float] {
@@ -239,6 +243,25 @@ fn requested_layers_are_in_the_file() {
 }
 
 #[test]
+fn denoised_radiance_is_a_layer_beside_the_rendered_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("denoised.exr");
+    let film = film();
+    let denoised: Vec<_> = (0..film.pixels().len()).map(|index| [index as f32, 0.5, 2.0]).collect();
+    let content = Content { film: &film, layers: &Layers::NONE, denoised: Some(&denoised) };
+    write(&path, &content, "{}", SampleFormat::Float).unwrap();
+    let found = channels(&path);
+    let names: Vec<_> = found.iter().map(|(name, ..)| name.as_str()).collect();
+    assert_eq!(names, ["B", "G", "R", "denoised.B", "denoised.G", "denoised.R"]);
+    let expected: Vec<_> = denoised.iter().map(|[red, ..]| *red).collect();
+    assert_eq!(found[5].2, expected);
+    assert_eq!(
+        read_rgb(&path).unwrap().pixels,
+        film.pixels().map(|pixel| pixel.radiance).collect::<Vec<_>>()
+    );
+}
+
+#[test]
 fn two_writes_give_the_same_bytes() {
     let provenance = format!(r#"{{"scene":"{}"}}"#, "a".repeat(3000));
     let (_first_folder, first) = written(SampleFormat::Half, &provenance);
@@ -258,7 +281,7 @@ fn a_bright_light_stays_finite_in_halves() {
         let pixel = PixelValue { radiance, ..PixelValue::default() };
         write_pixel(&mut film, x as u32, 0, pixel, PixelLayers::default());
     }
-    write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
+    write(&path, &content(&film, &Layers::default()), "{}", SampleFormat::Half).unwrap();
     let image = read_rgb(&path).unwrap();
     assert_eq!(image.pixels, [[65504.0; 3], [65504.0, 0.0, 0.0]]);
 }
@@ -274,11 +297,11 @@ fn errors_name_the_bad_file() {
         assert!(matches!(read_rgb(&path), Err(ExrError::Malformed { .. })));
     }
     assert!(matches!(
-        write(Path::new("absent/x.exr"), &film(), &Layers::default(), "{}", SampleFormat::Half),
+        write(Path::new("absent/x.exr"), &content(&film(), &Layers::default()), "{}", SampleFormat::Half),
         Err(ExrError::Output(_))
     ));
     assert!(matches!(
-        write(&path, &film(), &Layers::default(), "", SampleFormat::Half),
+        write(&path, &content(&film(), &Layers::default()), "", SampleFormat::Half),
         Err(ExrError::Encode { .. })
     ));
 }
@@ -327,7 +350,7 @@ proptest! {
         let path = folder.path().join("picture.exr");
         let mut film = Film::new(12, 20, Window::full(12, 20), FORMAT).unwrap();
         write_pixel(&mut film, 1, 1, value(1, 1), PixelLayers::default());
-        write(&path, &film, &Layers::default(), "{}", SampleFormat::Half).unwrap();
+        write(&path, &content(&film, &Layers::default()), "{}", SampleFormat::Half).unwrap();
         let mut bytes = fs::read(&path).unwrap();
         for (at, value, in_header) in flips {
             // Half of the damage is in the header, which holds the sizes.

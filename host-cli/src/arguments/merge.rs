@@ -24,6 +24,9 @@ pub(crate) struct MergeOptions {
     pub(crate) sample_type: SampleFormat,
     #[command(flatten)]
     pub(crate) tone: ToneOptions,
+    /// Remove noise by Open Image Denoise, as photoncard render --denoise does
+    #[arg(long)]
+    pub(crate) denoise: bool,
     /// Form of the progress, and of the message of a failure
     #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     pub(crate) progress: ProgressForm,

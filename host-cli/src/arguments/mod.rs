@@ -281,7 +281,7 @@ mod tests {
             ("photoncard render a.glb --samples 64", "--spp"),
             ("photoncard render a.glb --samples=64", "--spp"),
             ("photoncard render a.glb --width 640", "--size"),
-            ("photoncard render a.glb --denoise", "denoising.md"),
+            ("photoncard render a.glb --oidn", "--denoise"),
             ("photoncard render a.glb --gpu", "--card"),
             ("photoncard view a.glb --cores 4", "emulated:N"),
             ("photoncard tonemap a.exr --threads 4 -o b.png", "of photoncard render"),

@@ -6,6 +6,7 @@ use clap::Args;
 use photoncard_driver::display::{DisplayAddress, DisplaySettings};
 use photoncard_driver::exr::SampleFormat;
 use photoncard_driver::partial::PartialSettings;
+use photoncard_driver::quality::Finish;
 
 use super::choice::choice;
 use super::files::{PictureFormat, PictureOutput, TextOutput, picture, text};
@@ -34,6 +35,12 @@ pub(crate) struct OutputOptions {
     sample_type: Option<SampleFormat>,
     #[command(flatten)]
     pub(crate) tone: ToneOptions,
+    /// Remove noise by Open Image Denoise, a library that is found at run time
+    ///
+    /// The PNG shows the denoised picture. The EXR keeps the rendered one, and has the denoised one in the
+    /// layer denoised. The quality takes fewer samples and rays, and no irradiance cache.
+    #[arg(long)]
+    pub(crate) denoise: bool,
     /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port:
     /// 14158]
     #[arg(long, value_name = "HOST:PORT", hide_short_help = true)]
@@ -87,6 +94,11 @@ impl OutputOptions {
             outputs.stats = Some(TextOutput::File(numbered(pattern, frame).ok_or(&**pattern)?));
         }
         Ok(outputs)
+    }
+
+    /// What becomes of the rendered picture.
+    pub(super) fn finish(&self) -> Finish {
+        if self.denoise { Finish::Denoised } else { Finish::Rendered }
     }
 
     /// Type of an EXR's samples.

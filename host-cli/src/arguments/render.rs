@@ -116,7 +116,7 @@ impl RenderOptions {
         if !unfitted.stated.needs_fit() {
             return Ok(None);
         }
-        let fit = self.quality.fit(scene, packed, &unfitted.settings, observer)?;
+        let fit = self.quality.fit(self.outputs.finish(), (scene, packed), &unfitted.settings, observer)?;
         let noise = self.samples.aim().and_then(|aim| aim.noise);
         Ok(fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise))))
     }
@@ -129,7 +129,7 @@ impl RenderOptions {
     /// [`Self::settings`] with another quality.
     pub(crate) fn settings_of(&self, quality: Quality) -> RenderSettings {
         let cards = self.cards.settings();
-        let base = quality.settings();
+        let base = quality.settings_for(self.outputs.finish());
         RenderSettings {
             picture: self.picture.settings(&base.picture),
             photons: PhotonMaps { photons_for: self.photons_for(), ..self.photons.settings(&base.photons) },

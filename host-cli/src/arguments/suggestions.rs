@@ -34,8 +34,8 @@ pub(super) const OF_OTHERS: [Word; 17] = [
         commands: PICTURE,
     },
     Word {
-        options: &["--denoise", "--denoiser", "--oidn"],
-        remedy: "no denoiser is part of photoncard: -o OUT.exr has the layers albedo and N for one (docs/denoising.md); --quality final has less noise",
+        options: &["--denoiser", "--oidn"],
+        remedy: "noise is removed by --denoise, with Open Image Denoise (docs/denoising.md)",
         commands: &["render", "farm"],
     },
     Word {

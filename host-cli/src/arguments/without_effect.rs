@@ -9,7 +9,8 @@ impl RenderOptions {
     /// Sentences about the options without effect on a render of `scene`.
     pub(crate) fn without_effect(&self, scene: &Scene) -> Vec<String> {
         let Self { picture, outputs, .. } = self;
-        let (integrator, base) = (self.settings().integrator, self.quality.settings().integrator);
+        let base = self.quality.settings_for(outputs.finish()).integrator;
+        let integrator = self.settings().integrator;
         let mut said = Vec::new();
         let mut add = |is_idle: bool, option: &str, why: &str| {
             said.extend(is_idle.then(|| format!("{option} has no effect {why}")));

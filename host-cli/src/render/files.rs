@@ -4,7 +4,8 @@ use std::io::IsTerminal;
 use std::path::Path;
 
 use miette::{MietteDiagnostic, Report};
-use photoncard_driver::exr::{self, SampleFormat};
+use photoncard_driver::denoise::Denoiser;
+use photoncard_driver::exr::{self, Content, SampleFormat};
 use photoncard_driver::film::Film;
 use photoncard_driver::layer::Layers;
 use photoncard_driver::output;
@@ -12,6 +13,7 @@ use photoncard_driver::partial::PartialError;
 use photoncard_driver::parts::{self, PartHead};
 use photoncard_driver::render::Rendering;
 use photoncard_driver::tone_mapping::{ToneMapping, png_bytes, write_png};
+use serde_json::Value;
 
 use super::{part, video};
 use crate::arguments::{
@@ -30,6 +32,8 @@ pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<
     let mut written: Vec<&Path> = outputs.pictures.iter().filter_map(PictureOutput::file).collect();
     written.extend(outputs.stats.as_ref().and_then(TextOutput::path));
     written.extend(options.cards.trace.as_deref());
+    // A missing denoiser is told before the work.
+    denoiser(denoises(options, outputs))?;
     crate::outputs::check(&input::files(&options.scene), &written, &[&outputs.partial_path()])?;
     match options.tile_outputs(outputs).partial.map_or(Ok(()), |partial| partial.check_free()) {
         // Any other fault of the file of a frame is told when it is rendered: the frames before are written.
@@ -91,8 +95,16 @@ pub(super) fn write(
     outputs: &OutputOptions,
     rendering: &Rendering,
 ) -> Result<(), Failure> {
-    let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels);
-    let provenance = printable_json(&provenance.map_err(|error| Failure::work_error(&error))?);
+    let denoiser = denoiser(denoises(options, outputs))?;
+    // What was rendered is written even if it cannot be denoised.
+    let (denoised, failure) = match denoised(denoiser.as_ref(), &rendering.film, options.threads) {
+        Ok(denoised) => (denoised, None),
+        Err(failure) => (None, Some(failure)),
+    };
+    let mut settings = rendering.statistics.provenance.pixels.clone();
+    settings.extend(denoiser.as_ref().filter(|_| denoised.is_some()).map(denoised_by));
+    let provenance = serde_json::to_string(&settings).map_err(|error| Failure::work_error(&error))?;
+    let provenance = printable_json(&provenance);
     let layers = options.picture.layers();
     let head = |part| {
         let settings = rendering.statistics.provenance.pixels.clone();
@@ -103,11 +115,18 @@ pub(super) fn write(
         layers: layers.clone(),
         sample_type: outputs.sample_type(),
         tone: outputs.tone.mapping(),
+        denoised,
     };
     for picture in &outputs.pictures {
         write_picture(picture, &rendering.film, &provenance, &form)?;
     }
-    write_statistics(outputs, serde_json::to_string_pretty(&rendering.statistics))
+    write_statistics(outputs, serde_json::to_string_pretty(&rendering.statistics))?;
+    failure.map_or(Ok(()), Err)
+}
+
+/// Returns whether pictures are denoised. A part is denoised when it is merged.
+pub(super) fn denoises(options: &RenderOptions, outputs: &OutputOptions) -> bool {
+    outputs.denoise && options.parts.part.is_none()
 }
 
 /// Writes statistics if an output for them is stated.
@@ -124,6 +143,26 @@ pub(super) fn write_statistics(
     }
 }
 
+/// Loads the denoiser if it is asked for.
+pub(crate) fn denoiser(is_asked: bool) -> Result<Option<Denoiser>, Failure> {
+    is_asked.then(Denoiser::find).transpose().map_err(|error| Failure::input_error(&error))
+}
+
+/// Entry of a picture's provenance about its denoiser.
+pub(crate) fn denoised_by(denoiser: &Denoiser) -> (String, Value) {
+    ("denoise".to_owned(), Value::from(denoiser.version()))
+}
+
+/// Denoised radiance of a film, if there is a denoiser.
+pub(crate) fn denoised(
+    denoiser: Option<&Denoiser>,
+    film: &Film,
+    threads: Option<usize>,
+) -> Result<Option<Vec<[f32; 3]>>, Failure> {
+    let radiance = denoiser.map(|denoiser| denoiser.radiance(film, threads)).transpose();
+    radiance.map_err(|error| Failure::work_error(&error))
+}
+
 /// Options of a picture beyond the format of its file.
 pub(crate) struct Form {
     /// Layers of an EXR.
@@ -132,6 +171,8 @@ pub(crate) struct Form {
     pub(crate) sample_type: SampleFormat,
     /// Tone mapping of a PNG.
     pub(crate) tone: ToneMapping,
+    /// Denoised radiance: a layer of an EXR, and what a PNG shows.
+    pub(crate) denoised: Option<Vec<[f32; 3]>>,
     /// Head of a part; `None` for a whole picture.
     pub(crate) part: Option<PartHead>,
 }
@@ -145,11 +186,17 @@ pub(crate) fn write_picture(
 ) -> Result<(), Failure> {
     let PictureOutput { path, format } = picture;
     match format {
-        PictureFormat::Exr => exr::write(path, film, &form.layers, provenance, form.sample_type)
-            .map_err(|error| Failure::work_error(&error)),
+        PictureFormat::Exr => {
+            let content = Content { film, layers: &form.layers, denoised: form.denoised.as_deref() };
+            exr::write(path, &content, provenance, form.sample_type)
+                .map_err(|error| Failure::work_error(&error))
+        }
         PictureFormat::Png => {
             let size = [film.window().width(), film.window().height()];
-            let radiance = film.pixels().map(|pixel| pixel.radiance);
+            let denoised = form.denoised.as_deref();
+            let radiance = film.pixels().enumerate().map(|(index, pixel)| {
+                denoised.and_then(|denoised| denoised.get(index)).copied().unwrap_or(pixel.radiance)
+            });
             if picture.file().is_none() {
                 let bytes = png_bytes(path, size, radiance, form.tone, Some(provenance));
                 return write_bytes(&bytes.map_err(|error| Failure::work_error(&error))?);

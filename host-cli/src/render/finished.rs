@@ -9,7 +9,7 @@ use photoncard_driver::scene::Scene;
 use photoncard_driver::{exr, tone_mapping};
 use serde_json::Value;
 
-use super::messages;
+use super::{files, messages};
 use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 
 /// Settings in a picture's provenance that a render derives from others when it traces photons and places the
@@ -38,6 +38,10 @@ pub(super) fn is_finished(
     let mut stated = settings.identity(scene);
     stated.insert("aov".to_owned(), Value::from(settings.picture.layers.to_string()));
     stated.extend(inputs.clone());
+    match files::denoiser(files::denoises(options, outputs)) {
+        Ok(denoiser) => stated.extend(denoiser.as_ref().map(files::denoised_by)),
+        Err(_) => return false,
+    }
     let found: Vec<&str> =
         FOUND.into_iter().filter(|name| stated.get(*name).is_none_or(Value::is_null)).collect();
     let without_found = |mut settings: NamedSettings| {

@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
+use photoncard_driver::quality::Finish;
 use photoncard_driver::render::{Chosen, Phase, PreparedScene, RenderSettings};
 use photoncard_driver::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -110,8 +111,11 @@ impl<'a> Preparation<'a> {
     fn choose(&self, scene: &Scene, packed: &PackedScene) -> Chosen {
         let Self { options, settings, progress, said } = self;
         let stated = options.stated();
-        let fit =
-            if stated.needs_fit() { options.quality.fit(scene, packed, settings, progress)? } else { None };
+        let fit = if stated.needs_fit() {
+            options.quality.fit(Finish::Rendered, (scene, packed), settings, progress)?
+        } else {
+            None
+        };
         let chosen = settings.clone().with(|settings| {
             if let Some(fit) = &fit {
                 fit.apply(settings, stated);

@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::quality::{Fit, Quality};
+use photoncard_driver::quality::{Finish, Fit, Quality};
 use photoncard_driver::render::{Observer, Phase, RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
 
@@ -37,7 +37,8 @@ impl Fitting {
         let stop = Arc::new(AtomicBool::new(false));
         let observer = Stop(stop.clone());
         let work = move || {
-            let fit = || quality.fit(&scene, &PackedScene::new(&scene)?, &settings, &observer);
+            let fit =
+                || quality.fit(Finish::Rendered, (&scene, &PackedScene::new(&scene)?), &settings, &observer);
             let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build());
             match pool {
                 Some(Ok(pool)) => pool.install(fit),

@@ -182,7 +182,7 @@ impl Hub {
 fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMapping) -> Result<(), String> {
     let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
     let layers = settled.wish.settings.picture.layers.clone();
-    let form = Form { layers, sample_type: SampleFormat::Float, tone, part: None };
+    let form = Form { layers, sample_type: SampleFormat::Float, tone, denoised: None, part: None };
     let picture = PictureOutput { path: path.to_owned(), format };
     let film = &settled.rendering.film;
     write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.line())

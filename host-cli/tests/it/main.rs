@@ -5,6 +5,7 @@ mod bad_input;
 mod commands_of_documents;
 mod costly_files;
 mod counters;
+mod denoise;
 mod display;
 mod documents;
 mod farm;

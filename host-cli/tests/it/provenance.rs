@@ -75,7 +75,7 @@ const OTHERS: [&[&str]; 24] = [
 ];
 
 /// Options about the storage of samples, which the file states itself, and about messages.
-const OF_THE_FILE: [&str; 5] = ["--output", "--sample-type", "--quiet", "--progress", "--help"];
+const OF_THE_FILE: [&str; 6] = ["--output", "--sample-type", "--denoise", "--quiet", "--progress", "--help"];
 
 /// Option on which pixels depend, but which applies to no shipped scene.
 const OF_SCENES_WITH_VARIANTS: &str = "--variant";

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_driver::film::Window;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::quality::{Fit, Quality};
+use photoncard_driver::quality::{Finish, Fit, Quality};
 use photoncard_driver::render::{RenderSettings, Unobserved};
 use photoncard_driver::scene::gltf;
 use photoncard_driver::scene::{Material, PunctualKind, PunctualLight, Reflection, Scene};
@@ -18,7 +18,7 @@ fn small() -> RenderSettings {
 
 fn fit(scene: &Scene, settings: &RenderSettings) -> Fit {
     let packed = PackedScene::new(scene).expect("packs");
-    let fit = Quality::Good.fit(scene, &packed, settings, &Unobserved);
+    let fit = Quality::Good.fit(Finish::Rendered, (scene, &packed), settings, &Unobserved);
     fit.unwrap_or_else(|error| panic!("{error}")).expect("good depends on the scene")
 }
 
@@ -128,7 +128,9 @@ fn indirect_light_from_a_spot_takes_more_rays_and_photons() {
 fn the_dissertations_values_depend_on_no_scene() {
     let scene = lit_room();
     let packed = PackedScene::new(&scene).expect("packs");
-    let fit = Quality::Paper.fit(&scene, &packed, &RenderSettings::default(), &Unobserved).expect("no pilot");
+    let fit =
+        Quality::Paper.fit(Finish::Rendered, (&scene, &packed), &RenderSettings::default(), &Unobserved);
+    let fit = fit.expect("no pilot");
     assert_eq!(fit, None);
     assert_eq!(Quality::Paper.settings(), RenderSettings::default());
 }

@@ -12,6 +12,7 @@ mod dwa;
 use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 
+use exr::image::read::specific_channels::ReadSpecificChannel as _;
 use exr::meta::BlockDescription;
 use exr::meta::header::Header;
 use exr::prelude::{
@@ -137,22 +138,37 @@ pub enum ExrError {
     },
 }
 
-/// Writes the film to `path` in the format of [`bytes`], whole or not at all.
+/// What an EXR file has.
+#[derive(Clone, Copy)]
+pub struct Content<'a> {
+    /// Film of the radiance, and of the layers.
+    pub film: &'a Film,
+    /// Layers besides radiance.
+    pub layers: &'a Layers,
+    /// Denoised radiance of the film's pixels, W/(sr m^2), row by row: the layer `denoised`.
+    pub denoised: Option<&'a [[f32; 3]]>,
+}
+
+/// Channels of radiance.
+const RENDERED: [&str; 3] = ["R", "G", "B"];
+/// Channels of the layer [`Content::denoised`].
+const DENOISED: [&str; 3] = ["denoised.R", "denoised.G", "denoised.B"];
+
+/// Writes a picture to `path` in the format of [`bytes`], whole or not at all.
 ///
 /// # Errors
 /// If the file cannot be written, or the provenance is empty.
 #[cfg(not(target_family = "wasm"))]
 pub fn write(
     path: &Path,
-    film: &Film,
-    layers: &Layers,
+    content: &Content,
     provenance_json: &str,
     format: SampleFormat,
 ) -> Result<(), ExrError> {
-    Ok(output::write(path, &bytes(path, film, layers, provenance_json, format)?)?)
+    Ok(output::write(path, &bytes(path, content, provenance_json, format)?)?)
 }
 
-/// Encodes the film as `OpenEXR`. Equal films give equal bytes. `path` is the file's name in errors.
+/// Encodes a picture as `OpenEXR`. Equal contents give equal bytes. `path` is the file's name in errors.
 ///
 /// Pixels that were never written are zero, and so are layers that the film does not have. `provenance_json`
 /// is stored in the attribute [`PROVENANCE`], with characters beyond ASCII as JSON `\u` escapes.
@@ -161,8 +177,7 @@ pub fn write(
 /// If the provenance is empty or cannot be stored as text.
 pub fn bytes(
     path: &Path,
-    film: &Film,
-    layers: &Layers,
+    content: &Content,
     provenance_json: &str,
     format: SampleFormat,
 ) -> Result<Vec<u8>, ExrError> {
@@ -170,7 +185,7 @@ pub fn bytes(
     if provenance_json.is_empty() {
         return Err(fault("the provenance is empty".to_owned()));
     }
-    let image = image_of(film, layers, provenance_json, format)
+    let image = image_of(content, provenance_json, format)
         .ok_or_else(|| fault("the provenance is not text".to_owned()))?;
     let mut bytes = Cursor::new(Vec::new());
     image.write().to_buffered(&mut bytes).map_err(|error| fault(error.to_string()))?;
@@ -180,11 +195,11 @@ pub fn bytes(
 }
 
 fn image_of(
-    film: &Film,
-    layers: &Layers,
+    content: &Content,
     provenance: &str,
     format: SampleFormat,
 ) -> Option<Image<Layer<AnyChannels<FlatSamples>>>> {
+    let film = content.film;
     let window = film.window();
     let provenance = Text::new_or_none(ascii(provenance))?;
     let mut attributes =
@@ -199,24 +214,36 @@ fn image_of(
         blocks: exr::image::Blocks::ScanLines,
         line_order: LineOrder::Increasing,
     };
-    Some(Image { attributes, layer_data: Layer::new(size, own, encoding, channels(film, layers, format)) })
+    Some(Image { attributes, layer_data: Layer::new(size, own, encoding, channels(content, format)) })
 }
 
-fn channels(film: &Film, layers: &Layers, format: SampleFormat) -> AnyChannels<FlatSamples> {
+fn channels(content: &Content, format: SampleFormat) -> AnyChannels<FlatSamples> {
+    let Content { film, layers, denoised } = content;
     let stored = |channel: &Channel, format: SampleFormat| {
-        let values = film.all().map(|pixel| (channel.value)(&pixel));
-        let samples = match format {
-            SampleFormat::Half => FlatSamples::F16(values.map(to_half).collect()),
-            SampleFormat::Float => FlatSamples::F32(values.collect()),
-        };
-        AnyChannel::new(channel.name, samples)
+        any_channel(channel.name, film.all().map(|pixel| (channel.value)(&pixel)), format)
     };
     let mut list: SmallVec<_> = Layers::colour().iter().map(|channel| stored(channel, format)).collect();
     for layer in layers.iter() {
         let format = if layer.is_always_single() { SampleFormat::Float } else { format };
         list.extend(layer.channels().iter().map(|channel| stored(channel, format)));
     }
+    if let Some(radiance) = denoised {
+        let of_channel = |(index, name)| any_channel(name, radiance.iter().map(|pixel| pixel[index]), format);
+        list.extend(DENOISED.into_iter().enumerate().map(of_channel));
+    }
     AnyChannels::sort(list)
+}
+
+fn any_channel(
+    name: &str,
+    values: impl Iterator<Item = f32>,
+    format: SampleFormat,
+) -> AnyChannel<FlatSamples> {
+    let samples = match format {
+        SampleFormat::Half => FlatSamples::F16(values.map(to_half).collect()),
+        SampleFormat::Float => FlatSamples::F32(values.collect()),
+    };
+    AnyChannel::new(name, samples)
 }
 
 /// Nearest half. Finite values beyond its range become plus or minus 65504.
@@ -260,13 +287,34 @@ pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
 /// If the file cannot be read, is malformed, lacks the channels, or has more than [`MAX_READ_PIXELS`]. A file
 /// whose stated size its length cannot hold is refused before anything is allocated.
 pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), ExrError> {
+    read(path, Shown::Rendered)
+}
+
+/// Reads what a tone-mapped picture shows: the layer [`Content::denoised`] of a file that has it, or else as
+/// [`read_with_provenance`].
+///
+/// # Errors
+/// As [`read_rgb`].
+pub fn read_shown(path: &Path) -> Result<(RgbImage, Option<String>), ExrError> {
+    read(path, Shown::Denoised)
+}
+
+/// Radiance to read.
+#[derive(Clone, Copy, PartialEq)]
+enum Shown {
+    Rendered,
+    /// Denoised, if the file has it.
+    Denoised,
+}
+
+fn read(path: &Path, shown: Shown) -> Result<(RgbImage, Option<String>), ExrError> {
     let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
     let found = std::fs::metadata(path).map_err(unreadable)?;
     if !found.is_file() {
         return Err(unreadable(io::Error::new(io::ErrorKind::InvalidInput, "it is not a regular file")));
     }
     let bytes = std::fs::read(path).map_err(unreadable)?;
-    decode_walled(path, &bytes, MAX_READ_PIXELS)
+    decode_walled(path, &bytes, MAX_READ_PIXELS, shown)
 }
 
 /// Reads the provenance of a picture and the type of its samples, without its pixels; `None` if this program
@@ -293,17 +341,18 @@ pub fn is_intact(path: &Path) -> bool {
 
 /// Reads a picture like [`read_rgb`], from the bytes of a file, with at most `most_pixels` pixels.
 pub fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
-    decode_walled(path, bytes, most_pixels).map(|(picture, _)| picture)
+    decode_walled(path, bytes, most_pixels, Shown::Rendered).map(|(picture, _)| picture)
 }
 
 fn decode_walled(
     path: &Path,
     bytes: &[u8],
     most_pixels: u64,
+    shown: Shown,
 ) -> Result<(RgbImage, Option<String>), ExrError> {
     // The `exr` crate does not check every number of a file: sums of window sizes, offsets of blocks.
     foreign::decode(
-        || decode(path, bytes, most_pixels),
+        || decode(path, bytes, most_pixels, shown),
         || ExrError::Malformed {
             path: path.to_owned(),
             reason: "its structure contradicts itself".to_owned(),
@@ -311,7 +360,12 @@ fn decode_walled(
     )
 }
 
-fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<(RgbImage, Option<String>), ExrError> {
+fn decode(
+    path: &Path,
+    bytes: &[u8],
+    most_pixels: u64,
+    shown: Shown,
+) -> Result<(RgbImage, Option<String>), ExrError> {
     let malformed =
         |error: exr::error::Error| ExrError::Malformed { path: path.to_owned(), reason: error.to_string() };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(malformed)?;
@@ -319,7 +373,9 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<(RgbImage, Opti
     for header in &meta.headers {
         check_size(path, header, bytes.len() as u64, most_pixels)?;
     }
-    if !meta.headers.iter().any(has_colour) {
+    let is_denoised = meta.headers.iter().any(|header| has_channels(header, &DENOISED));
+    let [red, green, blue] = if shown == Shown::Denoised && is_denoised { DENOISED } else { RENDERED };
+    if !meta.headers.iter().any(|header| has_channels(header, &[red, green, blue])) {
         let names = meta.headers.iter().flat_map(|header| header.channels.list.iter());
         let names: Vec<_> = names.take(20).map(|channel| channel.name.to_string()).collect();
         return Err(ExrError::NoColour { path: path.to_owned(), channels: names.join(", ") });
@@ -332,7 +388,11 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<(RgbImage, Opti
     let image = reader()
         .no_deep_data()
         .largest_resolution_level()
-        .rgb_channels(
+        .specific_channels()
+        .required(red)
+        .required(green)
+        .required(blue)
+        .collect_pixels(
             |size, _| (size.width(), vec![[0.0; 3]; size.area()]),
             |(width, pixels): &mut (usize, Vec<[f32; 3]>), position, (red, green, blue): (f32, f32, f32)| {
                 pixels[position.y() * *width + position.x()] = [red, green, blue];
@@ -361,9 +421,8 @@ fn provenance(attributes: &LayerAttributes) -> Option<String> {
     serde_json::from_str::<serde::de::IgnoredAny>(&text).is_ok().then_some(text)
 }
 
-fn has_colour(header: &Header) -> bool {
-    let has = |name: &str| header.channels.list.iter().any(|channel| channel.name.eq(name));
-    has("R") && has("G") && has("B")
+fn has_channels(header: &Header, names: &[&str]) -> bool {
+    names.iter().all(|name| header.channels.list.iter().any(|channel| channel.name.eq(name)))
 }
 
 /// Refuses sizes that are too large, or that a file of `length` bytes cannot hold at any compression ratio.

@@ -8,7 +8,7 @@ use photoncard_scene::Scene;
 use photoncard_shared::message::PROBES;
 use serde::Serialize;
 
-use super::level::{Level, Quality};
+use super::level::{Finish, Level, Quality};
 use super::pilot::{SHADOW_RAYS as PILOT_SHADOW_RAYS, Variances, measure};
 use crate::{Integrator, Observer, RenderError, RenderSettings};
 
@@ -222,21 +222,21 @@ impl Fit {
 }
 
 impl Quality {
-    /// Chooses settings of this quality for a scene by pilot renders with the view, filter and sampling in
-    /// `settings`; `None` if no setting of the quality depends on the scene. Seed, cards, threads and crop
-    /// window have no effect.
+    /// Chooses settings of this quality, for a picture with this finish, by pilot renders of a scene with the
+    /// view, filter and sampling in `settings`; `None` if no setting of the quality depends on the scene.
+    /// Seed, cards, threads and crop window have no effect.
     ///
     /// # Errors
     /// As [`render`](crate::render).
     pub fn fit(
         self,
-        scene: &Scene,
-        packed: &PackedScene,
+        finish: Finish,
+        (scene, packed): (&Scene, &PackedScene),
         settings: &RenderSettings,
         observer: &dyn Observer,
     ) -> Result<Option<Fit>, RenderError> {
         settings.check()?;
-        let Some(level) = self.level() else { return Ok(None) };
+        let Some(level) = self.level(finish) else { return Ok(None) };
         let of = Pictured {
             pixels: f64::from(settings.picture.width) * f64::from(settings.picture.height),
             is_cached: settings.integrator.irradiance_error.is_some(),
@@ -349,7 +349,7 @@ mod tests {
     const PICTURED: Pictured = Pictured { pixels: 65_536.0, is_cached: true };
 
     fn good(variances: &Variances) -> Fit {
-        Quality::Good.level().unwrap().fit(variances, &PICTURED)
+        Quality::Good.level(Finish::Rendered).unwrap().fit(variances, &PICTURED)
     }
 
     /// Time plus weighted variance of a pixel.
@@ -364,13 +364,13 @@ mod tests {
             + shadow_ray / rays
             + gather_ray * WEIGHT_OF_RECORDS / gather_rays
             + photon * WEIGHT_OF_MAP / photons;
-        time + Quality::Good.level().unwrap().worth.powi(2) * variance
+        time + Quality::Good.level(Finish::Rendered).unwrap().worth.powi(2) * variance
     }
 
     /// Numbers within the limits of the quality are the best to a factor of 1.4, which covers rounding.
     #[test]
     fn fitted_settings_minimise_time_plus_weighted_variance() {
-        let (fit, level) = (good(&VARIANCES), Quality::Good.level().unwrap());
+        let (fit, level) = (good(&VARIANCES), Quality::Good.level(Finish::Rendered).unwrap());
         assert!((level.samples.start()..level.samples.end()).contains(&&fit.samples));
         let chosen = [fit.samples, fit.shadow_rays, fit.gather_rays, fit.photons as u32].map(f64::from);
         for (index, factor) in (0..4).flat_map(|index| [(index, 0.7), (index, 1.4)]) {
@@ -392,7 +392,7 @@ mod tests {
             let fit = good(&values);
             (fit.samples, fit.shadow_rays, fit.gather_rays, fit.photons)
         };
-        let Level { samples, gather_rays, photons, .. } = Quality::Good.level().unwrap();
+        let Level { samples, gather_rays, photons, .. } = Quality::Good.level(Finish::Rendered).unwrap();
         assert_eq!(all(0.0), (*samples.start(), 1, *gather_rays.start(), *photons.start()));
         for endless in [1e12, f64::INFINITY] {
             let most = (*samples.end(), *SHADOW_RAYS.end(), *gather_rays.end(), *photons.end());
@@ -440,7 +440,7 @@ mod tests {
     /// Without records, pixels do not share rays, so that equal costs allow more rays.
     #[test]
     fn pixels_without_records_take_more_rays_for_equal_costs() {
-        let level = Quality::Good.level().unwrap();
+        let level = Quality::Good.level(Finish::Rendered).unwrap();
         let alone = level.fit(&VARIANCES, &Pictured { is_cached: false, ..PICTURED });
         assert!(!alone.interpolates && alone.gather_rays > good(&VARIANCES).gather_rays);
         assert_eq!(alone.gather_rays, good(&Variances { lambertian: 0.0, ..VARIANCES }).gather_rays);
@@ -533,12 +533,12 @@ mod tests {
     #[test]
     fn a_better_quality_never_lowers_a_number() {
         let fits = [Quality::Draft, Quality::Good, Quality::Final]
-            .map(|quality| quality.level().unwrap().fit(&VARIANCES, &PICTURED));
+            .map(|quality| quality.level(Finish::Rendered).unwrap().fit(&VARIANCES, &PICTURED));
         for [worse, better] in [[fits[0], fits[1]], [fits[1], fits[2]]] {
             assert!(worse.samples <= better.samples && worse.photons <= better.photons);
             assert!(worse.gather_rays <= better.gather_rays);
             assert!(worse.samples * worse.shadow_rays <= better.samples * better.shadow_rays);
         }
-        assert!(Quality::Paper.level().is_none());
+        assert!(Quality::Paper.level(Finish::Rendered).is_none());
     }
 }

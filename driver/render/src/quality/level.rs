@@ -20,6 +20,17 @@ pub enum Quality {
     Paper,
 }
 
+/// What becomes of a rendered picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Finish {
+    /// The picture is shown as it is.
+    #[default]
+    Rendered,
+    /// A denoiser removes the noise that each pixel has of its own. Fewer samples and rays suffice. Nothing
+    /// is interpolated, because the denoiser would take errors that neighbouring pixels share for light.
+    Denoised,
+}
+
 choices!(Quality {
     Draft = "draft": "A look at the scene: visible noise, 8 to 16 samples a pixel",
     Good = "good": "A picture to show: without visible noise in a room, 24 to 48 samples a pixel",
@@ -45,21 +56,36 @@ pub(super) struct Level {
     pub(super) photons: RangeInclusive<usize>,
     /// Number of photons in the caustic map.
     caustic_photons: usize,
-    /// Error bound of interpolated irradiance.
-    irradiance_error: f32,
+    /// Error bound of interpolated irradiance; `None` if each sample gathers.
+    irradiance_error: Option<f32>,
+}
+
+impl Level {
+    /// Level of a picture that is denoised: half of the accuracy and of the samples, an eighth of a pixel's
+    /// gather rays.
+    fn denoised(self) -> Self {
+        let share = |range: RangeInclusive<u32>, divisor| range.start() / divisor..=range.end() / divisor;
+        Self {
+            worth: 0.5 * self.worth,
+            samples: share(self.samples, 2),
+            gather_rays: share(self.gather_rays, 8),
+            irradiance_error: None,
+            ..self
+        }
+    }
 }
 
 impl Quality {
     /// Parameters of this quality; `None` if none of its settings depends on the scene.
-    pub(super) fn level(self) -> Option<Level> {
-        Some(match self {
+    pub(super) fn level(self, finish: Finish) -> Option<Level> {
+        let level = match self {
             Self::Draft => Level {
                 worth: 50.0,
                 samples: 8..=16,
                 gather_rays: 32..=128,
                 photons: 100_000..=400_000,
                 caustic_photons: 50_000,
-                irradiance_error: 0.2,
+                irradiance_error: Some(0.2),
             },
             Self::Good => Level {
                 worth: 400.0,
@@ -67,7 +93,7 @@ impl Quality {
                 gather_rays: 128..=1024,
                 photons: 200_000..=1_000_000,
                 caustic_photons: 200_000,
-                irradiance_error: 0.1,
+                irradiance_error: Some(0.1),
             },
             Self::Final => Level {
                 worth: 2500.0,
@@ -75,16 +101,28 @@ impl Quality {
                 gather_rays: 200..=2000,
                 photons: 1_000_000..=4_000_000,
                 caustic_photons: 500_000,
-                irradiance_error: 0.05,
+                irradiance_error: Some(0.05),
             },
             Self::Paper => return None,
+        };
+        Some(match finish {
+            Finish::Rendered => level,
+            Finish::Denoised => level.denoised(),
         })
     }
 
     /// Settings of this quality for an unknown scene. Where [`Self::fit`] would choose, it has the fewest
     /// samples, and medium numbers of rays and photons.
     pub fn settings(self) -> RenderSettings {
-        let Some(level) = self.level() else { return RenderSettings::default() };
+        self.settings_for(Finish::Rendered)
+    }
+
+    /// [`Self::settings`] for a picture that is finished in another way.
+    pub fn settings_for(self, finish: Finish) -> RenderSettings {
+        let Some(level) = self.level(finish) else { return RenderSettings::default() };
+        let samples = *level.samples.start();
+        let rays = middle(*level.gather_rays.start() as usize, *level.gather_rays.end() as usize) as u32;
+        let gather_rays = if level.irradiance_error.is_some() { rays } else { rays.div_ceil(samples) };
         RenderSettings {
             picture: Picture { filter: Filter::BlackmanHarris, ..Picture::default() },
             photons: PhotonMaps {
@@ -94,11 +132,10 @@ impl Quality {
                 ..PhotonMaps::default()
             },
             integrator: Integrator {
-                samples: *level.samples.start(),
-                gather_rays: middle(*level.gather_rays.start() as usize, *level.gather_rays.end() as usize)
-                    as u32,
+                samples,
+                gather_rays,
                 shadow_rays: 4,
-                irradiance_error: Some(level.irradiance_error),
+                irradiance_error: level.irradiance_error,
                 ..Integrator::default()
             },
             ..RenderSettings::default()

@@ -11,4 +11,4 @@ mod pilot;
 mod spread;
 
 pub use self::fit::{Beyond, Fit, Measured, Stated};
-pub use self::level::Quality;
+pub use self::level::{Finish, Quality};

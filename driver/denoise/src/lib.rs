@@ -1,0 +1,97 @@
+//! Removes noise from a picture by Intel Open Image Denoise (Áfra 2019), a neural network that reads
+//! radiance, albedo and normals.
+//!
+//! The library is not part of this program: [`Denoiser::find`] loads version 2 of it at run time, from the
+//! first of these places that has it:
+//!
+//! 1. the file that the environment variable `PHOTONCARD_OIDN` names;
+//! 2. the folder of the program, and the folders `lib` in and beside it;
+//! 3. the package `pyoidn` of Python, in the active environment, the user's or the system's;
+//! 4. the library folders of the system.
+//!
+//! A denoised picture depends on the library's version and on the processor, by roundings. The film is not
+//! changed.
+
+#![deny(unsafe_code)]
+
+mod error;
+mod library;
+mod places;
+
+use std::path::PathBuf;
+
+use photoncard_picture::film::Film;
+
+pub use self::error::DenoiseError;
+use self::library::{Device, Features, Library};
+pub use self::places::VARIABLE;
+
+/// Open Image Denoise, ready to run on this machine's processor.
+pub struct Denoiser {
+    library: Library,
+    version: String,
+}
+
+impl Denoiser {
+    /// Loads the library.
+    ///
+    /// # Errors
+    /// [`DenoiseError::Missing`], and [`DenoiseError::Unusable`] for a file that is there but does not load.
+    pub fn find() -> Result<Self, DenoiseError> {
+        if let Some(path) = places::stated() {
+            return Self::open(path);
+        }
+        let mut unusable = None;
+        for path in places::candidates() {
+            match Self::open(path) {
+                Ok(denoiser) => return Ok(denoiser),
+                Err(error) => unusable = unusable.or(Some(error)),
+            }
+        }
+        // The system's loader searches last, and has no more to say if it finds nothing.
+        Self::open(places::FILE.into()).map_err(|error| match (unusable, error) {
+            (Some(error), _) | (None, error @ DenoiseError::Failed { .. }) => error,
+            (None, _) => DenoiseError::Missing,
+        })
+    }
+
+    fn open(path: PathBuf) -> Result<Self, DenoiseError> {
+        let library = Library::open(&path).map_err(|reason| DenoiseError::Unusable { path, reason })?;
+        let version = Device::new(&library, Some(1))?.version();
+        Ok(Self { library, version })
+    }
+
+    /// Name and version of the library, such as `OIDN 2.5.1`.
+    pub fn version(&self) -> &str {
+        &self.version
+    }
+
+    /// Denoised radiance of a complete film, W/(sr m^2), row by row from the top of the crop window.
+    ///
+    /// Albedo and normals are denoised first, alone, and then guide the radiance as features without noise.
+    /// `threads` is the maximum number of threads; `None` for one a core.
+    ///
+    /// # Errors
+    /// [`DenoiseError::Incomplete`], and [`DenoiseError::Failed`] if the library lacks memory.
+    pub fn radiance(&self, film: &Film, threads: Option<usize>) -> Result<Vec<[f32; 3]>, DenoiseError> {
+        if !film.is_complete() {
+            return Err(DenoiseError::Incomplete { missing: film.missing() });
+        }
+        let size = [film.window().width() as usize, film.window().height() as usize];
+        let device = Device::new(&self.library, threads)?;
+        let features = Features {
+            albedo: device.filtered(
+                size,
+                "albedo",
+                &film.pixels().map(|pixel| pixel.albedo).collect::<Vec<_>>(),
+            )?,
+            normal: device.filtered(
+                size,
+                "normal",
+                &film.pixels().map(|pixel| pixel.normal).collect::<Vec<_>>(),
+            )?,
+        };
+        let radiance: Vec<_> = film.pixels().map(|pixel| pixel.radiance).collect();
+        device.denoised(size, &radiance, &features)
+    }
+}

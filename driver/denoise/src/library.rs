@@ -1,0 +1,251 @@
+//! Functions of Open Image Denoise 2, and safe calls of them.
+#![expect(unsafe_code, reason = "functions of a C library, loaded at run time")]
+
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::path::Path;
+use std::ptr;
+
+use libloading::Library as Loaded;
+
+use crate::error::DenoiseError;
+
+/// `OIDN_DEVICE_TYPE_CPU`. A processor of graphics would be faster, but rounds in ways of its own and may be
+/// busy.
+const CPU: c_int = 1;
+/// `OIDN_FORMAT_FLOAT3`.
+const FLOAT3: c_int = 3;
+
+type Handle = *mut c_void;
+
+/// Declares the functions that are used, by their names in C without the prefix `oidn`.
+macro_rules! functions {
+    ($($field:ident = $name:literal: fn($($argument:ty),*) $(-> $result:ty)?;)*) => {
+        /// The library, with the addresses of its functions.
+        pub(crate) struct Library {
+            $($field: unsafe extern "C" fn($($argument),*) $(-> $result)?,)*
+            // The addresses hold as long as this is loaded.
+            _loaded: Loaded,
+        }
+
+        impl Library {
+            fn bind(loaded: Loaded) -> Result<Self, libloading::Error> {
+                // SAFETY: the types are those of `OpenImageDenoise/oidn.h`, which version 2 keeps.
+                $(let $field = unsafe { *loaded.get(concat!("oidn", $name, "\0").as_bytes())? };)*
+                Ok(Self { $($field,)* _loaded: loaded })
+            }
+        }
+    };
+}
+
+functions! {
+    new_device = "NewDevice": fn(c_int) -> Handle;
+    set_device_int = "SetDeviceInt": fn(Handle, *const c_char, c_int);
+    set_device_bool = "SetDeviceBool": fn(Handle, *const c_char, bool);
+    device_int = "GetDeviceInt": fn(Handle, *const c_char) -> c_int;
+    commit_device = "CommitDevice": fn(Handle);
+    device_error = "GetDeviceError": fn(Handle, *mut *const c_char) -> c_int;
+    release_device = "ReleaseDevice": fn(Handle);
+    new_filter = "NewFilter": fn(Handle, *const c_char) -> Handle;
+    set_image = "SetSharedFilterImage": fn(Handle, *const c_char, *mut c_void, c_int, usize, usize, usize, usize, usize);
+    set_filter_bool = "SetFilterBool": fn(Handle, *const c_char, bool);
+    commit_filter = "CommitFilter": fn(Handle);
+    execute_filter = "ExecuteFilter": fn(Handle);
+    release_filter = "ReleaseFilter": fn(Handle);
+}
+
+impl Library {
+    /// Loads a file; the error is the loader's.
+    pub(crate) fn open(path: &Path) -> Result<Self, String> {
+        // SAFETY: loading runs the library's initialisers, which its user has chosen to trust.
+        let loaded = unsafe { Loaded::new(path) };
+        loaded.and_then(Self::bind).map_err(|error| match std::error::Error::source(&error) {
+            Some(source) => source.to_string(),
+            None => error.to_string(),
+        })
+    }
+}
+
+/// Features of the visible surfaces, without noise.
+pub(crate) struct Features {
+    /// Albedo, 0 to 1.
+    pub(crate) albedo: Vec<[f32; 3]>,
+    /// Normals, of a length up to 1.
+    pub(crate) normal: Vec<[f32; 3]>,
+}
+
+/// A device of the library: this machine's processor.
+pub(crate) struct Device<'a> {
+    library: &'a Library,
+    handle: Handle,
+}
+
+impl<'a> Device<'a> {
+    /// Opens the processor, with at most `threads` threads; `None` for one a core.
+    pub(crate) fn new(library: &'a Library, threads: Option<usize>) -> Result<Self, DenoiseError> {
+        // SAFETY: the function has no preconditions.
+        let handle = unsafe { (library.new_device)(CPU) };
+        let device = Self { library, handle };
+        if handle.is_null() {
+            return Err(device.error().unwrap_or_else(|| failed("it has no device")));
+        }
+        let threads = threads.and_then(|threads| c_int::try_from(threads).ok()).unwrap_or(0);
+        // SAFETY: the device is one, and the names end in 0. Threads are not bound to processors, since other
+        // work of this process may be on them.
+        unsafe {
+            (library.set_device_int)(handle, c"numThreads".as_ptr(), threads);
+            (library.set_device_bool)(handle, c"setAffinity".as_ptr(), false);
+            (library.commit_device)(handle);
+        }
+        device.check()?;
+        Ok(device)
+    }
+
+    /// Name and version of the library.
+    pub(crate) fn version(&self) -> String {
+        // SAFETY: the device is one, and the name ends in 0.
+        let version = unsafe { (self.library.device_int)(self.handle, c"version".as_ptr()) };
+        format!("OIDN {}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
+    }
+
+    /// An image of a feature, `albedo` or `normal`, denoised alone.
+    pub(crate) fn filtered(
+        &self,
+        size: [usize; 2],
+        name: &str,
+        image: &[[f32; 3]],
+    ) -> Result<Vec<[f32; 3]>, DenoiseError> {
+        self.run(size, &[(name, image)], &[])
+    }
+
+    /// Denoised radiance.
+    pub(crate) fn denoised(
+        &self,
+        size: [usize; 2],
+        radiance: &[[f32; 3]],
+        features: &Features,
+    ) -> Result<Vec<[f32; 3]>, DenoiseError> {
+        let images = [("color", radiance), ("albedo", &*features.albedo), ("normal", &*features.normal)];
+        self.run(size, &images, &["hdr", "cleanAux"])
+    }
+
+    /// Runs a filter over images, with switches on.
+    fn run(
+        &self,
+        size: [usize; 2],
+        images: &[(&str, &[[f32; 3]])],
+        switches: &[&str],
+    ) -> Result<Vec<[f32; 3]>, DenoiseError> {
+        let [width, height] = size;
+        let mut output = vec![[0.0; 3]; width * height];
+        let mut filter = Filter::new(self, size)?;
+        images.iter().for_each(|(name, image)| filter.read(name, image));
+        filter.write(&mut output);
+        switches.iter().for_each(|name| filter.switch_on(name));
+        filter.execute();
+        drop(filter);
+        self.check()?;
+        Ok(output)
+    }
+
+    fn check(&self) -> Result<(), DenoiseError> {
+        self.error().map_or(Ok(()), Err)
+    }
+
+    /// The first error since the last call, if there is one.
+    fn error(&self) -> Option<DenoiseError> {
+        let mut message = ptr::null();
+        // SAFETY: a null device stands for the error of creating one. The message is valid until the next
+        // call.
+        let code = unsafe { (self.library.device_error)(self.handle, &raw mut message) };
+        if code == 0 {
+            return None;
+        }
+        if message.is_null() {
+            return Some(failed("without a reason"));
+        }
+        // SAFETY: it is a string of C.
+        Some(failed(&unsafe { CStr::from_ptr(message) }.to_string_lossy()))
+    }
+}
+
+impl Drop for Device<'_> {
+    fn drop(&mut self) {
+        if !self.handle.is_null() {
+            // SAFETY: the device is one, and is not used again.
+            unsafe { (self.library.release_device)(self.handle) }
+        }
+    }
+}
+
+/// A filter of a device, over images of `size` pixels.
+struct Filter<'a> {
+    library: &'a Library,
+    handle: Handle,
+    size: [usize; 2],
+}
+
+impl<'a> Filter<'a> {
+    fn new(device: &'a Device, size: [usize; 2]) -> Result<Self, DenoiseError> {
+        // SAFETY: the device is one; `RT` is the filter for rendered pictures.
+        let handle = unsafe { (device.library.new_filter)(device.handle, c"RT".as_ptr()) };
+        if handle.is_null() {
+            return Err(device.error().unwrap_or_else(|| failed("it has no filter RT")));
+        }
+        Ok(Self { library: device.library, handle, size })
+    }
+
+    /// Sets an image to read.
+    fn read(&mut self, name: &str, image: &'a [[f32; 3]]) {
+        self.check_size(image);
+        // The library does not write to images but the output.
+        self.set_image(name, image.as_ptr().cast_mut().cast());
+    }
+
+    /// Sets the image to write.
+    fn write(&mut self, image: &'a mut [[f32; 3]]) {
+        self.check_size(image);
+        self.set_image("output", image.as_mut_ptr().cast());
+    }
+
+    fn check_size(&self, image: &[[f32; 3]]) {
+        assert_eq!(image.len(), self.size.into_iter().product::<usize>(), "an image has the filter's size");
+    }
+
+    fn set_image(&mut self, name: &str, address: *mut c_void) {
+        let (name, [width, height]) = (text(name), self.size);
+        // SAFETY: the image has that many pixels of three floats, in rows without gaps (strides of 0), and is
+        // borrowed as long as the filter.
+        unsafe {
+            (self.library.set_image)(self.handle, name.as_ptr(), address, FLOAT3, width, height, 0, 0, 0);
+        }
+    }
+
+    fn switch_on(&mut self, name: &str) {
+        let name = text(name);
+        // SAFETY: the filter is one.
+        unsafe { (self.library.set_filter_bool)(self.handle, name.as_ptr(), true) }
+    }
+
+    fn execute(&mut self) {
+        // SAFETY: the filter is one, and its images are valid.
+        unsafe {
+            (self.library.commit_filter)(self.handle);
+            (self.library.execute_filter)(self.handle);
+        }
+    }
+}
+
+impl Drop for Filter<'_> {
+    fn drop(&mut self) {
+        // SAFETY: the filter is one, and is not used again.
+        unsafe { (self.library.release_filter)(self.handle) }
+    }
+}
+
+fn text(name: &str) -> CString {
+    CString::new(name).unwrap_or_default()
+}
+
+fn failed(reason: &str) -> DenoiseError {
+    DenoiseError::Failed { reason: reason.to_owned() }
+}
