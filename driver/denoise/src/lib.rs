@@ -14,7 +14,6 @@
 
 #![deny(unsafe_code)]
 
-mod error;
 mod library;
 mod places;
 
@@ -22,8 +21,8 @@ use std::path::PathBuf;
 
 use photoncard_picture::film::Film;
 
-pub use self::error::DenoiseError;
-use self::library::{Device, Features, Library};
+pub use self::library::DenoiseError;
+use self::library::{Device, Library};
 pub use self::places::VARIABLE;
 
 /// Open Image Denoise, ready to run on this machine's processor.
@@ -79,19 +78,15 @@ impl Denoiser {
         }
         let size = [film.window().width() as usize, film.window().height() as usize];
         let device = Device::new(&self.library, threads)?;
-        let features = Features {
-            albedo: device.filtered(
-                size,
-                "albedo",
-                &film.pixels().map(|pixel| pixel.albedo).collect::<Vec<_>>(),
-            )?,
-            normal: device.filtered(
-                size,
-                "normal",
-                &film.pixels().map(|pixel| pixel.normal).collect::<Vec<_>>(),
-            )?,
-        };
-        let radiance: Vec<_> = film.pixels().map(|pixel| pixel.radiance).collect();
-        device.denoised(size, &radiance, &features)
+        let [mut radiance, mut albedo, mut normal] = [const { Vec::new() }; 3];
+        for pixel in film.pixels() {
+            radiance.push(pixel.radiance);
+            albedo.push(pixel.albedo);
+            normal.push(pixel.normal);
+        }
+        let albedo = device.run(size, &[("albedo", &albedo)], &[])?;
+        let normal = device.run(size, &[("normal", &normal)], &[])?;
+        let images = [("color", &*radiance), ("albedo", &*albedo), ("normal", &*normal)];
+        device.run(size, &images, &["hdr", "cleanAux"])
     }
 }

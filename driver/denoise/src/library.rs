@@ -1,13 +1,14 @@
-//! Functions of Open Image Denoise 2, and safe calls of them.
+//! Functions of Open Image Denoise 2, safe calls of them, and their errors.
 #![expect(unsafe_code, reason = "functions of a C library, loaded at run time")]
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::ptr;
 
 use libloading::Library as Loaded;
+use thiserror::Error;
 
-use crate::error::DenoiseError;
+use crate::places::{FILE, VARIABLE};
 
 /// `OIDN_DEVICE_TYPE_CPU`. A processor of graphics would be faster, but rounds in ways of its own and may be
 /// busy.
@@ -16,6 +17,40 @@ const CPU: c_int = 1;
 const FLOAT3: c_int = 3;
 
 type Handle = *mut c_void;
+
+/// Error of loading or running the denoiser.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DenoiseError {
+    /// No place has the library.
+    #[error(
+        "Open Image Denoise 2 is not on this machine; install it, such as by: pip install pyoidn, or name its file {} by {VARIABLE}",
+        FILE
+    )]
+    Missing,
+    /// The file is no library for this machine, or lacks a function of version 2.
+    #[error("cannot load Open Image Denoise from {}: {reason}; version 2 for this processor is needed", path.display())]
+    Unusable {
+        /// Path of the library.
+        path: PathBuf,
+        /// Error of the operating system's loader.
+        reason: String,
+    },
+    /// The library has failed.
+    #[error(
+        "Open Image Denoise has failed: {reason}; leave out the denoiser, or use another version of its library"
+    )]
+    Failed {
+        /// Error message of the library.
+        reason: String,
+    },
+    /// Pixels of the film were never written.
+    #[error("{missing} pixels of the picture are missing; it is denoised when it is complete")]
+    Incomplete {
+        /// Number of the pixels.
+        missing: usize,
+    },
+}
 
 /// Declares the functions that are used, by their names in C without the prefix `oidn`.
 macro_rules! functions {
@@ -65,14 +100,6 @@ impl Library {
     }
 }
 
-/// Features of the visible surfaces, without noise.
-pub(crate) struct Features {
-    /// Albedo, 0 to 1.
-    pub(crate) albedo: Vec<[f32; 3]>,
-    /// Normals, of a length up to 1.
-    pub(crate) normal: Vec<[f32; 3]>,
-}
-
 /// A device of the library: this machine's processor.
 pub(crate) struct Device<'a> {
     library: &'a Library,
@@ -107,29 +134,8 @@ impl<'a> Device<'a> {
         format!("OIDN {}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
     }
 
-    /// An image of a feature, `albedo` or `normal`, denoised alone.
-    pub(crate) fn filtered(
-        &self,
-        size: [usize; 2],
-        name: &str,
-        image: &[[f32; 3]],
-    ) -> Result<Vec<[f32; 3]>, DenoiseError> {
-        self.run(size, &[(name, image)], &[])
-    }
-
-    /// Denoised radiance.
-    pub(crate) fn denoised(
-        &self,
-        size: [usize; 2],
-        radiance: &[[f32; 3]],
-        features: &Features,
-    ) -> Result<Vec<[f32; 3]>, DenoiseError> {
-        let images = [("color", radiance), ("albedo", &*features.albedo), ("normal", &*features.normal)];
-        self.run(size, &images, &["hdr", "cleanAux"])
-    }
-
-    /// Runs a filter over images, with switches on.
-    fn run(
+    /// Filters images of `size` pixels by their names in the library, with switches on.
+    pub(crate) fn run(
         &self,
         size: [usize; 2],
         images: &[(&str, &[[f32; 3]])],

@@ -96,7 +96,7 @@ impl OutputOptions {
         Ok(outputs)
     }
 
-    /// What becomes of the rendered picture.
+    /// Finish of the pictures.
     pub(super) fn finish(&self) -> Finish {
         if self.denoise { Finish::Denoised } else { Finish::Rendered }
     }

@@ -96,7 +96,7 @@ pub(super) fn write(
     rendering: &Rendering,
 ) -> Result<(), Failure> {
     let denoiser = denoiser(denoises(options, outputs))?;
-    // What was rendered is written even if it cannot be denoised.
+    // A failing denoiser must not lose the render: it is written without the layer.
     let (denoised, failure) = match denoised(denoiser.as_ref(), &rendering.film, options.threads) {
         Ok(denoised) => (denoised, None),
         Err(failure) => (None, Some(failure)),

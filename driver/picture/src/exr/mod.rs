@@ -138,7 +138,7 @@ pub enum ExrError {
     },
 }
 
-/// What an EXR file has.
+/// Contents of an EXR file.
 #[derive(Clone, Copy)]
 pub struct Content<'a> {
     /// Film of the radiance, and of the layers.

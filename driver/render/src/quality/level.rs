@@ -20,7 +20,7 @@ pub enum Quality {
     Paper,
 }
 
-/// What becomes of a rendered picture.
+/// Finish of a picture after its render, for which a quality chooses settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Finish {
     /// The picture is shown as it is.
