@@ -10,7 +10,7 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::{decode_direction, kernel_share};
+use photoncard_shared::layout::{PhotonNode, decode_direction, kernel_share};
 use photoncard_shared::message::Fault;
 
 use super::collector::{Collector, Lanes};
@@ -100,6 +100,7 @@ impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
             lit_by,
             normals,
             surface: SameSurface::new(reflection.normal()),
+            classes: SameSurface::classes(reflection.normal()),
             power: ColourSum::ZERO,
             of_lobe: ColourSum::ZERO,
             photons: 0,
@@ -126,6 +127,8 @@ struct Sums<'a> {
     lit_by: LitBy,
     normals: [Vec3; 2],
     surface: SameSurface,
+    /// Classes of the surface's normals, one bit each.
+    classes: u16,
     /// Sum of power times kernel.
     power: ColourSum,
     /// Sum of power times kernel times the lobe's factor.
@@ -187,6 +190,12 @@ impl Collector for Sums<'_> {
     #[inline(always)]
     fn limit(&self) -> f32 {
         self.limit
+    }
+
+    #[inline(always)]
+    fn skips(&self, node: PhotonNode) -> bool {
+        let classes = node.normals();
+        classes != 0 && classes & self.classes == 0
     }
 
     #[inline(always)]

@@ -1,5 +1,7 @@
 //! Interface between a search of leaves and its result, which has the photons found and the search radius.
 
+use photoncard_shared::layout::PhotonNode;
+
 use crate::simd::{Isa, LANES};
 
 /// Collector of the nearest photons or irradiance points, which limits the search radius.
@@ -9,10 +11,14 @@ pub(super) trait Collector {
 
     /// Narrows the search at the first node with a [`PhotonNode::photon_share`], if the search can be
     /// repeated with a larger radius.
-    ///
-    /// [`PhotonNode::photon_share`]: photoncard_shared::layout::PhotonNode::photon_share
     #[inline(always)]
     fn narrow(&mut self, _photon_share: f32) {}
+
+    /// Returns true if no photon below a node is searched for.
+    #[inline(always)]
+    fn skips(&self, _node: PhotonNode) -> bool {
+        false
+    }
 
     /// Adds the photons in the first `count` lanes that are within the limit.
     fn insert_lanes(&mut self, isa: impl Isa, count: u32, lanes: &Lanes);

@@ -43,8 +43,12 @@ pub(super) fn gather(
                 tested += test_leaf(isa, grid, PhotonLeaf::read(line), (query, filter), nearest);
             }
             Child::Node(node) => descent.enter(isa, memory, node, Order::NearestFirst, |line| {
-                nearest.narrow(PhotonNode(line).photon_share());
-                distances_to_boxes(isa, grid, PhotonNode(line), query, nearest.limit())
+                let line = PhotonNode(line);
+                if nearest.skips(line) {
+                    return [BEYOND; LANES];
+                }
+                nearest.narrow(line.photon_share());
+                distances_to_boxes(isa, grid, line, query, nearest.limit())
             })?,
         }
     }

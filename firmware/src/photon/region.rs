@@ -15,10 +15,10 @@
 use core::f32::consts::PI;
 
 use glam::Vec3;
-use photoncard_shared::layout::decode_normal;
 use photoncard_shared::message::Fault;
 
 use super::MIN_NORMAL_COSINE;
+use super::same_surface::unit_normal;
 use crate::memory::{MemoryPort, Stage};
 use crate::scene::{BUNDLE_RAYS, Hit, Ray, SceneImage, closest_hit, closest_hits, magnitude, offset_origin};
 use crate::simd::{HALF_LANES, Isa, LANES};
@@ -166,7 +166,7 @@ impl VisibleRegion {
         radius: f32,
         reach: f32,
     ) -> Result<Self, Fault> {
-        let coded = unit(decode_normal(normal).into());
+        let coded = unit_normal(normal);
         let lift = lift(scene, radius);
         let most = magnitude(&[position]);
         let above = offset_origin(position, coded, most) + coded * lift;
@@ -238,7 +238,7 @@ pub(super) fn is_covered(
     (position, normal): (Vec3, u8),
     radius: f32,
 ) -> Result<bool, Fault> {
-    let direction = unit(decode_normal(normal).into());
+    let direction = unit_normal(normal);
     let origin = offset_origin(position, direction, magnitude(&[position])) + direction * lift(scene, radius);
     memory.enter(Stage::GatherRay);
     let up = closest_hit(scene, memory, &Ray { origin, direction, max_distance: MAX_SLOPE * radius })?;

@@ -1,12 +1,63 @@
 //! Test by normals whether photons belong to one surface.
 
 use glam::Vec3;
-use photoncard_shared::layout::decode_normal;
-
-use crate::vector::unit;
+use photoncard_shared::layout::{decode_normal, normal_class};
 
 /// Minimum cosine between the normals of a photon and of the query that are taken as one surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
+
+/// Number of codes of a normal.
+const CODES: usize = 256;
+
+/// Unit normal of each code.
+static NORMALS: [Vec3; CODES] = {
+    let mut normals = [Vec3::ZERO; CODES];
+    let mut code = 0;
+    while code < CODES {
+        normals[code] = computed_normal(code as u8);
+        code += 1;
+    }
+    normals
+};
+
+/// Unit normal of a code, with the rounding of [`unit`](crate::vector::unit).
+const fn computed_normal(code: u8) -> Vec3 {
+    let [x, y, z] = decode_normal(code);
+    let inverse = 1.0 / root(x * x + y * y + z * z);
+    Vec3::new(x * inverse, y * inverse, z * inverse)
+}
+
+/// For each code of a normal, the classes of the normals that are taken as its surface's, one bit each.
+static CLASSES: [u16; CODES] = {
+    let mut classes = [0; CODES];
+    let mut pair = 0;
+    while pair < CODES * CODES {
+        let (code, other) = (pair / CODES, pair % CODES);
+        let ([a, b, c], [x, y, z]) = (NORMALS[code].to_array(), NORMALS[other].to_array());
+        if a * x + b * y + c * z >= MIN_NORMAL_COSINE {
+            classes[code] |= 1 << normal_class(other as u8);
+        }
+        pair += 1;
+    }
+    classes
+};
+
+/// Unit normal of a code.
+#[inline(always)]
+pub(super) fn unit_normal(code: u8) -> Vec3 {
+    NORMALS.get(usize::from(code)).copied().unwrap_or_default()
+}
+
+/// Square root of a number from 1/3 to 1, rounded correctly: Newton's method in twice the precision.
+const fn root(square: f32) -> f32 {
+    let square = square as f64;
+    let (mut root, mut step) = (1.0, 0);
+    while step < 6 {
+        root = 0.5 * (root + square / root);
+        step += 1;
+    }
+    root as f32
+}
 
 /// Test whether a photon belongs to a surface. Consecutive photons mostly have equal normals, so that the
 /// last result is cached.
@@ -22,8 +73,14 @@ impl SameSurface {
     /// Creates the test for a surface whose normal has this code.
     #[inline(always)]
     pub fn new(code: u8) -> Self {
-        let normal = unit(decode_normal(code).into());
+        let normal = unit_normal(code);
         Self { normal, last: (code, normal.dot(normal)), decoded: 0 }
+    }
+
+    /// Classes of the normals that [`Self::holds`] accepts, one bit each.
+    #[inline(always)]
+    pub(super) fn classes(code: u8) -> u16 {
+        CLASSES.get(usize::from(code)).copied().unwrap_or_default()
     }
 
     /// Number of normals decoded so far.
@@ -42,10 +99,44 @@ impl SameSurface {
     #[inline(always)]
     pub(super) fn cosine(&mut self, code: u8) -> f32 {
         if self.last.0 != code {
-            let other = unit(decode_normal(code).into());
             self.decoded += 1;
-            self.last = (code, other.dot(self.normal));
+            self.last = (code, unit_normal(code).dot(self.normal));
         }
         self.last.1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use photoncard_shared::layout::encode_normal;
+
+    use super::*;
+    use crate::vector::unit;
+
+    #[test]
+    fn the_table_has_the_unit_normal_of_each_code() {
+        for code in 0..=u8::MAX {
+            assert_eq!(unit_normal(code), unit(decode_normal(code).into()), "{code}");
+        }
+    }
+
+    #[test]
+    fn classes_contain_each_normal_of_the_surface() {
+        for code in 0..=u8::MAX {
+            let mut surface = SameSurface::new(code);
+            let held = (0..=u8::MAX).filter(|&other| surface.holds(other));
+            let classes = held.fold(0, |classes, other| classes | 1 << normal_class(other));
+            assert_eq!(SameSurface::classes(code), classes, "{code}");
+        }
+    }
+
+    #[test]
+    fn a_floor_is_of_other_classes_than_its_walls() {
+        let class = |normal| 1 << normal_class(encode_normal(normal));
+        let of_floor = SameSurface::classes(encode_normal([0.0, 0.0, 1.0]));
+        assert_ne!(of_floor & class([0.0, 0.0, 1.0]), 0);
+        for wall in [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]] {
+            assert_eq!(of_floor & class(wall), 0, "{wall:?}");
+        }
     }
 }

@@ -33,12 +33,18 @@ pub fn encode_normal(vector: [f32; 3]) -> u8 {
 
 /// Decodes a one-byte octahedral code to a vector in the normal's direction, with `|x| + |y| + |z| = 1`.
 #[inline(always)]
-pub fn decode_normal(byte: u8) -> [f32; 3] {
-    let [u, v] = [byte >> 4, byte & 15].map(|half| (half as f32 - NORMAL_STEPS) / NORMAL_STEPS);
-    fold(u, v)
+pub const fn decode_normal(byte: u8) -> [f32; 3] {
+    let [high, low] = [byte >> 4, byte & 15];
+    fold((high as f32 - NORMAL_STEPS) / NORMAL_STEPS, (low as f32 - NORMAL_STEPS) / NORMAL_STEPS)
 }
 
-fn magnitude(x: f32) -> f32 {
+/// Class of a normal's code, 0 to 15: four by four adjacent codes of the octahedral map are of one class.
+#[inline(always)]
+pub const fn normal_class(byte: u8) -> u32 {
+    (byte as u32 >> 6) << 2 | (byte as u32 >> 2) & 3
+}
+
+const fn magnitude(x: f32) -> f32 {
     if x < 0.0 { -x } else { x }
 }
 
@@ -55,11 +61,15 @@ fn unfold([x, y, z]: [f32; 3]) -> [f32; 2] {
 }
 
 #[inline(always)]
-fn fold(u: f32, v: f32) -> [f32; 3] {
+const fn fold(u: f32, v: f32) -> [f32; 3] {
     let z = 1.0 - magnitude(u) - magnitude(v);
     let overhang = if z < 0.0 { -z } else { 0.0 };
-    let inward = |a: f32| if a < 0.0 { a + overhang } else { a - overhang };
-    [inward(u), inward(v), z]
+    [inward(u, overhang), inward(v, overhang), z]
+}
+
+#[inline(always)]
+const fn inward(a: f32, overhang: f32) -> f32 {
+    if a < 0.0 { a + overhang } else { a - overhang }
 }
 
 /// Quantises a value in [-1, 1] to the nearest code, 0 to `2 steps`. The code of zero is `steps`.

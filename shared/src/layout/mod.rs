@@ -47,7 +47,7 @@ mod wide_node;
 pub use attributes::{Attributes, LeafAttributes, NO_ATTRIBUTES};
 pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, LEAF_VERTICES, MAX_MATERIALS, Triangle, VERTEX_LANES};
 pub use bvh_node::{BvhAxis, BvhNode, NodeBox};
-pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal};
+pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal, normal_class};
 pub use distant_light::DistantLight;
 pub use emitter::{Emitter, EmitterKind};
 pub use irradiance_point::IrradiancePoint;

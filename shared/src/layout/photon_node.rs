@@ -15,12 +15,12 @@ use crate::address::LINE_BYTES;
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | x, y, z of the corner: bits 0-23 grid coordinate, 24-31 exponent of the unit on this axis |
-/// | 22..24 | upper half of the bits of [`Self::photon_share`] |
+/// | 22..24 | in the caustic map [`Self::normals`], else upper half of the bits of [`Self::photon_share`] |
 #[derive(Clone, Copy)]
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
-/// Offset of the photon share in the line, bytes.
+/// Offset of the photon share or the classes of normals in the line, bytes.
 const SHARE: usize = 22;
 /// Maximum of [`NodeCoordinates::exponent`], for a box as large as the grid.
 const MAX_EXPONENT: u32 = 13;
@@ -62,6 +62,20 @@ impl<'a> PhotonNode<'a> {
     pub fn set_photon_share(line: &mut [u8; LINE_BYTES], share: f32) {
         let [_, _, low, high] = share.to_bits().saturating_add(0xffff).to_le_bytes();
         [line[SHARE], line[SHARE + 1]] = [low, high];
+    }
+
+    /// Classes of the normals of the node's photons ([`normal_class`]), one bit each. 0 where the host has not
+    /// stated them.
+    ///
+    /// [`normal_class`]: super::normal_class
+    #[inline(always)]
+    pub fn normals(&self) -> u16 {
+        u16::from_le_bytes([SHARE, SHARE + 1].map(|at| WideNode(self.0).byte(at)))
+    }
+
+    /// Sets the classes of normals in the line of a node.
+    pub fn set_normals(line: &mut [u8; LINE_BYTES], classes: u16) {
+        [line[SHARE], line[SHARE + 1]] = classes.to_le_bytes();
     }
 
     /// Boxes of all children, by axis.

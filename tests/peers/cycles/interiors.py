@@ -3,6 +3,7 @@
 import math
 from itertools import pairwise
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -359,8 +360,19 @@ def rod(name, start, end, radius, surface):
         rotation=direction.to_euler(),
     )
     room.finish(name, surface)
-    for face in bpy.context.object.data.polygons:
+    side_apart(bpy.context.object.data)
+
+
+def side_apart(cylinder):
+    """Gives the ends vertices of their own: Cycles averages the normals of faces that share a vertex, the file does not."""
+    for face in cylinder.polygons:
         face.use_smooth = len(face.vertices) == 4
+    whole = bmesh.new()
+    whole.from_mesh(cylinder)
+    rims = [edge for edge in whole.edges if len({face.smooth for face in edge.link_faces}) == 2]
+    bmesh.ops.split_edges(whole, edges=rims)
+    whole.to_mesh(cylinder)
+    whole.free()
 
 
 def turned(name, foot, profile, surface, count=48):

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_firmware::sampler::hash;
 use photoncard_shared::layout::{
-    GRID_BITS, PHOTON_CONTENT_BYTES, Photon, PhotonGrid, Record, Rgbe, decode_normal,
+    GRID_BITS, PHOTON_CONTENT_BYTES, Photon, PhotonGrid, Record, Rgbe, decode_normal, normal_class,
 };
 
 /// A photon: its grid point, and its other values in encoded form.
@@ -77,6 +77,16 @@ impl StoredPhoton {
     /// Unit normal of the photon's surface.
     pub(crate) fn normal(self) -> Vec3 {
         Vec3::from(decode_normal(Photon::normal_of_flags(self.flags()))).normalize()
+    }
+
+    /// Class of the normal of the photon's surface ([`normal_class`]).
+    pub(crate) fn normal_class(self) -> u32 {
+        normal_class(Photon::normal_of_flags(self.flags()))
+    }
+
+    /// Code of the photon's disc: a fraction, or the radius of a kernel in the caustic map.
+    pub(crate) fn disc(self) -> u8 {
+        Photon::disc_of_flags(self.flags())
     }
 
     fn flags(self) -> u16 {

@@ -6,6 +6,10 @@
 //! visits a box is proportional to its volume, enlarged by the search radius. Splits are rounded to whole
 //! leaves, so that lines are full. The binary tree is then folded into wide nodes with the fewest expected
 //! visits, by the same probabilities.
+//!
+//! In a caustic map photons are grouped by the classes of their normals and by the sizes of their discs before
+//! they are split in space, so that a search skips the groups of other surfaces, and no large disc enlarges
+//! the box of small ones.
 
 use std::num::NonZeroU8;
 
@@ -47,26 +51,20 @@ impl<'a> PhotonTree<'a> {
     /// Builds a tree of photons for searches with a radius of about `radius` cells. It does not depend on
     /// threads. `None` without photons.
     pub(super) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
-        Self::of(photons, &Searches { radius, reach: &|_| 0 })
+        Self::of(photons, &Searches { radius, reach: &|_| 0, is_of_discs: false })
     }
 
     /// Builds a tree of photons for searches at a point. Its boxes contain all points within the reach of
-    /// each photon, cells.
+    /// each photon, cells. Its nodes have the classes of normals.
     pub(super) fn of_discs(photons: &'a mut [StoredPhoton], reach: Reach) -> Option<Self> {
-        let mut reaches: Vec<u32> = photons.iter().map(reach).collect();
-        if reaches.is_empty() {
-            return None;
-        }
-        let middle = reaches.len() / 2;
-        let typical = *reaches.select_nth_unstable(middle).1;
-        Self::of(photons, &Searches { radius: typical.into(), reach })
+        Self::of(photons, &Searches { radius: 0.0, reach, is_of_discs: true })
     }
 
     fn of(photons: &'a mut [StoredPhoton], searches: &Searches) -> Option<Self> {
-        let mut folded = Folded::new(build(photons, 0, searches, 0)?);
+        let mut folded = Folded::new(build_groups(photons, searches, 0)?);
         if folded.stack > PHOTON_STACK {
             // Median splits are slower to search, but have minimum depth.
-            folded = Folded::new(build(photons, 0, searches, MAX_SKEWED)?);
+            folded = Folded::new(build_groups(photons, searches, MAX_SKEWED)?);
         }
         Some(Self { photons, folded })
     }
@@ -74,9 +72,12 @@ impl<'a> PhotonTree<'a> {
     /// Lines of the inner nodes.
     pub(super) fn nodes(&self) -> impl ExactSizeIterator<Item = [u8; LINE_BYTES]> {
         self.folded.nodes.iter().map(|node| {
-            let boxes: Vec<GridBox> = node.children.iter().map(|extent| extent.0).collect();
-            PhotonNode::encode(&boxes, node.links)
-                .unwrap_or_else(|| unreachable!("a node of {} children", boxes.len()))
+            let boxes: Vec<GridBox> = node.children.iter().map(|extent| extent.room).collect();
+            let mut line = PhotonNode::encode(&boxes, node.links)
+                .unwrap_or_else(|| unreachable!("a node of {} children", boxes.len()));
+            let normals = node.children.iter().fold(0, |normals, extent| normals | extent.normals);
+            PhotonNode::set_normals(&mut line, normals);
+            line
         })
     }
 
@@ -99,6 +100,48 @@ struct Searches<'r> {
     radius: f64,
     /// Distance by which a photon's box is enlarged.
     reach: Reach<'r>,
+    /// True for a caustic map, whose photons are found by their own radii.
+    is_of_discs: bool,
+}
+
+/// Group of a caustic photon: the class of its normal, and that of its radius. Radii in a group differ by a
+/// factor of at most two.
+fn group(photon: &StoredPhoton) -> (u32, u8) {
+    (photon.normal_class(), photon.disc() / 2)
+}
+
+/// Builds the tree of photons, with a part for each group of a caustic map. `None` without photons.
+fn build_groups(
+    photons: &mut [StoredPhoton],
+    searches: &Searches,
+    depth: usize,
+) -> Option<Tree<Run, Extent>> {
+    if !searches.is_of_discs {
+        return build(photons, 0, searches, depth);
+    }
+    photons.sort_unstable_by_key(|photon| (group(photon), *photon));
+    let mut first = 0;
+    let mut parts: Vec<Tree<Run, Extent>> = Vec::new();
+    for part in photons.chunk_by_mut(|photon, next| group(photon) == group(next)) {
+        let radius = part.iter().map(searches.reach).max().unwrap_or(0);
+        let count = part.len() as u32;
+        parts.push(build(part, first, &Searches { radius: radius.into(), ..*searches }, depth)?);
+        first += count;
+    }
+    join(parts)
+}
+
+/// Binary tree of adjacent parts, of minimum depth. `None` without parts.
+fn join(mut parts: Vec<Tree<Run, Extent>>) -> Option<Tree<Run, Extent>> {
+    let above = parts.split_off(parts.len() / 2);
+    if parts.is_empty() {
+        return above.into_iter().next();
+    }
+    let parts = [join(parts)?, join(above)?];
+    let [below, above] = parts.each_ref().map(Tree::bounds);
+    let both = below.union(above);
+    // The boxes contain the reach of their photons.
+    Some(Tree::node(parts, both, both.chance(0.0) as f32, None))
 }
 
 /// Builds the tree of photons. The first has the index `first`. `None` without photons.
@@ -115,9 +158,9 @@ fn build(
     let extent = Extent::new(photons);
     let count = u8::try_from(photons.len()).ok().and_then(NonZeroU8::new);
     if let Some(count) = count
-        && PhotonLeaf::fits(&extent.0, photons.len())
+        && PhotonLeaf::fits(&extent.room, photons.len())
     {
-        let reached = Extent::reached(photons, searches.reach);
+        let reached = Extent::reached(photons, searches);
         return Some(Tree::leaf(Run { first, count }, reached, 0.0));
     }
     let (axis, middle) = if depth < MAX_SKEWED {
@@ -132,37 +175,45 @@ fn build(
     let mut above = || build(above, first + middle as u32, searches, depth + 1);
     let (below, above) = if is_large { rayon::join(below, above) } else { (below(), above()) };
     let parts = [below?, above?];
-    let [below, above] = parts.each_ref().map(|part| part.bounds().0);
-    Some(Tree::node(parts, Extent(below.union(above)), extent.chance(radius) as f32, None))
+    let [below, above] = parts.each_ref().map(Tree::bounds);
+    Some(Tree::node(parts, below.union(above), extent.chance(radius) as f32, None))
 }
 
-/// Bounding box of photons.
+/// Bounding box of photons, and the classes of their normals, one bit each; 0 but in a caustic map.
 #[derive(Clone, Copy)]
-struct Extent(GridBox);
+struct Extent {
+    room: GridBox,
+    normals: u16,
+}
 
 impl Extent {
     fn new(photons: &[StoredPhoton]) -> Self {
-        let mut extent = GridBox { lower: [u32::MAX; 3], upper: [0; 3] };
+        let mut room = GridBox { lower: [u32::MAX; 3], upper: [0; 3] };
         for photon in photons {
-            extent = extent.union(GridBox::of(photon.point()));
+            room = room.union(GridBox::of(photon.point()));
         }
-        Self(extent)
+        Self { room, normals: 0 }
     }
 
-    /// Box of all grid points within the reach of the photons, on each axis.
-    fn reached(photons: &[StoredPhoton], reach: Reach) -> Self {
-        let mut extent = GridBox { lower: [u32::MAX; 3], upper: [0; 3] };
+    /// Box of all grid points within the reach of the photons, on each axis, with their classes.
+    fn reached(photons: &[StoredPhoton], searches: &Searches) -> Self {
+        let mut extent = Self { room: GridBox { lower: [u32::MAX; 3], upper: [0; 3] }, normals: 0 };
         for photon in photons {
-            let reach = reach(photon);
+            let reach = (searches.reach)(photon);
             let lower = photon.point().map(|coordinate| coordinate.saturating_sub(reach));
             let upper = photon.point().map(|coordinate| (coordinate + reach).min(LAST_POINT));
-            extent = extent.union(GridBox { lower, upper });
+            let normals = if searches.is_of_discs { 1 << photon.normal_class() } else { 0 };
+            extent = extent.union(Self { room: GridBox { lower, upper }, normals });
         }
-        Self(extent)
+        extent
+    }
+
+    fn union(self, other: Self) -> Self {
+        Self { room: self.room.union(other.room), normals: self.normals | other.normals }
     }
 
     fn side(&self, axis: usize) -> u32 {
-        self.0.upper[axis] - self.0.lower[axis]
+        self.room.upper[axis] - self.room.lower[axis]
     }
 
     fn longest(&self) -> usize {
@@ -208,7 +259,7 @@ impl Extent {
             let scale = ((intervals as u64) << 32) / (u64::from(self.side(axis)) + 1);
             let mut counts = [0_usize; INTERVALS];
             for photon in photons.iter().step_by(step) {
-                let cells = u64::from(photon.coordinate(axis) - self.0.lower[axis]);
+                let cells = u64::from(photon.coordinate(axis) - self.room.lower[axis]);
                 counts[((cells * scale) >> 32) as usize] += 1;
             }
             let across: f64 =
@@ -237,7 +288,7 @@ fn chance(sides: [f64; 3], radius: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use photoncard_firmware::sampler::hash;
-    use photoncard_shared::layout::{Child, PHOTON_CONTENT_BYTES, WideNode};
+    use photoncard_shared::layout::{Child, PHOTON_CONTENT_BYTES, Photon, WideNode};
 
     use super::*;
 
@@ -306,6 +357,56 @@ mod tests {
             found.sort_unstable();
             sorted.sort_unstable();
             assert!(found == sorted, "{count} photons on {bits} bits");
+        }
+    }
+
+    /// Checks below `child` of a caustic map, all of whose discs reach `reach` cells, that each box contains
+    /// the reach of its photons, and that each node states the classes of their normals. Returns the classes,
+    /// and counts the photons.
+    fn walk_discs(lines: &PhotonLines, child: Child, room: GridBox, reach: u32, count: &mut usize) -> u16 {
+        let node = match child {
+            Child::Leaf(leaf) => {
+                let leaf = PhotonLeaf::read(&lines.leaves[leaf as usize]);
+                *count += leaf.photons() as usize;
+                return (0..leaf.photons()).fold(0, |classes, index| {
+                    let point = leaf.point(index);
+                    let lower = point.map(|coordinate| coordinate.saturating_sub(reach));
+                    let upper = point.map(|coordinate| (coordinate + reach).min(LAST_POINT));
+                    assert!(room.contains(&GridBox { lower, upper }));
+                    classes | 1 << StoredPhoton::at(point, leaf.content(index)).normal_class()
+                });
+            }
+            Child::Node(node) => &lines.nodes[node as usize],
+        };
+        let children = WideNode(node).children() as usize;
+        let classes = (0..children).fold(0, |classes, child| {
+            let sides = PhotonNode(node).coordinates().map(|axis| axis.sides(child).expect("a child"));
+            let room = GridBox { lower: sides.map(|[lower, _]| lower), upper: sides.map(|[_, upper]| upper) };
+            classes | walk_discs(lines, WideNode(node).links().child(child as u32), room, reach, count)
+        });
+        assert_eq!(PhotonNode(node).normals(), classes);
+        classes
+    }
+
+    #[test]
+    fn nodes_of_a_caustic_map_state_the_normals_and_contain_the_discs_of_all_photons_below() {
+        for count in [1, 10, 1000, 30_000] {
+            let mut stored: Vec<_> = photons(count, 20)
+                .into_iter()
+                .zip(0_u32..)
+                .map(|((point, content), index)| {
+                    let content =
+                        (u64::from_le_bytes(content) | u64::from(hash(index) % 225) << 50).to_le_bytes();
+                    StoredPhoton::at(point, Photon::content_with_disc(content, (hash(!index) & 31) as u8))
+                })
+                .collect();
+            let classes = stored.iter().fold(0, |classes, photon| classes | 1 << photon.normal_class());
+            let tree = PhotonTree::of_discs(&mut stored, &|_| 5000).expect("there are photons");
+            let lines = PhotonLines { nodes: tree.nodes().collect(), leaves: tree.leaves().collect() };
+            let everything = GridBox { lower: [0; 3], upper: [u32::MAX; 3] };
+            let mut found = 0;
+            assert_eq!(walk_discs(&lines, Child::Node(0), everything, 5000, &mut found), classes);
+            assert_eq!(found, count as usize);
         }
     }
 
