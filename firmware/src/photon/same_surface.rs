@@ -10,6 +10,7 @@ pub const MIN_NORMAL_COSINE: f32 = 0.75;
 const CODES: usize = 256;
 
 /// Unit normal of each code.
+#[expect(clippy::indexing_slicing, reason = "computed at compile time")]
 static NORMALS: [Vec3; CODES] = {
     let mut normals = [Vec3::ZERO; CODES];
     let mut code = 0;
@@ -28,6 +29,7 @@ const fn computed_normal(code: u8) -> Vec3 {
 }
 
 /// For each code of a normal, the classes of the normals that are taken as its surface's, one bit each.
+#[expect(clippy::indexing_slicing, reason = "computed at compile time")]
 static CLASSES: [u16; CODES] = {
     let mut classes = [0; CODES];
     let mut pair = 0;
