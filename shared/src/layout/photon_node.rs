@@ -64,8 +64,8 @@ impl<'a> PhotonNode<'a> {
         [line[SHARE], line[SHARE + 1]] = [low, high];
     }
 
-    /// Classes of the normals of the node's photons ([`normal_class`]), one bit each. 0 where the host has not
-    /// stated them.
+    /// Classes of the normals of the node's photons ([`normal_class`]), one bit each; 0 where the host has
+    /// not stated them.
     ///
     /// [`normal_class`]: super::normal_class
     #[inline(always)]

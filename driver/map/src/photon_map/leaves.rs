@@ -7,9 +7,9 @@
 //! leaves, so that lines are full. The binary tree is then folded into wide nodes with the fewest expected
 //! visits, by the same probabilities.
 //!
-//! In a caustic map photons are grouped by the classes of their normals and by the sizes of their discs before
-//! they are split in space, so that a search skips the groups of other surfaces, and no large disc enlarges
-//! the box of small ones.
+//! In a caustic map photons are grouped by the classes of their normals and by the sizes of their discs
+//! before they are split in space, so that a search skips the groups of other surfaces, and no large disc
+//! enlarges the box of small ones.
 
 use std::num::NonZeroU8;
 
