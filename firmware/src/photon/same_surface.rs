@@ -28,7 +28,7 @@ const fn computed_normal(code: u8) -> Vec3 {
     Vec3::new(x * inverse, y * inverse, z * inverse)
 }
 
-/// For each code of a normal, the classes of the normals that are taken as its surface's, one bit each.
+/// Classes of the normals that are taken as of one surface with the normal of each code, one bit each.
 #[expect(clippy::indexing_slicing, reason = "computed at compile time")]
 static CLASSES: [u16; CODES] = {
     let mut classes = [0; CODES];
@@ -50,7 +50,7 @@ pub(super) fn unit_normal(code: u8) -> Vec3 {
     NORMALS.get(usize::from(code)).copied().unwrap_or_default()
 }
 
-/// Square root of a number from 1/3 to 1, rounded correctly: Newton's method in twice the precision.
+/// Square root of a number from 1/3 to 2, rounded correctly: Newton's method in twice the precision.
 const fn root(square: f32) -> f32 {
     let square = square as f64;
     let (mut root, mut step) = (1.0, 0);

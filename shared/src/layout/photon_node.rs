@@ -70,7 +70,7 @@ impl<'a> PhotonNode<'a> {
     /// [`normal_class`]: super::normal_class
     #[inline(always)]
     pub fn normals(&self) -> u16 {
-        u16::from_le_bytes([SHARE, SHARE + 1].map(|at| WideNode(self.0).byte(at)))
+        u16::from_le_bytes([WideNode(self.0).byte(SHARE), WideNode(self.0).byte(SHARE + 1)])
     }
 
     /// Sets the classes of normals in the line of a node.

@@ -51,9 +51,7 @@ pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f3
 /// Number of cells that a photon's disc extends from its position. `greatest` is the radius of the last code,
 /// metres.
 pub(super) fn reach(photon: &StoredPhoton, greatest: f32) -> u32 {
-    let [.., low, high] = photon.content();
-    let code = Photon::disc_of_flags(u16::from_le_bytes([low, high]));
-    (greatest * kernel_share(code).sqrt()).ceil() as u32 + MARGIN_CELLS
+    (greatest * kernel_share(photon.disc()).sqrt()).ceil() as u32 + MARGIN_CELLS
 }
 
 fn place(photon: &StoredPhoton) -> Place {

@@ -16,6 +16,7 @@ use std::num::NonZeroU8;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::PHOTON_STACK;
 use photoncard_shared::layout::{GRID_BITS, GridBox, LEAF_PHOTONS, PhotonLeaf, PhotonNode, leaf_capacity};
+use rayon::prelude::*;
 
 use crate::fold::{Folded, Tree};
 use crate::photon::StoredPhoton;
@@ -51,13 +52,13 @@ impl<'a> PhotonTree<'a> {
     /// Builds a tree of photons for searches with a radius of about `radius` cells. It does not depend on
     /// threads. `None` without photons.
     pub(super) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
-        Self::of(photons, &Searches { radius, reach: &|_| 0, is_of_discs: false })
+        Self::of(photons, &Searches { radius, reach: None })
     }
 
     /// Builds a tree of photons for searches at a point. Its boxes contain all points within the reach of
     /// each photon, cells. Its nodes have the classes of normals.
     pub(super) fn of_discs(photons: &'a mut [StoredPhoton], reach: Reach) -> Option<Self> {
-        Self::of(photons, &Searches { radius: 0.0, reach, is_of_discs: true })
+        Self::of(photons, &Searches { radius: 0.0, reach: Some(reach) })
     }
 
     fn of(photons: &'a mut [StoredPhoton], searches: &Searches) -> Option<Self> {
@@ -98,13 +99,11 @@ type Reach<'r> = &'r (dyn Fn(&StoredPhoton) -> u32 + Sync);
 struct Searches<'r> {
     /// Radius of a typical search, cells.
     radius: f64,
-    /// Distance by which a photon's box is enlarged.
-    reach: Reach<'r>,
-    /// True for a caustic map, whose photons are found by their own radii.
-    is_of_discs: bool,
+    /// Distance by which a photon's box is enlarged, in a caustic map, whose groups have radii of their own.
+    reach: Option<Reach<'r>>,
 }
 
-/// Group of a caustic photon: the class of its normal, and that of its radius. Radii in a group differ by a
+/// Group of a caustic photon: the class of its normal, and that of its disc. Areas in a group differ by a
 /// factor of at most two.
 fn group(photon: &StoredPhoton) -> (u32, u8) {
     (photon.normal_class(), photon.disc() / 2)
@@ -116,14 +115,12 @@ fn build_groups(
     searches: &Searches,
     depth: usize,
 ) -> Option<Tree<Run, Extent>> {
-    if !searches.is_of_discs {
-        return build(photons, 0, searches, depth);
-    }
-    photons.sort_unstable_by_key(|photon| (group(photon), *photon));
+    let Some(reach) = searches.reach else { return build(photons, 0, searches, depth) };
+    photons.par_sort_unstable_by_key(|photon| (group(photon), *photon));
     let mut first = 0;
     let mut parts: Vec<Tree<Run, Extent>> = Vec::new();
     for part in photons.chunk_by_mut(|photon, next| group(photon) == group(next)) {
-        let radius = part.iter().map(searches.reach).max().unwrap_or(0);
+        let radius = part.iter().map(reach).max().unwrap_or(0);
         let count = part.len() as u32;
         parts.push(build(part, first, &Searches { radius: radius.into(), ..*searches }, depth)?);
         first += count;
@@ -160,7 +157,7 @@ fn build(
     if let Some(count) = count
         && PhotonLeaf::fits(&extent.room, photons.len())
     {
-        let reached = Extent::reached(photons, searches);
+        let reached = Extent::reached(photons, searches.reach);
         return Some(Tree::leaf(Run { first, count }, reached, 0.0));
     }
     let (axis, middle) = if depth < MAX_SKEWED {
@@ -179,7 +176,7 @@ fn build(
     Some(Tree::node(parts, below.union(above), extent.chance(radius) as f32, None))
 }
 
-/// Bounding box of photons, and the classes of their normals, one bit each; 0 but in a caustic map.
+/// Bounding box of photons, and in a caustic map the classes of their normals, one bit each.
 #[derive(Clone, Copy)]
 struct Extent {
     room: GridBox,
@@ -196,13 +193,12 @@ impl Extent {
     }
 
     /// Box of all grid points within the reach of the photons, on each axis, with their classes.
-    fn reached(photons: &[StoredPhoton], searches: &Searches) -> Self {
+    fn reached(photons: &[StoredPhoton], reach: Option<Reach>) -> Self {
         let mut extent = Self { room: GridBox { lower: [u32::MAX; 3], upper: [0; 3] }, normals: 0 };
         for photon in photons {
-            let reach = (searches.reach)(photon);
+            let (reach, normals) = reach.map_or((0, 0), |reach| (reach(photon), 1 << photon.normal_class()));
             let lower = photon.point().map(|coordinate| coordinate.saturating_sub(reach));
             let upper = photon.point().map(|coordinate| (coordinate + reach).min(LAST_POINT));
-            let normals = if searches.is_of_discs { 1 << photon.normal_class() } else { 0 };
             extent = extent.union(Self { room: GridBox { lower, upper }, normals });
         }
         extent
@@ -395,8 +391,9 @@ mod tests {
                 .into_iter()
                 .zip(0_u32..)
                 .map(|((point, content), index)| {
-                    let content =
-                        (u64::from_le_bytes(content) | u64::from(hash(index) % 225) << 50).to_le_bytes();
+                    let content = (u64::from_le_bytes(content)
+                        | u64::from(((hash(index) % 15) << 4) + hash(index) / 15 % 15) << 50)
+                        .to_le_bytes();
                     StoredPhoton::at(point, Photon::content_with_disc(content, (hash(!index) & 31) as u8))
                 })
                 .collect();
