@@ -92,7 +92,7 @@ fn photons(place: &Place) -> Option<Step> {
         Step::TreePhoton
     } else if place.is_in("importance/incident.rs") {
         if place.is_of("importance/incident.rs", "new") { Step::TablePhoton } else { Step::Table }
-    } else if place.is_of("photon/radiance.rs", "holds") {
+    } else if place.is_in("photon/same_surface.rs") {
         Step::Normal
     } else if place.is_of("scene/reflection/ggx_kernel.rs", "factor") {
         Step::Microfacets

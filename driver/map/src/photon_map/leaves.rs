@@ -67,6 +67,10 @@ impl<'a> PhotonTree<'a> {
             // Median splits are slower to search, but have minimum depth.
             folded = Folded::new(build_groups(photons, searches, MAX_SKEWED)?);
         }
+        if folded.stack > PHOTON_STACK {
+            // The tree above the groups is too deep.
+            folded = Folded::new(build(photons, 0, searches, MAX_SKEWED)?);
+        }
         Some(Self { photons, folded })
     }
 
@@ -356,20 +360,25 @@ mod tests {
         }
     }
 
-    /// Checks below `child` of a caustic map, all of whose discs reach `reach` cells, that each box contains
-    /// the reach of its photons, and that each node states the classes of their normals. Returns the classes,
-    /// and counts the photons.
-    fn walk_discs(lines: &PhotonLines, child: Child, room: GridBox, reach: u32, count: &mut usize) -> u16 {
+    /// Reach of a photon, cells: 1,000 for each step of its disc.
+    fn reach(photon: &StoredPhoton) -> u32 {
+        1000 * u32::from(photon.disc())
+    }
+
+    /// Checks below `child` of a caustic map that each box contains the [`reach`] of its photons, and that
+    /// each node states the classes of their normals. Returns the classes, and counts the photons.
+    fn walk_discs(lines: &PhotonLines, child: Child, room: GridBox, count: &mut usize) -> u16 {
         let node = match child {
             Child::Leaf(leaf) => {
                 let leaf = PhotonLeaf::read(&lines.leaves[leaf as usize]);
                 *count += leaf.photons() as usize;
                 return (0..leaf.photons()).fold(0, |classes, index| {
                     let point = leaf.point(index);
-                    let lower = point.map(|coordinate| coordinate.saturating_sub(reach));
-                    let upper = point.map(|coordinate| (coordinate + reach).min(LAST_POINT));
+                    let photon = StoredPhoton::at(point, leaf.content(index));
+                    let lower = point.map(|coordinate| coordinate.saturating_sub(reach(&photon)));
+                    let upper = point.map(|coordinate| (coordinate + reach(&photon)).min(LAST_POINT));
                     assert!(room.contains(&GridBox { lower, upper }));
-                    classes | 1 << StoredPhoton::at(point, leaf.content(index)).normal_class()
+                    classes | 1 << photon.normal_class()
                 });
             }
             Child::Node(node) => &lines.nodes[node as usize],
@@ -378,7 +387,7 @@ mod tests {
         let classes = (0..children).fold(0, |classes, child| {
             let sides = PhotonNode(node).coordinates().map(|axis| axis.sides(child).expect("a child"));
             let room = GridBox { lower: sides.map(|[lower, _]| lower), upper: sides.map(|[_, upper]| upper) };
-            classes | walk_discs(lines, WideNode(node).links().child(child as u32), room, reach, count)
+            classes | walk_discs(lines, WideNode(node).links().child(child as u32), room, count)
         });
         assert_eq!(PhotonNode(node).normals(), classes);
         classes
@@ -398,11 +407,12 @@ mod tests {
                 })
                 .collect();
             let classes = stored.iter().fold(0, |classes, photon| classes | 1 << photon.normal_class());
-            let tree = PhotonTree::of_discs(&mut stored, &|_| 5000).expect("there are photons");
+            let tree = PhotonTree::of_discs(&mut stored, &reach).expect("there are photons");
+            assert!(tree.folded.stack <= PHOTON_STACK, "{}", tree.folded.stack);
             let lines = PhotonLines { nodes: tree.nodes().collect(), leaves: tree.leaves().collect() };
             let everything = GridBox { lower: [0; 3], upper: [u32::MAX; 3] };
             let mut found = 0;
-            assert_eq!(walk_discs(&lines, Child::Node(0), everything, 5000, &mut found), classes);
+            assert_eq!(walk_discs(&lines, Child::Node(0), everything, &mut found), classes);
             assert_eq!(found, count as usize);
         }
     }

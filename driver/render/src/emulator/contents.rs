@@ -1,7 +1,8 @@
 //! Contents of the lines that a chip reads: the boxes, triangles and photons among which it searches.
 //!
-//! A chip tests everything in a line, so that these counts are the exact numbers of its units' steps. The
-//! cost model ([`crate::cost_model`]) multiplies them by the operations per step.
+//! A chip tests everything in a line, so that these counts are the exact numbers of its units' steps. Only
+//! the boxes of a caustic node that a search skips by its classes of normals are counted and not tested. The
+//! cost model ([`crate::cost_model`]) multiplies the counts by the operations per step.
 
 use std::ops::Range;
 
