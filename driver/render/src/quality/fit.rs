@@ -136,6 +136,14 @@ const WEIGHT_OF_RECORDS: f64 = 0.5;
 /// Weight of the map's squared error in 4x4 pixels. It is above 1, because the error is not noise of single
 /// pixels but a blotch.
 const WEIGHT_OF_MAP: f64 = 6.0;
+/// [`WEIGHT_OF_MAP`] for a map that is guided to the camera. Few parts of the scene then have most of the
+/// photons, and each brings light to a large part of the picture: blotches are wide, and the pilot's few
+/// photons, which are guided less, show a third of their square.
+const WEIGHT_OF_GUIDED_MAP: f64 = 8.0 * WEIGHT_OF_MAP;
+/// Minimum number of photons for each triangle, up to [`MOST_FOR_TRIANGLES`]. Photons that are farther apart
+/// than things are large make furnished rooms too dark, of which the pilot's noise tells nothing.
+const PHOTONS_OF_TRIANGLE: usize = 8;
+const MOST_FOR_TRIANGLES: usize = 1_000_000;
 /// Allowed error of 4x4 pixels by the photon map, relative to the aimed noise of the picture. The error of
 /// single pixels is up to twice as large.
 const SHARE_OF_MAP: f64 = 0.25;
@@ -239,6 +247,7 @@ impl Quality {
         let Some(level) = self.level(finish) else { return Ok(None) };
         let of = Pictured {
             pixels: f64::from(settings.picture.width) * f64::from(settings.picture.height),
+            triangles: scene.triangles.len(),
             is_cached: settings.integrator.irradiance_error.is_some(),
         };
         Ok(Some(level.fit(&measure(scene, packed, settings, observer)?, &of)))
@@ -248,6 +257,7 @@ impl Quality {
 /// Properties of a picture that a fit depends on.
 struct Pictured {
     pixels: f64,
+    triangles: usize,
     /// True if the irradiance cache may be used.
     is_cached: bool,
 }
@@ -279,14 +289,17 @@ impl Level {
         let weight = if interpolates { WEIGHT_OF_RECORDS } else { 1.0 };
         let cost = COST_OF_GATHER_RAY * gather_rays_per_ray.max(MIN_GATHER_RAYS_PER_RAY);
         let gather_rays = number(weight * gather_ray, cost);
-        let photons = number(WEIGHT_OF_MAP * photon, COST_OF_PHOTON / of.pixels);
+        let weight_of_map = if gaining.is_some() { WEIGHT_OF_GUIDED_MAP } else { WEIGHT_OF_MAP };
+        let photons = number(weight_of_map * photon, COST_OF_PHOTON / of.pixels);
+        let for_triangles = of.triangles.saturating_mul(PHOTONS_OF_TRIANGLE).min(MOST_FOR_TRIANGLES);
+        let [fewest, most] = [*self.photons.start(), *self.photons.end()];
         Fit {
             samples,
-            photons: rounded(photons, &self.photons),
+            photons: rounded(photons, &(fewest.max(for_triangles).min(most)..=most)),
             photons_for: if gaining.is_some() { PhotonsFor::Camera } else { PhotonsFor::Scene },
             gather_rays: within(gather_rays, &self.gather_rays, 8),
             beyond: Beyond {
-                photons: (photons > *self.photons.end() as f64).then(|| rounded(photons, &(0..=MAX_PHOTONS))),
+                photons: (photons > most as f64).then(|| rounded(photons, &(0..=MAX_PHOTONS))),
                 gather_rays: (gather_rays > f64::from(*self.gather_rays.end()))
                     .then(|| within(gather_rays, &(0..=MAX_RAYS_OF_RECORD), 8)),
             },
@@ -346,7 +359,7 @@ mod tests {
         level: 4.0,
         deviations: Deviations::NONE,
     };
-    const PICTURED: Pictured = Pictured { pixels: 65_536.0, is_cached: true };
+    const PICTURED: Pictured = Pictured { pixels: 65_536.0, triangles: 32, is_cached: true };
 
     fn good(variances: &Variances) -> Fit {
         Quality::Good.level(Finish::Rendered).unwrap().fit(variances, &PICTURED)
@@ -404,9 +417,22 @@ mod tests {
     }
 
     #[test]
+    fn a_scene_of_many_triangles_has_photons_for_each() {
+        let few = Variances { photon: 0.0, ..VARIANCES };
+        let photons = |quality: Quality, triangles| {
+            let of = Pictured { triangles, ..PICTURED };
+            quality.level(Finish::Rendered).unwrap().fit(&few, &of).photons
+        };
+        assert_eq!(photons(Quality::Good, 10_000), 200_000);
+        assert_eq!(photons(Quality::Good, 100_000), 800_000);
+        assert_eq!(photons(Quality::Good, usize::MAX), MOST_FOR_TRIANGLES);
+        assert_eq!(photons(Quality::Draft, 100_000), 400_000);
+    }
+
+    #[test]
     fn fewer_photons_are_traced_for_the_camera_where_that_gains() {
         let by = |ratio: f64| {
-            let maps = ForCamera { photon: 0.25 * VARIANCES.photon, ratio };
+            let maps = ForCamera { photon: 0.01 * VARIANCES.photon, ratio };
             good(&Variances { for_camera: Some(maps), ..VARIANCES })
         };
         let [gaining, even] = [by(0.25), by(0.8)];
