@@ -1,6 +1,5 @@
 //! Fuzzing of compressed buffer views and primitives: damaged streams in valid scenes.
 
-use std::fs;
 use std::path::PathBuf;
 
 use photoncard_driver::scene::gltf;
@@ -9,7 +8,7 @@ use tempfile::TempDir;
 use super::gltf::{glb, split_glb};
 use super::mutation;
 use super::random::Random;
-use super::target::{Target, bound};
+use super::target::{Target, bound, write_anew};
 
 /// Scenes with buffer views of every mode and filter, in both versions of meshopt.
 const MESHOPT: [&[u8]; 2] = [
@@ -75,7 +74,7 @@ impl Target for Streams {
     }
 
     fn read(&self, input: &[u8]) -> bool {
-        fs::write(self.path(), input).expect("there is room for a scene");
+        write_anew(&self.path(), input);
         gltf::load(&self.path()).inspect_err(|error| drop(error.to_string())).is_ok()
     }
 }

@@ -1,6 +1,5 @@
 //! Fuzzing of environment maps in Radiance format. Those in `OpenEXR` are covered by `picture`.
 
-use std::fs;
 use std::path::PathBuf;
 
 use photoncard_driver::scene::Environment;
@@ -8,7 +7,7 @@ use tempfile::TempDir;
 
 use super::mutation;
 use super::random::Random;
-use super::target::{Target, bound};
+use super::target::{Target, bound, write_anew};
 
 /// Target for environment maps.
 pub(super) struct Environments {
@@ -62,7 +61,7 @@ impl Target for Environments {
     }
 
     fn read(&self, input: &[u8]) -> bool {
-        fs::write(self.path(), input).expect("there is room for a picture");
+        write_anew(&self.path(), input);
         match Environment::load(&self.path()) {
             Ok(map) => {
                 assert_eq!(map.texels.len(), map.width as usize * map.height as usize);

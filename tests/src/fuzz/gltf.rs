@@ -1,6 +1,5 @@
 //! Fuzzing of scenes: glTF as text and as GLB, loaded and packed.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use photoncard_driver::error::SceneError;
@@ -11,7 +10,7 @@ use tempfile::TempDir;
 
 use super::mutation;
 use super::random::Random;
-use super::target::{Target, bound};
+use super::target::{Target, bound, write_anew};
 
 /// Maximum number of triangles of a scene that is packed. Larger ones are only loaded.
 const MAX_PACKED: usize = 2000;
@@ -187,7 +186,7 @@ impl Target for Scenes {
     }
 
     fn read(&self, input: &[u8]) -> bool {
-        fs::write(self.path(), input).expect("there is room for a scene");
+        write_anew(&self.path(), input);
         let scene = match load(&self.path()) {
             Ok(scene) => scene,
             Err(error) => {

@@ -14,7 +14,7 @@ use tempfile::TempDir;
 
 use super::mutation;
 use super::random::Random;
-use super::target::Target;
+use super::target::{Target, write_anew};
 use crate::everything::everything;
 
 /// Maximum number of bytes that a file may allocate: the patches of the largest picture, although the file
@@ -160,7 +160,7 @@ impl Target for Files {
     }
 
     fn read(&self, input: &[u8]) -> bool {
-        fs::write(self.path(), input).expect("there is room for a file");
+        write_anew(&self.path(), input);
         (self.read)(&self.path())
     }
 }

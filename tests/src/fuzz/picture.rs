@@ -1,6 +1,5 @@
 //! Fuzzing of pictures: `OpenEXR` files of every compression, read and compared.
 
-use std::fs;
 use std::io::Cursor;
 use std::path::PathBuf;
 
@@ -15,7 +14,7 @@ use tempfile::TempDir;
 
 use super::mutation;
 use super::random::Random;
-use super::target::{Target, bound};
+use super::target::{Target, bound, write_anew};
 
 /// Width and height of the pictures, pixels.
 const SIZE: [usize; 2] = [20, 36];
@@ -112,7 +111,7 @@ impl Target for Pictures {
     }
 
     fn read(&self, input: &[u8]) -> bool {
-        fs::write(self.path(), input).expect("there is room for a picture");
+        write_anew(&self.path(), input);
         let image = match read_rgb(&self.path()) {
             Ok(image) => image,
             Err(error) => {

@@ -1,5 +1,8 @@
 //! Fuzzing targets: readers of foreign bytes.
 
+use std::fs;
+use std::path::Path;
+
 use super::random::Random;
 
 /// Reader of foreign bytes that is fuzzed.
@@ -23,4 +26,14 @@ pub trait Target: Send + Sync {
 /// Bound of allocations, bytes: 64 MiB plus `for_each` per byte of the input.
 pub(super) const fn bound(input: usize, for_each: usize) -> usize {
     (64 << 20) + input * for_each
+}
+
+/// Writes a file in place of that of the input before, which is removed. Some file systems write the contents
+/// of a file that is truncated to the disk when it is closed, which takes milliseconds.
+///
+/// # Panics
+/// If there is no room for the file.
+pub(super) fn write_anew(path: &Path, contents: &[u8]) {
+    let _ = fs::remove_file(path);
+    fs::write(path, contents).expect("there is room for a file");
 }

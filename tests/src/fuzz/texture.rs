@@ -1,6 +1,5 @@
 //! Fuzzing of textures: PNG, JPEG, WebP and KTX2 files in a valid scene.
 
-use std::fs;
 use std::path::PathBuf;
 
 use photoncard_driver::scene::gltf::{self, LoadSettings};
@@ -8,7 +7,7 @@ use tempfile::TempDir;
 
 use super::gltf::glb;
 use super::random::Random;
-use super::target::{Target, bound};
+use super::target::{Target, bound, write_anew};
 use super::{mutation, png};
 
 /// Target for textures. An input is an image file.
@@ -100,7 +99,7 @@ impl Target for Textures {
     }
 
     fn read(&self, input: &[u8]) -> bool {
-        fs::write(self.path(), textured(input)).expect("there is room for a scene");
+        write_anew(&self.path(), &textured(input));
         let settings = LoadSettings { dram_bytes: DRAM_BYTES, ..LoadSettings::default() };
         match gltf::load_with(&self.path(), &settings) {
             Ok(scene) => match &scene.images[..] {

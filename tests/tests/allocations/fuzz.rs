@@ -49,17 +49,17 @@ macro_rules! tests_of_targets {
 mod no_input_panics_hangs_or_takes_much_memory {
     tests_of_targets! {
         frames: 100_000,
-        messages: 500_000,
-        session: 20_000,
-        image: 6_000,
-        gltf: 8_000,
-        meshopt: 8_000,
-        draco: 8_000,
-        textures: 6_000,
-        environments: 20_000,
-        exr: 8_000,
-        parts: 4_000,
-        prepared: 4_000,
+        messages: 300_000,
+        session: 12_000,
+        image: 3_000,
+        gltf: 2_500,
+        meshopt: 2_000,
+        draco: 2_500,
+        textures: 3_000,
+        environments: 10_000,
+        exr: 2_500,
+        parts: 3_000,
+        prepared: 2_000,
     }
 }
 
