@@ -27,7 +27,7 @@ fn glossy() -> Scene {
 fn settings() -> RenderSettings {
     RenderSettings {
         picture: Picture { width: 37, height: 29, ..Picture::default() },
-        photons: PhotonMaps { count: 20_000, neighbors: 50, ..PhotonMaps::default() },
+        photons: PhotonMaps { count: 5000, neighbors: 30, ..PhotonMaps::default() },
         integrator: Integrator { gather_rays: 12, samples: 2, ..Integrator::default() },
         schedule: Schedule { order: GatherOrder::Tiled, ..Schedule::default() },
         cards: CardSet { addresses: vec![card("emulated:1")], ..CardSet::default() },
@@ -101,7 +101,13 @@ fn variants() -> Vec<RenderSettings> {
 
 /// Checks all variants with a sampling, with and without irradiance records.
 fn check_variants(sampling: Sampling) {
-    check_variants_of(&glossy(), &settings().with(|s| s.integrator.sampling = sampling));
+    check_variants_of(&glossy(), &few_pixels().with(|s| s.integrator.sampling = sampling));
+}
+
+/// Settings of a picture that is rendered dozens of times. It has several tiles of 16x16 pixels, and more
+/// gathers than the longest queue.
+fn few_pixels() -> RenderSettings {
+    settings().with(|s| (s.picture.width, s.picture.height) = (27, 19))
 }
 
 /// Checks that pixels of all variants equal those with `settings_of`.
@@ -183,9 +189,9 @@ proptest! {
     ) {
         let scene = everything();
         let base = settings().with(|s| {
-            (s.picture.width, s.picture.height) = (19, 17);
-            s.photons.count = 3000;
-            s.photons.caustic_photons = Some(500);
+            (s.picture.width, s.picture.height) = (17, 13);
+            s.photons.count = 1500;
+            s.photons.caustic_photons = Some(300);
             s.integrator.gather_rays = 8;
             s.integrator.irradiance_error = irradiance_error;
             if is_adaptive {
@@ -229,14 +235,14 @@ fn mixture_sampling_is_exact() {
 
 #[test]
 fn precomputed_irradiance_is_exact() {
-    check_variants_of(&glossy(), &settings().with(|s| s.photons.radiance = Radiance::Precomputed));
+    check_variants_of(&glossy(), &few_pixels().with(|s| s.photons.radiance = Radiance::Precomputed));
 }
 
 #[test]
 fn textures_cut_outs_mirrors_glass_and_lights_of_every_kind_are_exact() {
-    let small = settings().with(|s| {
-        (s.picture.width, s.picture.height) = (25, 19);
-        s.photons.caustic_photons = Some(3000);
+    let small = few_pixels().with(|s| {
+        (s.picture.width, s.picture.height) = (21, 17);
+        s.photons.caustic_photons = Some(1000);
     });
     check_variants_of(&everything(), &small);
 }
@@ -247,7 +253,7 @@ fn adaptive_sampling_is_exact() {
     for irradiance_error in [None, Some(0.1)] {
         let with = |settings: RenderSettings| {
             settings.with(|s| {
-                (s.picture.width, s.picture.height) = (18, 13);
+                (s.picture.width, s.picture.height) = (17, 9);
                 (s.photons.count, s.photons.caustic_photons) = (3000, Some(500));
                 // Paths that share the rays of a sample have eight or more each: enough for a photon search.
                 s.integrator.gather_rays = if irradiance_error.is_some() { 128 } else { 24 };
