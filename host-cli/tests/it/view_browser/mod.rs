@@ -154,7 +154,8 @@ fn a_light_that_is_switched_off_darkens_the_picture() {
 fn a_material_becomes_glass() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
-    let view = View::start(&room, &shipped("cornell-spheres.glb"), &SMALL);
+    let options = [&SMALL[..], &["--caustic-photons", "2000"]].concat();
+    let view = View::start(&room, &shipped("cornell-spheres.glb"), &options);
     let mut tab = opened(&mut browser, &view);
     assert_eq!(
         tab.labels("white"),
