@@ -17,8 +17,8 @@ fn furnace(material: Material) -> Scene {
 fn settings() -> RenderSettings {
     RenderSettings {
         picture: Picture { width: 48, height: 48, ..Picture::default() },
-        photons: PhotonMaps { count: 200_000, ..PhotonMaps::default() },
-        integrator: Integrator { gather_rays: 64, samples: 4, ..Integrator::default() },
+        photons: PhotonMaps { count: 100_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 64, samples: 2, ..Integrator::default() },
         cards: CardSet {
             addresses: vec!["emulated:2".parse::<CardAddress>().unwrap()],
             ..CardSet::default()

@@ -13,8 +13,8 @@ use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_pani
 fn settings() -> RenderSettings {
     RenderSettings {
         picture: Picture { width: 16, height: 16, ..Picture::default() },
-        photons: PhotonMaps { count: 100_000, ..PhotonMaps::default() },
-        integrator: Integrator { gather_rays: 32, samples: 64, ..Integrator::default() },
+        photons: PhotonMaps { count: 30_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 32, samples: 16, ..Integrator::default() },
         ..RenderSettings::default()
     }
 }
@@ -183,9 +183,9 @@ fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Vec<[f32; 3]> {
     let settings = settings().with(|s| {
         s.picture.width = 48;
         s.picture.height = 48;
-        s.integrator.samples = 16;
+        s.integrator.samples = 8;
         s.integrator.gather_rays = 16;
-        s.photons.count = 200_000;
+        s.photons.count = 100_000;
     });
     radiances(&render_or_panic(&scene, &settings).film)
 }

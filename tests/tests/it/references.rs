@@ -77,10 +77,10 @@ fn check_with(
     let scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
     let settings = RenderSettings {
         picture: Picture { width: 64, height: 64, ..Picture::default() },
-        photons: PhotonMaps { count: 300_000, radiance, ..PhotonMaps::default() },
+        photons: PhotonMaps { count: 150_000, radiance, ..PhotonMaps::default() },
         integrator: Integrator {
             gather_rays: if irradiance_error.is_some() { 256 } else { 32 },
-            samples: 16,
+            samples: 8,
             sampling,
             irradiance_error,
             ..Integrator::default()
@@ -96,8 +96,8 @@ fn read(reference: &str) -> RgbImage {
     read_rgb(&path("references").join(reference)).expect("a shipped reference reads")
 }
 
-/// Checks a scene of mirrors, glass, textures or sky.
-fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>) {
+/// Checks a scene of mirrors, glass, textures or sky with a number of photons and of samples.
+fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>, [photons, samples]: [u32; 2]) {
     let mut scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
     let file = environment.map(|file| path("../scenes").join(file));
     scene.environment = file.map(|file| Environment::load(&file).expect("a shipped sky loads"));
@@ -108,8 +108,8 @@ fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>) {
             height: (reference.height / SHRUNK) as u32,
             ..Picture::default()
         },
-        photons: PhotonMaps { count: 500_000, ..PhotonMaps::default() },
-        integrator: Integrator { gather_rays: 8, shadow_rays: 2, samples: 64, ..Integrator::default() },
+        photons: PhotonMaps { count: photons as usize, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 8, shadow_rays: 2, samples, ..Integrator::default() },
         cards: CardSet { addresses: vec!["emulated:2".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
     };
@@ -128,15 +128,15 @@ fn the_glossy_cornell_box_agrees_with_its_reference() {
 
 #[test]
 fn mirror_and_glass_balls_with_caustics_agree_with_their_reference() {
-    check_light_paths("cornell-spheres.glb", "cornell-spheres.exr", None);
+    check_light_paths("cornell-spheres.glb", "cornell-spheres.exr", None, [250_000, 32]);
 }
 
 #[test]
 fn a_room_full_of_textures_agrees_with_its_reference() {
-    check_light_paths("room.glb", "room.exr", None);
+    check_light_paths("room.glb", "room.exr", None, [250_000, 32]);
 }
 
 #[test]
 fn a_court_under_a_sky_agrees_with_its_reference() {
-    check_light_paths("atrium-open.glb", "atrium-sky.exr", Some("sky.exr"));
+    check_light_paths("atrium-open.glb", "atrium-sky.exr", Some("sky.exr"), [500_000, 64]);
 }

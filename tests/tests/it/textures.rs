@@ -10,8 +10,8 @@ use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_pani
 fn settings() -> RenderSettings {
     RenderSettings {
         picture: Picture { width: 48, height: 48, ..Picture::default() },
-        photons: PhotonMaps { count: 100_000, ..PhotonMaps::default() },
-        integrator: Integrator { gather_rays: 32, samples: 4, ..Integrator::default() },
+        photons: PhotonMaps { count: 50_000, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 32, samples: 2, ..Integrator::default() },
         cards: CardSet {
             addresses: vec!["emulated:2".parse::<CardAddress>().unwrap()],
             ..CardSet::default()
