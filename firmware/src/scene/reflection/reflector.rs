@@ -66,8 +66,8 @@ impl Reflector {
         }
     }
 
-    /// Direction below the triangle whose part of the lobe is mirrored to `direction`, above it, and the ratio
-    /// of their cosines to the shading normal, 0 to 1; `None` if no part of the lobe is.
+    /// Direction below the triangle whose part of the lobe is mirrored to `direction`, and the ratio of their
+    /// cosines to the shading normal, 0 to 1; `None` if no part of the lobe is.
     #[inline(always)]
     fn mirrored_part(&self, direction: Vec3) -> Option<(Vec3, f32)> {
         if self.normal == self.geometric_normal {
