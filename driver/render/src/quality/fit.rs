@@ -155,7 +155,7 @@ const SHARE_OF_RECORDS: f64 = 0.5;
 const IRRADIANCE_ERROR_OF_NOISE: f64 = 2.5;
 /// Maximum number of photons for an aimed noise. [`MAX_RAYS_OF_RECORD`] is the maximum number of rays of a
 /// record.
-const MAX_PHOTONS: usize = 8_000_000;
+const MAX_PHOTONS: usize = 16_000_000;
 const MAX_RAYS_OF_RECORD: u32 = 8_000;
 
 impl Fit {
@@ -453,12 +453,12 @@ mod tests {
     fn numbers_beyond_the_limits_are_reported() {
         let beyond = |photon, gather_ray| good(&Variances { photon, gather_ray, ..VARIANCES }).beyond;
         assert_eq!(beyond(VARIANCES.photon, VARIANCES.gather_ray), Beyond::default());
-        let Beyond { photons, gather_rays } = beyond(100.0 * VARIANCES.photon, 100.0 * VARIANCES.gather_ray);
-        // A hundred times the variance takes ten times the number; 4 % cover the rounding of both.
-        let is_tenfold = |more: f64, number: f64| (9.6..10.4).contains(&(more / number));
+        let Beyond { photons, gather_rays } = beyond(400.0 * VARIANCES.photon, 400.0 * VARIANCES.gather_ray);
+        // 400 times the variance take 20 times the number; 4 % cover the rounding of both.
+        let is_multiple = |more: f64, number: f64| (19.2..20.8).contains(&(more / number));
         let fit = good(&VARIANCES);
-        assert!(photons.is_some_and(|more| is_tenfold(more as f64, fit.photons as f64)), "{photons:?}");
-        assert!(gather_rays.is_some_and(|more| is_tenfold(more.into(), fit.gather_rays.into())));
+        assert!(photons.is_some_and(|more| is_multiple(more as f64, fit.photons as f64)), "{photons:?}");
+        assert!(gather_rays.is_some_and(|more| is_multiple(more.into(), fit.gather_rays.into())));
         let most = beyond(f64::INFINITY, f64::INFINITY);
         assert_eq!(most, Beyond { photons: Some(MAX_PHOTONS), gather_rays: Some(MAX_RAYS_OF_RECORD) });
     }

@@ -142,8 +142,8 @@ fn a_lobe_loses_no_light_below_a_triangle_that_its_normal_is_not_of() {
             }
             let ([all, density], [kept, kept_density]) = (integrals(flat), integrals(&tilted));
             let name = format!("lobe {index}, {tilt} {azimuth}");
-            assert!((kept / all - 1.0).abs() < 1e-2, "{name}: {kept} of {all}");
-            assert!((kept_density / density - 1.0).abs() < 1e-2, "{name}: {kept_density} of {density}");
+            assert!((kept / all - 1.0).abs() < 2e-2, "{name}: {kept} of {all}");
+            assert!((kept_density / density - 1.0).abs() < 2e-2, "{name}: {kept_density} of {density}");
 
             let (mut sum, side) = (0.0_f64, 200_u16);
             for sample in 0..side * side {
@@ -154,7 +154,7 @@ fn a_lobe_loses_no_light_below_a_triangle_that_its_normal_is_not_of() {
                 sum += f64::from(weight.x);
             }
             let mean = sum / (f64::from(side) * f64::from(side));
-            assert!((mean / all - 1.0).abs() < 1e-2, "{name}: samples {mean} of {all}");
+            assert!((mean / all - 1.0).abs() < 2e-2, "{name}: samples {mean} of {all}");
         }
     }
 }
