@@ -295,7 +295,7 @@ mod tests {
 
     fn reflector(diffuse: f32, specular: f32, exponent: f32, outgoing: Vec3) -> Reflector {
         let reflection = Reflection::phong(Vec3::splat(diffuse), Vec3::splat(specular), exponent);
-        Reflector { normal: Vec3::Y, geometric_normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
+        Reflector { normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
     }
 
     /// A table with cells between 1 and 255 and a lobe.

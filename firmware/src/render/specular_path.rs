@@ -18,8 +18,7 @@ use super::{Context, SHORTER};
 use crate::memory::MemoryPort;
 use crate::scene::light::{LightChoices, LightSample, Receiver, sample_light};
 use crate::scene::{
-    Hit, Ray, ReflectedDirection, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit, read_surface,
-    transmittance,
+    Hit, Ray, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit, read_surface, transmittance,
 };
 use crate::vector::{max, max_component, min};
 
@@ -190,11 +189,11 @@ impl SpecularPath {
         let was_straight = core::mem::replace(&mut self.is_straight, false);
         let past_specular = chosen - (stays + reflected + transmitted);
         if glossy > 0.0 && (past_specular >= 0.0 || reflected + transmitted <= 0.0) {
-            let ReflectedDirection { direction, weight } = lobe.sample_lobe_alone([u, v]);
+            let direction = lobe.sample_lobe([u, v]);
             if !surface.is_above(direction) {
                 return Arrival::Absorbed;
             }
-            self.throughput *= weight * (all / glossy);
+            self.throughput *= lobe.lobe_weight(direction) * (all / glossy);
             self.ray = Ray::new(surface.offset_origin(), direction);
         } else if chosen < stays + reflected || transmitted <= 0.0 {
             self.throughput *= specular.reflected * (all / reflected);
