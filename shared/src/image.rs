@@ -19,7 +19,7 @@ use crate::message::SumScale;
 /// The first eight bytes of an image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// Version of the formats in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 12;
+pub const LAYOUT_VERSION: u16 = 13;
 /// Lines of the header.
 pub const HEADER_LINES: usize = 2;
 /// Number of entries of [`SectionKind::LeafAttributes`] per line.
@@ -187,7 +187,9 @@ pub struct Header {
     pub caustic_power_unit: f32,
     /// Unit of the fixed-point sums in pixels, W/(sr m^2): a power of two.
     pub radiance_unit: f32,
-    /// Grid on which the photons' positions lie.
+    /// Maximum magnitude of a coordinate of the scene, metres.
+    pub reach: f32,
+    /// Grid on which the photons' positions lie. It may cover a part of the scene only.
     pub photon_grid: PhotonGrid,
     /// Probabilities of the kinds of lights, and the environment light.
     pub lights: Lights,
@@ -239,7 +241,7 @@ pub enum HeaderError {
     /// The image has this layout version, which is not [`LAYOUT_VERSION`].
     Version(u16),
     /// A number is out of range: a unit or the grid's cell is not a positive normal number, a probability is
-    /// not in [0, 1], or the environment's radiance is negative or not finite.
+    /// not in [0, 1], or the environment's radiance or the reach is negative or not finite.
     Unit,
     /// The section with this index extends past the image's last line.
     Section(u8),
@@ -275,6 +277,7 @@ impl Header {
         photon_power_unit: 1.0,
         caustic_power_unit: 1.0,
         radiance_unit: 1.0,
+        reach: 0.0,
         photon_grid: PhotonGrid::UNIT,
         lights: Lights::NONE,
         sections: [Section { first_line: 0, records: 0 }; SECTIONS],
@@ -297,6 +300,7 @@ impl Header {
         put(12, &self.lines.to_le_bytes());
         put(16, &self.photon_power_unit.to_le_bytes());
         put(20, &self.radiance_unit.to_le_bytes());
+        put(24, &self.reach.to_le_bytes());
         put(28, &self.caustic_power_unit.to_le_bytes());
         for (axis, origin) in self.photon_grid.origin.iter().enumerate() {
             put(PHOTON_GRID + 4 * axis, &origin.to_le_bytes());
@@ -338,6 +342,7 @@ impl Header {
             lines: word(12),
             photon_power_unit: f32::from_bits(word(16)),
             radiance_unit: f32::from_bits(word(20)),
+            reach: f32::from_bits(word(24)),
             caustic_power_unit: f32::from_bits(word(28)),
             photon_grid: PhotonGrid {
                 origin: core::array::from_fn(|axis| word(PHOTON_GRID + 4 * axis) as i32),
@@ -375,7 +380,8 @@ impl Header {
         let is_unit = |x: f32| x.is_normal() && x > 0.0;
         let units =
             [self.photon_power_unit, self.caustic_power_unit, self.radiance_unit, self.photon_grid.cell];
-        if !units.into_iter().all(is_unit) || !self.lights.is_sound() {
+        let is_reach = (0.0..=f32::MAX).contains(&self.reach);
+        if !units.into_iter().all(is_unit) || !is_reach || !self.lights.is_sound() {
             return Err(HeaderError::Unit);
         }
         for kind in SectionKind::ALL {
@@ -403,6 +409,7 @@ mod tests {
             photon_power_unit: 0.5,
             caustic_power_unit: 0.25,
             radiance_unit: 2.0,
+            reach: 1.5,
             photon_grid,
             lights: Lights {
                 emitters: 0.5,

@@ -16,6 +16,7 @@
 
 pub mod bvh;
 mod density;
+mod detail;
 mod fold;
 mod light;
 pub mod pack;

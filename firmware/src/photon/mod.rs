@@ -120,7 +120,8 @@ pub fn gathered_radiance(
 ) -> Result<Vec3, Fault> {
     let mut nearest = NearestPhotons::new(candidates.reborrow(), neighbors, max_distance);
     let tested = gather(scene, memory, PhotonMap::Indirect, position, &mut nearest)?;
-    let of_all = reflected_radiance(&nearest, position, None, reflection);
+    let cell = scene.header.photon_grid.cell;
+    let of_all = reflected_radiance(&nearest, cell, None, reflection);
     count(tested, &nearest, &of_all);
     let radius = nearest.radius();
     let surface = (position, reflection.normal());
@@ -139,7 +140,7 @@ pub fn gathered_radiance(
         VISIBLE_MOST * radius * radius * (PI * radius * radius / region.sectors.area(radius * radius)),
     );
     let tested = gather_visible(scene, memory, PhotonMap::Indirect, (position, &region), &mut nearest)?;
-    let of_region = reflected_radiance(&nearest, position, Some(&region.sectors), reflection);
+    let of_region = reflected_radiance(&nearest, cell, Some(&region.sectors), reflection);
     count(tested, &nearest, &of_region);
     // A photon that is visible, and sees all around it, vouches for the others.
     let is_vouched = of_all.sight == Sight::Unknown && of_all.closest == of_region.closest;

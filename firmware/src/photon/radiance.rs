@@ -24,13 +24,13 @@ use photoncard_shared::layout::{disc_fraction, is_of_region};
 
 use super::{Candidate, NearestPhotons, SameSurface, Sectors};
 use crate::fixed_point::ColourSum;
-use crate::scene::{DecodedLobe, PartialReflection, magnitude};
+use crate::scene::{DecodedLobe, PartialReflection};
 use crate::simd::{self, Isa, Kernel};
 use crate::vector::{max, min};
 
-/// Minimum radius of a disc divided by the query's greatest coordinate, about the rounding error. It makes
-/// the density of photons at a single point finite.
-const MIN_RADIUS_SHARE: f32 = 1e-6;
+/// Minimum squared radius of a disc in squared cells of the photon grid: that of a disc with the area of a
+/// cell's face, from which photons are rounded to a single point.
+const MIN_RADIUS_SQUARED: f32 = 1.0 / PI;
 
 /// Light that photons bring to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,25 +61,25 @@ pub enum Sight {
 /// farther away.
 const APART: f32 = 7.0;
 
-/// Radiance of a gather at a position: the reflected power of the photons, divided by the area of their disc
-/// or of the visible region that was searched.
+/// Radiance of a gather: the reflected power of the photons, divided by the area of their disc or of the
+/// visible region that was searched. `cell` is the side of a cell of the photon grid, metres.
 #[inline(never)]
 pub fn reflected_radiance(
     nearest: &NearestPhotons,
-    position: Vec3,
+    cell: f32,
     region: Option<&Sectors>,
     reflection: &PartialReflection,
 ) -> Reflected {
     let lobe = reflection.decode_lobe();
-    simd::run(Estimate { nearest, position, region, reflection, lobe })
+    simd::run(Estimate { nearest, cell, region, reflection, lobe })
 }
 
 /// Kernel of [`reflected_radiance`].
 pub struct Estimate<'a, 'n> {
     /// The nearest photons of a finished search.
     pub nearest: &'a NearestPhotons<'n>,
-    /// Position of the gather, metres.
-    pub position: Vec3,
+    /// Side of a cell of the photon grid, metres.
+    pub cell: f32,
     /// Region that was searched; `None` for a sphere.
     pub region: Option<&'a Sectors>,
     /// Reflection at the position.
@@ -93,7 +93,7 @@ impl Kernel for Estimate<'_, '_> {
 
     #[inline(always)]
     fn run(self, _: impl Isa) -> Reflected {
-        let Self { nearest, position, region, reflection, lobe } = self;
+        let Self { nearest, cell, region, reflection, lobe } = self;
         let (radius_squared, farthest) = if nearest.is_full() {
             let farthest = extreme(nearest, u32::max, |candidate, other| candidate.order() > other.order());
             (farthest.map_or(0.0, |farthest| farthest.distance_squared()), farthest)
@@ -104,8 +104,7 @@ impl Kernel for Estimate<'_, '_> {
             let sight = if region.is_none() && !nearest.is_empty() { Sight::Unknown } else { Sight::Free };
             return Reflected { radiance: Vec3::ZERO, normals_decoded: 0, closest: None, sight };
         };
-        let least = MIN_RADIUS_SHARE * magnitude(&[position]);
-        let radius_squared = max(radius_squared, max(least * least, f32::MIN_POSITIVE));
+        let radius_squared = max(radius_squared, max(MIN_RADIUS_SQUARED * cell * cell, f32::MIN_POSITIVE));
         let fraction = disc_fraction(closest.disc());
         let in_disc = PI * radius_squared * fraction;
         let is_of_region = is_of_region(closest.disc());

@@ -71,7 +71,8 @@ impl Map {
         let lobe = reflection.decode_lobe();
         let radius = nearest.radius();
         let (nearest, reflection) = (&nearest, &reflection);
-        let estimate = || Estimate { nearest, position, region: None, reflection, lobe };
+        let cell = scene.header.photon_grid.cell;
+        let estimate = || Estimate { nearest, cell, region: None, reflection, lobe };
         let mut radiances = Level::ALL.iter().filter_map(|level| level.run(estimate()));
         let of_disc = radiances.next().expect("what every processor has");
         assert!(radiances.all(|other| other == of_disc), "{position}");

@@ -45,3 +45,4 @@ mod settings;
 mod specular;
 mod study_figures;
 mod textures;
+mod wide_ground;

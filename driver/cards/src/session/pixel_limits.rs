@@ -10,8 +10,6 @@ use photoncard_shared::message::{
 const NORMAL_ROUNDING: f64 = 1.0 / (1 << 19) as f64;
 /// Rounding error of a surface's position along the view's axis, relative to the scene's maximum coordinate.
 const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
-/// Maximum number of cells of the photon grid along the longest side of the scene.
-const GRID_CELLS: f32 = (1 << 20) as f32;
 
 /// Ranges of a frame's pixel sums over n samples, of which s see a surface.
 ///
@@ -39,13 +37,10 @@ pub(super) struct BadValue {
 impl PixelLimits {
     /// Computes the limits of a frame of the image with this header.
     pub fn new(header: &Header, frame: &FrameParameters) -> Self {
-        let grid = &header.photon_grid;
-        let corners = grid.origin.iter().map(|&origin| (origin as f32).abs() * grid.cell);
-        let farthest = corners.fold(0.0, f32::max) + GRID_CELLS * grid.cell;
         let eye = frame.camera.origin.iter().fold(0.0, |most: f32, coordinate| most.max(coordinate.abs()));
         let format = SumFormat::new(header, frame);
         let steps = f64::from(DEPTH_STEPS) / f64::from(format.scale.depth);
-        let rounding = f64::from(DEPTH_ROUNDING * (farthest + eye)) * steps + 1.0;
+        let rounding = f64::from(DEPTH_ROUNDING * (header.reach + eye)) * steps + 1.0;
         Self { format, depths: [-rounding, farthest_corner(header, frame) * steps + rounding] }
     }
 
@@ -88,16 +83,10 @@ impl PixelLimits {
     }
 }
 
-/// Distance from the eye to the farthest corner of the photon grid, which contains the scene, metres. It is
-/// multiplied by the length of the view vector if that exceeds 1.
+/// Maximum distance from the eye to a corner of the box of all coordinates up to the scene's reach, metres. It
+/// is multiplied by the length of the view vector if that exceeds 1.
 fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
-    let grid = &header.photon_grid;
     let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();
-    let ways = std::array::from_fn(|axis| {
-        let first = f64::from(grid.origin[axis]) * f64::from(grid.cell);
-        let last = first + f64::from(GRID_CELLS * grid.cell);
-        let eye = f64::from(frame.camera.origin[axis]);
-        (first - eye).abs().max((last - eye).abs())
-    });
+    let ways = frame.camera.origin.map(|eye| f64::from(eye.abs()) + f64::from(header.reach));
     length(ways) * length(frame.camera.forward.map(f64::from)).max(1.0)
 }

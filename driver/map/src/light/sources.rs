@@ -41,9 +41,11 @@ pub(crate) enum Source {
 pub(crate) struct Sources {
     list: Vec<Source>,
     thresholds: Vec<u32>,
-    /// Lower and upper corner of the box through which infinitely distant light enters. It is slightly larger
-    /// than the scene's bounds.
+    /// Lower and upper corner of the box through which infinitely distant light enters: the part of the scene
+    /// in which photons are stored, slightly enlarged.
     pub(crate) bounds: [Vec3; 2],
+    /// Distance from the box, metres, at which nothing of the scene hides it; 0 if it contains the scene.
+    pub(crate) beyond: f32,
     /// Targets at which photons are aimed; empty if photons are not aimed.
     pub(crate) targets: Targets,
     /// Power of all sources, watts, averaged over channels; 0 if photons can be aimed.
@@ -69,22 +71,23 @@ const MIN_AIMED_SHARE: f64 = 1e-3;
 const MARGIN: f32 = 1e-4;
 
 impl Sources {
-    /// Sources of a scene whose photons are emitted in all directions.
-    pub(crate) fn new(scene: &Scene, lights: &Lights) -> Self {
-        Self::towards(scene, lights, Targets::default())
+    /// Sources of a scene whose photons are emitted in all directions. `part` is the part of the scene in which
+    /// photons are stored; `None` if it is the whole scene.
+    pub(crate) fn new(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Self {
+        Self::towards(scene, lights, part, Targets::default())
     }
 
     /// Sources of a scene whose photons are aimed at specular surfaces; `None` if there are no such surfaces.
-    pub(crate) fn of_caustics(scene: &Scene, lights: &Lights) -> Option<Self> {
+    pub(crate) fn of_caustics(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Option<Self> {
         let targets = Targets::specular(scene);
-        (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
+        (!targets.is_empty()).then(|| Self::towards(scene, lights, part, targets))
     }
 
     /// Sources of a scene most of whose photons are aimed at surfaces that are not lamps, because the lights
     /// may be far from them; `None` if there are no such surfaces.
-    pub(crate) fn aimed(scene: &Scene, lights: &Lights) -> Option<Self> {
+    pub(crate) fn aimed(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Option<Self> {
         let targets = Targets::lit(scene);
-        (!targets.is_empty()).then(|| Self::towards(scene, lights, targets))
+        (!targets.is_empty()).then(|| Self::towards(scene, lights, part, targets))
     }
 
     /// Variant of these sources whose photons are partly aimed at other targets.
@@ -93,8 +96,9 @@ impl Sources {
         Self { targets, strongest, power: 0.0, ..self.clone() }
     }
 
-    fn towards(scene: &Scene, lights: &Lights, targets: Targets) -> Self {
-        let bounds = enlarged(scene.bounds());
+    fn towards(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>, targets: Targets) -> Self {
+        let whole = scene.bounds();
+        let bounds = enlarged(part.map_or(whole, |[lower, upper]| (lower, upper)));
         let size = (bounds[1] - bounds[0]).as_dvec3();
         let is_aimed = !targets.is_empty();
         let mut all = AllSources::default();
@@ -123,6 +127,7 @@ impl Sources {
             list: all.list,
             thresholds,
             bounds,
+            beyond: if part.is_some() { whole.0.distance(whole.1) } else { 0.0 },
             targets,
         }
     }
@@ -257,7 +262,7 @@ mod tests {
             environment: Some(Environment::constant(Vec3::ZERO)),
             ..SceneContents::default()
         });
-        let sources = Sources::new(&scene, &Lights::new(&scene));
+        let sources = Sources::new(&scene, &Lights::new(&scene), None);
         assert!((sources.power / (16.0 * std::f64::consts::PI) - 1.0).abs() < 1e-6);
         let at = |number: f64| sources.choose((number * 2.0_f64.powi(64)) as u64).expect("there are some");
         let first = at(0.2);
@@ -268,6 +273,6 @@ mod tests {
         assert!((second.rest - 0.2).abs() < 1e-6, "{second:?}");
         assert_eq!(at(0.999_999_999_9).source, Source::Emitter(1));
         let dark = Scene::default();
-        assert!(Sources::new(&dark, &Lights::new(&dark)).choose(7).is_none());
+        assert!(Sources::new(&dark, &Lights::new(&dark), None).choose(7).is_none());
     }
 }

@@ -1,8 +1,9 @@
 //! Targets at which photons are aimed: spheres around some of a scene's surfaces.
 //!
-//! A sphere is chosen in proportion to the solid angle that it subtends, and then a direction uniformly
-//! within this angle. Where spheres overlap, a direction can be chosen through any of them: its density is
-//! the number of spheres in this direction divided by the sum of the solid angles of all spheres.
+//! A sphere is chosen in proportion to its density times the solid angle that it subtends, and then a direction
+//! uniformly within this angle. Where spheres overlap, a direction can be chosen through any of them: its
+//! density is the sum of the densities of the spheres in this direction, divided by the sum of the products of
+//! all spheres.
 
 use std::f32::consts::PI;
 
@@ -15,6 +16,8 @@ pub(crate) struct Sphere {
     centre: Vec3,
     /// Radius, metres.
     radius: f32,
+    /// Density of photons through the sphere, relative to other spheres.
+    density: f32,
 }
 
 /// Bounding spheres of some of a scene's surfaces.
@@ -68,22 +71,22 @@ impl Targets {
     /// Targets around the surfaces of the chosen materials.
     fn around(scene: &Scene, is_chosen: &[bool], share: f32) -> Self {
         let triangles = scene.triangles.iter().filter(|triangle| is_chosen[triangle.material as usize]);
-        Self::holding(triangles.map(|triangle| triangle.vertices).collect(), share)
+        Self::holding(triangles.map(|triangle| (triangle.vertices, None)).collect(), share)
     }
 
-    /// Targets around boxes, given by their lower and upper corners. Half of the photons are aimed at them.
-    pub(crate) fn boxes(boxes: impl IntoIterator<Item = [Vec3; 2]>) -> Self {
-        Self::holding(boxes.into_iter().map(|[lower, upper]| [lower, upper, lower]).collect(), BOX_SHARE)
+    /// Targets around boxes, given by their lower and upper corners and their weights: the variance that a
+    /// photon of power 1 in the box adds. Half of the photons are aimed at them.
+    pub(crate) fn boxes(boxes: impl IntoIterator<Item = ([Vec3; 2], f64)>) -> Self {
+        let boxes = boxes.into_iter().map(|([lower, upper], weight)| ([lower, upper, lower], Some(weight)));
+        Self::holding(boxes.collect(), BOX_SHARE)
     }
 
-    /// Targets around all of the triangles.
-    fn holding(all: Vec<[Vec3; 3]>, share: f32) -> Self {
+    /// Targets around all of the triangles, with their weights.
+    fn holding(all: Vec<Weighted>, share: f32) -> Self {
         let mut parts: Vec<Part> = Part::new(all).into_iter().collect();
         while parts.len() < MAX_SPHERES {
-            // The largest splittable part.
-            let sizes = parts.iter().enumerate().filter(|(_, part)| part.may_be_split);
-            let Some((index, _)) = sizes.max_by(|(_, a), (_, b)| a.sphere.radius.total_cmp(&b.sphere.radius))
-            else {
+            let costs = parts.iter().enumerate().filter(|(_, part)| part.may_be_split);
+            let Some((index, _)) = costs.max_by(|(_, a), (_, b)| a.cost().total_cmp(&b.cost())) else {
                 break;
             };
             match parts[index].split() {
@@ -101,9 +104,10 @@ impl Targets {
         self.spheres.is_empty()
     }
 
-    /// Sum of the solid angles that the spheres subtend at a point, sr. Overlaps count repeatedly.
+    /// Sum of the solid angles that the spheres subtend at a point, times their densities, sr. Overlaps count
+    /// repeatedly.
     pub(super) fn solid_angle(&self, from: Vec3) -> f32 {
-        self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()).sum()
+        self.spheres.iter().map(|sphere| sphere.weighted_angle(from)).sum()
     }
 
     /// Decides by a number in [0, 1) whether to aim at a sphere. Also returns the remainder of the number,
@@ -125,32 +129,33 @@ impl Targets {
     /// Density with which [`Self::direction`] samples a direction from a point, 1/sr.
     pub(crate) fn direction_density(&self, from: Vec3, towards: Vec3) -> f32 {
         let all = self.solid_angle(from);
-        let covering = self.spheres.iter().filter(|sphere| sphere.cone(from).holds(towards)).count();
-        if all > 0.0 { covering as f32 / all } else { 0.0 }
+        let covering = self.spheres.iter().filter(|sphere| sphere.cone(from).holds(towards));
+        if all > 0.0 { covering.map(|sphere| sphere.density).sum::<f32>() / all } else { 0.0 }
     }
 
     /// Density with which [`Self::place`] samples the line with this direction through the point `place`,
     /// 1/m^2.
     pub(crate) fn place_density(&self, direction: Vec3, place: Vec3) -> f32 {
         let all = self.area();
-        let covering = self.spheres.iter().filter(|sphere| sphere.is_met(place, direction)).count();
-        if all > 0.0 { covering as f32 / all } else { 0.0 }
+        let covering = self.spheres.iter().filter(|sphere| sphere.is_met(place, direction));
+        if all > 0.0 { covering.map(|sphere| sphere.density).sum::<f32>() / all } else { 0.0 }
     }
 
-    /// Sum of the projected areas `pi r^2` of the spheres, m^2. Overlaps count repeatedly.
+    /// Sum of the projected areas `pi r^2` of the spheres, times their densities, m^2. Overlaps count repeatedly.
     pub(super) fn area(&self) -> f32 {
-        self.spheres.iter().map(Sphere::disc_area).sum()
+        self.spheres.iter().map(Sphere::weighted_area).sum()
     }
 
     /// Samples a direction from a point through a sphere, by a point of the unit square; `None` if there are
     /// no spheres.
     pub(crate) fn direction(&self, from: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.solid_angle(from);
-        let (index, c) = choose(c, all, self.spheres.iter().map(|sphere| sphere.cone(from).solid_angle()))?;
+        let (index, c) = choose(c, all, self.spheres.iter().map(|sphere| sphere.weighted_angle(from)))?;
         let towards = self.spheres[index].cone(from).direction([c, d]);
         let others = self.spheres.iter().enumerate().filter(|(other, _)| *other != index);
-        let covering = others.filter(|(_, sphere)| sphere.cone(from).holds(towards)).count();
-        Some(Aim { towards, measure: all / (1 + covering) as f32 })
+        let covering = others.filter(|(_, sphere)| sphere.cone(from).holds(towards));
+        let density = covering.fold(self.spheres[index].density, |sum, (_, sphere)| sum + sphere.density);
+        Some(Aim { towards, measure: all / density })
     }
 
     /// Samples a line with a given direction through a sphere, by a point of the unit square. Returns the
@@ -158,15 +163,16 @@ impl Targets {
     /// spheres.
     pub(crate) fn place(&self, direction: Vec3, [c, d]: [f32; 2]) -> Option<Aim> {
         let all = self.area();
-        let (index, c) = choose(c, all, self.spheres.iter().map(Sphere::disc_area))?;
-        let Sphere { centre, radius } = self.spheres[index];
+        let (index, c) = choose(c, all, self.spheres.iter().map(Sphere::weighted_area))?;
+        let Sphere { centre, radius, density } = self.spheres[index];
         let (tangent, bitangent) = direction.any_orthonormal_pair();
         let (sin, cos) = libm::sincosf(2.0 * PI * d);
         let place = centre + (tangent * cos + bitangent * sin) * (radius * c.sqrt());
         let others = self.spheres.iter().enumerate().filter(|(other, _)| *other != index);
-        let covering = others.filter(|(_, sphere)| sphere.is_met(place, direction)).count();
+        let covering = others.filter(|(_, sphere)| sphere.is_met(place, direction));
+        let density = covering.fold(density, |sum, (_, sphere)| sum + sphere.density);
         let towards = place.reject_from_normalized(direction);
-        Some(Aim { towards, measure: all / (1 + covering) as f32 })
+        Some(Aim { towards, measure: all / density })
     }
 }
 
@@ -237,42 +243,57 @@ impl Sphere {
         (place - self.centre).reject_from_normalized(direction).length_squared() < self.radius * self.radius
     }
 
-    fn disc_area(&self) -> f32 {
-        PI * self.radius * self.radius
+    /// Solid angle that the sphere subtends at a point, times its density, sr.
+    fn weighted_angle(&self, from: Vec3) -> f32 {
+        self.density * self.cone(from).solid_angle()
+    }
+
+    /// Projected area, times the density, m^2.
+    fn weighted_area(&self) -> f32 {
+        self.density * (PI * self.radius * self.radius)
     }
 }
 
+/// A triangle and its weight; `None` if photons are to be equally dense on all triangles.
+type Weighted = ([Vec3; 3], Option<f64>);
+
 /// Some triangles and their bounding sphere.
 struct Part {
-    triangles: Vec<[Vec3; 3]>,
+    triangles: Vec<Weighted>,
     sphere: Sphere,
     may_be_split: bool,
 }
 
 impl Part {
-    fn new(triangles: Vec<[Vec3; 3]>) -> Option<Self> {
-        let corners = || triangles.iter().flatten().copied();
+    fn new(triangles: Vec<Weighted>) -> Option<Self> {
+        let corners = || triangles.iter().flat_map(|(triangle, _)| triangle).copied();
         let [lower, upper] = [corners().reduce(Vec3::min)?, corners().reduce(Vec3::max)?];
         let centre = lower.midpoint(upper);
         let radius = corners().map(|corner| corner.distance(centre)).fold(0.0, f32::max);
         let greatest = lower.abs().max(upper.abs()).max_element();
         let radius = radius * (1.0 + MARGIN) + greatest * MARGIN * MARGIN;
         let may_be_split = triangles.len() > 1;
-        Some(Self { triangles, sphere: Sphere { centre, radius }, may_be_split })
+        let weight: Option<f64> = triangles.iter().map(|(_, weight)| *weight).sum();
+        // The variance `sum w / density` at a given number of photons is least for these densities.
+        let density = weight.map_or(1.0, |weight| (weight.sqrt() / f64::from(radius)) as f32);
+        Some(Self { triangles, sphere: Sphere { centre, radius, density }, may_be_split })
     }
 
-    /// Halves the part along its longest axis, if the halves' spheres together have less projected area than
-    /// its own.
+    /// Share of the photons that the part takes, not normalized.
+    fn cost(&self) -> f32 {
+        self.sphere.density * self.sphere.radius * self.sphere.radius
+    }
+
+    /// Halves the part along its longest axis, if the halves together take fewer photons than it does.
     fn split(&self) -> Option<[Self; 2]> {
-        let middle = |[a, b, c]: &[Vec3; 3]| (a + b + c) / 3.0;
+        let middle = |([a, b, c], _): &Weighted| (*a + *b + *c) / 3.0;
         let lower = self.triangles.iter().map(middle).reduce(Vec3::min)?;
         let upper = self.triangles.iter().map(middle).reduce(Vec3::max)?;
         let axis = (upper - lower).max_position();
         let border = lower.midpoint(upper)[axis];
         let (first, second) = self.triangles.iter().partition(|triangle| middle(triangle)[axis] < border);
         let parts = [Self::new(first)?, Self::new(second)?];
-        let [a, b] = [&parts[0], &parts[1]].map(|part| part.sphere.radius * part.sphere.radius);
-        (a + b < self.sphere.radius * self.sphere.radius).then_some(parts)
+        (parts[0].cost() + parts[1].cost() < self.cost()).then_some(parts)
     }
 }
 
@@ -288,8 +309,12 @@ mod tests {
 
     /// Three spheres, two of which overlap.
     fn targets() -> Targets {
-        let sphere = |x: f32, y: f32, radius: f32| Sphere { centre: Vec3::new(x, y, 5.0), radius };
-        let spheres = vec![sphere(0.0, 0.0, 1.0), sphere(0.8, 0.0, 0.7), sphere(-3.0, 2.0, 0.5)];
+        let sphere = |x: f32, y: f32, radius: f32, density: f32| {
+            let centre = Vec3::new(x, y, 5.0);
+            Sphere { centre, radius, density }
+        };
+        let spheres =
+            vec![sphere(0.0, 0.0, 1.0, 1.0), sphere(0.8, 0.0, 0.7, 2.5), sphere(-3.0, 2.0, 0.5, 0.3)];
         Targets { spheres, share: 1.0 }
     }
 

@@ -4,6 +4,7 @@
 //! ([`crate::photon`]) traces in it with the chip's ray caster, so that photons lie on exactly the surfaces
 //! that gather rays hit. [`crate::photon_map`] adds the sections of the photon map.
 
+use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::SceneImage;
 use photoncard_picture::allocation::{self, OutOfMemory};
@@ -15,6 +16,7 @@ use photoncard_shared::layout::{
 use photoncard_shared::message::SumScale;
 
 use crate::bvh::{self, Finishes, LeafTriangles};
+use crate::detail;
 use crate::light::{Lights, Sources};
 
 mod card_image;
@@ -38,6 +40,8 @@ const BYTES_OF_A_TRIANGLE: u64 = 700;
 #[derive(Clone)]
 pub struct PackedScene {
     image: CardImage,
+    /// Part of the scene in which photons are stored; `None` if it is the whole scene.
+    detailed_part: Option<[Vec3; 2]>,
     sources: Sources,
     aimed_sources: Option<Sources>,
     caustic_sources: Option<Sources>,
@@ -54,14 +58,18 @@ impl PackedScene {
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
         allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
             .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
+        let part = detail::detailed_part(scene);
+        let split = part.map(|part| detail::split_around(scene, part));
+        let scene = split.as_ref().unwrap_or(scene);
         let lights = Lights::new(scene);
         let image = write(scene, &lights)?;
         let keeps_photons = materials::keep_photons(scene, image.view());
         Ok(Self {
             image,
-            sources: Sources::new(scene, &lights),
-            aimed_sources: Sources::aimed(scene, &lights),
-            caustic_sources: Sources::of_caustics(scene, &lights),
+            detailed_part: part,
+            sources: Sources::new(scene, &lights, part),
+            aimed_sources: Sources::aimed(scene, &lights, part),
+            caustic_sources: Sources::of_caustics(scene, &lights, part),
             keeps_photons,
             has_lobes_under_punctual_lights: !scene.lights.is_empty()
                 && scene.materials.iter().any(|material| scene.has_narrow_lobe(material)),
@@ -83,11 +91,17 @@ impl PackedScene {
         self.image
     }
 
-    /// Grid of photon positions: the finest grid that covers the scene.
+    /// Grid of photon positions: the finest grid that covers the scene or, if all detail is in a small part of
+    /// the scene, this part and what is around it.
     pub fn photon_grid(&self) -> PhotonGrid {
-        self.image
-            .bounds()
-            .map_or(PhotonGrid::UNIT, |NodeBox { lower, upper }| PhotonGrid::around(lower, upper))
+        let part = self.detailed_part.map(|corners| corners.map(|corner| corner.to_array()));
+        let whole = || self.image.bounds().map(|NodeBox { lower, upper }| [lower, upper]);
+        part.or_else(whole).map_or(PhotonGrid::UNIT, |[lower, upper]| PhotonGrid::around(lower, upper))
+    }
+
+    /// Returns whether photons are stored at a position, metres.
+    pub(crate) fn stores_photons_at(&self, position: Vec3) -> bool {
+        self.detailed_part.is_none_or(|[lower, upper]| position.clamp(lower, upper) == position)
     }
 
     /// Units of the sums in pixels.
@@ -151,10 +165,12 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     Ok(image.finish())
 }
 
-/// Header of a scene without photons: units and lights. [`ImageWriter`] sets lines and sections.
+/// Header of a scene without photons: units, reach and lights. [`ImageWriter`] sets lines and sections.
 fn header(scene: &Scene, lights: &Lights) -> Header {
+    let (lower, upper) = scene.bounds();
     Header {
         radiance_unit: radiance_unit(scene, lights),
+        reach: lower.abs().max(upper.abs()).max_element(),
         lights: lights.header(scene.textures.len() as u32),
         ..Header::EMPTY
     }

@@ -13,7 +13,7 @@ use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::light::{
     EmitterPoint, emitter_point, environment_direction, environment_radiance, falloff, read_emitter,
 };
-use photoncard_firmware::scene::{Ray, SceneImage, Surface};
+use photoncard_firmware::scene::{Ray, SceneImage, Surface, closest_hit};
 use photoncard_shared::layout::{Emitter, EmitterKind};
 use photoncard_shared::message::Fault;
 
@@ -134,13 +134,15 @@ pub(super) fn emit(
         }
         Source::Distant { direction, irradiance } => {
             has_extent = false;
-            from_afar(sources.bounds, way, direction, irradiance, [c, d])
+            let emission = from_afar(sources.bounds, way, direction, irradiance, [c, d]);
+            from_beyond(scene, memory, sources, emission)?
         }
         Source::Cell { across: [left, width], cosines: [upper, lower], solid_angle } => {
             let cosine = (upper + (lower - upper) * b).clamp(-1.0, 1.0);
             let towards = environment_direction(left + width * chosen.rest, cosine);
             let irradiance = environment_radiance(scene, memory, towards)? * solid_angle;
-            from_afar(sources.bounds, way, -towards, irradiance, [c, d])
+            let emission = from_afar(sources.bounds, way, -towards, irradiance, [c, d]);
+            from_beyond(scene, memory, sources, emission)?
         }
     };
     let emission = emission.map(|emission| Emission {
@@ -304,6 +306,23 @@ fn from_afar(
         let free = if meets_box(bounds, ray) { 1.0 / shown(bounds, direction).element_sum() } else { 0.0 };
         [way.targets.place_density(direction, ray.origin), free]
     })
+}
+
+/// Moves the origin of a ray from afar out of the scene, if something lies between the sky and the box through
+/// which light enters. Where nothing does, the ray begins at the box, because its precision falls with the
+/// distance.
+fn from_beyond(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    sources: &Sources,
+    emission: Option<Emission>,
+) -> Result<Option<Emission>, Fault> {
+    let Some(Emission { ray, .. }) = emission else { return Ok(None) };
+    let is_open = sources.beyond == 0.0
+        || meets_box(sources.bounds, &ray)
+            && closest_hit(scene, memory, &Ray::new(ray.origin, -ray.direction))?.is_none();
+    let origin = if is_open { ray.origin } else { ray.origin - ray.direction * sources.beyond };
+    Ok(emission.map(|emission| Emission { ray: Ray::new(origin, ray.direction), ..emission }))
 }
 
 /// Projected areas of a box's faces along a direction, m^2.

@@ -93,8 +93,11 @@ impl Importons {
             })
             .collect();
         let (seen, used): (Vec<_>, Vec<_>) = rows?.into_iter().unzip();
-        let seen = seen.concat();
-        let mut used = used.concat();
+        let [seen, mut used] = [seen, used].map(|importons| {
+            let mut all = importons.concat();
+            all.retain(|importon| packed.stores_photons_at(importon.position));
+            all
+        });
         used.extend(&seen);
         Ok(Self { indirect: ImportonGrid::new(&used, indirect), caustic: ImportonGrid::new(&seen, caustic) })
     }
@@ -187,8 +190,6 @@ pub(crate) struct ImportonGrid {
 
 /// Minimum mean number of importons per cell that contains surface.
 const MIN_IMPORTONS: f32 = 8.0;
-/// Fraction of the total weight that the cells at which photons are aimed contain.
-const AIMED_WEIGHT: f64 = 0.95;
 /// Fraction of the importons beyond each face of the box from which the area of the surface is estimated.
 const OUTLIERS: f32 = 0.02;
 
@@ -213,19 +214,13 @@ impl ImportonGrid {
         self.cells.get(&cell).copied().unwrap_or(0.0).sqrt()
     }
 
-    /// Targets for photons: the cells with the greatest weights, which together have most of the weight.
+    /// Targets for photons: the cells with their weights.
     pub(super) fn targets(&self) -> Targets {
         let mut cells: Vec<(&Cell, f64)> = self.cells.iter().map(|(cell, &weight)| (cell, weight)).collect();
-        cells.sort_by(|(a, first), (b, second)| second.total_cmp(first).then(a.cmp(b)));
-        let all: f64 = cells.iter().map(|(_, weight)| weight).sum();
-        let mut sum = 0.0;
-        let greatest = cells.into_iter().take_while(|(_, weight)| {
-            sum += weight;
-            sum - weight < AIMED_WEIGHT * all
-        });
-        Targets::boxes(greatest.map(|((place, _), _)| {
+        cells.sort_by(|(a, _), (b, _)| a.cmp(b));
+        Targets::boxes(cells.into_iter().map(|((place, _), weight)| {
             let lower = Vec3::from_array(place.map(|coordinate| coordinate as f32)) * self.side;
-            [lower, lower + self.side]
+            ([lower, lower + self.side], weight)
         }))
     }
 

@@ -35,9 +35,6 @@ const SHARE_TASKS: u64 = 8;
 /// Number of lower bits of a grid coordinate that a cell in these pilots spans, such that the longest side of
 /// the scene has 32 to 64 cells.
 const CELL_BITS: u32 = GRID_BITS - 6;
-/// Maximum ratio of the spreads of guided paths with and without aim at importons, at which paths are aimed.
-/// It is slightly above 1, because a pilot of unaimed paths misses rare paths of great use.
-const MAX_SPREAD_BY_AIM: f64 = 1.1;
 /// Minimum ratio of the effective numbers of photons of aimed and unaimed paths, at which paths are aimed. It
 /// is 2 so that noise does not decide in rooms, where both are about equal.
 const MIN_GAIN_BY_AIM: f64 = 2.0;
@@ -137,8 +134,7 @@ fn effective_number(weights: impl Iterator<Item = f64>) -> f64 {
     if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }
 
-/// Chooses one of two tracers: the second, which is aimed at importons, if the use of its guided paths
-/// spreads less.
+/// Chooses the tracer the use of whose guided paths spreads less.
 pub(super) fn more_useful<'s>(
     tracers: [Tracer<'s>; 2],
     packed: &PackedScene,
@@ -151,7 +147,7 @@ pub(super) fn more_useful<'s>(
     };
     let [of_first, of_second] = [pilot(&tracers[0])?, pilot(&tracers[1])?];
     let [first, second] = tracers;
-    Ok(if of_second < MAX_SPREAD_BY_AIM * of_first { second } else { first })
+    Ok(if of_second < of_first { second } else { first })
 }
 
 /// Guides a tracer's paths towards importons, for a number of photons; `None` if no path of the pilot is

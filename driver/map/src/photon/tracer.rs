@@ -49,6 +49,7 @@ pub(super) enum Purpose {
 
 /// Parameters of all paths of a tracer.
 pub(super) struct Tracer<'s> {
+    packed: &'s PackedScene,
     scene: SceneImage,
     sources: &'s Sources,
     pub(super) guide: Option<&'s Guide>,
@@ -60,12 +61,12 @@ pub(super) struct Tracer<'s> {
 }
 
 impl<'s> Tracer<'s> {
-    pub(super) fn new(packed: &PackedScene, sources: &'s Sources, seed: u32, purpose: Purpose) -> Self {
+    pub(super) fn new(packed: &'s PackedScene, sources: &'s Sources, seed: u32, purpose: Purpose) -> Self {
         // Photons rarely gain power after emission: factor 2 at a Phong lobe, 16 at glass whose reflection is
         // almost the mirror's alone.
         let path_unit = power_of_two_above(sources.strongest.into());
         let (scene, grid) = (packed.view().0, packed.photon_grid());
-        Self { scene, sources, guide: None, grid, path_unit, seed, purpose }
+        Self { packed, scene, sources, guide: None, grid, path_unit, seed, purpose }
     }
 
     /// Tracer with another seed.
@@ -137,7 +138,7 @@ impl<'s> Tracer<'s> {
                         Purpose::Caustics => emission.has_extent,
                     };
                     // Light that comes through a surface is stored at the side where it arrives.
-                    if !surface.is_behind {
+                    if !surface.is_behind && self.packed.stores_photons_at(surface.position) {
                         photons.push(self.stored(&surface, arrived, flag, random.dither()));
                     }
                     if self.purpose == Purpose::Caustics {

@@ -1,0 +1,198 @@
+//! Scenes all of whose detail is in a small part, such as a product on a ground of many kilometres.
+//!
+//! Photons are stored in this part and its surroundings only: of 20 bits, their coordinates on a ground of 10 km
+//! would be multiples of 1 cm, and few photons of the sky would reach a product of 10 cm. Triangles that are much
+//! larger than their distance from the part are split, because a computed point of a triangle is as exact as
+//! its corners' coordinates are.
+
+use glam::{Vec2, Vec3, Vec4};
+use photoncard_scene::{NO_ATTRIBUTES, NO_TANGENTS, Scene, SceneContents, Triangle, VertexAttributes};
+
+/// Maximum size of a triangle that counts as detail, relative to the scene's.
+const SHARE_OF_DETAIL: f32 = 1.0 / 64.0;
+/// Distance up to which photons around the box of all detail are stored, relative to the box's size. Of the
+/// light that a horizontal ground reflects to a point at this box, at most 1 / 2^16 comes from farther away.
+const SIZES_AROUND: f32 = 256.0;
+/// Minimum size of the part, relative to the scene's. Depths, whose unit is a cell of the part's photon grid,
+/// then fit 64 bits.
+const MIN_SHARE: f32 = 1.0 / 8192.0;
+/// Maximum size of a triangle near the centre of the part, relative to the part's.
+const SHARE_OF_PART: f32 = 1.0 / 32.0;
+/// Maximum size of a triangle relative to its distance from the centre of the part.
+const GROWTH: f32 = 1.0;
+
+/// Lower and upper corner of the box around all detail of a scene and its surroundings, metres; `None` unless
+/// it is much smaller than the scene's bounding box.
+pub(crate) fn detailed_part(scene: &Scene) -> Option<[Vec3; 2]> {
+    let (lower, upper) = scene.bounds();
+    let size = (upper - lower).max_element();
+    let detail = scene.triangles.iter().map(|triangle| ends(&triangle.vertices)).filter(|[low, high]| {
+        let own = (*high - *low).max_element();
+        own > 0.0 && own < SHARE_OF_DETAIL * size
+    });
+    let [low, high] = detail.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
+    let around = (SIZES_AROUND * (high - low).max_element()).max(MIN_SHARE * size);
+    let part = [lower.max(low - around), upper.min(high + around)];
+    let is_smaller = (part[1] - part[0]).max_element() < 0.5 * size;
+    is_smaller.then_some(part)
+}
+
+/// Splits the triangles of a scene that are large for their distance from the centre of a part.
+pub(crate) fn split_around(scene: &Scene, [lower, upper]: [Vec3; 2]) -> Scene {
+    let centre = lower.midpoint(upper);
+    let least = SHARE_OF_PART * (upper - lower).max_element();
+    let is_large = |vertices: &[Vec3; 3]| {
+        let [low, high] = ends(vertices);
+        let distance = centre.distance(centre.clamp(low, high));
+        (high - low).max_element() > least.max(GROWTH * distance)
+    };
+    scene.clone().with(|scene| {
+        let mut index = 0;
+        while index < scene.triangles.len() {
+            let triangle = scene.triangles[index];
+            if is_large(&triangle.vertices) {
+                let [first, second] = halves_of(scene, &triangle);
+                scene.triangles[index] = first;
+                scene.triangles.push(second);
+            } else {
+                index += 1;
+            }
+        }
+    })
+}
+
+/// Halves of a triangle, split at the middle of its longest edge. Their attributes are added to the scene.
+fn halves_of(scene: &mut SceneContents, triangle: &Triangle) -> [Triangle; 2] {
+    let edge = longest_edge(&triangle.vertices);
+    let vertices = halves(edge, triangle.vertices, Vec3::midpoint);
+    let attributes = if triangle.attributes == NO_ATTRIBUTES {
+        [NO_ATTRIBUTES; 2]
+    } else {
+        let own = scene.attributes[triangle.attributes as usize];
+        let tangents = if own.tangents == NO_TANGENTS {
+            [NO_TANGENTS; 2]
+        } else {
+            let own = scene.tangents[own.tangents as usize];
+            halves(edge, own, middle_tangent).map(|half| pushed(&mut scene.tangents, half))
+        };
+        let normals = own.normals.map(|normals| halves(edge, normals, middle_normal));
+        let coordinates = own.coordinates.map(|set| halves(edge, set, Vec2::midpoint));
+        let colours = halves(edge, own.colours, |a, b| Vec4::from(a).midpoint(b.into()).to_array());
+        [0, 1].map(|half: usize| {
+            let attributes = VertexAttributes {
+                normals: normals.map(|normals| normals[half]),
+                coordinates: coordinates.map(|set| set[half]),
+                colours: colours[half],
+                tangents: tangents[half],
+            };
+            pushed(&mut scene.attributes, attributes)
+        })
+    };
+    [0, 1].map(|half: usize| Triangle { vertices: vertices[half], attributes: attributes[half], ..*triangle })
+}
+
+/// Index of the corner at which the longest edge of a triangle begins.
+fn longest_edge(vertices: &[Vec3; 3]) -> usize {
+    let length = |edge: usize| vertices[edge].distance_squared(vertices[(edge + 1) % 3]);
+    (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0)
+}
+
+/// Values at the corners of both halves of a triangle, in its order.
+fn halves<T: Copy>(edge: usize, corners: [T; 3], middle: impl Fn(T, T) -> T) -> [[T; 3]; 2] {
+    let end = (edge + 1) % 3;
+    let middle = middle(corners[edge], corners[end]);
+    let [mut first, mut second] = [corners; 2];
+    (first[end], second[edge]) = (middle, middle);
+    [first, second]
+}
+
+fn middle_normal(a: Vec3, b: Vec3) -> Vec3 {
+    a.midpoint(b).try_normalize().unwrap_or(a)
+}
+
+fn middle_tangent(a: Vec4, b: Vec4) -> Vec4 {
+    middle_normal(a.truncate(), b.truncate()).extend(a.w)
+}
+
+/// Adds a value to a list, and returns its index.
+fn pushed<T>(list: &mut Vec<T>, value: T) -> u32 {
+    list.push(value);
+    (list.len() - 1) as u32
+}
+
+/// Lower and upper corner of a triangle's bounding box.
+fn ends([a, b, c]: &[Vec3; 3]) -> [Vec3; 2] {
+    [a.min(*b).min(*c), a.max(*b).max(*c)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ground of the given size, with texture coordinates from 0 to 1, and a small triangle at the origin.
+    fn scene(size: f32) -> Scene {
+        let corner = |x: f32, z: f32| Vec3::new(x, 0.0, z) * size;
+        let corners = [corner(-0.5, -0.5), corner(-0.5, 0.5), corner(0.5, 0.5), corner(0.5, -0.5)];
+        let halves = [[0, 1, 2], [0, 2, 3]].map(|triangle| triangle.map(|index: usize| corners[index]));
+        Scene::default().with(|scene| {
+            for (attributes, vertices) in (0..).zip(halves) {
+                let across = vertices.map(|corner| Vec2::new(corner.x, corner.z) / size + 0.5);
+                scene.attributes.push(VertexAttributes {
+                    normals: Some([Vec3::Y; 3]),
+                    coordinates: [across; 2],
+                    ..VertexAttributes::NONE
+                });
+                scene.triangles.push(Triangle { vertices, material: 0, attributes });
+            }
+            scene.triangles.push(Triangle::new([Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.1], 0));
+        })
+    }
+
+    #[test]
+    fn photons_are_stored_in_the_whole_of_a_scene_unless_its_detail_is_in_a_small_part() {
+        for size in [1.0, 20.0, 50.0] {
+            assert_eq!(detailed_part(&scene(size)), None, "{size} m");
+        }
+        for size in [1e3, 1e5, 1e6] {
+            let [lower, upper] = detailed_part(&scene(size)).expect("a small part");
+            let around = 25.6_f32.max(size / 8192.0);
+            assert!((lower + Vec3::new(around, 0.0, around)).length() < 1e-3 * around, "{size} m: {lower}");
+            assert!(
+                upper.x < 0.11 + around && upper.z < 0.01 + around && upper.y == 0.1,
+                "{size} m: {upper}"
+            );
+        }
+    }
+
+    #[test]
+    fn triangles_are_split_until_they_are_as_small_as_they_are_near() {
+        let whole = scene(1e6);
+        let part = detailed_part(&whole).expect("a small part");
+        let split = split_around(&whole, part);
+        assert!(split.triangles.len() < 2_000, "{}", split.triangles.len());
+        let area = |scene: &Scene| scene.triangles.iter().map(|own| f64::from(own.area())).sum::<f64>();
+        assert!((area(&split) / area(&whole) - 1.0).abs() < 1e-6);
+        let centre = part[0].midpoint(part[1]);
+        for triangle in &split.triangles {
+            let [low, high] = ends(&triangle.vertices);
+            let distance = centre.distance(centre.clamp(low, high));
+            let most = distance.max((part[1] - part[0]).max_element() / 32.0);
+            assert!((high - low).max_element() <= most, "{triangle:?}");
+        }
+    }
+
+    #[test]
+    fn halves_have_the_attributes_of_their_whole() {
+        let whole = scene(1e5);
+        let split = split_around(&whole, detailed_part(&whole).expect("a small part"));
+        for triangle in split.triangles.iter().filter(|triangle| triangle.attributes != NO_ATTRIBUTES) {
+            let attributes = split.attributes[triangle.attributes as usize];
+            assert_eq!(attributes.normals, Some([Vec3::Y; 3]));
+            assert!(triangle.scaled_normal().y > 0.0, "{triangle:?}");
+            for (corner, across) in triangle.vertices.into_iter().zip(attributes.coordinates[1]) {
+                let stated = Vec2::new(corner.x, corner.z) / 1e5 + 0.5;
+                assert!(across.distance(stated) < 1e-6, "{across} instead of {stated}");
+            }
+        }
+    }
+}
