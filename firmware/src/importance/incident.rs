@@ -185,6 +185,7 @@ mod tests {
     #[test]
     fn a_lobe_in_the_dark_gets_few_rays_and_a_lobe_in_the_light_many() {
         let reflector = |exponent| Reflector {
+            geometric_normal: Vec3::Y,
             normal: Vec3::Y,
             outgoing: Vec3::Y,
             reflection: Reflection::phong(Vec3::splat(0.3), Vec3::splat(0.3), exponent),

@@ -295,7 +295,7 @@ mod tests {
 
     fn reflector(diffuse: f32, specular: f32, exponent: f32, outgoing: Vec3) -> Reflector {
         let reflection = Reflection::phong(Vec3::splat(diffuse), Vec3::splat(specular), exponent);
-        Reflector { normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
+        Reflector { normal: Vec3::Y, geometric_normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
     }
 
     /// A table with cells between 1 and 255 and a lobe.
@@ -388,37 +388,53 @@ mod tests {
         assert!((without_lobe - 0.75).abs() < 5e-3, "{without_lobe}");
     }
 
-    #[test]
-    fn the_density_of_a_sampled_direction_is_the_one_it_was_sampled_with() {
-        let reflector = reflector(0.3, 0.5, 20.0, Vec3::new(2.0, 1.0, 0.5));
-        let table = uneven(9, 4000.0);
-        let mut others = 0;
-        for index in 0..1000 {
-            let Some(sampled) = table.sample(&reflector, pattern(1), index, 1000) else { continue };
-            let density = table.density(&reflector, sampled.direction);
-            // On the border of two cells the rounding of the direction may choose the other.
-            others += u32::from((density / sampled.density - 1.0).abs() > 1e-4);
-        }
-        assert!(others <= 2, "{others}");
+    /// The reflector on a triangle that its normal is not of. A part of its lobe is below the triangle.
+    fn on_another_triangle(reflector: Reflector) -> Reflector {
+        Reflector { geometric_normal: Vec3::new(-0.5, 1.0, 0.2).normalize(), ..reflector }
     }
 
     #[test]
-    fn the_density_integrates_to_one() {
-        let reflector = reflector(0.3, 0.5, 20.0, Vec3::new(0.2, 1.0, 0.1));
-        let table = uneven(2, 4000.0);
-        let side = 1000;
-        let mut integral = 0.0_f64;
-        for i in 0..side {
-            for j in 0..2 * side {
-                let [cosine, azimuth] = [(i as f32 + 0.5) / side as f32, (j as f32 + 0.5) * PI / side as f32];
-                let sine = libm::sqrtf(1.0 - cosine * cosine);
-                let direction = Vec3::new(sine * libm::cosf(azimuth), cosine, sine * libm::sinf(azimuth));
-                let solid_angle = PI / (side * side) as f32;
-                integral += (table.density(&reflector, direction) * solid_angle) as f64;
+    fn the_density_of_a_sampled_direction_is_the_one_it_was_sampled_with() {
+        let flat = reflector(0.3, 0.5, 20.0, Vec3::new(2.0, 1.0, 0.5));
+        let tilted = on_another_triangle(reflector(0.3, 0.5, 20.0, Vec3::new(-2.0, 1.0, 0.5)));
+        for reflector in [flat, tilted] {
+            let table = uneven(9, 4000.0);
+            let mut others = 0;
+            for index in 0..1000 {
+                let Some(sampled) = table.sample(&reflector, pattern(1), index, 1000) else { continue };
+                let density = table.density(&reflector, sampled.direction);
+                // On the border of two cells the rounding of the direction may choose the other.
+                others += u32::from((density / sampled.density - 1.0).abs() > 1e-4);
             }
+            assert!(others <= 2, "{others}");
         }
-        // The part of the lobe below the surface is lost: hardly any here.
-        assert!((integral - 1.0).abs() < 5e-3, "{integral}");
+    }
+
+    #[test]
+    fn the_density_above_the_triangle_integrates_to_the_fraction_of_directions_there() {
+        let flat = reflector(0.3, 0.5, 20.0, Vec3::new(0.2, 1.0, 0.1));
+        let tilted = on_another_triangle(reflector(0.3, 0.5, 20.0, Vec3::new(-1.0, 1.0, 0.1)));
+        let table = uneven(2, 4000.0);
+        for reflector in [flat, tilted] {
+            let is_above = |direction: Vec3| reflector.geometric_normal.dot(direction) > 0.0;
+            let side = 1000;
+            let mut integral = 0.0_f64;
+            for i in 0..side {
+                for j in 0..2 * side {
+                    let cosine = (i as f32 + 0.5) / side as f32;
+                    let azimuth = (j as f32 + 0.5) * PI / side as f32;
+                    let sine = libm::sqrtf(1.0 - cosine * cosine);
+                    let direction = Vec3::new(sine * libm::cosf(azimuth), cosine, sine * libm::sinf(azimuth));
+                    let solid_angle = PI / (side * side) as f32;
+                    if is_above(direction) {
+                        integral += (table.density(&reflector, direction) * solid_angle) as f64;
+                    }
+                }
+            }
+            let rays = (0..10_000).filter_map(|index| table.sample(&reflector, pattern(1), index, 10_000));
+            let above = rays.filter(|sampled| is_above(sampled.direction)).count() as f64 / 10_000.0;
+            assert!((integral - above).abs() < 5e-3, "{integral} {above}");
+        }
     }
 
     #[test]

@@ -86,10 +86,11 @@ impl GatherPoint {
     /// Part of the reflection that the rays serve, seen from the eye.
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
-        let Surface { normal, outgoing, reflection, .. } = self.surface;
+        let reflector = self.surface.reflector();
         let is_of_lobe = self.purpose == Purpose::Lobe;
+        let reflection = reflector.reflection;
         let reflection = if is_of_lobe { reflection.without_lambertian() } else { reflection };
-        Reflector { normal, outgoing, reflection }
+        Reflector { reflection, ..reflector }
     }
 
     /// Chooses the shares of the directions. Points with few rays use the reflection, others the frame's

@@ -18,7 +18,8 @@ use super::{Context, SHORTER};
 use crate::memory::MemoryPort;
 use crate::scene::light::{LightChoices, LightSample, Receiver, sample_light};
 use crate::scene::{
-    Hit, Ray, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit, read_surface, transmittance,
+    Hit, Ray, ReflectedDirection, Reflection, Reflector, SURFACE_CHOICES, Surface, closest_hit, read_surface,
+    transmittance,
 };
 use crate::vector::{max, max_component, min};
 
@@ -131,7 +132,9 @@ impl SpecularPath {
     }
 
     /// Arrives at a surface. The first of the three numbers in `random`, in [0, 1), chooses the continuation,
-    /// the others a direction. If the path ends, the surface loses any lobe that the path would pass.
+    /// the others a direction. If the path ends, the surface loses any lobe that the path would pass. If a
+    /// photon goes on by a lobe, the surface's `outgoing` becomes the direction that the photon is taken to
+    /// come from ([`Reflector::sample_photon`]).
     #[inline(always)]
     pub fn arrive(&mut self, surface: &mut Surface, random: [f32; 3]) -> Arrival {
         if !self.may_pass(surface) && self.absorption == Vec3::ZERO {
@@ -189,11 +192,16 @@ impl SpecularPath {
         let was_straight = core::mem::replace(&mut self.is_straight, false);
         let past_specular = chosen - (stays + reflected + transmitted);
         if glossy > 0.0 && (past_specular >= 0.0 || reflected + transmitted <= 0.0) {
-            let direction = lobe.sample_lobe([u, v]);
+            let (from, sampled) = match self.carried {
+                Carried::Radiance => (surface.outgoing, lobe.sample_lobe_alone([u, v])),
+                Carried::Power => lobe.sample_photon([u, v]),
+            };
+            surface.outgoing = from;
+            let ReflectedDirection { direction, weight } = sampled;
             if !surface.is_above(direction) {
                 return Arrival::Absorbed;
             }
-            self.throughput *= lobe.lobe_weight(direction) * (all / glossy);
+            self.throughput *= weight * (all / glossy);
             self.ray = Ray::new(surface.offset_origin(), direction);
         } else if chosen < stays + reflected || transmitted <= 0.0 {
             self.throughput *= specular.reflected * (all / reflected);

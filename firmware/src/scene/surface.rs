@@ -90,8 +90,8 @@ impl Surface {
     /// Reflection seen from the ray's origin.
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
-        let Self { normal, outgoing, reflection, .. } = *self;
-        Reflector { normal, outgoing, reflection }
+        let Self { normal, geometric_normal, outgoing, reflection, .. } = *self;
+        Reflector { normal, geometric_normal, outgoing, reflection }
     }
 
     /// Multiplies reflection and emission by a throughput.

@@ -1,8 +1,18 @@
 //! Caustics of few photons: sparse light beside a dense patch.
 
 use glam::Vec3;
-use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
+use photoncard_driver::pack::{CardImage, PackedScene};
+use photoncard_driver::photon_map::{MappedImage, PhotonLayout, PhotonSettings, map_photons};
+use photoncard_driver::render::{
+    CardAddress, CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings,
+};
 use photoncard_driver::scene::{Material, PunctualKind, PunctualLight, Reflection, Scene, Transmission};
+use photoncard_firmware::memory::Counted;
+use photoncard_firmware::photon::{CausticSearch, Caustics, LitBy, MIN_NORMAL_COSINE, reflected_caustics};
+use photoncard_firmware::scene::{PartialReflection, Surface};
+use photoncard_shared::address::Structure;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{Photon, PhotonLeaf, PhotonNode, decode_normal, kernel_share};
 use photoncard_tests::shapes::{add_ball, cuboid};
 use photoncard_tests::{camera, lambertian, mean, radiances, render_or_panic, room, scene};
 
@@ -86,4 +96,99 @@ fn a_board_is_not_lit_by_a_caustic_on_the_wall_behind_it() {
         [true, false].map(|has_board| mean(&caustics(&mirror_behind_a_board(has_board), 2_000, 1)));
     assert!(on_wall > 0.0);
     assert!(on_board < 0.01 * on_wall, "{on_board} beside {on_wall}");
+}
+
+/// The caustic map of [`two_balls`], and the maximum radius of its discs, metres.
+fn caustic_map() -> (CardImage, f32) {
+    let settings = PhotonSettings {
+        camera: None,
+        caustic_photons: 20_000,
+        caustic_neighbors: 50,
+        seed: 1,
+        photons: 1000,
+        neighbors: 50,
+        max_distance: None,
+        layout: PhotonLayout::Lines,
+        radiance: Radiance::Density,
+    };
+    let packed = PackedScene::new(&two_balls()).expect("packs");
+    let MappedImage { image, caustics, .. } = map_photons(packed, &settings, &|_| true).expect("maps");
+    (image, caustics.expect("there are caustics").max_distance)
+}
+
+/// Caustics on a white surface, and the number of lines that the search reads.
+fn searched(image: &CardImage, max_radius: f32, position: Vec3, normal: Vec3) -> (Caustics, u64) {
+    let (scene, memory) = image.view();
+    let mut memory = Counted::new(memory);
+    let surface = Surface::white(position, normal, 1.0);
+    let (reflection, lobe) = PartialReflection::encode_present(&surface.reflector(), Vec3::ONE, 1 << 31);
+    let caustics = reflected_caustics(CausticSearch {
+        scene: &scene,
+        memory: &mut memory,
+        position,
+        max_radius,
+        reflection: &reflection,
+        lobe,
+        lit_by: LitBy::All,
+        normals: [normal; 2],
+    });
+    let of_map = [Structure::CausticNodes, Structure::CausticPhotons];
+    let reads = memory.traffic().sum(|_, structure| of_map.contains(&structure));
+    (caustics.expect("the image is valid"), reads.requests)
+}
+
+/// Number of photons on a wall whose discs contain a position, from all leaves.
+fn within_discs(image: &CardImage, max_radius: f32, position: Vec3, normal: Vec3) -> u32 {
+    let grid = image.view().0.header.photon_grid;
+    let mut count = 0;
+    for line in image.section(SectionKind::CausticLeaves) {
+        let leaf = PhotonLeaf::read(&line.0);
+        for index in 0..leaf.photons() {
+            let [.., low, high] = leaf.content(index);
+            let flags = u16::from_le_bytes([low, high]);
+            let way = position - Vec3::from_array(grid.position(leaf.point(index)));
+            let share = kernel_share(Photon::disc_of_flags(flags));
+            let of_photon = Vec3::from_array(decode_normal(Photon::normal_of_flags(flags))).normalize();
+            let is_of_wall = of_photon.dot(normal) >= MIN_NORMAL_COSINE && way.dot(normal).abs() < 1e-3;
+            count += u32::from(is_of_wall && way.length_squared() < max_radius * max_radius * share);
+        }
+    }
+    count
+}
+
+#[test]
+fn a_search_finds_all_caustics_of_a_wall_and_skips_those_of_others() {
+    let (image, max_radius) = caustic_map();
+    let mut of_any_normal = image.lines().to_vec();
+    let nodes = image.view().0.header.section(SectionKind::CausticNodes);
+    for line in &mut of_any_normal[nodes.first_line as usize..][..nodes.records as usize] {
+        PhotonNode::set_normals(&mut line.0, 0);
+    }
+    let of_any_normal = CardImage::of_lines(of_any_normal).expect("a valid image");
+    let mut sums = [0; 3];
+    for (axis, side) in [0, 1, 2].into_iter().flat_map(|axis| [(axis, -1.0), (axis, 1.0)]) {
+        for place in 0..100_u8 {
+            let [u, v] = [place % 10, place / 10].map(|step| f32::from(step) * 0.2 - 0.9);
+            let mut position = [u, v, v];
+            position[axis] = side;
+            position[(axis + 1) % 3] = u;
+            let normal = Vec3::AXES[axis] * -side;
+            let [(found, reads), (all, more_reads)] =
+                [&image, &of_any_normal].map(|image| searched(image, max_radius, position.into(), normal));
+            let of_any = (all.photons, all.radiance);
+            assert_eq!((found.photons, found.radiance), of_any, "{position:?}");
+            assert_eq!(
+                found.photons,
+                within_discs(&image, max_radius, position.into(), normal),
+                "{position:?}"
+            );
+            sums[0] += u64::from(found.photons);
+            sums[1] += reads;
+            sums[2] += more_reads;
+        }
+    }
+    let [photons, reads, more_reads] = sums;
+    println!("{photons} photons, {reads} lines read, {more_reads} of any normal");
+    assert!(photons > 1000, "{photons}");
+    assert!(reads < more_reads, "{reads} {more_reads}");
 }

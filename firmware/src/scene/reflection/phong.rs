@@ -1,10 +1,6 @@
 //! Phong's cosine lobe, normalised (Lafortune, Willems 1994, *Using the modified Phong reflectance model for
 //! physically based rendering*): `f = ks (n + 2) / (2 pi) max(0, cos alpha)^n`, alpha measured from the
 //! mirror direction. Its directions are sampled with the density `p = (n + 1) / (2 pi) max(0, cos alpha)^n`.
-//!
-//! [`PhongLobe::evaluate`] and [`PhongLobe::density`] divide by `2 pi`. [`PhongLobe::sampled_value`],
-//! [`PhongLobe::sampled_density`] and [`PhongLobe::factor`] multiply by the reciprocal. The results can
-//! differ by one unit in the last place, and pictures depend on it.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -39,24 +35,12 @@ impl PhongLobe {
     /// BRDF `f`, 1/sr, for a value of [`Self::power`].
     #[inline(always)]
     pub(super) fn evaluate(&self, power: f32) -> Vec3 {
-        self.albedo * ((self.exponent + 2.0) / (2.0 * PI) * power)
+        self.albedo * (Self::factor(self.exponent) * power)
     }
 
     /// Sampling density `p`, 1/sr, for a value of [`Self::power`].
     #[inline(always)]
     pub(super) fn density(&self, power: f32) -> f32 {
-        (self.exponent + 1.0) / (2.0 * PI) * power
-    }
-
-    /// BRDF `f`, 1/sr, of a sampled direction.
-    #[inline(always)]
-    pub(super) fn sampled_value(&self, power: f32) -> Vec3 {
-        self.albedo * (Self::factor(self.exponent) * power)
-    }
-
-    /// Sampling density `p`, 1/sr, of a sampled direction.
-    #[inline(always)]
-    pub(super) fn sampled_density(&self, power: f32) -> f32 {
         (self.exponent + 1.0) * 0.5 * FRAC_1_PI * power
     }
 

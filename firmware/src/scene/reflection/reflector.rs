@@ -4,6 +4,14 @@
 //! stratified pattern is therefore stratified on the hemisphere too. The Lambertian part and the lobe share
 //! the samples in proportion to their albedos, and the density of the mixture weights each sample (balance
 //! heuristic: Veach, Guibas 1995). This bounds the weight by the sum of the albedos and avoids fireflies.
+//!
+//! On a triangle whose shading normal `n` is not its normal `g`, a part of the lobe lies below the triangle.
+//! That part is mirrored in the triangle, so that no light is lost: with `i' = i - 2 (g.i) g`, the lobe has
+//! `f(i) + f(i') max(0, n.i') / n.i` for `i` above the triangle, and the density `p(i) + p(i')`.
+//!
+//! Of the light from `i`, the eye thus receives `f(i) n.i + f(i') max(0, n.i')`. A photon from `i` is
+//! therefore two, one from `i` and one from `i'`, which the lobe about the shading normal alone reflects. One
+//! of them is followed, with twice the weight.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -30,6 +38,8 @@ pub struct ReflectedDirection {
 pub struct Reflector {
     /// Unit shading normal on the side of `outgoing`.
     pub normal: Vec3,
+    /// Unit normal of the triangle on the side of `outgoing`.
+    pub geometric_normal: Vec3,
     /// Unit vector towards which light is reflected, on the eye's side of a path.
     pub outgoing: Vec3,
     /// Reflection at the point.
@@ -37,18 +47,48 @@ pub struct Reflector {
 }
 
 impl Reflector {
-    /// BRDF `f`, 1/sr, for light from a unit vector on the normal's side.
+    /// BRDF `f`, 1/sr, for light from a unit vector above the triangle, on the normal's side.
     #[inline(always)]
     pub fn evaluate(&self, incident: Vec3) -> Vec3 {
         if self.reflection.is_lambertian() {
             return self.lambertian();
         }
-        self.lambertian()
-            + match &self.reflection.lobe {
-                Lobe::Phong(lobe) => lobe.evaluate(self.phong_power(lobe, incident)),
-                Lobe::Ggx(lobe) => lobe.evaluate(&self.geometry(incident)),
-                Lobe::Sheen(lobe) => lobe.evaluate(self.normal, self.outgoing, incident),
-            }
+        let mut value = self.lobe_value(incident);
+        if let Some((below, share)) = self.mirrored_part(incident) {
+            value += self.lobe_value(below) * share;
+        }
+        self.lambertian() + value
+    }
+
+    /// `f` of the lobe by the shading normal alone, 1/sr.
+    #[inline(always)]
+    fn lobe_value(&self, incident: Vec3) -> Vec3 {
+        match &self.reflection.lobe {
+            Lobe::Phong(lobe) => lobe.evaluate(self.phong_power(lobe, incident)),
+            Lobe::Ggx(lobe) => lobe.evaluate(&self.geometry(incident)),
+            Lobe::Sheen(lobe) => lobe.evaluate(self.normal, self.outgoing, incident),
+        }
+    }
+
+    /// For a direction above the triangle: the direction below it whose part of the lobe is mirrored to
+    /// `direction`, and the ratio of their cosines to the shading normal, 0 to 1; `None` if no part is.
+    #[inline(always)]
+    fn mirrored_part(&self, direction: Vec3) -> Option<(Vec3, f32)> {
+        if self.normal == self.geometric_normal {
+            return None;
+        }
+        let below = -mirror(direction, self.geometric_normal);
+        let [cosine, cosine_below] = [direction, below].map(|direction| self.normal.dot(direction));
+        (cosine_below > 0.0 && cosine > cosine_below).then(|| (below, cosine_below / cosine))
+    }
+
+    /// Mirrors a direction of the lobe in the triangle if it lies below it, and above the shading horizon.
+    #[inline(always)]
+    fn raised(&self, direction: Vec3) -> Vec3 {
+        let is_below = self.normal != self.geometric_normal
+            && self.geometric_normal.dot(direction) < 0.0
+            && self.normal.dot(direction) > 0.0;
+        if is_below { -mirror(direction, self.geometric_normal) } else { direction }
     }
 
     /// Lambertian part of `f`, 1/sr.
@@ -103,6 +143,32 @@ impl Reflector {
     /// Samples a direction of the lobe by a point of the unit square.
     #[inline(always)]
     pub fn sample_lobe(&self, point: [f32; 2]) -> Vec3 {
+        self.raised(self.lobe_direction(point))
+    }
+
+    /// Samples the lobe alone by a point of the unit square. The weight is zero, and the direction anywhere,
+    /// if the sampled direction lies below the shading horizon.
+    pub fn sample_lobe_alone(&self, point: [f32; 2]) -> ReflectedDirection {
+        let direction = self.lobe_direction(point);
+        ReflectedDirection { direction: self.raised(direction), weight: self.lobe_weight(direction) }
+    }
+
+    /// Samples the lobe alone for a photon that arrives from `outgoing`, by a point of the unit square: the
+    /// adjoint of [`Self::sample_lobe_alone`]. Returns the direction, too, that the photon is taken to come
+    /// from: `outgoing`, or its mirror direction below the triangle.
+    pub fn sample_photon(&self, [u, v]: [f32; 2]) -> (Vec3, ReflectedDirection) {
+        let below = -mirror(self.outgoing, self.geometric_normal);
+        let is_of_two = self.normal != self.geometric_normal && self.normal.dot(below) > 0.0;
+        let [v, of_two] = if is_of_two { [2.0 * v, 2.0] } else { [v, 1.0] };
+        let (from, v) = if v < 1.0 { (self.outgoing, v) } else { (below, v - 1.0) };
+        let lobe = Self { outgoing: from, ..*self };
+        let direction = lobe.lobe_direction([u, v]);
+        (from, ReflectedDirection { direction, weight: lobe.lobe_weight(direction) * of_two })
+    }
+
+    /// Samples a direction of the lobe by the shading normal alone.
+    #[inline(always)]
+    fn lobe_direction(&self, point: [f32; 2]) -> Vec3 {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.direction(mirror(self.outgoing, self.normal), point),
             Lobe::Ggx(lobe) => lobe.direction(self.normal, self.outgoing, point),
@@ -110,9 +176,9 @@ impl Reflector {
         }
     }
 
-    /// Weight `f cos(theta) / p` of the lobe, dimensionless, for a direction from [`Self::sample_lobe`]; zero
-    /// below the surface.
-    pub fn lobe_weight(&self, direction: Vec3) -> Vec3 {
+    /// Weight `f cos(theta) / p` of the lobe by the shading normal alone, dimensionless; zero below the
+    /// shading horizon.
+    fn lobe_weight(&self, direction: Vec3) -> Vec3 {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.albedo * (lobe.gain() * max(self.normal.dot(direction), 0.0)),
             Lobe::Ggx(lobe) => lobe.weight(&self.geometry(direction)),
@@ -123,8 +189,8 @@ impl Reflector {
         }
     }
 
-    /// Ratio `f / p` of the lobe divided by its albedo, dimensionless, for a direction from
-    /// [`Self::sample_lobe`] above the surface.
+    /// Ratio `f / p` of the lobe by the shading normal alone, divided by its albedo, dimensionless, for a
+    /// direction above the surface.
     #[inline(always)]
     pub fn lobe_gain(&self, direction: Vec3) -> f32 {
         match &self.reflection.lobe {
@@ -134,9 +200,19 @@ impl Reflector {
         }
     }
 
-    /// Probability density of [`Self::sample_lobe`], 1/sr; 0 without a lobe.
+    /// Probability density of [`Self::sample_lobe`], 1/sr, for a direction above the triangle; 0 without a
+    /// lobe.
     #[inline(always)]
     pub fn lobe_density(&self, direction: Vec3) -> f32 {
+        let density = self.lobe_direction_density(direction);
+        match self.mirrored_part(direction) {
+            Some((below, _)) => density + self.lobe_direction_density(below),
+            None => density,
+        }
+    }
+
+    #[inline(always)]
+    fn lobe_direction_density(&self, direction: Vec3) -> f32 {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => lobe.density(self.phong_power_or_zero(lobe, direction)),
             Lobe::Ggx(lobe) => lobe.density(&self.geometry(direction)),
@@ -148,16 +224,28 @@ impl Reflector {
     /// cheaper.
     #[inline(always)]
     pub fn sampled(&self, direction: Vec3) -> (Vec3, f32) {
+        let (mut value, mut density) = self.lobe_sampled(direction);
+        if let Some((below, share)) = self.mirrored_part(direction) {
+            let (value_below, density_below) = self.lobe_sampled(below);
+            value += value_below * share;
+            density += density_below;
+        }
+        (self.lambertian() + value, density)
+    }
+
+    /// `f` of the lobe and its density by the shading normal alone, both 1/sr.
+    #[inline(always)]
+    fn lobe_sampled(&self, direction: Vec3) -> (Vec3, f32) {
         match &self.reflection.lobe {
             Lobe::Phong(lobe) => {
                 let power = self.phong_power_or_zero(lobe, direction);
-                (self.lambertian() + lobe.sampled_value(power), lobe.density(power))
+                (lobe.evaluate(power), lobe.density(power))
             }
             Lobe::Ggx(lobe) => {
                 let geometry = self.geometry(direction);
-                (self.lambertian() + lobe.evaluate(&geometry), lobe.density(&geometry))
+                (lobe.evaluate(&geometry), lobe.density(&geometry))
             }
-            Lobe::Sheen(lobe) => (self.evaluate(direction), lobe.density()),
+            Lobe::Sheen(lobe) => (lobe.evaluate(self.normal, self.outgoing, direction), lobe.density()),
         }
     }
 
@@ -178,13 +266,7 @@ impl Reflector {
         if cosine <= 0.0 {
             return None;
         }
-        let (value, lobe_density) = match &reflection.lobe {
-            Lobe::Phong(lobe) => {
-                let power = self.phong_power(lobe, direction);
-                (self.lambertian() + lobe.sampled_value(power), lobe.sampled_density(power))
-            }
-            Lobe::Ggx(_) | Lobe::Sheen(_) => self.sampled(direction),
-        };
+        let (value, lobe_density) = self.sampled(direction);
         let density = diffuse_share * cosine * FRAC_1_PI + (1.0 - diffuse_share) * lobe_density;
         let weight = value * (cosine / density);
         (density > 0.0).then_some(ReflectedDirection { direction, weight })
@@ -227,7 +309,7 @@ mod tests {
 
     fn reflector(diffuse: f32, specular: f32, exponent: f32, outgoing: Vec3) -> Reflector {
         let reflection = Reflection::phong(Vec3::splat(diffuse), Vec3::splat(specular), exponent);
-        Reflector { normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
+        Reflector { normal: Vec3::Y, geometric_normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
     }
 
     fn mean_weight(reflector: &Reflector, side: u32) -> f32 {

@@ -1,7 +1,7 @@
 //! Properties of every lobe: samples follow the density, weights are `f cos / p`, and the lobe is reciprocal.
 
 use core::f32::consts::TAU;
-use std::{vec, vec::Vec};
+use std::{format, vec, vec::Vec};
 
 use glam::Vec3;
 
@@ -9,7 +9,7 @@ use super::ggx::GgxLobe;
 use super::lobe::Lobe;
 use super::phong::PhongLobe;
 use super::sheen::SheenLobe;
-use super::{Reflection, Reflector};
+use super::{ReflectedDirection, Reflection, Reflector};
 use crate::sampler::{hash, unit_interval};
 
 fn at(cosine: f32, azimuth: f32) -> Vec3 {
@@ -19,7 +19,7 @@ fn at(cosine: f32, azimuth: f32) -> Vec3 {
 
 fn seen(lobe: Lobe, cosine: f32) -> Reflector {
     let reflection = Reflection { diffuse: Vec3::ZERO, lobe };
-    Reflector { normal: Vec3::Y, outgoing: at(cosine, 0.3), reflection }
+    Reflector { normal: Vec3::Y, geometric_normal: Vec3::Y, outgoing: at(cosine, 0.3), reflection }
 }
 
 fn ggx(roughness: f32, cosine: f32) -> Lobe {
@@ -102,15 +102,99 @@ fn weights_are_the_value_times_the_cosine_over_the_density() {
     for (index, reflector) in reflectors().iter().enumerate() {
         for sample in 0..200_u32 {
             let point = [1, 2].map(|axis| unit_interval(hash(sample * 2 + axis)));
-            let direction = reflector.sample_lobe(point);
+            let ReflectedDirection { direction, weight } = reflector.sample_lobe_alone(point);
+            assert_eq!(direction, reflector.sample_lobe(point));
             if direction.y < 0.02 {
                 continue;
             }
             let density = reflector.lobe_density(direction);
             let expected = reflector.evaluate(direction) * (direction.y / density);
-            let weight = reflector.lobe_weight(direction);
             let error = (weight - expected).abs().max_element();
             assert!(error < 1e-3 * expected.max_element() + 1e-6, "lobe {index}: {weight} {expected}");
+        }
+    }
+}
+
+/// Integrals of `f cos` and of the density over the directions above the triangle and the shading horizon.
+fn integrals(reflector: &Reflector) -> [f64; 2] {
+    const ROWS: usize = 300;
+    const COLUMNS: usize = 600;
+    let mut sums = [0.0_f64; 2];
+    for (row, column) in (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column))) {
+        let direction = at((row as f32 + 0.5) / ROWS as f32, (column as f32 + 0.5) / COLUMNS as f32 * TAU);
+        if reflector.geometric_normal.dot(direction) > 0.0 {
+            let (value, density) = reflector.sampled(direction);
+            assert_eq!((reflector.evaluate(direction), reflector.lobe_density(direction)), (value, density));
+            sums[0] += f64::from(value.x * direction.y);
+            sums[1] += f64::from(density);
+        }
+    }
+    sums.map(|sum| sum * f64::from(TAU) / (ROWS * COLUMNS) as f64)
+}
+
+#[test]
+fn a_lobe_loses_no_light_below_a_triangle_that_its_normal_is_not_of() {
+    for (index, flat) in reflectors().iter().enumerate() {
+        for (tilt, azimuth) in [(0.2_f32, 0.3), (0.2, 3.4), (0.6, 0.3), (0.6, 1.9)] {
+            let tilted = Reflector { geometric_normal: at(tilt.cos(), azimuth), ..*flat };
+            if tilted.geometric_normal.dot(tilted.outgoing) <= 0.0 {
+                continue;
+            }
+            let ([all, density], [kept, kept_density]) = (integrals(flat), integrals(&tilted));
+            let name = format!("lobe {index}, {tilt} {azimuth}");
+            assert!((kept / all - 1.0).abs() < 2e-2, "{name}: {kept} of {all}");
+            assert!((kept_density / density - 1.0).abs() < 2e-2, "{name}: {kept_density} of {density}");
+
+            let (mut sum, side) = (0.0_f64, 200_u16);
+            for sample in 0..side * side {
+                let point = [sample % side, sample / side].map(|i| (f32::from(i) + 0.5) / f32::from(side));
+                let ReflectedDirection { direction, weight } = tilted.sample_lobe_alone(point);
+                let is_above = tilted.geometric_normal.dot(direction) > 0.0 && direction.y > 0.0;
+                assert!(is_above || weight == Vec3::ZERO, "{name}: {direction}");
+                sum += f64::from(weight.x);
+            }
+            let mean = sum / (f64::from(side) * f64::from(side));
+            assert!((mean / all - 1.0).abs() < 2e-2, "{name}: samples {mean} of {all}");
+        }
+    }
+}
+
+/// Powers from all directions above a triangle to all others, weighted by a function of both: by the lobe's
+/// samples for eye rays, and by those for photons.
+#[test]
+fn photons_of_a_lobe_transport_the_power_that_eye_rays_find() {
+    let triangle = Vec3::Y;
+    let importance = |eye: Vec3, light: Vec3| f64::from((1.5 + eye.x) * (1.5 + light.x) * (1.0 + light.y));
+    for (index, flat) in reflectors().iter().take(6).enumerate() {
+        for tilt in [0.2_f32, 0.6] {
+            let on_triangle = |outgoing: Vec3| Reflector {
+                normal: at(tilt.cos(), 0.3),
+                geometric_normal: triangle,
+                outgoing,
+                ..*flat
+            };
+            let (mut found, mut brought, samples) = (0.0_f64, 0.0_f64, 100_000_u32);
+            for sample in 0..samples {
+                let [height, turn, u, v] = [1, 2, 3, 4].map(|axis| unit_interval(hash(hash(sample) + axis)));
+                let start = at(height, turn * TAU);
+                let reflector = on_triangle(start);
+                let normal = reflector.normal;
+                if normal.dot(start) <= 0.0 {
+                    continue;
+                }
+                let ReflectedDirection { direction, weight } = reflector.sample_lobe_alone([u, v]);
+                if direction.y > 0.0 && normal.dot(direction) > 0.0 {
+                    found += f64::from(weight.x * start.y) * importance(start, direction);
+                }
+                let (from, ReflectedDirection { direction, weight }) = reflector.sample_photon([u, v]);
+                let exit = normal.dot(direction);
+                if direction.y > 0.0 && exit > 0.0 {
+                    // The power that arrives is proportional to the cosine to the triangle.
+                    let share = normal.dot(from) * direction.y / exit;
+                    brought += f64::from(weight.x * share) * importance(direction, start);
+                }
+            }
+            assert!((brought / found - 1.0).abs() < 0.03, "lobe {index}, {tilt}: {brought} of {found}");
         }
     }
 }

@@ -244,28 +244,32 @@ fn bumps() -> Vec<DVec3> {
     (0..16).map(|k| tilted(f64::from(k % 4 + 1) * 10.0, 97.0 * f64::from(k))).collect()
 }
 
-/// Mean albedos of a bumpy plate over its texels: with [`bent`] normals, with unbent ones, and with unbent
-/// ones over each texel's own hemisphere.
+/// A direction mirrored in the plate, where a lobe's part below the plate is added.
+fn below(direction: DVec3) -> DVec3 {
+    DVec3::new(direction.x, direction.y, -direction.z)
+}
+
+/// Mean albedos of a bumpy plate over its texels: with [`bent`] normals and the lobe's part below the plate
+/// mirrored in it, with unbent ones, and with unbent ones over each texel's own hemisphere.
 fn albedos(outgoing: DVec3, roughness: Option<f64>) -> [f64; 3] {
     let count = bumps().len() as f64;
     let mut sums = [0.0; 3];
     for normal in bumps() {
         let normal = rounded(normal, 1.0);
-        let albedo = |normal: DVec3, over: DVec3| {
-            // The plate's horizon, or the texel's own.
-            let frame = glam::DQuat::from_rotation_arc(DVec3::Z, over);
-            over_the_sky(|direction| {
-                let direction = frame * direction;
-                match roughness {
-                    Some(roughness) => metal_times_cosine(normal, outgoing, direction, roughness),
-                    None => f64::from(ALBEDO) / PI * normal.dot(direction).max(0.0),
-                }
-            }) / count
+        let value = |normal: DVec3, direction: DVec3| match roughness {
+            Some(roughness) => metal_times_cosine(normal, outgoing, direction, roughness),
+            None => f64::from(ALBEDO) / PI * normal.dot(direction).max(0.0),
         };
-        let used = if roughness.is_some() { bent(normal, outgoing) } else { normal };
-        sums[0] += albedo(used, DVec3::Z);
-        sums[1] += albedo(normal, DVec3::Z);
-        sums[2] += albedo(normal, normal);
+        let mirrored = |direction: DVec3| match roughness {
+            Some(_) => {
+                value(bent(normal, outgoing), direction) + value(bent(normal, outgoing), below(direction))
+            }
+            None => value(normal, direction),
+        };
+        let own = glam::DQuat::from_rotation_arc(DVec3::Z, normal);
+        sums[0] += over_the_sky(mirrored) / count;
+        sums[1] += over_the_sky(|direction| value(normal, direction)) / count;
+        sums[2] += over_the_sky(|direction| value(normal, own * direction)) / count;
     }
     sums
 }
@@ -288,12 +292,12 @@ fn in_a_furnace(material: Material, direction: DVec3) -> f64 {
 #[test]
 fn bumpy_plates_in_a_white_furnace_lose_little() {
     for (degrees, roughness, largest_loss) in [
-        (0.0, None, 0.07),
-        (60.0, None, 0.07),
-        (0.0, Some(0.3), 0.05),
-        (45.0, Some(0.3), 0.2),
-        (70.0, Some(0.3), 0.3),
-        (70.0, Some(0.6), 0.3),
+        (0.0, None, 0.06),
+        (60.0, None, 0.06),
+        (0.0, Some(0.3), 0.005),
+        (45.0, Some(0.3), 0.005),
+        (70.0, Some(0.3), 0.005),
+        (70.0, Some(0.6), 0.005),
     ] {
         let direction = tilted(degrees, 20.0);
         let [expected, unbent, whole] = albedos(direction, roughness);
@@ -305,7 +309,7 @@ fn bumpy_plates_in_a_white_furnace_lose_little() {
         println!(
             "{degrees} {roughness:?}: {found:.4}, expected {expected:.4}, unbent {unbent:.4}, whole {whole:.4}"
         );
-        assert!((found / expected - 1.0).abs() < 0.01, "{degrees} {roughness:?}: {found} {expected}");
+        assert!((found / expected - 1.0).abs() < 0.005, "{degrees} {roughness:?}: {found} {expected}");
         assert!(found >= unbent * 0.995, "{degrees} {roughness:?}: {found} {unbent}");
         assert!(found > whole * (1.0 - largest_loss), "{degrees} {roughness:?}: {found} {whole}");
     }
@@ -320,15 +324,19 @@ fn schlick(f0: f64, outgoing: DVec3, incident: DVec3) -> f64 {
     f0 + (1.0 - f0) * (1.0 - (outgoing + incident).normalize().dot(outgoing)).powi(5)
 }
 
-/// Mean albedo of a bumpy plastic plate over its texels. The lobe uses the [`bent`] normal, the Lambertian
-/// base the texel's own. The base receives the light that the lobe does not reflect.
+/// Mean albedo of a bumpy plastic plate over its texels. The lobe uses the [`bent`] normal, and its part
+/// below the plate is mirrored in it. The Lambertian base uses the texel's own normal, and receives the light
+/// that the lobe does not reflect.
 fn plastic_albedo(outgoing: DVec3, roughness: f64) -> f64 {
     let base = f64::from(ALBEDO);
+    let value = |normal: DVec3, outgoing: DVec3, direction: DVec3| {
+        let metal = schlick(base, outgoing, direction);
+        metal_times_cosine(normal, outgoing, direction, roughness) / metal
+            * schlick(0.04, outgoing, direction)
+    };
     let lobe = |normal: DVec3, outgoing: DVec3| {
         over_the_sky(|direction| {
-            let metal = schlick(base, outgoing, direction);
-            metal_times_cosine(normal, outgoing, direction, roughness) / metal
-                * schlick(0.04, outgoing, direction)
+            value(normal, outgoing, direction) + value(normal, outgoing, below(direction))
         })
     };
     let of_texel = |normal: DVec3| {
@@ -363,7 +371,7 @@ fn bumpy_plastic_plates_lose_no_light_where_normals_are_bent() {
         let expected = plastic_albedo(direction, roughness);
         let found = in_a_furnace(plastic(roughness as f32), direction);
         println!("{degrees} {roughness}: {found:.4}, expected {expected:.4}");
-        assert!((found / expected - 1.0).abs() < 0.01, "{degrees} {roughness}: {found} {expected}");
+        assert!((found / expected - 1.0).abs() < 0.005, "{degrees} {roughness}: {found} {expected}");
     }
 }
 
@@ -428,12 +436,7 @@ fn glossy_bumpy_balls_have_neither_black_nor_bright_fringes() {
             let most = ball.iter().copied().fold(0.0, f32::max);
             let mean = ball.iter().sum::<f32>() / ball.len() as f32;
             println!("{roughness} {scale}: {least} {mean} {most}");
-            // Half of a lobe whose mirror direction is at the horizon is below it.
-            let bound = if scale > 0.0 { 0.4 } else { 0.65 };
-            assert!(
-                least > bound && mean < 0.95 && most < 1.01,
-                "{roughness} {scale}: {least} {mean} {most}"
-            );
+            assert!(least > 0.7 && mean < 0.95 && most < 1.01, "{roughness} {scale}: {least} {mean} {most}");
         }
     }
 }
