@@ -311,17 +311,22 @@ fn white_furnace(white: Vec<Triangle>, double_sided: bool) -> Scene {
 /// Meshes that touch share edges. The space that one of them encloses must stay dark.
 #[test]
 fn a_room_of_boxes_that_touch_is_as_bright_as_one_of_sheets() {
-    for thickness in [0.0001, 0.001, 0.05, 0.2] {
-        for (double_sided, overlap) in [(true, false), (true, true), (false, false)] {
-            let room = white_furnace(walls_of_boxes(thickness, overlap), double_sided);
-            let map = Map::new(&room, 300_000);
-            for distance in [0.02, 0.1, 0.3, 0.9] {
-                let mean = map.mean_around(-1.0, 1.0 - distance, 0.8);
-                assert!(
-                    (mean - 1.0).abs() < 0.06,
-                    "{thickness} m, double-sided {double_sided}, overlap {overlap}: {mean} at {distance} m"
-                );
-            }
+    for (thickness, double_sided, overlap) in [
+        (0.0001, true, false),
+        (0.0001, false, false),
+        (0.001, true, true),
+        (0.05, true, false),
+        (0.2, true, true),
+        (0.2, false, false),
+    ] {
+        let room = white_furnace(walls_of_boxes(thickness, overlap), double_sided);
+        let map = Map::new(&room, 300_000);
+        for distance in [0.02, 0.1, 0.3, 0.9] {
+            let mean = map.mean_around(-1.0, 1.0 - distance, 0.8);
+            assert!(
+                (mean - 1.0).abs() < 0.06,
+                "{thickness} m, double-sided {double_sided}, overlap {overlap}: {mean} at {distance} m"
+            );
         }
     }
 }

@@ -32,6 +32,11 @@ fn settings() -> RenderSettings {
     }
 }
 
+/// Settings for direct light, of which photons have no part.
+fn settings_of_direct_light() -> RenderSettings {
+    settings().with(|s| s.photons.count = 1000)
+}
+
 /// Horizontal square that faces up, or down if `sign` is -1.
 fn square(half: f32, y: f32, sign: f32, material: u32) -> [Triangle; 2] {
     let corner = |x: f32, z: f32| Vec3::new(x * half, y, -z * half * sign);
@@ -149,7 +154,7 @@ fn check(name: &str, pane: &Material, panes: &[Triangle], through: [&dyn Fn(f64)
     for (light, add, irradiance) in lights() {
         let mut scene = floor(pane.clone(), panes);
         add(&mut scene);
-        let [direct, _, caustic] = irradiances(&scene, &settings());
+        let [direct, _, caustic] = irradiances(&scene, &settings_of_direct_light());
         for channel in 0..3 {
             let expected = irradiance(through[channel]);
             let error = direct[channel] / expected - 1.0;
@@ -264,7 +269,7 @@ fn gather_rays_and_shadow_rays_agree_on_light_through_panes() {
             for (gather_rays, shadow_rays, irradiance_error) in
                 [(1, 8, None), (8, 1, None), (64, 0, None), (8, 2, Some(0.1)), (256, 1, Some(0.1))]
             {
-                let settings = settings().with(|s| {
+                let settings = settings_of_direct_light().with(|s| {
                     (s.integrator.gather_rays, s.integrator.shadow_rays) = (gather_rays, shadow_rays);
                     s.integrator.irradiance_error = irradiance_error;
                 });

@@ -215,7 +215,7 @@ fn the_memory_of_all_primitives_is_bounded_together() {
     );
 }
 
-/// Tries streams with each byte changed, and cut at every length.
+/// Tries streams with each byte changed, in all of its bits or in one, and cut at every length.
 #[test]
 fn damaged_streams_are_loaded_or_refused() {
     let load = |json: &Value, bytes: Vec<u8>| {
@@ -226,13 +226,11 @@ fn damaged_streams_are_loaded_or_refused() {
         let (json, bytes) = parts(file);
         let mut refused = 0;
         for place in stream(&json) {
-            for change in [0xff, 0x01] {
-                let mut damaged = bytes.clone();
-                damaged[place] ^= change;
-                refused += u32::from(load(&json, damaged).is_err());
-            }
+            let mut damaged = bytes.clone();
+            damaged[place] ^= if place % 2 == 0 { 0xff } else { 0x01 };
+            refused += u32::from(load(&json, damaged).is_err());
         }
-        assert!(refused > 100, "{refused}");
+        assert!(refused > 50, "{refused}");
         for length in 0..stream(&json).len() {
             let mut json = json.clone();
             json["bufferViews"][0]["byteLength"] = json!(length);

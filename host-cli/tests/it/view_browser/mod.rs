@@ -270,7 +270,7 @@ fn check_memory((whose, after, before): (&str, u64, u64), limit: u64) {
 }
 
 #[test]
-fn five_hundred_random_actions_end_at_the_exact_picture() {
+fn two_hundred_random_actions_end_at_the_exact_picture() {
     let Some(mut browser) = Browser::start() else { return };
     let room = Room::new();
     room.write_scene("two-lights.gltf", &person::two_lights());
@@ -280,7 +280,7 @@ fn five_hundred_random_actions_end_at_the_exact_picture() {
     let view = View::start(&room, "two-lights.gltf", &options);
     let mut tab = opened(&mut browser, &view);
     let (page, command) = (tab.memory(), view.memory());
-    random::act(&room, &mut tab, &mut cards, 500);
+    random::act(&room, &mut tab, &mut cards, 200);
     tab.choose("layer", "radiance");
     tab.wait(SETTLED, LIMIT);
     check_saved(&room, &mut tab, "last");
