@@ -83,8 +83,8 @@ impl PixelLimits {
     }
 }
 
-/// Maximum distance from the eye to a corner of the box of all coordinates up to the scene's reach, metres. It
-/// is multiplied by the length of the view vector if that exceeds 1.
+/// Maximum distance from the eye to a corner of the box of all coordinates up to the scene's reach, metres.
+/// It is multiplied by the length of the view vector if that exceeds 1.
 fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
     let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();
     let ways = frame.camera.origin.map(|eye| f64::from(eye.abs()) + f64::from(header.reach));

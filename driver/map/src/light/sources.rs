@@ -71,8 +71,8 @@ const MIN_AIMED_SHARE: f64 = 1e-3;
 const MARGIN: f32 = 1e-4;
 
 impl Sources {
-    /// Sources of a scene whose photons are emitted in all directions. `part` is the part of the scene in which
-    /// photons are stored; `None` if it is the whole scene.
+    /// Sources of a scene whose photons are emitted in all directions. `part` is the part of the scene in
+    /// which photons are stored; `None` if it is the whole scene.
     pub(crate) fn new(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Self {
         Self::towards(scene, lights, part, Targets::default())
     }

@@ -1,9 +1,9 @@
 //! Targets at which photons are aimed: spheres around some of a scene's surfaces.
 //!
-//! A sphere is chosen in proportion to its density times the solid angle that it subtends, and then a direction
-//! uniformly within this angle. Where spheres overlap, a direction can be chosen through any of them: its
-//! density is the sum of the densities of the spheres in this direction, divided by the sum of the products of
-//! all spheres.
+//! A sphere is chosen in proportion to its density times the solid angle that it subtends, and then a
+//! direction uniformly within this angle. Where spheres overlap, a direction can be chosen through any of
+//! them: its density is the sum of the densities of the spheres in this direction, divided by the sum of the
+//! products of all spheres.
 
 use std::f32::consts::PI;
 
@@ -141,7 +141,8 @@ impl Targets {
         if all > 0.0 { covering.map(|sphere| sphere.density).sum::<f32>() / all } else { 0.0 }
     }
 
-    /// Sum of the projected areas `pi r^2` of the spheres, times their densities, m^2. Overlaps count repeatedly.
+    /// Sum of the projected areas `pi r^2` of the spheres, times their densities, m^2. Overlaps count
+    /// repeatedly.
     pub(super) fn area(&self) -> f32 {
         self.spheres.iter().map(Sphere::weighted_area).sum()
     }

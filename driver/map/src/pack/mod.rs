@@ -91,8 +91,8 @@ impl PackedScene {
         self.image
     }
 
-    /// Grid of photon positions: the finest grid that covers the scene or, if all detail is in a small part of
-    /// the scene, this part and what is around it.
+    /// Grid of photon positions: the finest grid that covers the scene or, if all detail is in a small part
+    /// of the scene, this part and its surroundings.
     pub fn photon_grid(&self) -> PhotonGrid {
         let part = self.detailed_part.map(|corners| corners.map(|corner| corner.to_array()));
         let whole = || self.image.bounds().map(|NodeBox { lower, upper }| [lower, upper]);

@@ -308,9 +308,9 @@ fn from_afar(
     })
 }
 
-/// Moves the origin of a ray from afar out of the scene, if something lies between the sky and the box through
-/// which light enters. Where nothing does, the ray begins at the box, because its precision falls with the
-/// distance.
+/// Moves the origin of a ray from afar out of the scene, if something lies between the sky and the box
+/// through which light enters. Where nothing does, the ray begins at the box, because its precision falls
+/// with the distance.
 fn from_beyond(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
