@@ -1,9 +1,9 @@
 //! Scenes all of whose detail is in a small part, such as a product on a ground of many kilometres.
 //!
 //! Photons are stored in this part and its surroundings only: of 20 bits, their coordinates on a ground of
-//! 10 km would be multiples of 1 cm, and few photons of the sky would reach a product of 10 cm. Triangles that
-//! are larger than their distance from the part are split, because a computed point of a triangle is as exact
-//! as its corners' coordinates are.
+//! 10 km would be multiples of 1 cm, and few photons of the sky would reach a product of 10 cm. Triangles
+//! that are larger than their distance from the part are split, because a computed point of a triangle is as
+//! exact as its corners' coordinates are.
 
 use glam::{Vec2, Vec3, Vec4};
 use photoncard_scene::{NO_ATTRIBUTES, NO_TANGENTS, Scene, SceneContents, Triangle, VertexAttributes};
