@@ -1,40 +1,64 @@
-//! Scenes all of whose detail is in a small part, such as a product on a ground of many kilometres.
+//! Scenes all of whose detail is in a small part of a plane ground, such as a product on a ground of many
+//! kilometres.
 //!
 //! Photons are stored in this part and its surroundings only: of 20 bits, their coordinates on a ground of
 //! 10 km would be multiples of 1 cm, and few photons of the sky would reach a product of 10 cm. Triangles
-//! that are larger than their distance from the part are split, because a computed point of a triangle is as
-//! exact as its corners' coordinates are.
+//! that are larger than their distance from the middle of the part are split, because a computed point of a
+//! triangle is as exact as its corners' coordinates are.
 
 use glam::{Vec2, Vec3, Vec4};
 use photoncard_scene::{NO_ATTRIBUTES, NO_TANGENTS, Scene, SceneContents, Triangle, VertexAttributes};
 
-/// Maximum size of a triangle that counts as detail, relative to the scene's.
+/// Maximum size of a triangle that counts as detail, relative to the scene's size.
 const SHARE_OF_DETAIL: f32 = 1.0 / 64.0;
-/// Distance up to which photons around the box of all detail are stored, relative to the box's size. Of the
-/// light that a horizontal ground reflects to a point at this box, at most 1 / 2^16 comes from farther away.
+/// Distance up to which photons around the box of all detail are stored, relative to the box's size.
 const SIZES_AROUND: f32 = 256.0;
-/// Minimum size of the part, relative to the scene's. Depths, whose unit is a cell of the part's photon grid,
-/// then fit 64 bits.
+/// Maximum distance of the detail, and of corners of the ground, from the ground's plane, relative to the
+/// distance up to which photons are stored. Of the light that the ground reflects to the detail, at most
+/// 1 / 2^12 comes from farther away.
+const MAX_HEIGHT: f32 = 1.0 / 64.0;
+/// Maximum number of triangles of the ground, which are split.
+const MAX_GROUND: usize = 1024;
+/// Minimum size of the part, relative to the scene's size. Depths, whose unit is a cell of the part's photon
+/// grid, then fit 64 bits for eyes within the scene.
 const MIN_SHARE: f32 = 1.0 / 8192.0;
+/// Margin of the part for rounding, relative to the distance up to which photons are stored.
+const MARGIN: f32 = 1e-3;
 /// Maximum size of a triangle near the centre of the part, relative to the part's.
 const SHARE_OF_PART: f32 = 1.0 / 32.0;
 /// Maximum size of a triangle relative to its distance from the centre of the part.
 const GROWTH: f32 = 1.0;
 
 /// Lower and upper corner of the box around all detail of a scene and its surroundings, metres; `None` unless
-/// it is much smaller than the scene's bounding box.
+/// it is much smaller than the scene's bounding box, and all larger triangles are of one plane ground.
 pub(crate) fn detailed_part(scene: &Scene) -> Option<[Vec3; 2]> {
     let (lower, upper) = scene.bounds();
     let size = (upper - lower).max_element();
-    let detail = scene.triangles.iter().map(|triangle| ends(&triangle.vertices)).filter(|[low, high]| {
-        let own = (*high - *low).max_element();
-        own > 0.0 && own < SHARE_OF_DETAIL * size
-    });
+    let is_detail = |triangle: &&Triangle| {
+        let [low, high] = ends(&triangle.vertices);
+        (high - low).max_element() < SHARE_OF_DETAIL * size
+    };
+    let detail = scene.triangles.iter().filter(is_detail).map(|triangle| ends(&triangle.vertices));
     let [low, high] = detail.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
     let around = (SIZES_AROUND * (high - low).max_element()).max(MIN_SHARE * size);
-    let part = [lower.max(low - around), upper.min(high + around)];
+    let margin = MARGIN * around;
+    let part = [(lower - margin).max(low - around), (upper + margin).min(high + around)];
     let is_smaller = (part[1] - part[0]).max_element() < 0.5 * size;
-    is_smaller.then_some(part)
+    let ground = || scene.triangles.iter().filter(|triangle| !is_detail(triangle));
+    (is_smaller && is_plane(ground(), [low, high], MAX_HEIGHT * around)).then_some(part)
+}
+
+/// Returns whether the triangles are few and lie, with the corners of a box, within a distance of one plane.
+fn is_plane<'s>(
+    triangles: impl Iterator<Item = &'s Triangle> + Clone,
+    corners: [Vec3; 2],
+    distance: f32,
+) -> bool {
+    let largest = triangles.clone().max_by(|a, b| a.area().total_cmp(&b.area()));
+    let Some(largest) = largest.filter(|_| triangles.clone().count() <= MAX_GROUND) else { return false };
+    let (origin, normal) = (largest.vertices[0], largest.scaled_normal().normalize_or_zero());
+    let mut all = triangles.flat_map(|triangle| triangle.vertices).chain(corners);
+    normal != Vec3::ZERO && all.all(|place| normal.dot(place - origin).abs() <= distance)
 }
 
 /// Splits the triangles of a scene that are large for their distance from the centre of a part.
@@ -44,7 +68,10 @@ pub(crate) fn split_around(scene: &Scene, [lower, upper]: [Vec3; 2]) -> Scene {
     let is_large = |vertices: &[Vec3; 3]| {
         let [low, high] = ends(vertices);
         let distance = centre.distance(centre.clamp(low, high));
-        (high - low).max_element() > least.max(GROWTH * distance)
+        // Beyond the precision of coordinates, halves are as large as the whole.
+        let is_divisible =
+            halves(longest_edge(vertices), *vertices, Vec3::midpoint).iter().all(|half| half != vertices);
+        is_divisible && (high - low).max_element() > least.max(GROWTH * distance)
     };
     scene.clone().with(|scene| {
         let mut index = 0;
@@ -91,9 +118,9 @@ fn halves_of(scene: &mut SceneContents, triangle: &Triangle) -> [Triangle; 2] {
     [0, 1].map(|half: usize| Triangle { vertices: vertices[half], attributes: attributes[half], ..*triangle })
 }
 
-/// Index of the corner at which the longest edge of a triangle begins.
+/// Index of the corner at which the longest edge of a triangle, by its coordinates, begins.
 fn longest_edge(vertices: &[Vec3; 3]) -> usize {
-    let length = |edge: usize| vertices[edge].distance_squared(vertices[(edge + 1) % 3]);
+    let length = |edge: usize| (vertices[edge] - vertices[(edge + 1) % 3]).abs().max_element();
     (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0)
 }
 
@@ -129,8 +156,13 @@ fn ends([a, b, c]: &[Vec3; 3]) -> [Vec3; 2] {
 mod tests {
     use super::*;
 
-    /// Ground of the given size, with texture coordinates from 0 to 1, and a small triangle at the origin.
+    /// Ground of the given size, with texture coordinates from 0 to 1, and a small triangle on it.
     fn scene(size: f32) -> Scene {
+        above_ground(size, 0.0)
+    }
+
+    /// [`scene`] with the triangle at a height above the ground, metres.
+    fn above_ground(size: f32, height: f32) -> Scene {
         let corner = |x: f32, z: f32| Vec3::new(x, 0.0, z) * size;
         let corners = [corner(-0.5, -0.5), corner(-0.5, 0.5), corner(0.5, 0.5), corner(0.5, -0.5)];
         let halves = [[0, 1, 2], [0, 2, 3]].map(|triangle| triangle.map(|index: usize| corners[index]));
@@ -144,7 +176,8 @@ mod tests {
                 });
                 scene.triangles.push(Triangle { vertices, material: 0, attributes });
             }
-            scene.triangles.push(Triangle::new([Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.1], 0));
+            let corners = [Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.1];
+            scene.triangles.push(Triangle::new(corners.map(|corner| corner + Vec3::Y * height), 0));
         })
     }
 

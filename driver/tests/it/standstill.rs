@@ -45,7 +45,7 @@ const STEP: Duration = Duration::from_millis(100);
 /// Limits of the pixels of an image in units of 1, with the grid of a small scene.
 fn limits(frame: &FrameParameters) -> PixelLimits {
     let photon_grid = PhotonGrid { origin: [0; 3], cell: 1e-6 };
-    PixelLimits::new(&Header { photon_grid, ..Header::EMPTY }, frame)
+    PixelLimits::new(&Header { reach: 1.0, photon_grid, ..Header::EMPTY }, frame)
 }
 
 /// Session in virtual time.

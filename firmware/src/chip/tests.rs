@@ -27,6 +27,7 @@ fn scene() -> SceneImage {
         photon_power_unit: 1.0,
         caustic_power_unit: 1.0,
         radiance_unit: 1.0,
+        reach: 1.0,
         photon_grid: PhotonGrid::UNIT,
         lights: Lights::NONE,
         sections: Default::default(),

@@ -212,7 +212,7 @@ impl Target for Sessions {
         };
         let frame = &self.frames[usize::from(layers)];
         let photon_grid = PhotonGrid { origin: [0; 3], cell: 1e-6 };
-        let limits = PixelLimits::new(&Header { photon_grid, ..Header::EMPTY }, frame);
+        let limits = PixelLimits::new(&Header { reach: 1.0, photon_grid, ..Header::EMPTY }, frame);
         let job = Job { upload: self.upload.clone(), frame: *frame, limits };
         ends.session.start(job, ends.now);
         let mut was_loaded = false;

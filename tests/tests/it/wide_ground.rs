@@ -10,6 +10,8 @@ use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_pani
 const SKY: f32 = 1.0;
 const ALBEDO_OF_GROUND: f32 = 0.5;
 const ALBEDO_OF_BOX: f32 = 0.8;
+/// Height of the ground, metres.
+const HEIGHT: f32 = -0.137;
 /// Side of the picture, pixels.
 const SIDE: u32 = 16;
 /// Side of a block of pixels.
@@ -18,11 +20,11 @@ const BLOCK: usize = 4;
 /// A box of 10 cm on a ground of a given half side, metres, under a constant sky. The picture shows a part of
 /// its front.
 fn product(half_side: f32) -> Scene {
-    let on_ground = |x: f32, z: f32| Vec3::new(x, 0.0, z) * half_side;
+    let on_ground = |x: f32, z: f32| Vec3::new(x, 0.0, z) * half_side + Vec3::Y * HEIGHT;
     let mut triangles =
         quad([on_ground(-1.0, 1.0), on_ground(1.0, 1.0), on_ground(1.0, -1.0), on_ground(-1.0, -1.0)], 0)
             .to_vec();
-    let at = |x: f32, y: f32, z: f32| Vec3::new(x, y, z) * 0.1;
+    let at = |x: f32, y: f32, z: f32| Vec3::new(x, y, z) * 0.1 + Vec3::Y * HEIGHT;
     triangles.extend(quad([at(-0.5, 0.0, 0.5), at(0.5, 0.0, 0.5), at(0.5, 1.0, 0.5), at(-0.5, 1.0, 0.5)], 1));
     triangles
         .extend(quad([at(0.5, 0.0, -0.5), at(-0.5, 0.0, -0.5), at(-0.5, 1.0, -0.5), at(0.5, 1.0, -0.5)], 1));
@@ -32,7 +34,7 @@ fn product(half_side: f32) -> Scene {
     triangles
         .extend(quad([at(-0.5, 1.0, 0.5), at(0.5, 1.0, 0.5), at(0.5, 1.0, -0.5), at(-0.5, 1.0, -0.5)], 1));
     let materials = vec![lambertian("ground", ALBEDO_OF_GROUND), lambertian("box", ALBEDO_OF_BOX)];
-    let view = camera(Vec3::new(0.0, 0.05, 0.09), Vec3::NEG_Z);
+    let view = camera(Vec3::new(0.0, 0.05 + HEIGHT, 0.09), Vec3::NEG_Z);
     scene(triangles, materials, view)
         .with(|scene| scene.environment = Some(Environment::constant(Vec3::splat(SKY))))
 }

@@ -159,7 +159,7 @@ mod tests {
 
     fn limits() -> PixelLimits {
         let photon_grid = PhotonGrid { origin: [0; 3], cell: 1e-6 };
-        PixelLimits::new(&Header { photon_grid, ..Header::EMPTY }, &frame())
+        PixelLimits::new(&Header { reach: 1.0, photon_grid, ..Header::EMPTY }, &frame())
     }
 
     fn in_flight(tiles: &[Tile]) -> TilesInFlight {

@@ -295,7 +295,7 @@ fn from_afar(
 ) -> Option<Emission> {
     let emission = if way.is_aimed {
         let Aim { towards, measure } = way.targets.place(direction, square)?;
-        // The origin lies before the whole scene.
+        // The origin lies before the whole box.
         let corners = bounds.map(|corner| corner * direction);
         let origin = towards + direction * corners[0].min(corners[1]).element_sum();
         Emission { ray: Ray::new(origin, direction), power: irradiance * measure, has_extent: true }
@@ -310,17 +310,18 @@ fn from_afar(
 
 /// Moves the origin of a ray from afar out of the scene, if something lies between the sky and the box
 /// through which light enters. Where nothing does, the ray begins at the box, because its precision falls
-/// with the distance.
+/// with the distance. Rays that miss the box of a part of the scene are dropped, aimed or not.
 fn from_beyond(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     sources: &Sources,
     emission: Option<Emission>,
 ) -> Result<Option<Emission>, Fault> {
-    let Some(Emission { ray, .. }) = emission else { return Ok(None) };
-    let is_open = sources.beyond == 0.0
-        || meets_box(sources.bounds, &ray)
-            && closest_hit(scene, memory, &Ray::new(ray.origin, -ray.direction))?.is_none();
+    let Some(Emission { ray, .. }) = emission.filter(|_| sources.beyond > 0.0) else { return Ok(emission) };
+    if !meets_box(sources.bounds, &ray) {
+        return Ok(None);
+    }
+    let is_open = closest_hit(scene, memory, &Ray::new(ray.origin, -ray.direction))?.is_none();
     let origin = if is_open { ray.origin } else { ray.origin - ray.direction * sources.beyond };
     Ok(emission.map(|emission| Emission { ray: Ray::new(origin, ray.direction), ..emission }))
 }
@@ -340,7 +341,7 @@ fn meets_box(bounds: [Vec3; 2], ray: &Ray) -> bool {
     first <= last
 }
 
-/// Emission from infinitely far through the faces of the scene's bounding box. Faces are chosen in proportion
+/// Emission from infinitely far through the faces of a box. Faces are chosen in proportion
 /// to their projected areas.
 fn through_box(bounds: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
     let [lower, upper] = bounds;
