@@ -26,8 +26,6 @@ const MIN_SHARE: f32 = 1.0 / 8192.0;
 const MARGIN: f32 = 1e-3;
 /// Maximum size of a triangle near the centre of the part, relative to the part's.
 const SHARE_OF_PART: f32 = 1.0 / 32.0;
-/// Maximum size of a triangle relative to its distance from the centre of the part.
-const GROWTH: f32 = 1.0;
 
 /// Lower and upper corner of the box around all detail of a scene and its surroundings, metres; `None` unless
 /// it is much smaller than the scene's bounding box, and all larger triangles are of one plane ground.
@@ -61,7 +59,7 @@ fn is_plane<'s>(
     normal != Vec3::ZERO && all.all(|place| normal.dot(place - origin).abs() <= distance)
 }
 
-/// Splits the triangles of a scene that are large for their distance from the centre of a part.
+/// Splits the triangles of a scene that are larger than their distance from the centre of a part.
 pub(crate) fn split_around(scene: &Scene, [lower, upper]: [Vec3; 2]) -> Scene {
     let centre = lower.midpoint(upper);
     let least = SHARE_OF_PART * (upper - lower).max_element();
@@ -69,9 +67,8 @@ pub(crate) fn split_around(scene: &Scene, [lower, upper]: [Vec3; 2]) -> Scene {
         let [low, high] = ends(vertices);
         let distance = centre.distance(centre.clamp(low, high));
         // Beyond the precision of coordinates, halves are as large as the whole.
-        let is_divisible =
-            halves(longest_edge(vertices), *vertices, Vec3::midpoint).iter().all(|half| half != vertices);
-        is_divisible && (high - low).max_element() > least.max(GROWTH * distance)
+        let is_divisible = || !halves(longest_edge(vertices), *vertices, Vec3::midpoint).contains(vertices);
+        (high - low).max_element() > least.max(distance) && is_divisible()
     };
     scene.clone().with(|scene| {
         let mut index = 0;

@@ -7,8 +7,8 @@ pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
 const MAX_COORDINATE: f64 = (1 << 24) as f64;
 
 /// Grid of the photons' positions: grid coordinates `q` below 2^20 stand for the position
-/// `(origin + q) * cell`, exact in `f32`. The longest side of the scene takes at least half of the 2^20
-/// cells. Far from the origin, where `f32` is coarser, it takes fewer.
+/// `(origin + q) * cell`, exact in `f32`. The longest side of the box that it covers takes at least
+/// half of the 2^20 cells. Far from the origin, where `f32` is coarser, it takes fewer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
     /// Minimum corner of the grid, in cells.

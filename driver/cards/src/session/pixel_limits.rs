@@ -18,7 +18,7 @@ const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 /// | light, direct, indirect, caustic | at least 0; beside a lamp without extent there is no upper limit |
 /// | albedo | 0 to s |
 /// | normals | length 0 to s, and 2^-19 s for the rounding of normals |
-/// | depths | 0 to s times the distance to the scene's farthest corner; 2^-19 s maximum coordinates beyond |
+/// | depths | 0 to s times the farthest distance within the scene's reach; 2^-19 s maximum coordinates beyond |
 /// | surfaces s, gathers | 0 to n |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {

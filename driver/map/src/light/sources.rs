@@ -66,7 +66,7 @@ pub(crate) struct ChosenSource {
 
 /// Minimum fraction of an emitter's light that is assumed to go towards the targets.
 const MIN_AIMED_SHARE: f64 = 1e-3;
-/// Margin of the box beyond the scene's bounds, relative to the longest side or to a tenth of the maximum
+/// Margin of the box beyond the scene or its part, relative to the longest side or to a tenth of the maximum
 /// coordinate, whichever is larger.
 const MARGIN: f32 = 1e-4;
 

@@ -134,15 +134,13 @@ pub(super) fn emit(
         }
         Source::Distant { direction, irradiance } => {
             has_extent = false;
-            let emission = from_afar(sources.bounds, way, direction, irradiance, [c, d]);
-            from_beyond(scene, memory, sources, emission)?
+            from_afar((scene, memory), sources, way, (direction, irradiance), [c, d])?
         }
         Source::Cell { across: [left, width], cosines: [upper, lower], solid_angle } => {
             let cosine = (upper + (lower - upper) * b).clamp(-1.0, 1.0);
             let towards = environment_direction(left + width * chosen.rest, cosine);
             let irradiance = environment_radiance(scene, memory, towards)? * solid_angle;
-            let emission = from_afar(sources.bounds, way, -towards, irradiance, [c, d]);
-            from_beyond(scene, memory, sources, emission)?
+            from_afar((scene, memory), sources, way, (-towards, irradiance), [c, d])?
         }
     };
     let emission = emission.map(|emission| Emission {
@@ -285,45 +283,42 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     })
 }
 
-/// Emission from infinitely far along `direction`. `irradiance` is that of a surface facing the light.
+/// Emission from infinitely far along `direction`. `irradiance` is that of a surface facing the light. Rays
+/// that miss a part of the scene in which photons are stored are dropped, aimed or not.
 fn from_afar(
-    bounds: [Vec3; 2],
+    (scene, memory): (&SceneImage, &mut impl MemoryPort),
+    sources: &Sources,
     way: Way,
-    direction: Vec3,
-    irradiance: Vec3,
+    (direction, irradiance): (Vec3, Vec3),
     square: [f32; 2],
-) -> Option<Emission> {
+) -> Result<Option<Emission>, Fault> {
+    let bounds = sources.bounds;
     let emission = if way.is_aimed {
-        let Aim { towards, measure } = way.targets.place(direction, square)?;
-        // The origin lies before the whole box.
-        let corners = bounds.map(|corner| corner * direction);
-        let origin = towards + direction * corners[0].min(corners[1]).element_sum();
-        Emission { ray: Ray::new(origin, direction), power: irradiance * measure, has_extent: true }
+        way.targets.place(direction, square).map(|Aim { towards, measure }| {
+            // The origin lies before the whole box.
+            let corners = bounds.map(|corner| corner * direction);
+            let origin = towards + direction * corners[0].min(corners[1]).element_sum();
+            Emission { ray: Ray::new(origin, direction), power: irradiance * measure, has_extent: true }
+        })
     } else {
-        through_box(bounds, direction, irradiance, square)
+        Some(through_box(bounds, direction, irradiance, square))
     };
-    way.balanced(Some(emission), |ray| {
+    let emission = way.balanced(emission, |ray| {
         let free = if meets_box(bounds, ray) { 1.0 / shown(bounds, direction).element_sum() } else { 0.0 };
         [way.targets.place_density(direction, ray.origin), free]
-    })
-}
-
-/// Moves the origin of a ray from afar out of the scene, if something lies between the sky and the box
-/// through which light enters. Where nothing does, the ray begins at the box, because its precision falls
-/// with the distance. Rays that miss the box of a part of the scene are dropped, aimed or not.
-fn from_beyond(
-    scene: &SceneImage,
-    memory: &mut impl MemoryPort,
-    sources: &Sources,
-    emission: Option<Emission>,
-) -> Result<Option<Emission>, Fault> {
-    let Some(Emission { ray, .. }) = emission.filter(|_| sources.beyond > 0.0) else { return Ok(emission) };
-    if !meets_box(sources.bounds, &ray) {
-        return Ok(None);
+    });
+    if sources.beyond == 0.0 {
+        return Ok(emission);
     }
-    let is_open = closest_hit(scene, memory, &Ray::new(ray.origin, -ray.direction))?.is_none();
-    let origin = if is_open { ray.origin } else { ray.origin - ray.direction * sources.beyond };
-    Ok(emission.map(|emission| Emission { ray: Ray::new(origin, ray.direction), ..emission }))
+    let Some(emission) = emission.filter(|emission| meets_box(bounds, &emission.ray)) else {
+        return Ok(None);
+    };
+    // A ray begins out of the scene only if something lies there, because its precision falls with the
+    // distance.
+    let origin = emission.ray.origin;
+    let is_open = closest_hit(scene, memory, &Ray::new(origin, -direction))?.is_none();
+    let origin = if is_open { origin } else { origin - direction * sources.beyond };
+    Ok(Some(Emission { ray: Ray::new(origin, direction), ..emission }))
 }
 
 /// Projected areas of a box's faces along a direction, m^2.
@@ -341,8 +336,8 @@ fn meets_box(bounds: [Vec3; 2], ray: &Ray) -> bool {
     first <= last
 }
 
-/// Emission from infinitely far through the faces of a box. Faces are chosen in proportion
-/// to their projected areas.
+/// Emission from infinitely far through the faces of a box. Faces are chosen in proportion to their projected
+/// areas.
 fn through_box(bounds: [Vec3; 2], direction: Vec3, irradiance: Vec3, [c, d]: [f32; 2]) -> Emission {
     let [lower, upper] = bounds;
     let size = upper - lower;

@@ -216,9 +216,9 @@ impl ImportonGrid {
 
     /// Targets for photons: the cells with their weights.
     pub(super) fn targets(&self) -> Targets {
-        let mut cells: Vec<(&Cell, f64)> = self.cells.iter().map(|(cell, &weight)| (cell, weight)).collect();
-        cells.sort_by(|(a, _), (b, _)| a.cmp(b));
-        Targets::boxes(cells.into_iter().map(|((place, _), weight)| {
+        let mut cells: Vec<(&Cell, &f64)> = self.cells.iter().collect();
+        cells.sort_by_key(|(cell, _)| *cell);
+        Targets::boxes(cells.into_iter().map(|((place, _), &weight)| {
             let lower = Vec3::from_array(place.map(|coordinate| coordinate as f32)) * self.side;
             ([lower, lower + self.side], weight)
         }))

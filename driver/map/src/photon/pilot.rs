@@ -33,7 +33,7 @@ const AIM_TASKS: u64 = 4;
 /// Number of tasks of each pilot that measures the share of caustics.
 const SHARE_TASKS: u64 = 8;
 /// Number of lower bits of a grid coordinate that a cell in these pilots spans, such that the longest side of
-/// the scene has 32 to 64 cells.
+/// the grid has 32 to 64 cells.
 const CELL_BITS: u32 = GRID_BITS - 6;
 /// Minimum ratio of the effective numbers of photons of aimed and unaimed paths, at which paths are aimed. It
 /// is 2 so that noise does not decide in rooms, where both are about equal.
