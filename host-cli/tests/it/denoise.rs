@@ -36,6 +36,11 @@ fn rendered_of(scene: &str, room: &Room, options: &[&str]) -> Option<()> {
     Some(())
 }
 
+/// Returns whether the machine has the library. A notice says that it has not.
+pub(crate) fn is_there(room: &Room) -> bool {
+    rendered(room, &["-o", "there.png", "--denoise"]).is_some()
+}
+
 /// Seconds of the denoiser in a statistics file.
 fn seconds(room: &Room, name: &str) -> Option<f64> {
     let statistics: Value = serde_json::from_slice(&room.read(name)).unwrap();
@@ -92,6 +97,29 @@ fn parts_are_denoised_when_they_are_merged() {
     for [merged, whole] in [["merged.exr", "whole.exr"], ["merged.png", "whole.png"]] {
         assert!(room.read(merged) == room.read(whole), "{merged}");
     }
+}
+
+/// The quality chooses other settings for a picture that is denoised.
+#[test]
+fn a_scene_is_prepared_for_pictures_that_are_denoised() {
+    let room = Room::new();
+    if !is_there(&room) {
+        return;
+    }
+    let cornell = shipped("cornell.gltf");
+    let picture = ["--size=24x24", "--quiet"];
+    let run = |own: &[&str]| {
+        let outcome = room.run(&[own, &picture].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    };
+    let options = ["--quality=draft", "--photons=5000"];
+    run(&[&["render", &cornell, "-o", "whole.exr", "--denoise"], &options[..]].concat());
+    run(&[&["prepare", &cornell, "-o", "it.card", "--denoise"], &options[..]].concat());
+    run(&["render", "--prepared", "it.card", "-o", "prepared.exr", "--denoise"]);
+    assert!(room.read("prepared.exr") == room.read("whole.exr"));
+    run(&[&["prepare", &cornell, "-o", "other.card"], &options[..]].concat());
+    run(&["render", "--prepared", "other.card", "-o", "other.exr", "--denoise"]);
+    assert!(room.read("other.exr") != room.read("whole.exr"));
 }
 
 #[test]
