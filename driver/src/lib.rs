@@ -33,7 +33,7 @@
 //! let provenance = serde_json::to_string(&rendering.statistics.provenance.pixels)?;
 //! let content = Content { film: &rendering.film, layers: &settings.picture.layers, denoised: None };
 //! exr::write(&path, &content, &provenance, SampleFormat::Float)?;
-//! let picture = exr::read_rgb(&path)?;
+//! let picture = exr::read(&path, exr::Shown::Rendered)?;
 //! assert_eq!((picture.width, picture.height), (16, 16));
 //! assert!(picture.pixels.iter().flatten().sum::<f32>() > 0.0);
 //! # Ok(())

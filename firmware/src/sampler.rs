@@ -31,6 +31,8 @@ pub enum Dimension {
     /// Choices on an eye path, at perfectly specular surfaces, between reflection, transmission and
     /// absorption.
     Specular = 6,
+    /// Ray of a sharp lobe, which finds albedo and normal of what the lobe shows.
+    Features = 7,
 }
 
 /// Random pattern of points for one pixel, sample and dimension.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use photoncard_driver::difference::compare;
-use photoncard_driver::exr::{read_rgb, read_shown};
+use photoncard_driver::exr::{Shown, read};
 use photoncard_driver::film::Film;
 use photoncard_driver::parts::{Part, PartError, Parts};
 use photoncard_driver::tone_mapping::{PngError, write_png};
@@ -35,7 +35,7 @@ pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
     let parts = Parts::open(paths).map_err(Failure::input)?;
     say_missing(&parts);
     let mut merged = parts.merge().map_err(merge_failure)?;
-    merged.provenance.extend(denoiser.as_ref().map(denoised_by));
+    merged.provenance.extend(denoiser.map(denoised_by));
     say_dazzling(&merged.film);
     let provenance =
         serde_json::to_string(&merged.provenance).map_err(|error| Failure::work_error(&error))?;
@@ -43,7 +43,7 @@ pub(crate) fn merge(options: &MergeOptions) -> Result<(), Failure> {
         layers: merged.layers,
         sample_type: *sample_type,
         tone: tone.mapping(),
-        denoised: denoised(denoiser.as_ref(), &merged.film, None)?,
+        denoised: denoised(denoiser, &merged.film, None)?,
         part: None,
     };
     for picture in pictures {
@@ -84,9 +84,10 @@ fn merge_failure(error: PartError) -> Failure {
 pub(crate) fn tonemap(options: &TonemapOptions) -> Result<(), Failure> {
     let TonemapOptions { input, output, tone } = options;
     outputs::check(&[(input, "the picture to read")], &[output], &[])?;
-    let (picture, provenance) = read_shown(input).map_err(|error| Failure::input_error(&error))?;
+    let picture = read(input, Shown::Denoised).map_err(|error| Failure::input_error(&error))?;
     let radiance = picture.pixels.iter().copied();
-    let written = write_png(output, picture.size(), radiance, tone.mapping(), provenance.as_deref());
+    let provenance = picture.provenance.as_deref();
+    let written = write_png(output, picture.size(), radiance, tone.mapping(), provenance);
     written.map_err(|error| match error {
         PngError::NotANumber { .. } => Failure::input_error(&error),
         _ => Failure::work_error(&error),
@@ -95,7 +96,7 @@ pub(crate) fn tonemap(options: &TonemapOptions) -> Result<(), Failure> {
 
 /// Prints the difference between two pictures as JSON.
 pub(crate) fn diff(options: &DiffOptions) -> Result<(), Failure> {
-    let read = |path| read_rgb(path).map_err(|error| Failure::input_error(&error));
+    let read = |path| read(path, Shown::Rendered).map_err(|error| Failure::input_error(&error));
     let reference = read(&options.reference)?;
     let image = read(&options.image)?;
     let difference = compare(&reference, &image, options.block, options.exclude_above)

@@ -16,7 +16,7 @@ use std::error::Error;
 
 use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
 use glam::{DVec2, DVec3};
-use photoncard_driver::exr::{read_rgb, read_with_provenance};
+use photoncard_driver::exr::{Shown, read as read_picture};
 use serde_json::Value;
 
 /// Maximum relative difference between the depths of pixels that see one surface.
@@ -39,13 +39,14 @@ struct Frame {
 impl Frame {
     fn read(name: &str) -> Result<Self, Box<dyn Error>> {
         let (path, other) = name.split_once('=').unwrap_or((name, name));
-        let (picture, provenance) = read_with_provenance(path.as_ref())?;
+        let picture = read_picture(path.as_ref(), Shown::Rendered)?;
+        let provenance = picture.provenance.clone().ok_or("the picture has no provenance")?;
         let [width, height] = picture.size().map(|side| side as usize);
-        let radiance = if path == other { picture } else { read_rgb(other.as_ref())? };
+        let radiance = if path == other { picture } else { read_picture(other.as_ref(), Shown::Rendered)? };
         if radiance.size() != [width as u32, height as u32] {
             return Err(format!("{other} is of another size than {path}").into());
         }
-        let provenance: Value = serde_json::from_str(&provenance.ok_or("the picture has no provenance")?)?;
+        let provenance: Value = serde_json::from_str(&provenance)?;
         let view = &provenance["view"];
         let vector = |key: &str| {
             let number = |axis: usize| view[key][axis].as_f64().ok_or("the provenance has no view");

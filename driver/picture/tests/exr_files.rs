@@ -7,7 +7,7 @@ use exr::prelude::{
     Compression, Encoding, FlatSamples, Image, LayerAttributes, ReadChannels, ReadLayers, SpecificChannels,
     Vec2, WritableImage,
 };
-use photoncard_picture::exr::{Content, ExrError, SampleFormat, is_intact, read_rgb, write};
+use photoncard_picture::exr::{Content, ExrError, SampleFormat, Shown, is_intact, read, write};
 use photoncard_picture::film::{Film, FilmPixel, PixelLayers, PixelValue, SumFormat, SumScale, Window};
 use photoncard_picture::layer::Layers;
 use proptest::prelude::{ProptestConfig, any, proptest};
@@ -86,7 +86,7 @@ fn a_file_is_intact_only_as_it_was_written() {
 fn radiance_is_read_back_to_the_precision_of_the_format() {
     for (format, precision) in [(SampleFormat::Float, 0.0), (SampleFormat::Half, 1.0 / 2048.0)] {
         let (_folder, path) = written(format, "{}");
-        let image = read_rgb(&path).unwrap();
+        let image = read(&path, Shown::Rendered).unwrap();
         assert_eq!((image.width, image.height, image.data_window_origin), (17, 40, [3, 5]));
         for (index, pixel) in image.pixels.iter().enumerate() {
             let written = film().pixel(3 + index as u32 % 17, 5 + index as u32 / 17).unwrap();
@@ -116,7 +116,7 @@ fn pictures_with_dwa_compression_are_read() {
     let folder = tempfile::tempdir().unwrap();
     for compression in [Compression::DWAA(None), Compression::DWAB(None)] {
         let (path, _) = dwa(folder.path(), compression);
-        let picture = read_rgb(&path).unwrap();
+        let picture = read(&path, Shown::Rendered).unwrap();
         for (index, pixel) in picture.pixels.iter().enumerate() {
             let (x, y) = (index % 40, index / 40);
             let blue = if (x / 7 + y / 5) % 2 == 0 { 4.0 } else { 0.5 };
@@ -144,7 +144,7 @@ fn dwa_blocks_that_state_impossible_sizes_are_refused() {
                 let mut hostile = bytes.clone();
                 hostile[start + 8 * counter..][..8].copy_from_slice(&stated.to_le_bytes());
                 std::fs::write(&path, &hostile).unwrap();
-                let error = read_rgb(&path).unwrap_err();
+                let error = read(&path, Shown::Rendered).unwrap_err();
                 let is_refused =
                     matches!(&error, ExrError::Malformed { reason, .. } if reason.contains("more samples"));
                 assert!(is_refused, "{compression} {counter} {stated}: {error}");
@@ -255,10 +255,9 @@ fn denoised_radiance_is_a_layer_beside_the_rendered_one() {
     assert_eq!(names, ["B", "G", "R", "denoised.B", "denoised.G", "denoised.R"]);
     let expected: Vec<_> = denoised.iter().map(|[red, ..]| *red).collect();
     assert_eq!(found[5].2, expected);
-    assert_eq!(
-        read_rgb(&path).unwrap().pixels,
-        film.pixels().map(|pixel| pixel.radiance).collect::<Vec<_>>()
-    );
+    let rendered: Vec<_> = film.pixels().map(|pixel| pixel.radiance).collect();
+    let read = |shown| read(&path, shown).unwrap().pixels;
+    assert_eq!([read(Shown::Rendered), read(Shown::Denoised)], [rendered, denoised]);
 }
 
 #[test]
@@ -282,19 +281,22 @@ fn a_bright_light_stays_finite_in_halves() {
         write_pixel(&mut film, x as u32, 0, pixel, PixelLayers::default());
     }
     write(&path, &content(&film, &Layers::default()), "{}", SampleFormat::Half).unwrap();
-    let image = read_rgb(&path).unwrap();
+    let image = read(&path, Shown::Rendered).unwrap();
     assert_eq!(image.pixels, [[65504.0; 3], [65504.0, 0.0, 0.0]]);
 }
 
 #[test]
 fn errors_name_the_bad_file() {
     let folder = tempfile::tempdir().unwrap();
-    assert!(matches!(read_rgb(&folder.path().join("absent.exr")), Err(ExrError::Unreadable { .. })));
-    assert!(matches!(read_rgb(folder.path()), Err(ExrError::Unreadable { .. })));
+    assert!(matches!(
+        read(&folder.path().join("absent.exr"), Shown::Rendered),
+        Err(ExrError::Unreadable { .. })
+    ));
+    assert!(matches!(read(folder.path(), Shown::Rendered), Err(ExrError::Unreadable { .. })));
     let path = folder.path().join("bad.exr");
     for bytes in [&b""[..], b"text", b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"] {
         fs::write(&path, bytes).unwrap();
-        assert!(matches!(read_rgb(&path), Err(ExrError::Malformed { .. })));
+        assert!(matches!(read(&path, Shown::Rendered), Err(ExrError::Malformed { .. })));
     }
     assert!(matches!(
         write(Path::new("absent/x.exr"), &content(&film(), &Layers::default()), "{}", SampleFormat::Half),
@@ -315,7 +317,7 @@ fn a_picture_without_colour_channels_is_refused() {
     list.push(grey);
     let image = exr::image::Image::from_channels((2, 2), exr::image::AnyChannels::sort(list));
     exr::prelude::WritableImage::write(&image).to_file(&path).unwrap();
-    let error = read_rgb(&path).unwrap_err();
+    let error = read(&path, Shown::Rendered).unwrap_err();
     assert!(matches!(error, ExrError::NoColour { .. }) && error.to_string().contains('Y'), "{error}");
 }
 
@@ -333,7 +335,7 @@ fn absurd_windows_are_refused() {
         bytes[at + 8..at + 12].copy_from_slice(&i32::to_le_bytes(x1));
         bytes[at + 12..at + 16].copy_from_slice(&i32::to_le_bytes(y1));
         fs::write(&path, &bytes).unwrap();
-        assert!(read_rgb(&path).is_err(), "{x1} {y1}");
+        assert!(read(&path, Shown::Rendered).is_err(), "{x1} {y1}");
     }
 }
 
@@ -361,6 +363,6 @@ proptest! {
             bytes.truncate(cut % bytes.len());
         }
         fs::write(&path, &bytes).unwrap();
-        drop(read_rgb(&path));
+        drop(read(&path, Shown::Rendered));
     }
 }

@@ -24,6 +24,7 @@ use crate::irradiance_cache::IrradianceCache;
 use crate::kind::ChipKind;
 use crate::memory::{MemoryPort, Stage};
 use crate::render::eye::{Sight, View};
+use crate::render::features::features;
 use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
 
 /// Purpose for which the light of a path is computed.
@@ -141,7 +142,8 @@ impl<K: ChipKind> Flight<K> {
             }
             Sight::Surface(view) => {
                 if completion.path == 0 && matches!(as_what, Use::Term(_)) {
-                    completion.view.add(&context.scene.header, &view);
+                    let features = features(context, at, &view)?;
+                    completion.view.add(&context.scene.header, &features, view.depth);
                 }
                 light_path::<K, M>(context, &self.cache, (at, &view, paths), (as_what, completion))?
             }

@@ -9,7 +9,7 @@ use photoncard_shared::message::{
 use super::adaptive::Probes;
 use super::light::PixelLight;
 use crate::fixed_point::ColourSum;
-use crate::render::eye::View;
+use crate::render::features::Features;
 
 /// A complete pixel.
 #[derive(Clone, Copy, Debug)]
@@ -38,10 +38,11 @@ pub struct PixelView(PixelSums);
 impl PixelView {
     pub(super) const NOTHING: Self = Self(PixelSums::NOTHING);
 
-    pub(super) fn add(&mut self, header: &Header, view: &View) {
+    /// Adds a sample that sees a surface at a depth, metres.
+    pub(super) fn add(&mut self, header: &Header, features: &Features, depth: f32) {
         let Self(sums) = self;
-        let albedo = view.surface.reflector().albedo().clamp(Vec3::ZERO, Vec3::ONE) * ALBEDO_STEPS as f32;
-        let normal = view.surface.normal * NORMAL_STEPS as f32;
+        let albedo = features.albedo.clamp(Vec3::ZERO, Vec3::ONE) * ALBEDO_STEPS as f32;
+        let normal = features.normal * NORMAL_STEPS as f32;
         // Conversions are towards zero and saturate; no number of samples of a budget overflows the first
         // two.
         for (axis, (albedo, normal)) in albedo.to_array().into_iter().zip(normal.to_array()).enumerate() {
@@ -52,7 +53,7 @@ impl PixelView {
             *albedo_sum = albedo_sum.saturating_add(albedo as u32);
             *normal_sum = normal_sum.saturating_add(normal as i32);
         }
-        let depth = view.depth * (DEPTH_STEPS as f32 / header.sum_scale().depth);
+        let depth = depth * (DEPTH_STEPS as f32 / header.sum_scale().depth);
         sums.depth = sums.depth.saturating_add(depth as i64);
         sums.surfaces = sums.surfaces.saturating_add(1);
     }

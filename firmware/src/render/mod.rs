@@ -4,6 +4,7 @@
 pub mod caustic;
 pub mod direct;
 pub mod eye;
+pub mod features;
 pub mod final_gather;
 mod pixel_filter;
 mod point;

@@ -98,7 +98,7 @@ impl OutputOptions {
 
     /// Finish of the pictures.
     pub(super) fn finish(&self) -> Finish {
-        if self.denoise { Finish::Denoised } else { Finish::Rendered }
+        Finish::new(self.denoise)
     }
 
     /// Type of an EXR's samples.

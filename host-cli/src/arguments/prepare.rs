@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
-use photoncard_driver::quality::{Quality, Stated};
+use photoncard_driver::quality::{Finish, Quality, Stated};
 use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
 
 use super::cards::ChipOption;
@@ -33,6 +33,11 @@ pub(crate) struct PrepareOptions {
     /// Quality of the pictures, by which the options that are not stated are chosen
     #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
     pub(crate) quality: Quality,
+    /// Prepare for pictures that are denoised, by photoncard render --denoise or photoncard merge --denoise
+    ///
+    /// The quality takes fewer samples and rays, and no irradiance cache.
+    #[arg(long)]
+    denoise: bool,
     #[command(flatten)]
     pub(crate) frames: FrameOptions,
     #[command(flatten)]
@@ -68,9 +73,14 @@ impl PrepareOptions {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
+    /// Finish of the pictures.
+    pub(crate) fn finish(&self) -> Finish {
+        Finish::new(self.denoise)
+    }
+
     /// Settings of a picture with these options. The quality supplies others without knowing the scene.
     pub(crate) fn settings(&self) -> RenderSettings {
-        let base = self.quality.settings();
+        let base = self.quality.settings_for(self.finish());
         RenderSettings {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),

@@ -16,6 +16,8 @@ pub(crate) enum Step {
     Prepare,
     /// The preparation and the renders of parts.
     Both,
+    /// The preparation and the merge of the parts.
+    PrepareAndMerge,
     /// The renders of parts.
     Render,
     /// The merge of the parts.
@@ -31,6 +33,7 @@ impl Step {
             // Their headings, if they have any, are those of other steps.
             "quality" => Self::Prepare,
             "threads" | "quiet" => Self::Both,
+            "denoise" => Self::PrepareAndMerge,
             "display_server" => Self::Render,
             "frames" | "parts" => Self::Job,
             _ => match option.get_help_heading() {

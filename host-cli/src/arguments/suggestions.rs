@@ -36,7 +36,7 @@ pub(super) const OF_OTHERS: [Word; 17] = [
     Word {
         options: &["--denoiser", "--oidn"],
         remedy: "noise is removed by --denoise, with Open Image Denoise (docs/denoising.md)",
-        commands: &["render", "farm"],
+        commands: &["render", "merge", "prepare", "view", "farm"],
     },
     Word {
         options: &["--gpu", "--device", "--cuda", "--optix", "--metal", "--vulkan", "--cycles-device"],

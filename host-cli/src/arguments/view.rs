@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
-use photoncard_driver::quality::{Quality, Stated};
+use photoncard_driver::quality::{Finish, Quality, Stated};
 use photoncard_driver::render::RenderSettings;
 
 use super::cards::CardOptions;
@@ -33,6 +33,11 @@ pub(crate) struct ViewOptions {
     /// Quality of the settled picture, by which the options that are not stated are chosen
     #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
     pub(crate) quality: Quality,
+    /// Denoise the settled picture by Open Image Denoise, as photoncard render --denoise does
+    ///
+    /// The quality takes fewer samples and rays, and no irradiance cache.
+    #[arg(long)]
+    pub(crate) denoise: bool,
     #[command(flatten)]
     pub(crate) picture: PictureOptions,
     #[command(flatten)]
@@ -57,9 +62,14 @@ impl ViewOptions {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
+    /// Finish of the settled picture.
+    pub(crate) fn finish(&self) -> Finish {
+        Finish::new(self.denoise)
+    }
+
     /// Settings of the settled picture. The quality supplies others without knowing the scene.
     pub(crate) fn settings(&self) -> RenderSettings {
-        let base = self.quality.settings();
+        let base = self.quality.settings_for(self.finish());
         RenderSettings {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),

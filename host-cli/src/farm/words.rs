@@ -60,25 +60,26 @@ impl Words {
             let takes_value = matches!(argument.get_action(), ArgAction::Set | ArgAction::Append);
             let is_whole = has_value || is_short && name.len() > 2;
             let value = if takes_value && !is_whole { given.next() } else { None };
-            if let Some(room) = words.room(argument).ok_or_else(|| name.to_owned())? {
-                room.extend([word].into_iter().chain(value));
+            for room in words.rooms(argument).ok_or_else(|| name.to_owned())? {
+                room.extend([&word].into_iter().chain(&value).cloned());
             }
         }
         Ok(words)
     }
 
-    /// List of words to which an option belongs; `Some(None)` for an option of the job itself, `None` for one
-    /// that is not allowed in a job.
-    fn room(&mut self, option: &Arg) -> Option<Option<&mut Vec<String>>> {
+    /// Lists of words to which an option belongs; empty for an option of the job itself, `None` for one that
+    /// is not allowed in a job.
+    fn rooms(&mut self, option: &Arg) -> Option<Vec<&mut Vec<String>>> {
         if OF_NO_JOB.contains(&option.get_id().as_str()) {
             return None;
         }
         Some(match Step::of(option) {
-            Step::Prepare => Some(&mut self.prepare),
-            Step::Both => Some(&mut self.both),
-            Step::Render => Some(&mut self.render),
-            Step::Merge => Some(&mut self.merge),
-            Step::Job => None,
+            Step::Prepare => vec![&mut self.prepare],
+            Step::Both => vec![&mut self.both],
+            Step::PrepareAndMerge => vec![&mut self.prepare, &mut self.merge],
+            Step::Render => vec![&mut self.render],
+            Step::Merge => vec![&mut self.merge],
+            Step::Job => Vec::new(),
         })
     }
 }
@@ -99,13 +100,16 @@ mod tests {
     #[test]
     fn words_are_sorted_by_the_steps_that_take_them() {
         let line = "--size 8x8 --photons=9 a.gltf -o b.exr --quiet --card emulated:1 --irradiance-cache on --parts 3 -oc.png \
-                    --sample-type half --tile 8 --set -x.y=1 --frames=1-2";
+                    --sample-type half --tile 8 --set -x.y=1 --frames=1-2 --denoise";
         let words = words_of(line).unwrap();
         assert_eq!(words.scene, ["a.gltf"]);
         assert_eq!(words.both, ["--size", "8x8", "--quiet"]);
-        assert_eq!(words.prepare, ["--photons=9", "--irradiance-cache", "on", "--set", "-x.y=1"]);
+        assert_eq!(
+            words.prepare,
+            ["--photons=9", "--irradiance-cache", "on", "--set", "-x.y=1", "--denoise"]
+        );
         assert_eq!(words.render, ["--card", "emulated:1", "--tile", "8"]);
-        assert_eq!(words.merge, ["-o", "b.exr", "-oc.png", "--sample-type", "half"]);
+        assert_eq!(words.merge, ["-o", "b.exr", "-oc.png", "--sample-type", "half", "--denoise"]);
     }
 
     #[test]

@@ -2,6 +2,8 @@
 
 use std::io::IsTerminal;
 use std::path::Path;
+use std::sync::OnceLock;
+use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::denoise::Denoiser;
@@ -89,20 +91,24 @@ pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptio
     Ok(Some(outputs))
 }
 
-/// Writes pictures and statistics.
+/// Writes pictures and statistics. The time of the denoiser is added to the statistics.
 pub(super) fn write(
     options: &RenderOptions,
     outputs: &OutputOptions,
-    rendering: &Rendering,
+    rendering: &mut Rendering,
 ) -> Result<(), Failure> {
     let denoiser = denoiser(denoises(options, outputs))?;
+    let start = Instant::now();
     // A failing denoiser must not lose the render: it is written without the layer.
-    let (denoised, failure) = match denoised(denoiser.as_ref(), &rendering.film, options.threads) {
+    let (denoised, failure) = match denoised(denoiser, &rendering.film, options.threads) {
         Ok(denoised) => (denoised, None),
         Err(failure) => (None, Some(failure)),
     };
+    let seconds = denoiser.map_or(0.0, |_| start.elapsed().as_secs_f64());
+    rendering.statistics.time_s.denoise = seconds;
+    rendering.statistics.time_s.total += seconds;
     let mut settings = rendering.statistics.provenance.pixels.clone();
-    settings.extend(denoiser.as_ref().filter(|_| denoised.is_some()).map(denoised_by));
+    settings.extend(denoiser.filter(|_| denoised.is_some()).map(denoised_by));
     let provenance = serde_json::to_string(&settings).map_err(|error| Failure::work_error(&error))?;
     let provenance = printable_json(&provenance);
     let layers = options.picture.layers();
@@ -143,9 +149,16 @@ pub(super) fn write_statistics(
     }
 }
 
-/// Loads the denoiser if it is asked for.
-pub(crate) fn denoiser(is_asked: bool) -> Result<Option<Denoiser>, Failure> {
-    is_asked.then(Denoiser::find).transpose().map_err(|error| Failure::input_error(&error))
+/// Denoiser, if it is asked for. The process loads its library once.
+pub(crate) fn denoiser(is_asked: bool) -> Result<Option<&'static Denoiser>, Failure> {
+    static FOUND: OnceLock<Denoiser> = OnceLock::new();
+    if !is_asked {
+        return Ok(None);
+    }
+    if FOUND.get().is_none() {
+        let _ = FOUND.set(Denoiser::find().map_err(|error| Failure::input_error(&error))?);
+    }
+    Ok(FOUND.get())
 }
 
 /// Entry of a picture's provenance about its denoiser.

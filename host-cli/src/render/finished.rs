@@ -39,7 +39,7 @@ pub(super) fn is_finished(
     stated.insert("aov".to_owned(), Value::from(settings.picture.layers.to_string()));
     stated.extend(inputs.clone());
     match files::denoiser(files::denoises(options, outputs)) {
-        Ok(denoiser) => stated.extend(denoiser.as_ref().map(files::denoised_by)),
+        Ok(denoiser) => stated.extend(denoiser.map(files::denoised_by)),
         Err(_) => return false,
     }
     let found: Vec<&str> =

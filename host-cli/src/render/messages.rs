@@ -199,12 +199,13 @@ pub(super) fn say_damaged(path: &Path) {
 /// Text about the time of a frame, and of the parts that it does not share with the previous one.
 fn cost(statistics: &Statistics) -> String {
     let Statistics { time_s, link, .. } = statistics;
-    let Times { total, scene, pilot, photons, pack, load, render, .. } = time_s;
+    let Times { total, scene, pilot, photons, pack, load, render, denoise, .. } = time_s;
     let sent: u64 = link.image_bytes.iter().sum();
     let phases = [("pilot", pilot), ("scene", scene), ("photons", photons), ("card image", pack)];
     let phases = phases.iter().filter(|(_, seconds)| **seconds >= 0.005);
     let phases: String = phases.map(|(name, seconds)| format!("{name} {seconds:.2} s, ")).collect();
-    format!("{total:.2} s: {phases}{sent} bytes sent in {load:.2} s, tiles {render:.2} s")
+    let denoised = if *denoise > 0.0 { format!(", denoised in {denoise:.2} s") } else { String::new() };
+    format!("{total:.2} s: {phases}{sent} bytes sent in {load:.2} s, tiles {render:.2} s{denoised}")
 }
 
 /// Text about time, samples and, if the statistics have it, what limited the render.
@@ -234,6 +235,7 @@ fn longest(times: &Times) -> (&'static str, f64) {
         ("building the card image", times.pack),
         ("loading the cards", times.load),
         ("rendering", times.render),
+        ("denoising", times.denoise),
     ];
     phases.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
 }

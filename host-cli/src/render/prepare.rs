@@ -6,7 +6,6 @@ use std::sync::OnceLock;
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
-use photoncard_driver::quality::Finish;
 use photoncard_driver::render::{Chosen, Phase, PreparedScene, RenderSettings};
 use photoncard_driver::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -112,7 +111,7 @@ impl<'a> Preparation<'a> {
         let Self { options, settings, progress, said } = self;
         let stated = options.stated();
         let fit = if stated.needs_fit() {
-            options.quality.fit(Finish::Rendered, (scene, packed), settings, progress)?
+            options.quality.fit(options.finish(), (scene, packed), settings, progress)?
         } else {
             None
         };

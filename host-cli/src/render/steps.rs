@@ -62,7 +62,7 @@ pub(super) fn finish(
     provenance.work.insert("quality".to_owned(), json!(quality.name()));
     provenance.work.insert("threads".to_owned(), json!(options.threads));
     provenance.work.insert("pilot".to_owned(), json!(fit.map(|fit| fit.measured)));
-    files::write(options, outputs, &rendering)?;
+    files::write(options, outputs, &mut rendering)?;
     if let Some(partial) = rendering.partial.take().filter(|_| !options.samples.keep_samples) {
         partial.remove().map_err(Failure::work)?;
     }

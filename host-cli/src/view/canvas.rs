@@ -81,6 +81,8 @@ pub(super) struct Patch {
     /// Index of the card.
     card: u32,
     tile: FinishedTile,
+    /// Denoised radiance of the tile's pixels, which pages see in place of the rendered one.
+    denoised: Option<Vec<[f32; 3]>>,
     work: TileWork,
 }
 
@@ -93,7 +95,13 @@ const PIXEL: usize = 12;
 
 impl Patch {
     pub(super) fn new(origin: Origin, card: u32, tile: FinishedTile, work: TileWork) -> Self {
-        Self { origin, card, tile, work }
+        Self { origin, card, tile, denoised: None, work }
+    }
+
+    /// Copy with denoised radiance. `at` is that of a pixel of the picture.
+    fn denoised(&self, at: &dyn Fn(u32, u32) -> [f32; 3]) -> Self {
+        let denoised = Some(self.tile.pixels().map(|((x, y), _)| at(x, y)).collect());
+        Self { tile: self.tile.clone(), denoised, ..*self }
     }
 
     /// Returns whether this tile adds samples to an earlier one of the same area.
@@ -121,8 +129,10 @@ impl Patch {
         let place = [tile.x * step, tile.y * step, tile.width, tile.height];
         let header = [&[version, step][..], &place, &[samples, self.card, gathers, records, lines]];
         header.iter().copied().flatten().for_each(|value| bytes.extend(value.to_le_bytes()));
-        for (_, pixel) in self.tile.pixels() {
-            values(&pixel, shown).iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        let mut add = |values: [f32; 3]| values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
+        match &self.denoised {
+            Some(denoised) if shown == Shown::Radiance => denoised.iter().copied().for_each(add),
+            _ => self.tile.pixels().for_each(|(_, pixel)| add(values(&pixel, shown))),
         }
         bytes
     }
@@ -173,9 +183,21 @@ impl Canvas {
         if let Some((_, earlier)) = of_area.find(|(_, earlier)| patch.goes_on(earlier)) {
             patch.work = earlier.work.and(patch.work);
         }
+        self.push(patch);
+    }
+
+    fn push(&mut self, patch: Patch) {
         self.by_area.entry(patch.area()).or_default().push(self.next);
         self.patches.push_back((self.next, Arc::new(patch)));
         self.next += 1;
+    }
+
+    /// Replaces the tiles of a complete pass by denoised ones. `at` is the denoised radiance of a pixel.
+    pub(super) fn denoise(&mut self, origin: Origin, at: &dyn Fn(u32, u32) -> [f32; 3]) {
+        let of_pass = self.patches.iter().filter(|(_, patch)| patch.origin == origin);
+        let denoised: Vec<_> = of_pass.map(|(_, patch)| patch.denoised(at)).collect();
+        self.retain(|patch| patch.origin != origin);
+        denoised.into_iter().for_each(|patch| self.push(patch));
     }
 
     /// Drops all tiles.
@@ -261,5 +283,24 @@ mod tests {
         canvas.clear();
         canvas.put(patch(16, 1, 5));
         assert_eq!(work(&canvas), [5]);
+    }
+
+    #[test]
+    fn denoised_tiles_are_sent_again_with_their_work_and_layers() {
+        let mut canvas = Canvas::default();
+        (0..2).for_each(|x| canvas.put(patch(4, x, 7)));
+        canvas.put(patch(8, 0, 9));
+        canvas.denoise(patch(4, 0, 0).origin, &|x, _| [x as f32, 2.0, 5.0]);
+        assert_eq!(canvas.len(), 3);
+        let sent = |from: u64, shown| {
+            let (number, tile) = canvas.after(from).unwrap();
+            let message = tile.message(shown);
+            let values = message[HEADER..].as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes));
+            (number, tile.work.gathers, values.collect::<Vec<_>>())
+        };
+        assert_eq!(sent(3, Shown::Radiance), (3, 7, vec![0.0, 2.0, 5.0]));
+        assert_eq!(sent(4, Shown::Radiance), (4, 7, vec![1.0, 2.0, 5.0]));
+        assert_eq!(sent(4, Shown::Layer(Layer::Albedo)), (4, 7, vec![0.0; 3]));
+        assert_eq!(sent(0, Shown::Radiance), (2, 9 + 7, vec![0.0; 3]));
     }
 }

@@ -1,7 +1,7 @@
 //! Command line that renders a settled picture, with every option on which its pixels or its work depend.
 
 use photoncard_driver::choice::Choice;
-use photoncard_driver::quality::Quality;
+use photoncard_driver::quality::{Finish, Quality};
 use photoncard_driver::render::{Changes, Setting};
 use photoncard_driver::scene::LightUnits;
 
@@ -11,7 +11,7 @@ use crate::environment::EnvironmentOption;
 use crate::shell;
 
 /// Words of the command that renders the picture of a wish.
-pub(super) fn words(scene: &SceneOptions, quality: Quality, wish: &Wish) -> Vec<String> {
+pub(super) fn words(scene: &SceneOptions, quality: Quality, finish: Finish, wish: &Wish) -> Vec<String> {
     let mut words = Words(vec!["photoncard".into(), "render".into(), path(&scene.path.to_string_lossy())]);
     words.add("quality", quality.name());
     of_scene(scene, wish, &mut words);
@@ -20,6 +20,7 @@ pub(super) fn words(scene: &SceneOptions, quality: Quality, wish: &Wish) -> Vec<
             words.add_some(option, argument);
         }
     }
+    words.add_switch("denoise", finish == Finish::Denoised);
     words.0.extend(["-o", "picture.exr"].map(str::to_owned));
     words.0
 }

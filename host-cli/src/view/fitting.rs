@@ -30,15 +30,14 @@ impl Fitting {
     /// If the thread cannot be started.
     pub(super) fn start(
         scene: Arc<Scene>,
-        quality: Quality,
+        (quality, finish): (Quality, Finish),
         settings: RenderSettings,
         threads: Option<usize>,
     ) -> std::io::Result<Self> {
         let stop = Arc::new(AtomicBool::new(false));
         let observer = Stop(stop.clone());
         let work = move || {
-            let fit =
-                || quality.fit(Finish::Rendered, (&scene, &PackedScene::new(&scene)?), &settings, &observer);
+            let fit = || quality.fit(finish, (&scene, &PackedScene::new(&scene)?), &settings, &observer);
             let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build());
             match pool {
                 Some(Ok(pool)) => pool.install(fit),

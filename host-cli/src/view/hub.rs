@@ -23,6 +23,8 @@ use crate::render::files::{Form, write_picture};
 pub(super) struct Settled {
     pub(super) version: u32,
     pub(super) rendering: Rendering,
+    /// Denoised radiance, if the view denoises.
+    pub(super) denoised: Option<Vec<[f32; 3]>>,
     pub(super) wish: super::wish::Wish,
     /// Provenance of its pixels, with the names of the inputs.
     pub(super) provenance: NamedSettings,
@@ -182,7 +184,8 @@ impl Hub {
 fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMapping) -> Result<(), String> {
     let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
     let layers = settled.wish.settings.picture.layers.clone();
-    let form = Form { layers, sample_type: SampleFormat::Float, tone, denoised: None, part: None };
+    let denoised = settled.denoised.clone();
+    let form = Form { layers, sample_type: SampleFormat::Float, tone, denoised, part: None };
     let picture = PictureOutput { path: path.to_owned(), format };
     let film = &settled.rendering.film;
     write_picture(&picture, film, &printable_json(&provenance), &form).map_err(|failure| failure.line())

@@ -59,6 +59,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::notices::{self, Uses};
 use crate::progress::stop_on_signals;
+use crate::render::files::denoiser;
 use crate::render::on_threads;
 
 /// Interval at which the end of the view is checked.
@@ -77,6 +78,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
         .as_deref()
         .map(|path| Folder::new(path).map_err(|error| Failure::no_folder(path, &error)));
     let folder = folder.transpose()?;
+    let denoiser = denoiser(options.denoise)?;
     let is_over = stop_on_signals().map_err(|error| Failure::work_error(&error))?;
     let listener = listen(options.listen)?;
     let address = listener.local_addr().map_err(|error| Failure::work_error(&error))?;
@@ -84,6 +86,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     let start = Start {
         options: options.scene.clone(),
         quality: options.quality,
+        finish: options.finish(),
         wish: Wish::new(settings, options.stated(), options.scene.assignments.clone()),
         sketch: Sketch::new(&scene),
         facts: SceneFacts::new(input::name(&options.scene), &scene),
@@ -98,7 +101,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     std::thread::spawn(move || server::serve(&listener, &gate, &served));
     std::thread::scope(|scope| {
         scope.spawn(|| look_for_cards(&hub));
-        let painter = Painter::new(&hub, scene, options);
+        let painter = Painter::new(&hub, scene, options, denoiser);
         let painted = scope.spawn(|| on_threads(options.threads, || painter.run()));
         while !hub.is_over() {
             std::thread::sleep(ATTENTION);

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use photoncard_driver::quality::Quality;
+use photoncard_driver::denoise::Denoiser;
+use photoncard_driver::film::Film;
+use photoncard_driver::quality::{Finish, Quality};
 use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer, Rendering};
 use photoncard_driver::scene::Scene;
 use photoncard_driver::sink::{FinishedTile, TileSink};
@@ -17,12 +19,15 @@ use super::refinement::{Outcome, Pass};
 use super::state::{Task, with_remedy};
 use crate::arguments::{SceneOptions, ViewOptions};
 use crate::input;
+use crate::render::files::denoised_by;
 
 /// Renders the pictures that pages request, until the view is over.
 pub(super) struct Painter<'a> {
     hub: &'a Hub,
     options: &'a SceneOptions,
     quality: Quality,
+    finish: Finish,
+    denoiser: Option<&'static Denoiser>,
     renderer: Renderer,
     threads: Option<usize>,
     scene: Arc<Scene>,
@@ -34,12 +39,19 @@ pub(super) struct Painter<'a> {
 
 impl<'a> Painter<'a> {
     /// Creates the painter of a scene, to which no assignments are applied yet.
-    pub(super) fn new(hub: &'a Hub, scene: Scene, options: &'a ViewOptions) -> Self {
+    pub(super) fn new(
+        hub: &'a Hub,
+        scene: Scene,
+        options: &'a ViewOptions,
+        denoiser: Option<&'static Denoiser>,
+    ) -> Self {
         let ViewOptions { scene: scene_options, quality, threads, .. } = options;
         Self {
             hub,
             options: scene_options,
             quality: *quality,
+            finish: options.finish(),
+            denoiser,
             threads: *threads,
             renderer: Renderer::default(),
             scene: Arc::new(scene),
@@ -86,7 +98,8 @@ impl<'a> Painter<'a> {
     /// Waits for the result of pilot renders. Those that a new wish interrupts continue, with the view for
     /// which they were started.
     fn fit(&mut self, task: &Task) -> Result<(), RenderError> {
-        let begin = || Fitting::start(self.scene.clone(), self.quality, task.settings.clone(), self.threads);
+        let by = (self.quality, self.finish);
+        let begin = || Fitting::start(self.scene.clone(), by, task.settings.clone(), self.threads);
         let fitting = match self.fitting.take() {
             Some(fitting) => fitting,
             None => begin().map_err(|source| RenderError::Card {
@@ -111,14 +124,29 @@ impl<'a> Painter<'a> {
         let rendering = self.render_by_passes(task)?;
         let statistics = rendering.statistics.clone();
         if task.work.pass == Pass::Full {
+            let denoised = self.denoise(task, &rendering.film);
             let mut provenance = statistics.provenance.pixels.clone();
             let assignments = task.wish.assignments();
             provenance.extend(input::provenance(&SceneOptions { assignments, ..self.options.clone() }));
+            provenance.extend(self.denoiser.filter(|_| denoised.is_some()).map(denoised_by));
             let wish = task.wish.clone();
-            self.hub.keep(Settled { version: task.work.version, rendering, wish, provenance });
+            self.hub.keep(Settled { version: task.work.version, rendering, denoised, wish, provenance });
         }
         self.hub.change(|view, now| view.finish(task, Outcome::Done, Some(&statistics), now));
         Ok(())
+    }
+
+    /// Denoised radiance of the settled picture, if it is asked for. Pages show it, or why it failed.
+    fn denoise(&self, task: &Task, film: &Film) -> Option<Vec<[f32; 3]>> {
+        let denoised = self.denoiser?.radiance(film, self.threads);
+        self.hub.change(|view, _| match &denoised {
+            Ok(radiance) => {
+                let at = |x: u32, y: u32| radiance[(y * film.window().width() + x) as usize];
+                view.canvas.denoise(task.origin, &at);
+            }
+            Err(error) => view.tell_error(&error.to_string()),
+        });
+        denoised.ok()
     }
 
     /// Renders a picture by passes, each of which doubles the samples per pixel.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::time::Duration;
 
 use glam::Vec3;
-use photoncard_driver::quality::Quality;
+use photoncard_driver::quality::{Finish, Quality};
 use photoncard_driver::render::{RenderError, RenderSettings};
 use photoncard_driver::scene::Scene;
 use serde_json::{Value, json};
@@ -28,6 +28,7 @@ pub(super) type PageNumber = u64;
 pub(super) struct Start {
     pub(super) options: SceneOptions,
     pub(super) quality: Quality,
+    pub(super) finish: Finish,
     pub(super) wish: Wish,
     pub(super) sketch: Sketch,
     pub(super) facts: SceneFacts,
@@ -357,7 +358,8 @@ impl View {
 
     /// Command line that renders the settled picture.
     pub(super) fn command(&self) -> Vec<String> {
-        command_line::words(&self.start.options, self.start.quality, &self.wish)
+        let Start { options, quality, finish, .. } = &self.start;
+        command_line::words(options, *quality, *finish, &self.wish)
     }
 
     /// State for a page. It says that the picture is settled only if the page has all tiles.

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use exr::prelude::read_first_flat_layer_from_file;
-use photoncard_driver::exr::read_rgb;
+use photoncard_driver::exr::{Shown, read};
+use serde_json::Value;
 
 use crate::support::{Room, shipped, skip};
 
@@ -35,6 +36,17 @@ fn rendered_of(scene: &str, room: &Room, options: &[&str]) -> Option<()> {
     Some(())
 }
 
+/// Returns whether the machine has the library. A notice says that it has not.
+pub(crate) fn is_there(room: &Room) -> bool {
+    rendered(room, &["-o", "there.png", "--denoise"]).is_some()
+}
+
+/// Seconds of the denoiser in a statistics file.
+fn seconds(room: &Room, name: &str) -> Option<f64> {
+    let statistics: Value = serde_json::from_slice(&room.read(name)).unwrap();
+    statistics["time_s"]["denoise"].as_f64()
+}
+
 /// Radiance of the layer `denoised` of an EXR.
 fn denoised(path: &Path) -> Vec<[f32; 3]> {
     let picture = read_first_flat_layer_from_file(path).unwrap();
@@ -53,15 +65,16 @@ fn squared_error(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
 #[test]
 fn a_denoised_picture_has_less_noise_and_keeps_the_rendered_one() {
     let room = Room::new();
-    let both = ["-o", "a.exr", "-o", "a.png", "--denoise"];
+    let both = ["-o", "a.exr", "-o", "a.png", "--denoise", "--stats", "a.json"];
     let Some(()) = rendered(&room, &both) else { return };
-    rendered(&room, &["-o", "b.exr", "-o", "b.png"]);
+    rendered(&room, &["-o", "b.exr", "-o", "b.png", "--stats", "b.json"]);
+    assert!(seconds(&room, "a.json") > Some(0.0) && seconds(&room, "b.json") == Some(0.0));
     let scene = shipped("cornell.gltf");
     let clean = ["--size=64x64", "--quality=draft", "--photons=5000", "--spp=16", "--quiet"];
     let outcome = room.run(&[&["render", &scene, "-o", "clean.exr"], &clean[..]].concat());
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     let [raw, without, clean] =
-        ["a.exr", "b.exr", "clean.exr"].map(|name| read_rgb(&room.path(name)).unwrap().pixels);
+        ["a.exr", "b.exr", "clean.exr"].map(|name| read(&room.path(name), Shown::Rendered).unwrap().pixels);
     assert_eq!(raw, without);
     let [before, after] =
         [&raw, &denoised(&room.path("a.exr"))].map(|picture| squared_error(picture, &clean));
@@ -84,6 +97,29 @@ fn parts_are_denoised_when_they_are_merged() {
     for [merged, whole] in [["merged.exr", "whole.exr"], ["merged.png", "whole.png"]] {
         assert!(room.read(merged) == room.read(whole), "{merged}");
     }
+}
+
+/// The quality chooses other settings for a picture that is denoised.
+#[test]
+fn a_scene_is_prepared_for_pictures_that_are_denoised() {
+    let room = Room::new();
+    if !is_there(&room) {
+        return;
+    }
+    let cornell = shipped("cornell.gltf");
+    let picture = ["--size=24x24", "--quiet"];
+    let run = |own: &[&str]| {
+        let outcome = room.run(&[own, &picture].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    };
+    let options = ["--quality=draft", "--photons=5000"];
+    run(&[&["render", &cornell, "-o", "whole.exr", "--denoise"], &options[..]].concat());
+    run(&[&["prepare", &cornell, "-o", "it.card", "--denoise"], &options[..]].concat());
+    run(&["render", "--prepared", "it.card", "-o", "prepared.exr", "--denoise"]);
+    assert!(room.read("prepared.exr") == room.read("whole.exr"));
+    run(&[&["prepare", &cornell, "-o", "other.card"], &options[..]].concat());
+    run(&["render", "--prepared", "other.card", "-o", "other.exr", "--denoise"]);
+    assert!(room.read("other.exr") != room.read("whole.exr"));
 }
 
 #[test]

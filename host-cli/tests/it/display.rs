@@ -5,7 +5,7 @@ use std::net::{SocketAddr, TcpListener};
 use std::thread::{self, JoinHandle};
 
 use crate::support::{Room, scene};
-use photoncard_driver::exr::read_rgb;
+use photoncard_driver::exr::{Shown, read};
 
 /// Image of a viewer, built from received packets.
 #[derive(Default)]
@@ -131,7 +131,7 @@ fn a_viewer_receives_the_picture_of_the_file() {
         let outcome = room.rendered("scene.gltf", &options);
         assert!(!outcome.stderr.contains("display"), "{}", outcome.stderr);
         let viewed = viewing.join().unwrap();
-        let picture = read_rgb(&room.path("out.exr")).unwrap();
+        let picture = read(&room.path("out.exr"), Shown::Rendered).unwrap();
         assert_eq!(
             (viewed.name.as_str(), viewed.width, viewed.height),
             ("out.exr", picture.width, picture.height)

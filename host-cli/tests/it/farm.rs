@@ -48,9 +48,12 @@ fn run(room: &Room, arguments: &[&str]) -> Outcome {
 
 /// Text of the scene's job for an engine.
 fn job(room: &Room, engine: &str) -> String {
-    let own =
-        ["farm", engine, SCENE, "--parts", "3", "-o", PICTURE, "-o", "out.png", "--sample-type", "half"];
-    let outcome = run(room, &[&own[..], &OPTIONS].concat());
+    job_with(room, engine, &["--sample-type", "half"])
+}
+
+fn job_with(room: &Room, engine: &str, options: &[&str]) -> String {
+    let own = ["farm", engine, SCENE, "--parts", "3", "-o", PICTURE, "-o", "out.png"];
+    let outcome = run(room, &[&own[..], options, &OPTIONS].concat());
     assert_eq!((outcome.status, &*outcome.stderr), (Some(0), ""));
     outcome.stdout
 }
@@ -109,6 +112,20 @@ fn the_script_of_gnu_parallel_renders_the_picture() {
         by_hand(&room, &script);
     }
     check_pictures(&room);
+}
+
+#[test]
+fn the_last_step_of_a_job_denoises_the_picture() {
+    let (room, _) = room();
+    if !crate::denoise::is_there(&room) {
+        return;
+    }
+    by_hand(&room, &job_with(&room, "parallel", &["--denoise"]));
+    let own = ["render", SCENE, "-o", "whole.exr", "-o", "whole.png", "--denoise"];
+    let outcome = run(&room, &[&own[..], &OPTIONS].concat());
+    assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+    let read = |name: &str| std::fs::read(room.path(FOLDER).join(name)).unwrap();
+    assert!(read(PICTURE) == read("whole.exr") && read("out.png") == read("whole.png"));
 }
 
 /// Tasks are killed, run twice, or run after the scene has changed.

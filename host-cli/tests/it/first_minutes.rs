@@ -4,8 +4,10 @@
 use std::fs;
 use std::process::Stdio;
 
-use crate::support::{Outcome, Room, scene, small_render};
+use photoncard_driver::exr::{Shown, read};
 use serde_json::json;
+
+use crate::support::{Outcome, Room, scene, small_render};
 
 #[test]
 fn the_default_picture_is_beside_the_scene_and_replaces_no_other_file() {
@@ -91,7 +93,7 @@ fn environments_are_turned_by_the_option_and_by_blenders_convention() {
     let red = |name: &str, options: &[&str]| {
         let all = [&["-o", "a.exr", "--environment", "sky.exr"], options].concat();
         room.rendered(name, &all);
-        let picture = photoncard_driver::exr::read_rgb(&room.path("a.exr")).unwrap();
+        let picture = read(&room.path("a.exr"), Shown::Rendered).unwrap();
         picture.pixels.iter().map(|pixel| pixel[0]).sum::<f32>()
     };
     let ahead = red("other.gltf", &[]);

@@ -2,7 +2,7 @@
 //! with `--strict`.
 
 use crate::support::{Room, scene};
-use photoncard_driver::exr::read_rgb;
+use photoncard_driver::exr::{Shown, read};
 use serde_json::{Value, json};
 
 /// Scene with a texture whose image is missing.
@@ -69,7 +69,7 @@ fn a_scene_without_photons_has_a_picture() {
     // Direct light of a bright sky on what is seen stays.
     let options = ["-o", "a.exr", "--set", "floor.diffuse=0,0,0", "--environment", "1,1,1"];
     let said = room.rendered("scene.gltf", &options).stderr;
-    let picture = read_rgb(&room.path("a.exr")).unwrap();
+    let picture = read(&room.path("a.exr"), Shown::Rendered).unwrap();
     assert!(picture.pixels.contains(&[1.0; 3]) && picture.pixels.contains(&[0.0; 3]), "{said}");
 }
 

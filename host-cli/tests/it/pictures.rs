@@ -1,11 +1,11 @@
 //! Outputs of a render. The picture depends only on the scene and its settings.
 
 use crate::support::{Room, scene, scene_bytes, scene_of, shipped, small_render};
-use photoncard_driver::exr::{RgbImage, read_rgb};
+use photoncard_driver::exr::{RgbImage, Shown, read};
 use serde_json::{Value, json};
 
 fn picture(room: &Room, name: &str) -> RgbImage {
-    read_rgb(&room.path(name)).unwrap()
+    read(&room.path(name), Shown::Rendered).unwrap()
 }
 
 #[test]
@@ -14,7 +14,7 @@ fn layers_are_requested_by_name_and_do_not_change_the_picture() {
     room.write_scene("scene.gltf", &scene());
     let of_options = |options: &[&str]| {
         room.rendered("scene.gltf", &[&["-o", "a.exr"], options].concat());
-        (picture(&room, "a.exr"), room.read("a.exr"))
+        (picture(&room, "a.exr").pixels, room.read("a.exr"))
     };
     let (plain, bytes) = of_options(&[]);
     assert_eq!(of_options(&["--aov=Z,N,albedo"]).1, bytes);

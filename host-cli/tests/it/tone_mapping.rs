@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::support::{Outcome, Room, scene};
 use exr::prelude::{f16, write_rgb_file};
-use photoncard_driver::exr::read_rgb;
+use photoncard_driver::exr::{Shown, read};
 
 /// Options of tone mappings. The first one is the default.
 const MAPPINGS: [&[&str]; 5] = [
@@ -76,7 +76,7 @@ fn pictures_of_other_programs_are_tone_mapped() {
         (4, 3) => f32::INFINITY,
         _ => x as f32 - y as f32,
     });
-    assert!(read_rgb(&name).unwrap().pixels.iter().flatten().any(|value| *value < 0.0));
+    assert!(read(&name, Shown::Rendered).unwrap().pixels.iter().flatten().any(|value| *value < 0.0));
     let outcome = tonemap(&room, &["half.exr", "-o", "half.png", "--exposure", "0", "--tonemap", "none"]);
     assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     let file = std::io::BufReader::new(std::fs::File::open(room.path("half.png")).unwrap());

@@ -9,7 +9,7 @@ use exr::prelude::{
     WritableImage, f16,
 };
 use photoncard_driver::difference::compare;
-use photoncard_driver::exr::read_rgb;
+use photoncard_driver::exr::{Shown, read};
 use tempfile::TempDir;
 
 use super::mutation;
@@ -112,7 +112,7 @@ impl Target for Pictures {
 
     fn read(&self, input: &[u8]) -> bool {
         write_anew(&self.path(), input);
-        let image = match read_rgb(&self.path()) {
+        let image = match read(&self.path(), Shown::Rendered) {
             Ok(image) => image,
             Err(error) => {
                 let _ = error.to_string();

@@ -5,7 +5,7 @@ use std::io::{Write as _, stdout};
 use std::path::Path;
 
 use photoncard_driver::difference::compare;
-use photoncard_driver::exr::read_rgb;
+use photoncard_driver::exr::{self, Shown};
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Unobserved, render};
 use photoncard_driver::scene::{Environment, Scene, gltf};
@@ -53,7 +53,7 @@ fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
         "hdr" => told(Environment::load(&path)).is_some(),
         "exr" => {
             let environment = told(Environment::load(&path));
-            let picture = told(read_rgb(&path));
+            let picture = told(exr::read(&path, Shown::Rendered));
             if let Some(picture) = picture.filter(|picture| picture.pixels.len() <= MAX_COMPARED) {
                 told(compare(&picture, &picture, 16, None));
             }

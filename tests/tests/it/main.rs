@@ -13,6 +13,7 @@ mod environment_sun;
 mod exactness;
 mod extremes;
 mod faults;
+mod features;
 mod flat_glass;
 mod furnace;
 mod glossy;

@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use photoncard_driver::exr::{RgbImage, read_rgb};
+use photoncard_driver::exr::{self, RgbImage, Shown};
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{
     CardSet, Integrator, PhotonMaps, Picture, Radiance, RenderSettings, Sampling,
@@ -93,7 +93,7 @@ fn check_with(
 }
 
 fn read(reference: &str) -> RgbImage {
-    read_rgb(&path("references").join(reference)).expect("a shipped reference reads")
+    exr::read(&path("references").join(reference), Shown::Rendered).expect("a shipped reference reads")
 }
 
 /// Checks a scene of mirrors, glass, textures or sky with a number of photons and of samples.

@@ -60,6 +60,8 @@ pub struct RgbImage {
     pub data_window_origin: [i32; 2],
     /// The pixels, row by row from the top.
     pub pixels: Vec<[f32; 3]>,
+    /// JSON of the attribute [`PROVENANCE`]; `None` if the file has no such attribute, or it is not JSON.
+    pub provenance: Option<String>,
 }
 
 impl RgbImage {
@@ -69,7 +71,7 @@ impl RgbImage {
     }
 }
 
-/// Error of [`write()`] and [`read_rgb`].
+/// Error of [`write()`] and [`read()`].
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ExrError {
@@ -271,43 +273,21 @@ pub(crate) fn ascii(json: &str) -> String {
     text
 }
 
-/// Reads the channels `R G B` of the unnamed layer (half, float or unsigned) from the first part that has
-/// them.
-///
-/// # Errors
-/// As [`read_with_provenance`].
-pub fn read_rgb(path: &Path) -> Result<RgbImage, ExrError> {
-    read_with_provenance(path).map(|(picture, _)| picture)
+/// Radiance to read from a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shown {
+    /// The channels `R G B` of the unnamed layer.
+    Rendered,
+    /// The layer [`Content::denoised`], or else as [`Self::Rendered`]: what a tone-mapped picture shows.
+    Denoised,
 }
 
-/// Reads a picture like [`read_rgb`], and the JSON of its attribute [`PROVENANCE`]; `None` if the file has no
-/// such attribute, or it is not JSON.
+/// Reads three channels (half, float or unsigned) from the first part that has them.
 ///
 /// # Errors
 /// If the file cannot be read, is malformed, lacks the channels, or has more than [`MAX_READ_PIXELS`]. A file
 /// whose stated size its length cannot hold is refused before anything is allocated.
-pub fn read_with_provenance(path: &Path) -> Result<(RgbImage, Option<String>), ExrError> {
-    read(path, Shown::Rendered)
-}
-
-/// Reads what a tone-mapped picture shows: the layer [`Content::denoised`] of a file that has it, or else as
-/// [`read_with_provenance`].
-///
-/// # Errors
-/// As [`read_rgb`].
-pub fn read_shown(path: &Path) -> Result<(RgbImage, Option<String>), ExrError> {
-    read(path, Shown::Denoised)
-}
-
-/// Radiance to read.
-#[derive(Clone, Copy, PartialEq)]
-enum Shown {
-    Rendered,
-    /// Denoised, if the file has it.
-    Denoised,
-}
-
-fn read(path: &Path, shown: Shown) -> Result<(RgbImage, Option<String>), ExrError> {
+pub fn read(path: &Path, shown: Shown) -> Result<RgbImage, ExrError> {
     let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
     let found = std::fs::metadata(path).map_err(unreadable)?;
     if !found.is_file() {
@@ -339,17 +319,12 @@ pub fn is_intact(path: &Path) -> bool {
     std::fs::read(path).is_ok_and(|bytes| intact::is_intact_exr(&bytes))
 }
 
-/// Reads a picture like [`read_rgb`], from the bytes of a file, with at most `most_pixels` pixels.
+/// Reads the rendered radiance like [`read()`], from the bytes of a file, with at most `most_pixels` pixels.
 pub fn decode_rgb(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<RgbImage, ExrError> {
-    decode_walled(path, bytes, most_pixels, Shown::Rendered).map(|(picture, _)| picture)
+    decode_walled(path, bytes, most_pixels, Shown::Rendered)
 }
 
-fn decode_walled(
-    path: &Path,
-    bytes: &[u8],
-    most_pixels: u64,
-    shown: Shown,
-) -> Result<(RgbImage, Option<String>), ExrError> {
+fn decode_walled(path: &Path, bytes: &[u8], most_pixels: u64, shown: Shown) -> Result<RgbImage, ExrError> {
     // The `exr` crate does not check every number of a file: sums of window sizes, offsets of blocks.
     foreign::decode(
         || decode(path, bytes, most_pixels, shown),
@@ -360,12 +335,7 @@ fn decode_walled(
     )
 }
 
-fn decode(
-    path: &Path,
-    bytes: &[u8],
-    most_pixels: u64,
-    shown: Shown,
-) -> Result<(RgbImage, Option<String>), ExrError> {
+fn decode(path: &Path, bytes: &[u8], most_pixels: u64, shown: Shown) -> Result<RgbImage, ExrError> {
     let malformed =
         |error: exr::error::Error| ExrError::Malformed { path: path.to_owned(), reason: error.to_string() };
     let meta = MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(malformed)?;
@@ -408,8 +378,7 @@ fn decode(
     let provenance = provenance(&layer.attributes);
     let Vec2(x, y) = layer.attributes.layer_position;
     let (width, pixels) = layer.channel_data.pixels;
-    let picture = RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels };
-    Ok((picture, provenance))
+    Ok(RgbImage { width, height: layer.size.height(), data_window_origin: [x, y], pixels, provenance })
 }
 
 /// Value of the attribute [`PROVENANCE`], if it is JSON.

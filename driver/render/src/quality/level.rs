@@ -31,6 +31,13 @@ pub enum Finish {
     Denoised,
 }
 
+impl Finish {
+    /// Finish of a picture with or without a denoiser.
+    pub fn new(is_denoised: bool) -> Self {
+        if is_denoised { Self::Denoised } else { Self::Rendered }
+    }
+}
+
 choices!(Quality {
     Draft = "draft": "A look at the scene: visible noise, 8 to 16 samples a pixel",
     Good = "good": "A picture to show: without visible noise in a room, 24 to 48 samples a pixel",

@@ -40,6 +40,11 @@ use ggx::Estimate;
 use lobe::Lobe;
 use phong::PhongLobe;
 
+/// Maximum `a = roughness^2` of a sharp lobe. Cycles's denoising features have the same limit.
+const MAX_SHARP_ALPHA: f32 = 0.075;
+/// Minimum fraction of the albedo that a sharp lobe has.
+const MIN_SHARP_SHARE: f32 = 0.75;
+
 /// Parameters of a reflection function `f`: a Lambertian part and a lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflection {
@@ -92,6 +97,12 @@ impl Reflection {
             Lobe::Ggx(lobe) => lobe.estimate != Estimate::Photons && lobe.reflects(),
             Lobe::Sheen(lobe) => lobe.reflects(),
         }
+    }
+
+    /// Returns true for a reflection in which objects are recognised: nearly all of it is a sharp lobe.
+    pub fn is_sharp(&self) -> bool {
+        let has_sharp_lobe = matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.alpha() <= MAX_SHARP_ALPHA);
+        has_sharp_lobe && self.glossy_share() >= MIN_SHARP_SHARE
     }
 
     /// Fraction of the albedo that a GGX lobe has; 0 without one.

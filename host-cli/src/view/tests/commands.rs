@@ -130,7 +130,7 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
         let arguments = options(&mut random);
         let view = view_options(&arguments);
         let wish = wish(&view, &mut random);
-        let line = quoted(&words(&view.scene, view.quality, &wish));
+        let line = quoted(&words(&view.scene, view.quality, view.finish(), &wish));
         let render = render_options(&line);
         let settings = render.settings();
         assert_eq!(settings.of_pixels(), wish.settings.of_pixels(), "{arguments:?}: {line}");
@@ -154,7 +154,7 @@ fn numbers_and_words_survive_a_shell() {
     let view = view_options(&["it's a scene.gltf".into()]);
     let mut wish = Wish::new(view.settings(), view.stated(), Vec::new());
     wish.look([0.1, -2.0, 1e-7], [f64::MIN_POSITIVE, 16_777_216.0, -0.0], 33.3);
-    let line = quoted(&words(&view.scene, view.quality, &wish));
+    let line = quoted(&words(&view.scene, view.quality, view.finish(), &wish));
     assert!(line.starts_with(r"photoncard render 'it'\''s a scene.gltf' --quality good "), "{line}");
     let shell = std::process::Command::new("sh").arg("-c").arg(format!("printf '%s\\n' {line}")).output();
     let Ok(output) = shell else {

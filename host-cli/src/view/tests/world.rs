@@ -96,6 +96,7 @@ impl World {
         let scene = scene();
         let start = Start {
             quality: options.quality,
+            finish: options.finish(),
             wish: Wish::new(options.settings(), options.stated(), Vec::new()),
             sketch: Sketch::new(&scene),
             facts: SceneFacts::new("scene.gltf".into(), &scene),

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use crate::support::{Emulator, Room, scene, shipped};
 use page::{View, camera};
+use photoncard_driver::exr::{Shown, read};
 use serde_json::{Value, json};
 
 /// Options of a small picture.
@@ -96,6 +97,30 @@ fn the_settled_picture_equals_that_of_the_shown_command() {
             assert!(room.read(&format!("out/{name}")) == room.read(name), "{name}: {}", state["command"]);
         }
     }
+}
+
+/// Pages see the denoised radiance, which a PNG shows and an EXR has beside the rendered one.
+#[test]
+#[cfg(unix)]
+fn a_denoised_view_settles_to_the_denoised_picture_of_its_command() {
+    let room = Room::new();
+    if !crate::denoise::is_there(&room) {
+        return;
+    }
+    std::fs::create_dir(room.path("out")).unwrap();
+    let view = small_view(&room, &["--out", "out", "--denoise", "--spp", "3", "--tile", "8"]);
+    let mut page = view.connect();
+    let state = page.settle();
+    for name in ["a.exr", "a.png"] {
+        page.send(&json!({"type": "save", "name": name}));
+        page.wait_for("saved");
+        run_shown(&room, &state, name);
+        assert!(room.read(&format!("out/{name}")) == room.read(name), "{name}: {}", state["command"]);
+    }
+    let denoised = read(&room.path("a.exr"), Shown::Denoised).unwrap();
+    assert_ne!(denoised.pixels, read(&room.path("a.exr"), Shown::Rendered).unwrap().pixels);
+    let shown = (0..12).flat_map(|y| (0..20).map(move |x| (x, y))).map(|place| page.pixels[&place]);
+    assert_eq!(shown.collect::<Vec<_>>(), denoised.pixels);
 }
 
 /// The work of a settled picture's tiles adds up to that of its command, also for samples in several passes.
