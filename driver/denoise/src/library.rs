@@ -15,8 +15,33 @@ use crate::places::{FILE, VARIABLE};
 const CPU: c_int = 1;
 /// `OIDN_FORMAT_FLOAT3`.
 const FLOAT3: c_int = 3;
+/// `OIDN_ERROR_CANCELLED`.
+const CANCELLED: c_int = 6;
 
 type Handle = *mut c_void;
+/// `OIDNProgressMonitorFunction`: returns false to cancel the filter.
+type Monitor = unsafe extern "C" fn(*mut c_void, f64) -> bool;
+
+/// Tells whether work is no longer wanted. The library may ask on any of its threads.
+pub type MustStop<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// Quality of a filter, in exchange for its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Quality {
+    /// `OIDN_QUALITY_BALANCED`: a smaller network, two to three times as fast.
+    Balanced = 5,
+    /// `OIDN_QUALITY_HIGH`.
+    High = 6,
+}
+
+/// Input of a filter.
+pub(crate) struct Input<'a> {
+    /// Images by their names in the library.
+    pub(crate) images: &'a [(&'a str, &'a [[f32; 3]])],
+    /// Names of boolean parameters that are true.
+    pub(crate) switches: &'a [&'a str],
+    pub(crate) quality: Quality,
+}
 
 /// Error of loading or running the denoiser.
 #[derive(Debug, Error)]
@@ -44,6 +69,9 @@ pub enum DenoiseError {
         /// Error message of the library.
         reason: String,
     },
+    /// The caller stopped the denoiser.
+    #[error("the denoiser was stopped")]
+    Stopped,
     /// Pixels of the film were never written.
     #[error("{missing} pixels of the picture are missing; it is denoised when it is complete")]
     Incomplete {
@@ -83,6 +111,8 @@ functions! {
     new_filter = "NewFilter": fn(Handle, *const c_char) -> Handle;
     set_image = "SetSharedFilterImage": fn(Handle, *const c_char, *mut c_void, c_int, usize, usize, usize, usize, usize);
     set_filter_bool = "SetFilterBool": fn(Handle, *const c_char, bool);
+    set_filter_int = "SetFilterInt": fn(Handle, *const c_char, c_int);
+    set_monitor = "SetFilterProgressMonitorFunction": fn(Handle, Monitor, *mut c_void);
     commit_filter = "CommitFilter": fn(Handle);
     execute_filter = "ExecuteFilter": fn(Handle);
     release_filter = "ReleaseFilter": fn(Handle);
@@ -134,20 +164,24 @@ impl<'a> Device<'a> {
         format!("OIDN {}.{}.{}", version / 10_000, version / 100 % 100, version % 100)
     }
 
-    /// Filters images of `size` pixels by their names in the library, with switches on.
+    /// Filters images of `size` pixels.
     pub(crate) fn run(
         &self,
         size: [usize; 2],
-        images: &[(&str, &[[f32; 3]])],
-        switches: &[&str],
+        input: &Input,
+        must_stop: MustStop,
     ) -> Result<Vec<[f32; 3]>, DenoiseError> {
+        if must_stop() {
+            return Err(DenoiseError::Stopped);
+        }
         let [width, height] = size;
         let mut output = vec![[0.0; 3]; width * height];
         let mut filter = Filter::new(self, size)?;
-        images.iter().for_each(|(name, image)| filter.read(name, image));
+        input.images.iter().for_each(|(name, image)| filter.read(name, image));
         filter.write(&mut output);
-        switches.iter().for_each(|name| filter.switch_on(name));
-        filter.execute();
+        input.switches.iter().for_each(|name| filter.switch_on(name));
+        filter.set_quality(input.quality);
+        filter.execute(must_stop);
         drop(filter);
         self.check()?;
         Ok(output)
@@ -163,8 +197,10 @@ impl<'a> Device<'a> {
         // SAFETY: a null device stands for the error of creating one. The message is valid until the next
         // call.
         let code = unsafe { (self.library.device_error)(self.handle, &raw mut message) };
-        if code == 0 {
-            return None;
+        match code {
+            0 => return None,
+            CANCELLED => return Some(DenoiseError::Stopped),
+            _ => {}
         }
         if message.is_null() {
             return Some(failed("without a reason"));
@@ -232,9 +268,21 @@ impl<'a> Filter<'a> {
         unsafe { (self.library.set_filter_bool)(self.handle, name.as_ptr(), true) }
     }
 
-    fn execute(&mut self) {
-        // SAFETY: the filter is one, and its images are valid.
+    fn set_quality(&mut self, quality: Quality) {
+        // SAFETY: the filter is one, and the name ends in 0.
+        unsafe { (self.library.set_filter_int)(self.handle, c"quality".as_ptr(), quality as c_int) }
+    }
+
+    fn execute(&mut self, must_stop: MustStop) {
+        /// Monitor whose data are a [`MustStop`].
+        unsafe extern "C" fn goes_on(must_stop: *mut c_void, _share: f64) -> bool {
+            // SAFETY: `execute` outlives the filter's work, and the closure may be called on any thread.
+            let must_stop = unsafe { &*must_stop.cast::<MustStop>() };
+            !must_stop()
+        }
+        // SAFETY: the filter is one, its images are valid, and the monitor's data live until it has ended.
         unsafe {
+            (self.library.set_monitor)(self.handle, goes_on, (&raw const must_stop).cast_mut().cast());
             (self.library.commit_filter)(self.handle);
             (self.library.execute_filter)(self.handle);
         }

@@ -133,6 +133,7 @@ impl<K: ChipKind> Flight<K> {
     ) -> Result<bool, Fault> {
         let at = self.path(pixel, completion.sample, completion.path);
         let paths = self.paths(pixel).of_sample(completion.sample);
+        let pass = self.pass();
         let context = &mut job.context(&mut self.counters);
         let has_rays = match eye::view(context, at)? {
             Sight::Background(radiance) => {
@@ -141,11 +142,15 @@ impl<K: ChipKind> Flight<K> {
                 false
             }
             Sight::Surface(view) => {
-                if completion.path == 0 && matches!(as_what, Use::Term(_)) {
+                let path = (at, &view, paths);
+                let has_rays = light_path::<K, M>(context, &self.cache, path, (as_what, &mut *completion))?;
+                // A plain pass drops a pixel that has gather rays, and another pass completes it.
+                let is_kept = !(has_rays && pass == Pass::CompletePlain);
+                if is_kept && completion.path == 0 && matches!(as_what, Use::Term(_)) {
                     let features = features(context, at, &view)?;
                     completion.view.add(&context.scene.header, &features, view.depth);
                 }
-                light_path::<K, M>(context, &self.cache, (at, &view, paths), (as_what, completion))?
+                has_rays
             }
         };
         completion.end_light(context.scene.header.radiance_unit);

@@ -1,7 +1,7 @@
 //! Features of a sample, which guide a denoiser: albedo and normal of what the sample shows.
 //!
-//! Eye paths follow perfectly specular surfaces, so that features are those of the first other surface. At a
-//! sharp lobe, where an eye path ends, one ray of the lobe is followed on, as in Cycles.
+//! Eye paths follow perfectly specular surfaces, so that features are those of the first other surface. An
+//! eye path ends at a sharp lobe. There one ray of the lobe is followed on, as in Cycles.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -12,6 +12,9 @@ use super::{Context, PixelSample};
 use crate::memory::MemoryPort;
 use crate::sampler::Dimension;
 use crate::scene::{Ray, ReflectedDirection, Surface, closest_hit, read_surface};
+
+/// Minimum fraction of a surface's albedo that a sharp lobe has where features are those of what it reflects.
+const MIN_SHARP_SHARE: f32 = 0.75;
 
 /// Features of a sample.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +44,8 @@ pub fn features<M: MemoryPort>(
     view: &View,
 ) -> Result<Features, Fault> {
     let surface = &view.surface;
-    if !surface.reflection.is_sharp() {
+    // A coat's or a bump's lobe is drawn as a reflection of its own, with the probability of its share.
+    if surface.probability * surface.reflection.sharp_share() < MIN_SHARP_SHARE {
         return Ok(Features::of(surface));
     }
     let Features { albedo, normal } = reflected(context, pixel, surface)?;

@@ -97,7 +97,7 @@ impl OutputOptions {
     }
 
     /// Finish of the pictures.
-    pub(super) fn finish(&self) -> Finish {
+    pub(crate) fn finish(&self) -> Finish {
         Finish::new(self.denoise)
     }
 

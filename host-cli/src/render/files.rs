@@ -172,7 +172,7 @@ pub(crate) fn denoised(
     film: &Film,
     threads: Option<usize>,
 ) -> Result<Option<Vec<[f32; 3]>>, Failure> {
-    let radiance = denoiser.map(|denoiser| denoiser.radiance(film, threads)).transpose();
+    let radiance = denoiser.map(|denoiser| denoiser.radiance(film, threads, &|| false)).transpose();
     radiance.map_err(|error| Failure::work_error(&error))
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::photon_map::PhotonsFor;
-use photoncard_driver::quality::{Beyond, Fit, Quality, Stated};
+use photoncard_driver::quality::{Beyond, Finish, Fit, Quality, Stated};
 use photoncard_driver::render::{
     EARLIER_RENDER, MemoryStatistics, NamedSettings, Picture, ReadStatistics, RenderSettings, Rendering,
     Statistics, Times,
@@ -86,6 +86,20 @@ pub(super) fn say_prepared(path: &Path, settings: &RenderSettings, inputs: &Name
         "photoncard: {name}: {scene} with {} photons, prepared; seen by '{}', {width} x {height} pixels",
         photons.count, camera.name
     ));
+}
+
+/// Says that a scene was prepared for pictures of another finish.
+pub(super) fn say_other_finish(path: &Path, prepared: Finish, wanted: Finish) {
+    let text = match (prepared, wanted) {
+        (Finish::Denoised, Finish::Rendered) => {
+            "has the few samples of a picture that is denoised; add --denoise"
+        }
+        (Finish::Rendered, Finish::Denoised) => {
+            "may have interpolated irradiance, whose errors a denoiser keeps; prepare it with --denoise"
+        }
+        _ => return,
+    };
+    say(format_args!("photoncard: {} {text}", path.display()));
 }
 
 /// Clause that names the quality as the origin of settings.

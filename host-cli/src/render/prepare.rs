@@ -6,6 +6,7 @@ use std::sync::OnceLock;
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
+use photoncard_driver::quality::Finish;
 use photoncard_driver::render::{Chosen, Phase, PreparedScene, RenderSettings};
 use photoncard_driver::scene::Scene;
 use serde_json::{Map, Value, json};
@@ -155,12 +156,17 @@ impl<'a> Preparation<'a> {
     }
 }
 
-/// Metadata for renders: the quality, the names of the inputs, and the settings that all frames share.
+/// Metadata for renders: the quality and the finish, the names of the inputs, and the settings that all frames
+/// share.
 fn notes(options: &PrepareOptions) -> Map<String, Value> {
     let mut inputs = input::provenance(&options.scene);
     if options.frames.numbers().is_some() {
         inputs.extend(options.frames.shared_provenance());
     }
-    let notes = [("quality", json!(options.quality.name())), ("inputs", Value::Object(inputs))];
+    let notes = [
+        ("quality", json!(options.quality.name())),
+        ("denoise", json!(options.finish() == Finish::Denoised)),
+        ("inputs", Value::Object(inputs)),
+    ];
     notes.map(|(name, value)| (name.to_owned(), value)).into_iter().collect()
 }

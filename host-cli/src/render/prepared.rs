@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use miette::{MietteDiagnostic, Report};
 use photoncard_driver::choice::Choice;
-use photoncard_driver::quality::Quality;
+use photoncard_driver::quality::{Finish, Quality};
 use photoncard_driver::render::{NamedSettings, Phase, PreparedScene, RenderError, Renderer};
 use serde_json::{Value, json};
 
@@ -73,6 +73,7 @@ struct OpenScene {
     prepared: PreparedScene,
     renderer: Renderer,
     quality: Quality,
+    prepared_for: Finish,
     inputs: NamedSettings,
     /// Time of opening that was not reported yet, seconds.
     seconds: f64,
@@ -93,8 +94,9 @@ impl OpenScene {
             let text = format!("{} was not prepared by this command", options.scene.path.display());
             refusal(text, "prepare the scene by photoncard prepare")
         })?;
+        let prepared_for = Finish::new(prepared.notes().get("denoise") == Some(&Value::Bool(true)));
         let (renderer, seconds) = (prepared.renderer(), start.elapsed().as_secs_f64());
-        Ok(Self { path, prepared, renderer, quality, inputs, seconds })
+        Ok(Self { path, prepared, renderer, quality, prepared_for, inputs, seconds })
     }
 
     fn render(
@@ -104,7 +106,7 @@ impl OpenScene {
         outputs: &OutputOptions,
         progress: &Progress,
     ) -> Result<(), Failure> {
-        let Self { path, prepared, renderer, quality, inputs, seconds } = self;
+        let Self { path, prepared, renderer, quality, prepared_for, inputs, seconds } = self;
         let own;
         let scene = match frame {
             None => prepared.scene(),
@@ -121,6 +123,9 @@ impl OpenScene {
         if !options.quiet && *seconds > 0.0 {
             messages::say_prepared(path, &settings, &inputs, &camera);
             misfit.iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
+            if options.parts.part.is_none() {
+                messages::say_other_finish(path, *prepared_for, outputs.finish());
+            }
         }
         inputs.extend(frame.map(|frame| ("frame".to_owned(), json!(frame))));
         if let Some(frame) = frame.filter(|_| is_finished(options, outputs, &settings, scene, &inputs)) {

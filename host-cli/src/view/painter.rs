@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-use photoncard_driver::denoise::Denoiser;
+use photoncard_driver::denoise::{DenoiseError, Denoiser};
 use photoncard_driver::film::Film;
 use photoncard_driver::quality::{Finish, Quality};
 use photoncard_driver::render::{CardError, Observer, Phase, RenderError, Renderer, Rendering};
@@ -124,7 +124,7 @@ impl<'a> Painter<'a> {
         let rendering = self.render_by_passes(task)?;
         let statistics = rendering.statistics.clone();
         if task.work.pass == Pass::Full {
-            let denoised = self.denoise(task, &rendering.film);
+            let denoised = self.denoise(task, &rendering.film)?;
             let mut provenance = statistics.provenance.pixels.clone();
             let assignments = task.wish.assignments();
             provenance.extend(input::provenance(&SceneOptions { assignments, ..self.options.clone() }));
@@ -137,8 +137,12 @@ impl<'a> Painter<'a> {
     }
 
     /// Denoised radiance of the settled picture, if it is asked for. Pages show it, or why it failed.
-    fn denoise(&self, task: &Task, film: &Film) -> Option<Vec<[f32; 3]>> {
-        let denoised = self.denoiser?.radiance(film, self.threads);
+    fn denoise(&self, task: &Task, film: &Film) -> Result<Option<Vec<[f32; 3]>>, RenderError> {
+        let Some(denoiser) = self.denoiser else { return Ok(None) };
+        let denoised = denoiser.radiance(film, self.threads, &|| self.hub.must_stop());
+        if let Err(DenoiseError::Stopped) = denoised {
+            return Err(RenderError::Stopped);
+        }
         self.hub.change(|view, _| match &denoised {
             Ok(radiance) => {
                 let at = |x: u32, y: u32| radiance[(y * film.window().width() + x) as usize];
@@ -146,7 +150,7 @@ impl<'a> Painter<'a> {
             }
             Err(error) => view.tell_error(&error.to_string()),
         });
-        denoised.ok()
+        Ok(denoised.ok())
     }
 
     /// Renders a picture by passes, each of which doubles the samples per pixel.

@@ -112,6 +112,7 @@ fn a_scene_is_prepared_for_pictures_that_are_denoised() {
         let outcome = room.run(&[own, &picture].concat());
         assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     };
+    let notices = |own: &[&str]| room.run(&[own, &["--spp=1", "--size=8x8"]].concat()).stderr;
     let options = ["--quality=draft", "--photons=5000"];
     run(&[&["render", &cornell, "-o", "whole.exr", "--denoise"], &options[..]].concat());
     run(&[&["prepare", &cornell, "-o", "it.card", "--denoise"], &options[..]].concat());
@@ -120,6 +121,12 @@ fn a_scene_is_prepared_for_pictures_that_are_denoised() {
     run(&[&["prepare", &cornell, "-o", "other.card"], &options[..]].concat());
     run(&["render", "--prepared", "other.card", "-o", "other.exr", "--denoise"]);
     assert!(room.read("other.exr") != room.read("whole.exr"));
+    let of_other = |stderr: &str| stderr.contains("add --denoise") || stderr.contains("with --denoise");
+    for (scene, other) in [("it.card", false), ("other.card", true)] {
+        let rendered = ["render", "--prepared", scene, "-o", "small.png"];
+        assert_eq!(of_other(&notices(&rendered)), !other);
+        assert_eq!(of_other(&notices(&[&rendered[..], &["--denoise"]].concat())), other);
+    }
 }
 
 #[test]

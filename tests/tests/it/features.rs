@@ -1,10 +1,12 @@
 //! Albedo and normals that guide a denoiser are those of what mirrors, glass and sharp lobes show.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
-use photoncard_driver::scene::{Camera, Encoding, Image, Material, Reflection, Scene, Texture, Triangle};
-use photoncard_tests::shapes::add_textured_quad;
+use photoncard_driver::scene::{
+    Camera, Coat, Encoding, Image, Layers, Material, NormalMap, Reflection, Scene, Texture, Triangle,
+};
+use photoncard_tests::shapes::{add_tangents, add_textured_quad};
 use photoncard_tests::{camera, glass, lambertian, mean, quad, render_or_panic, room, scene};
 
 use super::specular::mirror;
@@ -101,6 +103,47 @@ fn polished_metal_has_the_albedo_of_what_it_shows_and_rough_metal_its_own() {
     assert!((seen_up / direct_up - 1.0).abs() < 0.02, "{seen_up} {direct_up}");
     let rough = film(&room_before(Some(metal(0.8, 0.4)), view));
     assert!(rough.pixels().all(|pixel| pixel.albedo[0] > 0.6 && pixel.normal[2] > 0.99));
+}
+
+/// Plastic with layers and a base of 0.8.
+fn plastic(roughness: f32, layers: Layers) -> Material {
+    let reflection = Reflection::MetallicRoughness {
+        base_colour: Vec3::splat(0.8),
+        metallic: 0.0,
+        roughness,
+        dielectric: Vec3::splat(0.04),
+        grazing: 1.0,
+        transmission: None,
+    };
+    Material { layers: Some(Box::new(layers)), ..Material::new("plastic", reflection) }
+}
+
+/// The wall of [`room_before`] with a texture, whose only texel is a normal 20 degrees off the wall's.
+fn room_before_bumps(wall: Material, view: Camera) -> Scene {
+    let mut scene = room_before(None, view);
+    scene.materials[2] = wall;
+    let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x, y, -1.0));
+    add_textured_quad(&mut scene, corners, [[0., 1.], [1., 1.], [1., 0.], [0., 0.]], 2);
+    add_tangents(&mut scene, 2, Vec4::new(1.0, 0.0, 0.0, 1.0));
+    let (name, encoding) = ("bumps".into(), Encoding::Linear);
+    scene.images.push(Image { name, width: 1, height: 1, texels: vec![[171, 128, 247, 255]], encoding });
+    scene.textures.push(Texture::new(1));
+    scene
+}
+
+#[test]
+fn coats_and_bumps_of_plastic_leave_the_features_of_the_plastic() {
+    let [view, _] = both_cameras();
+    let none = || Layers::none(Vec3::splat(0.04));
+    let coat =
+        Coat { factor: 1.0, roughness: 0.1, factor_texture: None, roughness_texture: None, normal: None };
+    let coated = plastic(0.9, Layers { coat: Some(coat), ..none() });
+    let bumpy = plastic(0.2, Layers { normal: Some(NormalMap { texture: 1, scale: 1.0 }), ..none() });
+    let coated = film(&room_before(Some(coated), view.clone()));
+    let bumpy = film(&room_before_bumps(bumpy, view));
+    for (film, least) in [(coated, 0.999), (bumpy, 0.93)] {
+        assert!(film.pixels().all(|pixel| pixel.normal[2] > least && pixel.albedo[0] > 0.6));
+    }
 }
 
 /// Reflectance of a thin wall of glass at normal incidence, with all reflections inside.

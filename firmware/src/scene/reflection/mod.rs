@@ -42,8 +42,6 @@ use phong::PhongLobe;
 
 /// Maximum `a = roughness^2` of a sharp lobe. Cycles's denoising features have the same limit.
 const MAX_SHARP_ALPHA: f32 = 0.075;
-/// Minimum fraction of the albedo that a sharp lobe has.
-const MIN_SHARP_SHARE: f32 = 0.75;
 
 /// Parameters of a reflection function `f`: a Lambertian part and a lobe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,10 +97,10 @@ impl Reflection {
         }
     }
 
-    /// Returns true for a reflection in which objects are recognised: nearly all of it is a sharp lobe.
-    pub fn is_sharp(&self) -> bool {
-        let has_sharp_lobe = matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.alpha() <= MAX_SHARP_ALPHA);
-        has_sharp_lobe && self.glossy_share() >= MIN_SHARP_SHARE
+    /// Fraction of the albedo that a sharp GGX lobe has, in which objects are recognised; 0 without one.
+    pub fn sharp_share(&self) -> f32 {
+        let is_sharp = matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.alpha() <= MAX_SHARP_ALPHA);
+        if is_sharp { self.glossy_share() } else { 0.0 }
     }
 
     /// Fraction of the albedo that a GGX lobe has; 0 without one.
