@@ -36,7 +36,7 @@ fn prepare_rest(options: &PrepareOptions) -> Result<(), Failure> {
     preparation.write(&prepared, &options.output)
 }
 
-/// Prepares frames. A frame that differs from the previous one only by its cameras shares its file.
+/// Prepares frames. Consecutive frames that differ only by their cameras share a file.
 fn prepare_frames(options: &PrepareOptions, numbers: &[u32]) -> Result<(), Failure> {
     let path = |number: u32| numbered(&options.output, number).unwrap_or_else(|| options.output.clone());
     numbers.iter().try_for_each(|&number| check(options, &path(number)))?;
@@ -80,12 +80,12 @@ fn one_file(output: &Path) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// State that all files of a preparation share.
+/// Options, settings and progress that all files of a preparation share.
 struct Preparation<'a> {
     options: &'a PrepareOptions,
     settings: RenderSettings,
     progress: Progress,
-    /// Text about the settings that the quality has found.
+    /// Message about the settings that the quality has chosen.
     said: OnceLock<String>,
 }
 
@@ -106,7 +106,7 @@ impl<'a> Preparation<'a> {
         Ok(Self { options, settings, progress, said: OnceLock::new() })
     }
 
-    /// Chooses photons and integrator for `scene`, unless they are stated.
+    /// Chooses the settings of photons and integrator that are not stated, by a pilot with `scene`.
     fn choose(&self, scene: &Scene, packed: &PackedScene) -> Chosen {
         let Self { options, settings, progress, said } = self;
         let stated = options.stated();
@@ -155,7 +155,7 @@ impl<'a> Preparation<'a> {
     }
 }
 
-/// Metadata for renders: the quality, the names of the inputs, and the settings that all frames share.
+/// Metadata that renders of a prepared scene read: quality, inputs, and settings that all frames share.
 fn notes(options: &PrepareOptions) -> Map<String, Value> {
     let mut inputs = input::provenance(&options.scene);
     if options.frames.numbers().is_some() {
