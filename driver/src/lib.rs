@@ -23,7 +23,7 @@
 //! let scene = gltf::load(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf")))?;
 //! let settings = Quality::Good.settings().with(|settings| {
 //!     (settings.picture.width, settings.picture.height) = (16, 16);
-//!     // Fewer than the quality's half a million, so that the example is fast.
+//!     // Far fewer photons than the quality's, so that the example is fast.
 //!     settings.photons.count = 5_000;
 //! });
 //! let rendering = render(&scene, &settings, &Unobserved)?;
@@ -45,8 +45,8 @@
 //! scene, with the fewest samples and medium numbers of rays and photons.
 //! [`Quality::fit`](quality::Quality::fit) chooses these numbers for a scene;
 //! [`render_chosen`](render::render_chosen) lets it do so during a render. `RenderSettings::default()` is
-//! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All of them are for one
-//! emulated reference chip. [`Rendering`](render::Rendering) holds the [`Film`](film::Film) and the
+//! [`Quality::Paper`](quality::Quality::Paper), the dissertation's nominal frame. All these settings are for
+//! one emulated reference chip. [`Rendering`](render::Rendering) holds the [`Film`](film::Film) and the
 //! [`Statistics`](render::Statistics). A [`Renderer`](render::Renderer) renders further pictures on cards
 //! that stay open. [`tone_mapping::write_png`] writes a tone-mapped PNG; [`difference`] compares two
 //! pictures.
@@ -101,7 +101,7 @@
 //!
 //! # Crates
 //!
-//! This crate re-exports the modules of seven crates. Each of them imports crates above it in this list;
+//! This crate re-exports the modules of seven crates. Each of them imports only crates above it in this list;
 //! `photoncard_cards` and `photoncard_denoise` import only `photoncard_picture`.
 //!
 //! - [`photoncard_picture`] ([`film`], [`sums`], [`sink`], [`viewer`], [`layer`], [`exr`], [`tone_mapping`],

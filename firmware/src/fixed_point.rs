@@ -8,7 +8,7 @@ use fixed::types::I24F40;
 use glam::Vec3;
 use photoncard_shared::layout::Rgbe;
 
-/// Scale 2^40. The number is exact in `f32`, and so are products with it.
+/// 2^40: number of steps of a sum per unit. The number is exact in `f32`, and so are products with it.
 const SCALE: f32 = (1_u64 << 40) as f32;
 
 /// Fixed-point sum of numbers, exact except for the rounding of each term.
@@ -51,7 +51,7 @@ impl Sum {
 /// Fixed-point sum of colours, exact except for the rounding of each term.
 ///
 /// Each component is a [`Sum`]. The sum of k photons of one power unit each, times a reflectance of at most a
-/// few thousand, is far below its limit.
+/// few thousand, is far below the limit of 2^23 units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct ColourSum([Sum; 3]);
 
@@ -90,7 +90,7 @@ impl ColourSum {
         self.add_powers(&[u32::from_le_bytes(power.0).into()]);
     }
 
-    /// Adds the [`Rgbe`] colours in the low four bytes of photon contents.
+    /// Adds the [`Rgbe`] colour in the low four bytes of each photon content.
     #[inline(always)]
     pub(crate) fn add_powers(&mut self, photons: &[u64]) {
         let mut sums = [0_u64; 3];
@@ -114,7 +114,7 @@ impl ColourSum {
         }
     }
 
-    /// Sum of each channel, in units of 2^-40.
+    /// Sum of each channel, in steps of 2^-40 units.
     #[inline(always)]
     pub fn bits(&self) -> [i64; 3] {
         self.0.map(|Sum(sum)| sum.to_bits())
@@ -127,14 +127,13 @@ impl ColourSum {
     }
 }
 
-/// Fixed-point components of the [`Rgbe`] colour in the low four bytes of a photon content.
+/// Components, in steps of 2^-40 units, of the [`Rgbe`] colour in the low four bytes of a photon content.
 #[inline(always)]
 fn bits_of_power(photon: u64) -> [u64; 3] {
-    // The exponent byte of a mantissa in units of 2^-40.
+    // Exponent byte with which a mantissa counts steps of 2^-40 units.
     const UNIT: u32 = Rgbe::EXPONENT_BIAS as u32 - I24F40::FRAC_NBITS;
     let exponent = (photon >> 24) as u32 & 0xff;
-    // One of the two shifts is 0; a byte shifted by 63 is out of range on the right, and 0 or 2^63 on the
-    // left.
+    // One of the two shifts is 0. A byte shifted by 63 is 0 on the right, and 0 or 2^63 on the left.
     let [up, down] = [exponent.saturating_sub(UNIT).min(63), UNIT.saturating_sub(exponent).min(63)];
     [photon, photon >> 8, photon >> 16].map(|mantissa| (mantissa & 0xff) << up >> down)
 }

@@ -1,12 +1,12 @@
 //! Random numbers as functions of (seed, pixel, sample, dimension), independent of chip, thread and order of
 //! execution.
 //!
-//! Points in a pixel, points on emitters and choices are the first points of a sequence, not a set of a fixed
-//! size, so that samples can be added to a picture and any number of them is stratified. The sequence is the
-//! first two dimensions of Sobol' (1967) with Owen's (1995) nested uniform scrambling. Its order is scrambled
-//! in the same way, so that patterns of different dimensions are independent (Burley 2020, *Practical
-//! hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned run of 2^m points has one point in
-//! every box of area 2^-m whose sides are powers of two.
+//! Points in a pixel, points on emitters and the first choices of an eye path are the first points of a
+//! sequence, not a set of a fixed size, so that samples can be added to a picture and any number of them is
+//! stratified. The sequence is the first two dimensions of Sobol' (1967) with Owen's (1995) nested uniform
+//! scrambling. Its order is scrambled in the same way, so that patterns of different dimensions are
+//! independent (Burley 2020, *Practical hash-based Owen scrambling*). It is a (0, 2)-sequence: each aligned
+//! run of 2^m points has one point in every box of area 2^-m whose sides are powers of two.
 //!
 //! A final gather ray has two coordinates. The first is jittered ([`Pattern::jitter`]) and selects a cell of
 //! the direction table ([`crate::importance::DirectionTable`]); the second is a radical inverse. Any run of
@@ -48,7 +48,7 @@ impl Pattern {
         Self(hash(hash(hash(pixel).wrapping_add(sample)).wrapping_add(dimension as u32)))
     }
 
-    /// Random bits for point `index`, independent of the point's coordinates.
+    /// Random bits for point `index`, independent of the point's coordinates, to dither values.
     #[inline(always)]
     pub fn dither(self, index: u32) -> u32 {
         self.bits(index, 0x2545_f491)
@@ -78,7 +78,7 @@ impl Pattern {
         hash(self.0.wrapping_add(salt) ^ index.wrapping_mul(0x9e37_79b9))
     }
 
-    /// Point `index` of the sequence, in [0, 1) x [0, 1).
+    /// Point `index` of the scrambled Sobol' sequence, in [0, 1) x [0, 1).
     #[inline(always)]
     pub fn point(self, index: u32) -> [f32; 2] {
         let seed = |salt: u32| hash(self.0.wrapping_add(salt));

@@ -60,8 +60,8 @@ pub(crate) fn max_component(v: Vec3) -> f32 {
     max(max(v.x, v.y), v.z)
 }
 
-/// Converts an `f32` to bfloat16, rounded to nearest, ties away from zero. Finite numbers above the largest
-/// bfloat16 become infinite; a NaN may become any number.
+/// Converts an `f32` to bfloat16, rounded to nearest, ties away from zero. Finite numbers that round to more
+/// than the largest bfloat16 become infinite; a NaN may become any number.
 #[inline(always)]
 pub(crate) fn upper_half(value: f32) -> u16 {
     (value.to_bits().saturating_add(0x8000) >> 16) as u16

@@ -1,6 +1,7 @@
-//! Traversal of a tree with wide nodes: the bounding volume hierarchy, or a photon map with leaves.
+//! Traversal of a tree of sixteen-wide nodes: the bounding volume hierarchy, or a photon map in the line
+//! layout.
 //!
-//! A visit of a node computes the distances to the boxes of all its children at once. Children within the
+//! A visit of a node computes the distances to the boxes of all children at once. Children within the search
 //! limit are pushed onto a stack, with the nearest on top.
 
 use heapless::Vec;
@@ -15,11 +16,11 @@ use crate::simd::{Isa, LANES};
 
 const _: () = assert!(NODE_CHILDREN == LANES);
 
-/// Distance bits of a child that is skipped.
+/// Value in place of a child's distance bits, for a child to be skipped.
 pub(crate) const BEYOND: u32 = u32::MAX;
 
-/// Stack entry of a subtree: bits of a lower bound of its distance in the upper half, index of its leaf or
-/// node in the lower half.
+/// Stack entry of a subtree: in the upper half the `f32` bits of a lower bound of its distance, or other bits
+/// that it was pushed with; in the lower half the index of its leaf or node.
 #[derive(Clone, Copy)]
 struct Deferred(u64);
 
@@ -39,8 +40,8 @@ impl Deferred {
     }
 }
 
-/// Stack of [`Deferred`] subtrees with the next one on top. `ENTRIES` is the tree's maximum plus [`LANES`],
-/// because all lanes of a node are written at once.
+/// Stack of [`Deferred`] subtrees with the next one on top. `ENTRIES` is the maximum that the tree needs plus
+/// [`LANES`], because all lanes of a node are written at once.
 pub(crate) type Stack<const ENTRIES: usize> = Vec<u64, ENTRIES>;
 
 /// Order in which a node's children are visited.
@@ -63,7 +64,7 @@ pub(crate) struct Descent<'s, const ENTRIES: usize> {
 }
 
 impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
-    /// Creates a traversal from the root of the tree in two sections. `stack` is emptied.
+    /// Creates a traversal that begins at the root of the tree in two sections. `stack` is emptied.
     #[inline(always)]
     pub(crate) fn new(
         scene: &'s SceneImage,
@@ -74,7 +75,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Self::with_root(scene, [nodes, leaves], stack, 0)
     }
 
-    /// Does [`Self::new`] with `bits` in place of the root's distance bits.
+    /// Creates the traversal of [`Self::new`] with `bits` instead of 0 as the root's distance bits.
     #[inline(always)]
     pub(crate) fn with_root(
         scene: &'s SceneImage,
@@ -85,19 +86,19 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         // The root is node 0, and an empty stack has room for it.
         stack.clear();
         let _ = stack.push(u64::from(bits) << 32);
-        // A tree visits each record once: more visits mean a cycle in an unsound image.
+        // A tree visits each record once: more visits mean a cycle in an unsound card image.
         let parts = [nodes, leaves].map(|kind| u64::from(scene.header.section(kind).records));
         Self { scene, nodes, leaves, stack, visits_left: parts.into_iter().sum() }
     }
 
-    /// Returns the next leaf or node whose distance is at most `limit`, given as bits; `None` at the end of
-    /// the traversal.
+    /// Returns the next leaf or node whose distance is at most `limit`, given as `f32` bits; `None` at the
+    /// end of the traversal.
     ///
     /// # Errors
-    /// [`FaultCode::Depth`] if the image is invalid: the tree has a cycle.
+    /// [`FaultCode::Depth`] if the card image is invalid: the tree has a cycle.
     #[inline(always)]
     pub(crate) fn next(&mut self, limit: u32) -> Result<Option<Child>, Fault> {
-        // Entries below were pushed earlier, and may be nearer: the loop goes on.
+        // Entries further down were pushed earlier, and may be nearer: the loop goes on.
         while let Some((distance, child)) = self.pop()? {
             if distance <= limit {
                 return Ok(Some(child));
@@ -106,7 +107,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Ok(None)
     }
 
-    /// Returns the next leaf or node, and the bits it was pushed with; `None` at the end of the traversal.
+    /// Returns the next leaf or node, and the distance bits it was pushed with; `None` at the end.
     ///
     /// # Errors
     /// As [`Self::next`].
@@ -181,7 +182,7 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
 #[inline(always)]
 fn parts(isa: impl Isa, node: WideNode, distances: &[u32; LANES]) -> [u64; LANES] {
     let Links { leaves, first_leaf, first_node } = node.links();
-    // Indices that wrap or have the bit LEAF occur in unsound images only.
+    // Indices that wrap or have the bit LEAF occur in unsound card images only.
     let [leaf, node_of] = [first_leaf | LEAF, first_node.wrapping_sub(leaves)];
     let mut parts = [0; LANES];
     for lane in 0..isa.lanes(node.children() as usize) {

@@ -52,7 +52,7 @@ pub(crate) fn info(address: &CardAddress) -> Result<(), Failure> {
     print(&lines)
 }
 
-/// Table rows with the on-chip memory of a board's firmware, as the board measures it.
+/// Returns the table rows of the stack use and the static data that a board's firmware measures.
 fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     let MemoryUse { static_bytes, stack_bytes, stack_used } = memory_use;
     [
@@ -61,7 +61,8 @@ fn measured_rows(memory_use: &MemoryUse) -> [String; 2] {
     ]
 }
 
-/// Table rows with the on-chip memory of the firmware's buffers, which the host knows for emulated chips.
+/// Returns the table rows of an emulated chip's buffers, of the techniques' shares of them, and of the
+/// on-chip memory that is free.
 fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     let techniques = kind.techniques();
     [
@@ -73,7 +74,7 @@ fn sram_rows(kind: EmulatedKind, sram_bytes: usize) -> [String; 5] {
     ]
 }
 
-/// Greets a card `count` times and prints the time of each answer.
+/// Sends a card `count` hellos, and prints the time until each answer, with the least, mean and greatest.
 pub(crate) fn ping(address: &CardAddress, count: u16) -> Result<(), Failure> {
     let answers = card_ping(address, count.into())?;
     let mut lines = Vec::new();
@@ -184,7 +185,7 @@ fn pattern_lines(test: &PatternTest, bytes: u64) -> Vec<String> {
     lines
 }
 
-/// Formats a duration with the rate in bytes per second.
+/// Formats the time of a transfer of `bytes` bytes, with its rate in MB/s.
 fn time(time: Duration, bytes: u64) -> String {
     let seconds = time.as_secs_f64();
     let rate = if seconds > 0.0 { bytes as f64 / seconds / 1e6 } else { 0.0 };

@@ -9,13 +9,13 @@ use photoncard_driver::printable::printable;
 use crate::failure::Failure;
 use crate::flags::with_flags;
 
-/// Writes a line to standard error, with flags in place of the fields that errors of the library name. Errors
-/// of the stream are ignored.
+/// Writes a line to standard error. Names of settings from the library's errors, such as
+/// `integrator.samples`, are replaced by flags. Errors of the stream are ignored.
 pub(crate) fn say(line: Arguments) {
     let _ = writeln!(stderr(), "{}", printable(&with_flags(&line.to_string())));
 }
 
-/// Writes a failure to standard error on lines of its own. Its report escapes foreign text.
+/// Writes a failure to standard error on lines of its own. The failure's `Display` escapes foreign text.
 pub(crate) fn say_failure(failure: &Failure) {
     let _ = writeln!(stderr(), "{failure}");
 }
@@ -35,8 +35,8 @@ pub(crate) fn print_json(text: &str) -> Result<(), Failure> {
     write_out(&(printable_json(text) + "\n"))
 }
 
-/// Escapes all characters of JSON that do not print as themselves. Apart from line ends, they can only occur
-/// in strings.
+/// Replaces characters of JSON that do not print as themselves by `\u` escapes. Line ends stay; all other
+/// characters of this kind are in strings.
 pub(crate) fn printable_json(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {

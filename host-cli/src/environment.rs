@@ -42,7 +42,7 @@ impl EnvironmentOption {
         }
     }
 
-    /// Description of the environment for the provenance of a picture.
+    /// Text for the provenance of a picture: `R,G,B`, or the file name of the map.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Constant([red, green, blue]) => format!("{red},{green},{blue}"),

@@ -1,11 +1,11 @@
-//! Flags of the command line in place of the fields that errors of the library name.
+//! Replaces the names of settings in the library's errors by flags of the command line.
 
 use photoncard_driver::render::{RenderSettings, Setting};
 
-/// Field that two options state.
+/// Field of the settings as the library's errors name it, and the two flags that set it.
 const CACHES: [&str; 2] = ["`cards.caches`", "--counters or --cache"];
 
-/// Text with the flag in place of each field between backticks: `--spp` for `integrator.samples`.
+/// Replaces each field of the settings, between backticks, by its flag: `integrator.samples` by `--spp`.
 pub(crate) fn with_flags(text: &str) -> String {
     let [caches, flags] = CACHES;
     let options = RenderSettings::default().options().into_iter();

@@ -12,7 +12,7 @@ use crate::arguments::SceneOptions;
 use crate::environment::EnvironmentOption;
 use crate::failure::Failure;
 
-/// Lists the input files, each with its description.
+/// Lists the input files, each with the words by which errors name it.
 pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
     let mut files = vec![(options.path.as_path(), "the scene")];
     if let Some(EnvironmentOption::File(path)) = &options.environment {
@@ -21,7 +21,7 @@ pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
     files
 }
 
-/// Loads a scene for cards of `dram_bytes` bytes. Assignments are not applied.
+/// Loads a scene for cards with `dram_bytes` bytes of memory. Assignments (`--set`) are not applied.
 pub(crate) fn load(options: &SceneOptions, dram_bytes: u32) -> Result<Scene, Failure> {
     let Input { file, environment, rotation, compensates_energy } = Input::open(options, dram_bytes)?;
     let scene = file.into_rest().map_err(Failure::input)?;
@@ -31,7 +31,7 @@ pub(crate) fn load(options: &SceneOptions, dram_bytes: u32) -> Result<Scene, Fai
 /// Opened scene file and environment, which are read once for all frames.
 pub(crate) struct Input {
     pub(crate) file: SceneFile,
-    /// Environment, with the notice about its clamped texels.
+    /// Environment, with the notice about clamped texels if there are any.
     environment: Option<(Environment, Option<String>)>,
     /// Rotation of the environment, degrees; `None` if it is not stated.
     rotation: Option<f32>,
@@ -39,7 +39,7 @@ pub(crate) struct Input {
 }
 
 impl Input {
-    /// Opens the files for cards of `dram_bytes` bytes.
+    /// Opens the files for cards with `dram_bytes` bytes of memory.
     pub(crate) fn open(options: &SceneOptions, dram_bytes: u32) -> Result<Self, Failure> {
         let (variant, light_units) = (options.variant.clone(), options.lights.light_units);
         let load = LoadSettings { dram_bytes, variant, light_units };
@@ -51,13 +51,13 @@ impl Input {
         })
     }
 
-    /// Scene at rest. Assignments are not applied.
+    /// Scene at rest. Assignments (`--set`) are not applied.
     pub(crate) fn at_rest(&self) -> Result<Scene, Failure> {
         let scene = self.file.at_rest().map_err(Failure::input)?;
         Ok(self.completed(scene))
     }
 
-    /// Scene at a moment of its animations. Assignments are not applied.
+    /// Scene at a moment of its animations. Assignments (`--set`) are not applied.
     pub(crate) fn at(&self, moment: &Moment) -> Result<Scene, Failure> {
         let scene = self.file.at(moment).map_err(Failure::input)?;
         Ok(self.completed(scene))
@@ -68,7 +68,8 @@ impl Input {
     }
 }
 
-/// Adds the environment and its notice to a scene.
+/// Adds the environment, turned by `rotation` degrees, to a scene, with its notice and remarks. Compensates
+/// energy if requested.
 fn completed(
     mut scene: Scene,
     (environment, rotation): (Option<(Environment, Option<String>)>, Option<f32>),
@@ -98,7 +99,7 @@ pub(crate) fn name(options: &SceneOptions) -> String {
     options.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Names of the inputs and of the changes to them, for the provenance of a picture.
+/// Names of the input files and options that change what is loaded, for the provenance of a picture.
 pub(crate) fn provenance(options: &SceneOptions) -> NamedSettings {
     let inputs = [
         ("scene", json!(name(options))),

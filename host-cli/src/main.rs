@@ -7,10 +7,10 @@
 //! |---|---|
 //! | `console`, `report` | the standard streams, with foreign text escaped; layout of errors |
 //! | `failure` | errors with their exit status |
-//! | `flags` | flags in place of fields, which errors of the library name |
+//!  `flags` | flags of the command line in place of the settings that the library's errors name |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `input` | scene and environment of a render |
-//! | `notices` | contents of a scene that are ignored |
+//!  `notices` | contents of a scene that are ignored, missing or interpreted in another way |
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |

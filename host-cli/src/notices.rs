@@ -14,7 +14,7 @@ use crate::failure::Failure;
 /// Maximum number of sentences per notice. Further ones are counted.
 const NAMED: usize = 3;
 
-/// Contents of the scene's file that the pictures use.
+/// Contents of the scene's file that the pictures use: true unless an option replaces them.
 pub(crate) struct Uses {
     view: bool,
     animations: bool,
@@ -22,7 +22,7 @@ pub(crate) struct Uses {
 }
 
 impl Uses {
-    /// Contents that a picture, or `frames`, uses. The picture has a valid camera.
+    /// Contents of the file that `picture`, or `frames` of it, uses.
     pub(crate) fn of(options: &SceneOptions, picture: &Picture, frames: Option<&FrameOptions>) -> Self {
         Self {
             view: !picture.states_view(),
@@ -41,7 +41,7 @@ impl Uses {
     }
 }
 
-/// Prints notices about contents that the pictures use and that are ignored or missing.
+/// Prints a notice about contents of the scene that are ignored or missing and that the pictures would use.
 ///
 /// # Errors
 /// If there is such a notice and `--strict` is given.
@@ -65,7 +65,7 @@ pub(crate) fn say_remarks(path: &Path, scene: &Scene) {
     }
 }
 
-/// Text of the first sentences, with the number of the others.
+/// Text of the first [`NAMED`] sentences, with the number of the others; `None` if there are none.
 fn first(path: &Path, sentences: &[&str]) -> Option<String> {
     let mut said = sentences.get(..NAMED.min(sentences.len()))?.join("; ");
     if said.is_empty() {
@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(refused("", &scene.with(|scene| scene.notices.clear())), None);
     }
 
-    /// Each notice concerns contents that the command line replaces: the view, animations or the environment.
+    /// Each of these notices concerns contents that options replace: the view, animations or the environment.
     #[test]
     fn strict_renders_accept_contents_that_the_command_line_replaces() {
         for (concern, replaced, used) in [

@@ -8,8 +8,8 @@ use photoncard_driver::tone_mapping::is_of_photoncard;
 
 use crate::failure::Failure;
 
-/// Checks that the files `written` are writable, and that no file of `written` or `reserved` is an input,
-/// described by its text, or another output.
+/// Checks that the files `written` are writable, and that no file of `written` or `reserved` is one of the
+/// inputs (path, and what it is) or occurs twice.
 pub(crate) fn check(inputs: &[(&Path, &str)], written: &[&Path], reserved: &[&Path]) -> Result<(), Failure> {
     for path in written {
         output::check_writable(path).map_err(|error| Failure::input_error(&error))?;

@@ -60,7 +60,7 @@ fn say_missing(parts: &Parts) {
     missing.iter().take(MAX_COMMANDS).for_each(|part| say(format_args!("{}", command(part))));
 }
 
-/// Prints a warning about dazzling pixels, which a faulty card may have caused.
+/// Prints a warning about pixels far brighter than any surface, which a faulty card may have caused.
 fn say_dazzling(film: &Film) {
     let pixels = film.dazzling_pixels();
     if pixels > 0 {
@@ -72,7 +72,7 @@ fn say_dazzling(film: &Film) {
     }
 }
 
-/// Failure of a merge. A full disk or memory is a failure of the work, all else one of the input.
+/// Failure of a merge: of the work if memory is short or two files of one part differ, else of the input.
 fn merge_failure(error: PartError) -> Failure {
     match error {
         PartError::Film(_) | PartError::Unequal { .. } => Failure::work(error),

@@ -1,4 +1,4 @@
-//! Layout of errors, with colours and line breaks on a terminal. Foreign text is escaped.
+//! Layout of printed errors: colours and line breaks on a terminal, escaped foreign text.
 
 use std::error::Error;
 use std::fmt::{Display, Formatter, Result};
@@ -11,7 +11,7 @@ use photoncard_driver::printable::printable;
 
 use crate::flags::with_flags;
 
-/// Width of the mark before an excerpt, columns.
+/// Columns before the text of an excerpt: ` │ `.
 const EXCERPT_MARK: usize = 5;
 
 /// Installs the layout. Lines are broken on a terminal only, so that a path in a log stays in one piece.
@@ -62,7 +62,7 @@ impl Layout {
         if self.has_colours { format!("{style}{text}{style:#}") } else { text.to_string() }
     }
 
-    /// Prints the lines of a text. The first line has the first mark before it, the others the second.
+    /// Prints text. `marks` stand before the first line and before each of the others.
     fn paragraph(&self, f: &mut Formatter<'_>, style: Style, marks: [&str; 2], text: &str) -> Result {
         let [mut mark, next] = marks;
         for line in text.lines() {
@@ -74,8 +74,8 @@ impl Layout {
         Ok(())
     }
 
-    /// Prints the line of a file to which an error points, with a mark below the position. The line is
-    /// already escaped by the error, because labels are offsets in it.
+    /// Prints each line of a file that an error points at, with a mark below the position. The error has
+    /// escaped the line already, as its labels are offsets in the escaped text.
     fn excerpt(&self, f: &mut Formatter<'_>, error: &dyn Diagnostic) -> Result {
         let (Some(source), Some(labels)) = (error.source_code(), error.labels()) else { return Ok(()) };
         for label in labels {
@@ -99,8 +99,8 @@ impl Layout {
     }
 }
 
-/// Escaped messages of an error and its causes, with flags in place of fields. A cause is left out if the
-/// message before it ends with it.
+/// Messages of an error and of its causes, escaped and with flags in place of settings' names. A cause is
+/// left out if the message before ends with the cause's.
 fn messages(error: &dyn Diagnostic) -> Vec<String> {
     let mut texts = vec![escaped(error)];
     let mut cause: Option<&dyn Error> =
@@ -115,7 +115,7 @@ fn messages(error: &dyn Diagnostic) -> Vec<String> {
     texts
 }
 
-/// Escaped remedy of an error, or of its first cause with a remedy.
+/// Escaped remedy of an error, or of the first of its causes that has one.
 fn help(error: &dyn Diagnostic) -> Option<String> {
     match error.help() {
         Some(help) => Some(escaped(help)),
@@ -139,8 +139,8 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
-/// Part of a line around column `at` of at most `width` characters, and the column of `at` in it. At least
-/// `mark` characters fit from there on. Ellipses stand for the rest.
+/// Part of a line of at most `width` characters, and the column of `at` in this part, which leaves `mark`
+/// columns from `at` to the end. An ellipsis stands for each end cut off.
 fn around(line: &str, at: usize, mark: usize, width: usize) -> (String, usize) {
     let count = line.chars().count();
     let least = (at + mark).saturating_sub(width).min(at);

@@ -2,7 +2,7 @@
 
 pub(crate) use photoncard_driver::printable::shell_word as quoted;
 
-/// Quoted command line of this program with the given arguments.
+/// Command line of this program with the arguments, quoted for a shell.
 pub(crate) fn command(arguments: impl IntoIterator<Item = String>) -> String {
     let arguments = arguments.into_iter().map(|argument| quoted(&argument).into_owned());
     std::iter::once("photoncard".to_owned()).chain(arguments).collect::<Vec<_>>().join(" ")

@@ -81,7 +81,7 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Axes of the node. A glTF camera looks along -z of its node, with +y up.
+    /// Axes of the camera's node: right, up and back. A glTF camera looks along -z of its node, with +y up.
     fn axes(&self) -> [Vec3; 3] {
         let back = self.eye - self.target;
         // Divided rather than normalised, so that coordinate axes stay exact.

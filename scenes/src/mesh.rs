@@ -86,8 +86,8 @@ impl Mesh {
         self.cuboid(Vec3::new(-half, bottom, -half), Vec3::new(half, top, half));
     }
 
-    /// Adds a grid of `columns` by `rows` vertices. Its front faces along (direction of a row) x (direction
-    /// of a column). `wrap` joins the last column to the first, the last row to the first, or both.
+    /// Adds a grid of `columns` by `rows` vertices. Its front is on the side of (step to the next column) x
+    /// (step to the next row). `wrap` joins the last column to the first, the last row to the first, or both.
     pub fn grid(&mut self, size: [usize; 2], wrap: [bool; 2], point: impl Fn(usize, usize) -> Vec3) {
         self.grid_cut(size, wrap, point, |_, _| false);
     }

@@ -30,24 +30,25 @@ impl Line {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct LineAddress(pub u32);
 
-/// Data structure that a line belongs to. Memory traffic is counted and cached by structure.
+/// Data structure that a line belongs to. Memory traffic is counted per structure; the structure also decides
+/// whether a line goes through the photon cache or the scene cache.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Structure {
-    /// The image's header.
+    /// Header of the card image.
     Header = 0,
-    /// Bounding volume hierarchy.
+    /// Inner nodes of the bounding volume hierarchy.
     Nodes = 1,
-    /// Triangles.
+    /// Leaves of the bounding volume hierarchy, which hold the triangles.
     Triangles = 2,
-    /// Materials.
+    /// Materials and their layers.
     Materials = 3,
-    /// Lights and the distributions that sample them: emitters, the light tree, distant lights, the
-    /// environment's cells.
+    /// Lights and the distributions from which they are sampled: emitters, the light tree, distant lights,
+    /// and the environment's distribution.
     Emitters = 4,
-    /// Inner nodes of a photon map whose photons are stored in leaves ([`crate::layout::PhotonNode`]).
+    /// Inner nodes ([`crate::layout::PhotonNode`]) of a photon map in the line layout.
     PhotonNodes = 5,
-    /// Photons.
+    /// Photons of the photon map: leaves of the line layout, or nodes of the kd-tree.
     Photons = 6,
     /// Inner nodes above irradiance points.
     IrradianceNodes = 7,
@@ -61,7 +62,7 @@ pub enum Structure {
     Attributes = 11,
     /// Texture records and texels.
     Textures = 12,
-    /// Irradiance records that a chip keeps from one frame to the next, beyond the image.
+    /// Irradiance records that a chip keeps from one frame to the next, in the lines after the card image.
     IrradianceRecords = 13,
 }
 
@@ -106,7 +107,7 @@ impl Structure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Stage {
-    /// Loading an image and beginning a frame.
+    /// Work before the tiles of a frame: the header of a loaded card image is read.
     Begin = 0,
     /// Eye rays.
     Eye = 1,

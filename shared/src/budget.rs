@@ -22,9 +22,9 @@ pub struct Budget {
     pub tile_pixels: u32,
     /// Maximum k of a search for the k nearest photons.
     pub neighbors: u32,
-    /// Maximum number of final gather rays of a sample.
+    /// Maximum of [`FrameParameters::gather_rays`](crate::message::FrameParameters::gather_rays).
     pub gather_rays: u32,
-    /// Entries of the queue of gathers for deferred reordering.
+    /// Capacity of the gather queue (deferred reordering), gathers.
     pub gather_queue: u32,
     /// Maximum number of irradiance records of one block of a tile; a power of two.
     pub irradiance_records: u32,
@@ -61,7 +61,7 @@ pub const MAX_IN_FLIGHT: u32 = 8;
 /// Upper limit of [`Budget::tile_pixels`] and of [`Budget::irradiance_records`] for all kinds of chips.
 pub const MAX_TILE_PIXELS: u32 = 1 << 15;
 
-/// [`Budget::dram_bytes`] of the reference chip. A scene is checked against it when no card is known.
+/// [`Budget::dram_bytes`] of the reference chip. Scenes are checked against this size when no card is known.
 pub const REFERENCE_DRAM_BYTES: u32 = 512 << 20;
 
 /// Upper limit of [`Budget::gather_rays`] for all kinds of chips.
@@ -87,16 +87,16 @@ pub const KD_TREE_LEVELS: usize = 27;
 /// Number of stack entries for a search in a photon map with leaves. The host builds no tree that needs more.
 pub const PHOTON_STACK: usize = 160;
 
-/// Number of candidates at which a search for the `neighbors` nearest photons drops all but the nearest. A
-/// lower number shrinks the search radius sooner, but takes more selections.
+/// Number of candidates at which a search for the `neighbors` nearest photons drops all but these. A lower
+/// number shrinks the search radius sooner, but takes more selections.
 pub const fn selected_candidates(neighbors: u32) -> usize {
     const MIN_BEYOND: usize = 32;
     let beyond = neighbors as usize * 3 / 5;
     neighbors as usize + if beyond < MIN_BEYOND { MIN_BEYOND } else { beyond }
 }
 
-/// Capacity for candidates of a search for `neighbors` photons: [`selected_candidates`] plus the photons of
-/// one leaf, which are tested together.
+/// Capacity for candidates of a search for the `neighbors` nearest photons: `selected_candidates(neighbors)`
+/// plus [`LEAF_LANES`], since the lanes of one leaf are tested together.
 pub const fn gather_candidates(neighbors: u32) -> usize {
     selected_candidates(neighbors) + LEAF_LANES
 }

@@ -1,8 +1,8 @@
-//! Checksums of frames and of images. Their polynomials differ, so that an error that one of them misses is
-//! detected by the other.
+//! Checksums of frames and of card images. Their polynomials differ, so that an error that one of them misses
+//! is detected by the other.
 //!
 //! Frames have [`Checksum`]: CRC-32C (Castagnoli) by slicing-by-16 (Kounavis, Berry 2005), which takes
-//! sixteen bytes at a time with one table per byte position. Chunks and the whole image have
+//! sixteen bytes at a time with one table per byte position. Card images and their chunks have
 //! [`ImageChecksum`]: CRC-64/XZ (ECMA-182) by slicing-by-8.
 
 use crate::address::Line;
@@ -91,8 +91,7 @@ impl Checksum {
             let mut tables = TABLES.iter().rev();
             let head = (u32::from_le_bytes([*a, *b, *c, *d]) ^ self.0).to_le_bytes();
             let head = head.into_iter().zip(&mut tables).fold(0, add);
-            // Only the first four bytes depend on the sum so far; the other twelve lookups need not wait for
-            // it.
+            // Only the first four bytes depend on the sum so far; the other twelve lookups run meanwhile.
             self.0 = behind.iter().copied().zip(tables).fold(0, add) ^ head;
         }
         for &byte in rest {

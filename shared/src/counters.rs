@@ -2,14 +2,15 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Work done on a tile. The sums over all tiles do not depend on which chip rendered which tile, unless chips
-/// keep irradiance records
+/// Work done on a tile. Except for [`Self::drains`] and [`Self::most_waiting`], the sums over all tiles do
+/// not depend on which chip rendered which tile, unless chips keep irradiance records
 /// ([`FrameParameters::keep_records`](crate::message::FrameParameters::keep_records)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
-    /// Eye rays. A sample takes two: one for its light, one for its other channels. A sample that sees its
-    /// surface through specular surfaces takes another eye ray for each later piece of work. A lookup of a
-    /// lattice point of the irradiance cache takes one.
+    /// Eye rays. In a pixel with gather rays, a path takes at least two: one to place its gather point, one
+    /// to complete the pixel. If the gather point is seen in a mirror or through glass, each further piece of
+    /// the path's work takes another. In other pixels a path takes one. A survey takes one for each lattice
+    /// point that it visits.
     pub eye_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,
@@ -19,43 +20,46 @@ pub struct Counters {
     pub survey_rays: u64,
     /// Rays from specular surfaces, which continue eye and gather rays.
     pub specular_rays: u64,
-    /// Paths that contributed nothing because they reached [`crate::budget::SPECULAR_BOUNCES`] specular
-    /// surfaces, or one that absorbs everything.
+    /// Paths that contributed nothing because they had [`crate::budget::SPECULAR_BOUNCES`] specular bounces,
+    /// or met a surface that absorbs all light.
     pub lost_paths: u64,
-    /// Searches for the k nearest photons in the caustic map.
+    /// Gathers in the caustic map, each a sum over all photons whose kernels reach the point.
     pub caustic_gathers: u64,
     /// Searches for the k nearest photons in the photon map.
     pub gathers: u64,
-    /// Searches for the direction tables of importance sampling. [`Self::gathers`] includes them.
+    /// Searches of [`Self::gathers`] that were made for direction tables (importance sampling).
     pub tables: u64,
     /// Irradiance records computed by a final gather.
     pub records: u64,
     /// Irradiance records read back from an earlier frame instead of being gathered.
     pub kept_records: u64,
-    /// Samples of a frame with final gather rays that see a surface with a Lambertian part.
+    /// Paths that see a surface with a Lambertian part, in a frame with final gather rays. A sample is one
+    /// path, with adaptive sampling up to 16.
     pub lambertian_samples: u64,
-    /// Samples in [`Self::lambertian_samples`] whose indirect irradiance was interpolated.
+    /// Paths of [`Self::lambertian_samples`] whose indirect irradiance was interpolated between irradiance
+    /// records.
     pub interpolated_samples: u64,
-    /// Photons whose distance was computed.
+    /// Photons of the photon map whose distance to a search's position was computed.
     pub photons_tested: u64,
-    /// Photons within the search radius at the time of their test. They became candidates.
+    /// Photons of [`Self::photons_tested`] that lay within the search radius when they were tested, and
+    /// became candidates.
     pub photons_taken: u64,
-    /// Candidates read while the k nearest were selected.
+    /// Candidates read by selections of the k nearest; a candidate counts in each selection.
     pub photons_selected: u64,
-    /// Comparisons of distances while the k nearest were selected, without comparisons of equal distances.
+    /// Comparisons of distances in selections of the k nearest, except those between equal distances.
     pub distances_compared: u64,
-    /// Photons returned by searches.
+    /// Photons that searches returned: k each, or fewer if fewer lie within the maximum distance.
     pub photons_found: u64,
-    /// Photons whose power was also reflected by a lobe, evaluated for the photon's direction. Photons of the
-    /// caustic map are included.
+    /// Photons that gathers found at surfaces with a lobe, which is evaluated for the photons' directions.
+    /// Gathers in the caustic map are included.
     pub photons_reflected: u64,
     /// Photons of [`Self::photons_reflected`] whose lobe is a microfacet model (GGX).
     pub photons_on_microfacets: u64,
-    /// Photon normals decoded in order to reject photons of other surfaces.
+    /// Photon normals that gathers decoded to reject photons of other surfaces.
     pub normals_decoded: u64,
     /// Searches for the nearest irradiance point.
     pub lookups: u64,
-    /// Irradiance points whose distance was computed.
+    /// Irradiance points whose distance to a search's position was computed.
     pub points_tested: u64,
     /// Drains of the gather queue.
     pub drains: u64,
@@ -114,7 +118,7 @@ impl Counters {
         rays.into_iter().chain(searches).fold(0, u64::wrapping_add)
     }
 
-    /// Adds the counts of another tile or chip.
+    /// Adds the counts of another tile or chip; [`Self::most_waiting`] becomes the maximum of both.
     pub fn add(&mut self, other: &Self) {
         self.eye_rays = self.eye_rays.saturating_add(other.eye_rays);
         self.shadow_rays = self.shadow_rays.saturating_add(other.shadow_rays);

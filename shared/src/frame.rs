@@ -1,4 +1,4 @@
-//! Frames: byte sequences with a checksum, for a line that damages, loses or repeats bytes.
+//! Frames: byte sequences with a checksum, for a link that damages, loses or repeats bytes.
 //!
 //! ```text
 //! COBS( kind: u8 | session: u32 | sequence: u16 | acknowledged: u16 | held: u8 | payload | CRC-32C of all
@@ -65,10 +65,10 @@ pub enum FrameKind {
     Open = 1,
     /// An acknowledgement alone.
     Acknowledge = 2,
-    /// A request for an [`Self::Answer`]. Its sequence number is that of the next frame: lower frames that
-    /// are not acknowledged are lost.
+    /// A request for an [`Self::Answer`]. Messages that the probe's receiver has sent under numbers below the
+    /// probe's sequence number are lost, unless the probe acknowledges them.
     Probe = 3,
-    /// Reply to a probe. It acknowledges frames and states the number of the sender's next frame.
+    /// Reply to a probe. Its sequence number is that of the sender's next message.
     Answer = 4,
     /// Reply to a frame whose session the card does not know.
     Unknown = 5,
@@ -88,12 +88,13 @@ pub struct FrameHeader {
     pub kind: FrameKind,
     /// Number of the frame's session.
     pub session: u32,
-    /// Number of the frame among those sent in its direction. Probes and answers define it differently
-    /// ([`FrameKind`]).
+    /// Number of the frame's message among the messages in this direction, modulo 2^16. In probes and answers
+    /// it is the number of another message ([`FrameKind`]); in other frames without a message it is 0.
     pub sequence: u16,
-    /// Number of the first frame from the other direction that has not been received.
+    /// Number of the message of the other direction that the frame's sender takes next: all before it are
+    /// taken.
     pub acknowledged: u16,
-    /// Bit `i` is set if frame `acknowledged + i` of the other direction has been received.
+    /// Bit `i` is set if message `acknowledged + i` of the other direction has arrived.
     pub held: u8,
 }
 

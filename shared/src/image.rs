@@ -1,4 +1,4 @@
-//! The card image: lines of memory with everything that a chip needs of a scene.
+//! The card image: the scene in lines of card memory, with all that a chip reads of it.
 //!
 //! The first lines are the header: magic, layout version, number of lines, units, lights, and a table of
 //! sections. A section is a run of lines with records of one kind ([`crate::layout`]). Each line holds as
@@ -16,7 +16,7 @@ use crate::layout::{
 };
 use crate::message::SumScale;
 
-/// The first eight bytes of an image.
+/// The first eight bytes of a card image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// Version of the formats in this module and in [`crate::layout`].
 pub const LAYOUT_VERSION: u16 = 14;
@@ -27,18 +27,19 @@ pub const LEAF_ATTRIBUTES_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 /// Number of thresholds of [`SectionKind::EnvironmentCells`] per line.
 pub const THRESHOLDS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
 
-/// Sections of an image, in the order of the section table and of the image.
+/// Sections of a card image, in the order of their lines and of their entries in the section table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum SectionKind {
     /// [`crate::layout::BvhNode`]s, the root first.
     Nodes = 0,
-    /// [`crate::layout::BvhLeaf`]s: the leaves of triangles.
+    /// [`crate::layout::BvhLeaf`]s, which hold the triangles.
     Triangles = 1,
-    /// [`crate::layout::LeafAttributes`], one `u32` for each leaf of triangles. Empty if no triangle has
-    /// attributes.
+    /// [`crate::layout::LeafAttributes`], one `u32` for each [`crate::layout::BvhLeaf`]. Empty if no triangle
+    /// has attributes.
     LeafAttributes = 2,
-    /// [`Attributes`] of triangles. If a leaf has [`crate::layout::Tangents`], they precede its attributes.
+    /// [`Attributes`] of triangles. The [`crate::layout::Tangents`] of a leaf, if it has any, precede its
+    /// attributes.
     Attributes = 3,
     /// [`Material`]s.
     Materials = 4,
@@ -71,8 +72,8 @@ pub enum SectionKind {
     PhotonLeaves = 14,
     /// [`crate::layout::PhotonNode`]s of the caustic map, the root first.
     CausticNodes = 15,
-    /// [`crate::layout::PhotonLeaf`]s of the caustic map. Its photons have at least one bounce, and all their
-    /// bounces were specular.
+    /// [`crate::layout::PhotonLeaf`]s of the caustic map, whose photons have followed paths `L S+ D`: one
+    /// bounce or more, all specular.
     CausticLeaves = 16,
     /// [`crate::layout::PhotonNode`]s above irradiance points, the root first.
     IrradianceNodes = 17,
@@ -157,9 +158,9 @@ impl SectionKind {
 /// Position and size of a section: consecutive records of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Section {
-    /// Index of its first line.
+    /// Index of the section's first line.
     pub first_line: u32,
-    /// Number of its records.
+    /// Number of the section's records.
     pub records: u32,
 }
 
@@ -176,28 +177,28 @@ impl Section {
     }
 }
 
-/// Header of an image, in its first [`HEADER_LINES`] lines.
+/// Header of a card image, in the first [`HEADER_LINES`] lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
-    /// Number of lines of the whole image, the header included.
+    /// Number of lines of the card image, the header included.
     pub lines: u32,
     /// Photon power unit of the photon map, W.
     pub photon_power_unit: f32,
     /// Photon power unit of the caustic map, W.
     pub caustic_power_unit: f32,
-    /// Unit of the fixed-point sums in pixels, W/(sr m^2): a power of two.
+    /// Radiance unit, W/(sr m^2): a power of two. A pixel's sums of light are in steps of 2^-40 of this unit.
     pub radiance_unit: f32,
     /// Maximum magnitude of a coordinate of the scene, metres.
     pub reach: f32,
-    /// Grid on which the photons' positions lie. It may cover a part of the scene only.
+    /// Grid on which the photons' positions lie. It may cover only a part of the scene.
     pub photon_grid: PhotonGrid,
-    /// Probabilities of the kinds of lights, and the environment light.
+    /// Probabilities of the kinds of lights, and parameters of the environment light.
     pub lights: Lights,
     /// Sections, indexed by [`SectionKind`].
     pub sections: [Section; SECTIONS],
 }
 
-/// Probabilities with which a light sample chooses a kind of light, and the environment light.
+/// Probabilities of the three kinds of lights in light sampling, and the parameters of the environment light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lights {
     /// Probability that a light sample chooses an emitter through the light tree.
@@ -216,7 +217,7 @@ pub struct Lights {
 }
 
 impl Lights {
-    /// Lights of a scene that has none.
+    /// Value for a scene without lights.
     pub const NONE: Self = Self {
         emitters: 0.0,
         environment: 0.0,
@@ -236,14 +237,14 @@ impl Lights {
 /// Reason why a header is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HeaderError {
-    /// The image does not begin with [`MAGIC`].
+    /// The card image does not begin with [`MAGIC`].
     Magic,
-    /// The image has this layout version, which is not [`LAYOUT_VERSION`].
+    /// The card image has this layout version, which is not [`LAYOUT_VERSION`].
     Version(u16),
     /// A number is out of range: a unit or the grid's cell is not a positive normal number, a probability is
     /// not in [0, 1], or the environment's radiance or the reach is negative or not finite.
     Unit,
-    /// The section with this index extends past the image's last line.
+    /// The section with this index extends past the card image's last line.
     Section(u8),
 }
 
@@ -267,11 +268,11 @@ const HEADER_BYTES: usize = HEADER_LINES * LINE_BYTES;
 /// them.
 const LIGHTS: usize = HEADER_BYTES - 32;
 const _: () = assert!(SECTION_TABLE + 8 * SECTIONS <= LIGHTS);
-/// Value that replaces the texture index in an image without an environment.
+/// Value stored as [`Lights::texture`] in a card image without an environment.
 const NO_ENVIRONMENT: u32 = u32::MAX;
 
 impl Header {
-    /// Header of an empty image: no lines, sections or lights; all units are 1.
+    /// Header of an empty card image: no lines, sections or lights; all units are 1.
     pub const EMPTY: Self = Self {
         lines: 0,
         photon_power_unit: 1.0,

@@ -19,7 +19,7 @@ pub const fn max_stuffed_bytes(plain: usize) -> usize {
 pub fn stuff<const N: usize>(parts: &[&[u8]], wire: &mut Vec<u8, N>) -> bool {
     let begin = wire.len();
     let plain = parts.iter().map(|part| part.len()).sum();
-    // Always fits: at most the capacity.
+    // The new length fits: it is at most the capacity.
     let _ = wire.resize_default(N.min(begin + max_stuffed_bytes(plain)));
     let written = wire.get_mut(begin..).and_then(|room| write_pieces(parts, room));
     wire.truncate(begin + written.unwrap_or(0));
@@ -36,7 +36,8 @@ fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
                 code = place;
                 place += 1;
             }
-            // Zero bytes are unpredictable: no branch depends on them. One is in the place of the next code.
+            // Zero bytes are unpredictable, so that no branch depends on them. A zero byte is written where
+            // the next code goes.
             *room.get_mut(place)? = byte;
             *room.get_mut(code)? = (place - code) as u8 + u8::from(byte != 0);
             code = if byte == 0 { place } else { code };
@@ -48,17 +49,17 @@ fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
 }
 
 /// Decodes stuffed bytes, without the terminating zero, in place; `None` if they are not a COBS encoding.
-/// They must hold no zero byte.
+/// `wire` must hold no zero byte.
 pub fn unstuff(wire: &mut [u8]) -> Option<&mut [u8]> {
-    // Plain bytes are where they were stuffed, and a zero byte is in the place of its code. Only the code
-    // behind a full piece, for which no zero byte stands, is taken out: those before it move up.
+    // Each plain byte stays in place, and each code is overwritten by the zero byte that it stands for. Only
+    // the code after a full piece stands for no zero byte. It is removed: the bytes before it move up by one.
     let mut begin = 1;
     let mut place = 0;
     let mut is_zero = false;
     while place < wire.len() {
         let code = core::mem::take(wire.get_mut(place)?);
         if place > 0 && !is_zero {
-            // Never empty, which the compiler cannot see: it would panic.
+            // Never empty, but the compiler cannot see that; `rotate_right` panics on an empty slice.
             if let Some(moved @ [_, ..]) = wire.get_mut(begin..=place) {
                 moved.rotate_right(1);
             }

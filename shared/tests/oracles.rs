@@ -14,7 +14,7 @@ fn plain() -> impl Strategy<Value = Vec<u8>> {
     prop_oneof![runs, vec(any::<u8>(), 0..600), vec(0_u8..2, 0..600)]
 }
 
-/// Bytes in two parts.
+/// Splits bytes into two parts at any position.
 fn cut(bytes: &[u8], at: Index) -> [&[u8]; 2] {
     bytes.split_at(at.index(bytes.len() + 1)).into()
 }
@@ -89,7 +89,7 @@ proptest! {
     }
 }
 
-/// The polynomial of the frame checksum, added to the bytes, is an error that this checksum cannot detect.
+/// The frame checksum cannot detect an error that is a multiple of its own polynomial.
 #[test]
 fn the_image_checksum_detects_an_error_that_the_frame_checksum_misses() {
     // The polynomial of CRC-32C has 33 bits. The first on the wire, a byte's lowest, is the highest

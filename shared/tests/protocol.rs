@@ -9,7 +9,7 @@ use photoncard_shared::frame::{
 use photoncard_shared::message::*;
 use proptest::prelude::*;
 
-/// Budget of distinct values, as large as those of real cards.
+/// Budget with values as large as those of real cards.
 const BUDGET: Budget = Budget {
     sram_bytes: 1 << 20,
     dram_bytes: 512 << 20,
@@ -154,7 +154,8 @@ fn a_frame_longer_than_the_maximum_is_an_error() {
     let mut longer = vec![2; MAX_FRAME];
     longer.push(0);
     assert_eq!(read_all(&longer, 100), [Err(FrameError::TooLong)]);
-    // As short as the longest frame, as zero bytes are stuffed for less: still no frame of this protocol.
+    // Zero bytes are stuffed in fewer bytes: this frame is shorter than the maximum, but its payload is too
+    // long.
     let payload = [0; MAX_PAYLOAD + 1];
     assert!(frame(&HEADER, &payload).len() < MAX_FRAME);
     assert_eq!(read_all(&frame(&HEADER, &payload), 100), [Err(FrameError::TooLong)]);
@@ -347,7 +348,7 @@ fn structures_have_their_golden_bytes() {
     assert_eq!(encoded(&Reply::TileDone { tile: 16, counters }), bytes);
 }
 
-/// Progress of a memory test with a wrong word, and without one.
+/// Pins the bytes of a memory test's progress, with a wrong word and without one.
 #[test]
 fn self_test_messages_have_their_golden_bytes() {
     for (number, pattern) in (0..).zip(MemoryPattern::ALL) {

@@ -1,4 +1,4 @@
-//! Messages arrive once, whole and in order, whatever the line does to bytes.
+//! Messages arrive once, whole and in order, whatever the link does to bytes.
 
 use photoncard_shared::frame::{MAX_FRAME, MAX_PAYLOAD};
 use photoncard_shared::transport::{Event, LineStatistics, Transport};
@@ -18,7 +18,7 @@ impl Random {
     }
 }
 
-/// Probabilities of a line's faults, per million bytes.
+/// Mean numbers of a link's faults per million bytes.
 #[derive(Clone, Copy, Debug)]
 struct Faults {
     flips: u64,
@@ -28,7 +28,8 @@ struct Faults {
 
 const NONE: Faults = Faults { flips: 0, drops: 0, repeats: 0 };
 
-/// Sends the pending bytes of one end over a faulty line, in pieces.
+/// Sends up to 699 of one end's pending bytes over a faulty link. Returns whether there were any, and the
+/// events at the other end.
 fn deliver(
     from: &mut Transport,
     to: &mut Transport,
@@ -67,13 +68,13 @@ fn fill(message: &[u8]) -> impl FnOnce(&mut [u8]) -> Option<usize> {
     }
 }
 
-/// Message number `number`; its length varies.
+/// Content of message number `number`; the length varies with the number.
 fn message(number: usize, salt: usize) -> Vec<u8> {
     let length = (number * 389 + salt * 7) % (MAX_PAYLOAD + 1);
     (0..length).map(|index| (index * 31 + number * 7 + salt) as u8).collect()
 }
 
-/// Sends `count` messages in each direction. Returns the line statistics of host and card.
+/// Sends `count` messages in each direction. Returns the statistics of host and card.
 fn converse(count: usize, faults: Faults, seed: u64) -> [LineStatistics; 2] {
     let mut random = Random(seed);
     let (mut host, mut card) = (Transport::host(), Transport::card());

@@ -31,7 +31,7 @@ fn main() {
 const NEIGHBORS: u32 = 100;
 const PHOTONS: usize = 500_000;
 
-/// Scene with its packed card image.
+/// Scene with its card image, and the maximum radius of a gather, metres.
 struct Prepared {
     scene: Scene,
     image: CardImage,
@@ -71,7 +71,7 @@ fn map(scene: &Scene, photons: usize, layout: PhotonLayout) -> MappedImage {
 }
 
 impl Prepared {
-    /// Positions of photons, in the order of the tree's levels or shuffled.
+    /// Positions of `count` photons of the kd-tree: of its lowest level in order, or random.
     fn queries(&self, count: u32, shuffled: bool) -> Vec<Vec3> {
         let (scene, mut memory) = self.image.view();
         let photons = scene.header.section(SectionKind::Photons).records;
@@ -84,7 +84,7 @@ impl Prepared {
             .collect()
     }
 
-    /// Incoherent rays that start at photons, with cosine-weighted directions.
+    /// Incoherent rays from surfaces that the camera sees, in cosine-weighted directions.
     fn rays(&self, count: u32) -> Vec<Ray> {
         let (scene, mut memory) = self.image.view();
         let camera = self.scene.camera(None).expect("a camera");
@@ -157,7 +157,7 @@ fn tile_of_cornell(bencher: Bencher, order: &str) {
     render_tile(bencher, order, CORNELL.image.view().1);
 }
 
-/// Renders the tile with its reads counted before and after the dissertation's caches.
+/// Renders the tile with a memory model: reads are counted before and after the dissertation's caches.
 #[divan::bench(sample_count = 10, args = ["tiled", "dirbin", "hash", "sort"])]
 fn tile_of_cornell_counted(bencher: Bencher, order: &str) {
     render_tile(bencher, order, CacheSettings::default().over(CORNELL.image.view().1));
@@ -182,7 +182,7 @@ fn render_tile(bencher: Bencher, order: &str, mut memory: impl MemoryPort) {
     });
 }
 
-/// Traces a million photons and builds their map, on all cores.
+/// Traces a million photons and builds their map, on all threads.
 #[divan::bench(sample_count = 3)]
 fn map_of_a_million_photons(bencher: Bencher) {
     let scene = load("cornell.gltf");

@@ -19,20 +19,21 @@ use glam::{DVec2, DVec3};
 use photoncard_driver::exr::{Shown, read as read_picture};
 use serde_json::Value;
 
-/// Maximum relative difference between the depths of pixels that see one surface.
+/// Maximum relative difference of depth at which two pixels see one surface.
 const SAME_DEPTH: f64 = 0.01;
 
-/// Lower and upper corner of the box that contains the positions.
+/// Lower and upper corner of the box of `--within`, metres.
 type Within = [DVec3; 2];
 
-/// Luminance, depths and camera of a frame.
+/// Camera of a frame, with the luminance and the depth of each pixel.
 struct Frame {
     name: String,
     size: [usize; 2],
     luminance: Vec<f64>,
     depths: Vec<f64>,
     at: DVec3,
-    /// Right, up and forward vectors. The first two are as long as half the picture at a distance of 1.
+    /// Right, up and forward. At distance 1, half the picture's width is as long as the first, half its
+    /// height as the second.
     axes: [DVec3; 3],
 }
 
@@ -65,7 +66,7 @@ impl Frame {
         })
     }
 
-    /// Position that a pixel sees; `None` if it sees no surface.
+    /// Position that pixel `(x, y)` sees; `None` if the pixel sees no surface.
     fn place(&self, x: usize, y: usize) -> Option<DVec3> {
         let [width, height] = self.size;
         let depth = self.depths[y * width + x];
@@ -75,7 +76,7 @@ impl Frame {
         depth.is_finite().then(|| self.at + (forward + right * across + up * upwards) * depth)
     }
 
-    /// Luminance at a position; `None` if the frame does not see it.
+    /// Interpolated luminance of the pixels that see a position; `None` if none do.
     fn luminance_at(&self, place: DVec3) -> Option<f64> {
         let [width, height] = self.size;
         let [right, up, forward] = self.axes;
@@ -121,8 +122,8 @@ fn depths(path: &str) -> Result<Vec<f64>, Box<dyn Error>> {
     Ok(depth.sample_data.values_as_f32().map(f64::from).collect())
 }
 
-/// Number of pixels whose position the previous frame sees as well, and the mean square of their relative
-/// difference.
+/// Number of pixels whose positions the frame before sees too, and the mean square of the relative
+/// differences of their luminance.
 fn difference(before: &Frame, frame: &Frame, within: Option<Within>) -> (usize, f64) {
     let [width, height] = frame.size;
     let is_within =

@@ -4,12 +4,14 @@
 //! [--inputs N] [--seed N] [--first N] [--batch N] [--command PHOTONCARD] [--every N] [--kilobytes N]
 //! [--folder PATH]`
 //!
-//! An input that ends a process by a panic, an abort or a signal, or takes more than 20 s, is a finding. It
-//! is written into the folder, and `--first N --inputs 1` repeats it. The program that `--command` names
-//! reads every 50th input as well; `--every` changes the interval. The last four kinds are files that this
-//! program keeps, and only it reads them. Half of them are damaged while it works, so that a finding may
-//! occur only in some repetitions. A picture that differs from that of undamaged files is a finding as well.
-//! `tests/hostile_files.sh` builds everything, and runs 100,000 images, 20,000 scenes and 50,000 kept files.
+//! An input that ends a process by a panic, an abort or a signal, or that takes more than 20 s, is a finding.
+//! It is written into the folder, and `--first N --inputs 1` repeats it. The program of `--command` also
+//! reads every 50th input; `--every` changes the interval.
+//!
+//! Files of the last four kinds (`cards`, `parts`, `partials`, `frames`) are written by this program, and
+//! only it reads them. Half of them are damaged while it runs: such a finding may not repeat. A picture that
+//! differs from that of undamaged files is a finding too. `tests/hostile_files.sh` builds everything, and
+//! runs 100,000 images, 20,000 scenes and 50,000 files of the last four kinds.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -33,7 +35,7 @@ fn defaults(kind: Kind) -> Settings {
     }
 }
 
-/// Runs the reader process. Its arguments are kind, seed, first, inputs and folder.
+/// Runs as a reader. The arguments are kind, seed, first input, number of inputs, and folder.
 fn read(arguments: &[String]) -> Result<(), Box<dyn Error>> {
     let [kind, seed, first, inputs, folder] = arguments else { return Err("five arguments".into()) };
     let kind = Kind::of(kind).ok_or("no such kind")?;

@@ -1,9 +1,9 @@
 //! Host's part of `tests/instructions.sh`, which counts the instructions of a gather.
 //!
-//! `instructions write FILE` writes the contents of a board's memory: the card image of the Cornell box with
-//! photons, and the frame's parameters in the following line. `instructions render FILE WORK` renders one
-//! tile as a board does, and prints its counters. `WORK` is `Eye`, `Rays` or `Gathers`; the work is done in
-//! the function `measured`.
+//! `instructions write FILE` writes the memory of a board: the card image of the Cornell box with photons
+//! and, in the line after it, the parameters of a frame. `instructions render FILE WORK` renders one tile of
+//! this frame as a board does, and prints its counters. `WORK` is `Eye`, `Rays` or `Gathers`; the tile is
+//! rendered in the function `measured`.
 
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
@@ -23,7 +23,8 @@ fn memory() -> Vec<u8> {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
     let scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
     let packed = PackedScene::new(&scene).expect("it is packed");
-    // One gather per ray, done at once.
+    // Without irradiance cache and direction tables, each gather ray that ends on a surface causes one
+    // gather.
     let settings = RenderSettings {
         picture: Picture { width: 64, height: 64, ..Picture::default() },
         photons: PhotonMaps { count: 20_000, neighbors: 100, ..PhotonMaps::default() },
@@ -44,7 +45,7 @@ fn memory() -> Vec<u8> {
     mapped.image.lines().iter().map(|line| line.0).chain([behind]).flatten().collect()
 }
 
-/// Renders the tile. Callgrind counts in this function only.
+/// Renders the tile. Callgrind counts the instructions of this function alone.
 #[inline(never)]
 fn measured(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
     render(chip, lines, work)

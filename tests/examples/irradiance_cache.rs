@@ -1,11 +1,11 @@
-//! Measures savings and errors of the irradiance cache, compared to a picture with many rays and without
+//! Measures what the irradiance cache saves, and its error against a picture of many rays without
 //! interpolation.
 //!
 //! `cargo run --release -p photoncard-tests --example irradiance_cache [SCENE [camera=NAME]
 //! [crop=X0,X1,Y0,Y1]]`
 //!
-//! The picture has 512x512 pixels; only the crop is rendered. The reference has equal eye and shadow rays, so
-//! that only the indirect light differs.
+//! The picture has 512x512 pixels, of which the crop is rendered. The reference has the same eye and shadow
+//! rays: only its indirect light differs.
 
 use glam::Vec3;
 use photoncard_driver::film::Window;

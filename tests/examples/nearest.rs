@@ -1,10 +1,10 @@
-//! Measures the search for the nearest photons in isolation, among a million on the faces of a cube.
+//! Measures the search for the k nearest photons alone, among a million on the faces of a cube.
 //!
 //! `cargo run --release -p photoncard-tests --example nearest -- [--write FOLDER] [--repeat N]`
 //!
-//! Prints searches per second of one thread, for queries in random order and along a Hilbert curve, and the
-//! sum of the squared distances found. `--write` stores points and queries as little-endian `f32`, so that
-//! other libraries can run the same searches: `tests/peers/nearest.sh`.
+//! Prints the searches per second of one thread, for queries in random order and along a Hilbert curve, and
+//! the sum of all squared distances found. `--write` stores points and queries as little-endian `f32`, so
+//! that other libraries can run the same searches (`tests/peers/nearest.sh`).
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -24,11 +24,11 @@ const POINTS: u32 = 1_000_000;
 const QUERIES: u32 = 100_000;
 const NEIGHBORS: u32 = 100;
 const MAX_DISTANCE: f32 = 0.025;
-/// Inverse of the fraction of points in a cluster.
+/// One point of this number is in a cluster.
 const CLUSTER_SHARE: u32 = 5;
 const CLUSTER_RADIUS: f32 = 0.05;
 
-/// Processor time of this thread, seconds. It excludes other processes.
+/// Processor time of this thread, seconds.
 fn cpu_seconds() -> f64 {
     let taken = clock_gettime(ClockId::ThreadCPUTime);
     taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
@@ -38,8 +38,8 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Point on a face of the cube with side 1 around the origin. Some points are clustered at the middle of one
-/// of two faces.
+/// Point on a face of the cube of side 1 around the origin. Points in a cluster are in the middle of one of
+/// two faces.
 fn point(index: u32) -> [f32; 3] {
     let in_cluster = index.is_multiple_of(CLUSTER_SHARE);
     let face = hash(index ^ 0x5555) % if in_cluster { 2 } else { 6 };
@@ -105,7 +105,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let (image, points) = image((0..POINTS).map(point));
     let random: Vec<[f32; 3]> = (0..QUERIES).map(|i| points[(hash(i) % POINTS) as usize]).collect();
     let mut along_curve = random.clone();
-    // Queries are sorted by their codes along the curve.
+    // The second order of queries is that along the Hilbert curve.
     let grid = image.view().0.header.photon_grid;
     along_curve.sort_by_key(|&query| HilbertCode::new(&grid, query));
     if let Some(folder) = folder {

@@ -1,8 +1,8 @@
 //! Counts the floating-point operations of the firmware, for `tests/operations.sh`.
 //!
-//! `operations table` prints `driver/render/src/cost_model/arithmetic/table.rs`: the operations of each step,
-//! as counted in tiles of several scenes. `operations report` prints the operations of each unit per ray and
-//! per gather, both counted and computed from the table.
+//! `operations table` prints `driver/render/src/cost_model/arithmetic/table.rs`: the mean operations of each
+//! step, counted in tiles of several scenes. `operations report` prints the operations of each unit for a ray
+//! and for a gather, as counted and by the table.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::arithmetic::{Operations, Step, Unit};
@@ -12,7 +12,7 @@ use photoncard_driver::scheduler::GatherOrder;
 use photoncard_tests::operations::Instrument;
 use photoncard_tests::operations::run::{Run, means};
 
-/// Scenes, each with the number of tiles to render.
+/// Scenes, each with the number of its tiles that are rendered.
 const SCENES: [(&str, usize); 6] = [
     ("cornell.gltf", 4),
     ("cornell-glossy.gltf", 4),
@@ -22,8 +22,8 @@ const SCENES: [(&str, usize); 6] = [
     ("roughness.glb", 2),
 ];
 
-/// Settings of the dissertation's frame, without techniques or with all. The picture is smaller and has fewer
-/// photons, which changes no step.
+/// Settings of the dissertation's frame, without its techniques or with all of them. Picture and photon map
+/// are smaller, which leaves the operations of a step as they are.
 fn settings(has_all: bool) -> RenderSettings {
     let plain = RenderSettings {
         picture: Picture { width: 256, height: 256, ..Picture::default() },
@@ -63,7 +63,7 @@ fn runs(instrument: &Instrument) -> Vec<(String, Run)> {
     SCENES.into_iter().flat_map(of).collect()
 }
 
-/// Formats a number with four digits; integers are exact.
+/// Formats a number with four digits, an integer with one decimal.
 fn number(value: f64) -> String {
     if value == 0.0 || (value - value.round()).abs() < 1e-9 {
         return format!("{:.1}", value.round());
@@ -100,7 +100,7 @@ fn print_operations(name: &str, counted: &Operations, modelled: &Operations, pie
     );
 }
 
-/// Prints the operations of each unit per ray or gather in a run.
+/// Prints the operations of each unit in a run, for a ray or for a gather.
 fn print_run(name: &str, run: &Run) {
     let counters = &run.counters;
     let rays = counters.eye_rays

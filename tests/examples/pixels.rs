@@ -1,13 +1,13 @@
-//! Prints checksums of pictures and of counted work, by which two builds of the command can be compared:
+//! Prints checksums of pictures and of counted work, to compare two builds of the command:
 //!
 //! ```text
 //! cargo run --release -p photoncard-tests --example pixels -- PHOTONCARD [--card ADDRESS] [ONLY]
 //! ```
 //!
-//! A line for each shipped scene and technique contains the CRC-64 of the samples of all layers, the CRC-64
-//! of the counters of `--stats --counters`, and the options. Attributes of the EXR file, times and bytes on
-//! links are excluded, so that builds of different versions can be compared. `--card` states the card that
-//! renders; no work is counted then.
+//! Each shipped scene with each technique has a line: the CRC-64 of the samples of all layers, the CRC-64 of
+//! the counters of `--stats --counters`, and the options. Attributes of the EXR file, times and bytes on
+//! links are left out, so that builds of different versions can be compared. `--card` states the card that
+//! renders; then no work is counted.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -15,7 +15,7 @@ use std::process::{Command, ExitCode};
 use crc::{CRC_64_XZ, Crc};
 use serde_json::Value;
 
-/// Scene files, each with the options that all its pictures have.
+/// Scene files, each with options for all its pictures.
 const SCENES: [(&str, &[&str]); 10] = [
     ("cornell.gltf", &[]),
     ("cornell-glossy.gltf", &["--camera", "floor"]),
@@ -29,7 +29,7 @@ const SCENES: [(&str, &[&str]); 10] = [
     ("roughness.glb", &["--shadow-rays", "3"]),
 ];
 
-/// Options of each technique, alone and in combination.
+/// Options of each technique, and of several together.
 const TECHNIQUES: [&[&str]; 9] = [
     &["--order", "naive", "--sampling", "brdf", "--photon-map", "jensen"],
     &["--order", "tiled", "--sampling", "photon"],
@@ -42,10 +42,10 @@ const TECHNIQUES: [&[&str]; 9] = [
     &["--card", "emulated-micro:2", "--neighbors", "50", "--tile", "8"],
 ];
 
-/// Options of a picture that is small enough for a minute or two, and large enough to fill queues.
+/// Options of the picture: small enough for a minute or two in all, large enough to fill gather queues.
 const SIZE: [&str; 8] = ["--size", "48x48", "--photons", "20000", "--gather-rays", "20", "--aov", "all"];
 
-/// Names of statistics that count work. They do not depend on machines or links.
+/// Statistics that count work, and depend neither on the machine nor on links.
 const COUNTED: [&str; 14] = [
     "rays",
     "lost_paths",
@@ -106,7 +106,7 @@ fn main() -> ExitCode {
 }
 
 impl Build {
-    /// Checksums of a picture's samples and of its counters.
+    /// Renders a picture. Returns the checksums of its samples and of its counters.
     fn checksums(
         &self,
         scene: &str,
@@ -130,7 +130,7 @@ impl Build {
     }
 }
 
-/// Options with values. A later option replaces an earlier one with the same name.
+/// Options with values from several lists. Of equal options the last one stays.
 fn with_last_of_each<'a>(lists: &[&[&'a str]]) -> Vec<&'a str> {
     let mut options: Vec<(&str, &str)> = Vec::new();
     for pair in lists.iter().flat_map(|list| list.chunks_exact(2)) {
@@ -140,7 +140,7 @@ fn with_last_of_each<'a>(lists: &[&[&'a str]]) -> Vec<&'a str> {
     options.into_iter().flat_map(|(name, value)| [name, value]).collect()
 }
 
-/// Checksum of the samples of all channels with their names.
+/// CRC-64 of the names and samples of all channels.
 fn samples(path: &Path) -> Result<u64, exr::error::Error> {
     use exr::prelude::{ReadChannels, ReadLayers, read};
     let image = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
@@ -157,7 +157,7 @@ fn samples(path: &Path) -> Result<u64, exr::error::Error> {
     Ok(checksum.finalize())
 }
 
-/// Checksum of the counters.
+/// CRC-64 of the counters [`COUNTED`].
 fn work(statistics: &Value) -> u64 {
     let mut checksum = CHECKSUM.digest();
     for key in COUNTED {

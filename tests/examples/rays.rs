@@ -1,13 +1,13 @@
-//! Measures the ray caster in isolation, with cosine-weighted rays from surfaces that a camera sees.
+//! Measures the ray caster alone, with cosine-weighted rays from surfaces that a camera sees.
 //!
 //! `cargo run --release -p photoncard-tests --example rays -- SCENE [--bundle 16] [--write FOLDER] [--rays N]
 //! [--repeat N]`
 //!
-//! Prints the rays per second of one thread, the number of hits, the sum of the hit distances, and the lines
-//! that a ray reads. It measures closest-hit and any-hit queries. By default each ray has its own origin.
-//! With `--bundle 16` sixteen rays share their origin and one of 32 cells of the hemisphere, and are cast
-//! both singly and in bundles. `--write` stores triangles and rays as little-endian `f32`, so that other
-//! libraries can cast the same rays: `tests/peers/rays.sh`.
+//! Prints, for closest-hit and any-hit queries: rays per second of one thread, number of hits, sum of the hit
+//! distances, and lines that a ray reads. By default each ray has its own origin. With `--bundle 16`, sixteen
+//! rays share their origin and one of 32 cells of the hemisphere, and are cast both singly and in bundles.
+//! `--write` stores triangles and rays as little-endian `f32`, so that other libraries can cast the same rays
+//! (`tests/peers/rays.sh`).
 
 use std::error::Error;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ use photoncard_shared::address::Structure;
 use photoncard_shared::image::SectionKind;
 use rustix::time::{ClockId, clock_gettime};
 
-/// Processor time of this thread, seconds. It excludes other processes.
+/// Processor time of this thread, seconds.
 fn cpu_seconds() -> f64 {
     let taken = clock_gettime(ClockId::ThreadCPUTime);
     taken.tv_sec as f64 + taken.tv_nsec as f64 * 1e-9
@@ -35,11 +35,11 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Number of cells along each axis of the unit square of random numbers. The directions from one origin are
-/// in one cell.
+/// Cells along each axis of the unit square that directions are mapped from. The rays of a bundle are in one
+/// cell.
 const CELLS: [f32; 2] = [8.0, 4.0];
 
-/// Rays from the surfaces that the camera sees, in sampled directions of reflection: `bundle` rays from each
+/// Rays from surfaces that the camera sees, in directions sampled by the reflection: `bundle` rays from each
 /// origin, in one cell.
 fn bounces(scene: &Scene, packed: &PackedScene, count: u32, bundle: u32) -> Vec<Ray> {
     let (image, mut memory) = packed.view();
@@ -59,7 +59,8 @@ fn bounces(scene: &Scene, packed: &PackedScene, count: u32, bundle: u32) -> Vec<
         };
         (0..bundle).map(ray).collect::<Option<Vec<Ray>>>()
     };
-    // Of the rays in shipped scenes four of five bounce; none do if the camera sees nothing.
+    // The number of attempts is limited, as a camera that sees nothing gives no rays; in shipped scenes four
+    // of five attempts give some.
     (0..count * 10).filter_map(&mut bounce).flatten().take(count as usize).collect()
 }
 
@@ -99,7 +100,7 @@ fn cast_all(
     (hits, sum)
 }
 
-/// Mean numbers of nodes and leaves that a ray reads.
+/// Mean numbers of nodes and of leaves that a ray reads, cast in a `way` (any hit, in bundles).
 fn lines_of_a_ray(image: &SceneImage, memory: Lines, rays: &[Ray], way: (bool, bool)) -> [f64; 2] {
     let mut counted = Counted::new(memory);
     cast_all(image, &mut counted, rays, way);

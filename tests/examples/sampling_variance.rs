@@ -1,12 +1,12 @@
-//! Measures the variance of each sampling of gather rays on a fixed photon map.
+//! Measures the variance of each `--sampling` of gather rays, on a fixed photon map.
 //!
 //! `cargo run --release -p photoncard-tests --example sampling_variance [SCENE [camera=NAME]
 //! [ASSIGNMENT...]]`
 //!
-//! Prints, for every sampling and several ray counts: the relative RMSE of a point's indirect radiance; the
-//! variance of `brdf` divided by that of the sampling; and the bias, the difference between the mean over
-//! seeds and a gather of 10,000 rays, in standard errors. Then prints how many rays the sampling needs for
-//! the RMSE of 200 `brdf` rays.
+//! Prints for every sampling, at several numbers of rays: the relative RMSE of a point's indirect radiance;
+//! the variance of `brdf` over that of the sampling; and the bias in standard errors, by the mean over seeds
+//! and a gather of 10,000 rays. Then prints the number of rays at which the sampling has the RMSE of 200
+//! `brdf` rays.
 
 use glam::DVec3;
 use photoncard_driver::render::{PhotonMaps, RenderSettings, Sampling};
@@ -24,7 +24,7 @@ const SAMPLINGS: [(&str, Sampling); 4] = [
     ("mixture", Sampling::Mixture),
 ];
 
-/// Mean and variance of each point's radiance over some seeds.
+/// Mean and variance over seeds of the radiance at each point.
 struct Moments {
     mean: Vec<DVec3>,
     variance: Vec<f64>,
@@ -48,17 +48,19 @@ impl Moments {
         (self.variance.iter().sum::<f64>() / self.variance.len() as f64).sqrt()
     }
 
-    /// Mean over points and channels, with its standard error.
+    /// Mean over points and channels, with an upper bound of its standard error.
     fn overall(&self) -> (f64, f64) {
         let points = self.mean.len() as f64;
         let mean = self.mean.iter().map(|mean| mean.element_sum() / 3.0).sum::<f64>() / points;
-        // Channels of a point are correlated: at most three times the variance of one.
+        // The sum of the channels' variances is more than the variance of their mean, however they are
+        // correlated.
         let variance = self.variance.iter().sum::<f64>() / self.seeds as f64 / (points * points);
         (mean, variance.sqrt())
     }
 }
 
-/// Number of rays with this RMSE, by interpolation in logarithmic coordinates.
+/// Number of rays at which a sampling has this RMSE, by interpolation of the logarithms in `curve` (rays,
+/// RMSE).
 fn rays_for(rmse: f64, curve: &[(u32, f64)]) -> f64 {
     let log = |(rays, rmse): (u32, f64)| ((rays as f64).ln(), rmse.ln());
     let target = rmse.ln();

@@ -1,4 +1,4 @@
-//! Small scene that contains every feature of a scene.
+//! Small scene that has every feature of a scene.
 
 use glam::{Vec2, Vec3};
 use photoncard_driver::scene::{
@@ -25,19 +25,20 @@ const BUMPS: u32 = 12;
 const DENTS: u32 = 13;
 const WINDOW: u32 = 14;
 
-/// Creates a room with every feature. It has a lamp, a point, a spot and a directional light, a sky through
-/// its open front, and walls with textures of both sets of coordinates. In it are a mirror ball, a glass
-/// ball, a lattice with cut-outs, an emissive screen, a veil of partial coverage with sheen and diffuse
-/// transmission, a varnished board, a rough pane and a rough block of glass, and normal maps on a glossy and
-/// on a Lambertian sheet. Under the lamps are a shelf of tinted glass and a coated window with textures.
+/// Creates a room with every feature. It has an emissive lamp, a point, a spot and a directional light, a sky
+/// through its open front, and walls with textures by both sets of coordinates. In the room are a mirror
+/// ball, a glass ball, a lattice with cut-outs, an emissive screen, a veil of partial coverage with sheen and
+/// diffuse transmission, a coated board, a rough pane and a rough block of glass, and a glossy and a
+/// Lambertian sheet with normal maps. Under the lights are a shelf of tinted glass and a coated window with
+/// textures.
 pub fn everything() -> Scene {
     let view = camera(Vec3::new(0.1, 0.1, 0.95), Vec3::new(-0.05, -0.2, -1.0));
     let mut scene = scene(room([METAL, WALL, PAPER, WALL, PAPER, WALL]), materials(), view);
-    // The last wall, behind the eye, is left out.
+    // The wall behind the camera is left open.
     scene.triangles.truncate(10);
     add_textures(&mut scene);
     add_lights(&mut scene);
-    // The room's walls of paper and metal have texture coordinates and colours.
+    // All walls but those of the material `WALL` have texture coordinates and colours.
     for index in 0..10 {
         let Triangle { vertices, material, .. } = scene.triangles[index];
         if material != WALL {

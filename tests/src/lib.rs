@@ -1,4 +1,4 @@
-//! Shared parts of the integration tests: small scenes, renders of them, and a card on a link.
+//! What several integration tests share: small scenes, renders of them, and a card on a link.
 #![forbid(unsafe_code)]
 
 pub mod everything;
@@ -17,13 +17,12 @@ use photoncard_driver::film::Film;
 use photoncard_driver::render::{RenderSettings, Rendering, Unobserved, render};
 use photoncard_driver::scene::{Camera, Material, Reflection, Scene, SceneContents, Transmission, Triangle};
 
-/// Says loudly that something is not tested, also if the test passes.
+/// Prints that something is not tested, whether the test passes or not.
 ///
-/// # Panics
-/// In continuous integration, where tools are installed before.
+/// # Panics In continuous integration, where all tools are installed.
 pub fn skip(what: &str) {
     assert!(std::env::var_os("CI").is_none(), "{what}");
-    // The test goes on if standard error is closed.
+    // A closed standard error does not end the test.
     let _ = writeln!(std::io::stderr(), "SKIPPED: {what}");
 }
 
@@ -32,7 +31,7 @@ pub fn lambertian(name: &str, albedo: f32) -> Material {
     Material::lambertian(name, Vec3::splat(albedo))
 }
 
-/// Creates smooth clear glass with this base colour and the index of refraction 1.5.
+/// Creates smooth clear glass with this base colour and index of refraction 1.5, as a solid or a thin wall.
 pub fn glass(name: &str, base_colour: Vec3, is_volume: bool) -> Material {
     let transmission = Transmission { factor: 1.0, ior: 1.5, is_volume, absorption: Vec3::ZERO };
     let reflection = Reflection::MetallicRoughness {
@@ -52,14 +51,14 @@ pub fn quad(corners: [Vec3; 4], material: u32) -> [Triangle; 2] {
     [Triangle::new([a, b, c], material), Triangle::new([a, c, d], material)]
 }
 
-/// Six inner walls of the cube from -1 to 1, in the order -x, +x, -y, +y, -z, +z, each with its own material.
+/// Creates the six walls of the cube from -1 to 1, which face inwards, in the order -x, +x, -y, +y, -z, +z.
 pub fn room(materials: [u32; 6]) -> Vec<Triangle> {
     let axes = [Vec3::X, Vec3::Y, Vec3::Z];
     let mut triangles = Vec::new();
     for (axis, pair) in materials.as_chunks::<2>().0.iter().enumerate() {
         for (side, &material) in [-1.0, 1.0].into_iter().zip(pair) {
             let (n, u) = (axes[axis] * side, axes[(axis + 1) % 3]);
-            // The front faces inwards: u, v and -n form a right-handed frame.
+            // The front faces inwards: u, v and -n are a right-handed frame.
             let v = (-n).cross(u);
             triangles.extend(quad([n - u - v, n + u - v, n + u + v, n - u + v], material));
         }
@@ -67,7 +66,7 @@ pub fn room(materials: [u32; 6]) -> Vec<Triangle> {
     triangles
 }
 
-/// Creates a camera with a field of view of 90 degrees.
+/// Creates a camera with a vertical field of view of 90 degrees, upright along +y.
 pub fn camera(origin: Vec3, forward: Vec3) -> Camera {
     let forward = forward.normalize();
     let right = forward.cross(Vec3::Y).normalize();
@@ -100,13 +99,13 @@ pub fn radiances(film: &Film) -> Vec<[f32; 3]> {
     film.pixels().map(|pixel| pixel.radiance).collect()
 }
 
-/// Mean over all pixels and channels.
+/// Mean over all pixels and channels, W/(sr m^2).
 pub fn mean(radiances: &[[f32; 3]]) -> f64 {
     let sum: f64 = radiances.as_flattened().iter().map(|&channel| channel as f64).sum();
     sum / (3 * radiances.len()) as f64
 }
 
-/// Runs `work` on a thread whose stack has room for a card's buffers, because they are built on the stack.
+/// Runs `work` on a thread with 16 MiB of stack, on which the buffers of a card are built.
 ///
 /// # Panics
 /// If the work panics, or the thread cannot be started.

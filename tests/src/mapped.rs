@@ -1,4 +1,4 @@
-//! Scenes whose photon map is shared by several frames, so that frames differ only in the gather.
+//! Scene whose photon map several frames share, so that they differ only in their gathers.
 
 use glam::Vec3;
 use photoncard_driver::emulator::direct::render_tile;
@@ -21,7 +21,7 @@ use photoncard_shared::counters::Counters;
 use photoncard_shared::message::{CausticGather, FrameParameters, Sampling, Tile};
 use rayon::prelude::*;
 
-/// Scene with its card image and photon map.
+/// Scene with its card image, photon map included.
 pub struct MappedScene {
     scene: Scene,
     image: CardImage,
@@ -29,11 +29,11 @@ pub struct MappedScene {
     caustics: Option<CausticGather>,
 }
 
-/// Rendered frame: the pixels of its window, and the counted work.
+/// Pixels of a frame's window, and the counted work of all its tiles.
 pub struct Frame {
     /// Radiance of the pixels, row by row, W/(sr m^2).
     pub radiance: Vec<Vec3>,
-    /// Counts of the work.
+    /// Counters of all tiles.
     pub counters: Counters,
 }
 
@@ -81,16 +81,17 @@ impl MappedScene {
     }
 }
 
-/// Indirect light of single surface points, gathered without rendering a picture.
+/// Indirect light at single surface points, without a picture.
 pub struct IndirectLight<'a> {
     mapped: &'a MappedScene,
     frame: FrameParameters,
-    /// Surface points spread evenly over the picture; points whose reflection is black are left out.
+    /// Surface points that are seen through the centres of a grid's cells. Points with black reflection are
+    /// left out.
     pub points: Vec<Surface>,
 }
 
 impl<'a> IndirectLight<'a> {
-    /// Finds the points that a camera sees at the centres of `side * side` cells of the picture.
+    /// Finds the points that a camera sees through the centres of `side * side` cells of the picture.
     ///
     /// # Panics
     /// If the scene has no camera of the settings' name, or the card image is malformed.
@@ -111,8 +112,8 @@ impl<'a> IndirectLight<'a> {
         Self { mapped, frame, points }
     }
 
-    /// Radiance of indirect light that each point reflects towards the eye, W/(sr m^2), estimated by `rays`
-    /// gather rays of a sampling.
+    /// Indirect radiance that each point reflects towards the eye, W/(sr m^2), by `rays` gather rays of a
+    /// sampling.
     ///
     /// # Panics
     /// If the card image is malformed.

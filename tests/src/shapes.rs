@@ -5,9 +5,9 @@ use photoncard_driver::scene::{Scene, Triangle, VertexAttributes};
 
 use crate::{quad, room};
 
-/// Axis-aligned box that faces outwards; `half` is half its size.
+/// Axis-aligned box that faces outwards. `half` is half of its size along each axis.
 pub fn cuboid(centre: Vec3, half: Vec3, material: u32) -> Vec<Triangle> {
-    // The room's walls, with their fronts turned outwards.
+    // The walls of a room face inwards: their orientation is reversed.
     let mut walls = room([material; 6]);
     for Triangle { vertices, .. } in &mut walls {
         vertices.swap(1, 2);
@@ -16,11 +16,11 @@ pub fn cuboid(centre: Vec3, half: Vec3, material: u32) -> Vec<Triangle> {
     walls
 }
 
-/// Adds a ball with smooth vertex normals to a scene. It has `steps` by `2 steps` quadrilaterals.
+/// Adds a ball to a scene: `steps` rows of `2 steps` quadrilaterals, with smooth vertex normals.
 pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, material: u32) {
     let normal = |row: u32, column: u32| {
         let pole = std::f32::consts::PI * row as f32 / steps as f32;
-        // The last column is the first, bit for bit.
+        // The last column ends exactly where the first begins.
         let around = std::f32::consts::PI * (column % (2 * steps)) as f32 / steps as f32;
         if row == 0 || row == steps {
             return Vec3::Y * pole.cos();
@@ -36,7 +36,7 @@ pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, materi
                     attributes: scene.attributes.len() as u32,
                     ..Triangle::new(normals.map(|normal| centre + normal * radius), material)
                 };
-                // Quadrilaterals at the poles are triangles.
+                // One triangle of each quadrilateral at a pole has no area.
                 if triangle.area() > 0.0 {
                     scene.triangles.push(triangle);
                     scene
@@ -48,8 +48,8 @@ pub fn add_ball(scene: &mut Scene, centre: Vec3, radius: f32, steps: u32, materi
     }
 }
 
-/// Adds a quadrilateral with texture coordinates of set 0 to a scene. Corners are counter-clockwise seen from
-/// the front.
+/// Adds a quadrilateral with texture coordinates of set 0 to a scene. Its corners are counter-clockwise, seen
+/// from the front.
 pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f32; 2]; 4], material: u32) {
     let [a, b, c, d] = coordinates.map(Vec2::from);
     for (triangle, coordinates) in quad(corners, material).into_iter().zip([[a, b, c], [a, c, d]]) {
@@ -61,8 +61,7 @@ pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f
     }
 }
 
-/// Adds equal tangents to the textured triangles of a material: a direction, with the sign of the bitangent
-/// in w.
+/// Gives all corners of a material's triangles this tangent; w is the sign of the bitangent.
 pub fn add_tangents(scene: &mut Scene, material: u32, tangent: Vec4) {
     let scene = &mut **scene;
     for triangle in scene.triangles.iter().filter(|triangle| triangle.material == material) {

@@ -1,4 +1,4 @@
-//! Card on a lossless link that a test drives command by command.
+//! Card on a lossless link, to which a test sends one command after another.
 
 use photoncard_firmware::card::Card;
 use photoncard_firmware::kind::{FixedKind, Micro};
@@ -11,22 +11,22 @@ use photoncard_shared::message::{
 };
 use photoncard_shared::transport::Transport;
 
-/// Card, and the host's end of its link, by which a test sends commands.
+/// Card, and the host's end of its link.
 pub struct Wire<'a, K: FixedKind = Micro> {
     /// The card.
     pub card: Box<Card<K, Dram<'a>>>,
     host: Transport,
     session: u32,
-    /// True if the last frame that was started has layers.
+    /// True if the last frame begun has layers, which make the records of pixels longer.
     layers: bool,
 }
 
-/// Owned summary of a [`Reply`] with what tests need.
+/// What tests need of a [`Reply`], without its borrowed bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// [`Reply::Hello`]: number of written lines, and the firmware's use of on-chip memory.
+    /// [`Reply::Hello`]: number of lines of card memory that were written, and use of on-chip memory.
     Hello(u32, Option<MemoryUse>),
-    /// [`Reply::Checksums`]: bytes of the checksums.
+    /// [`Reply::Checksums`]: bytes of the checksums of chunks of lines.
     Checksums(Vec<u8>),
     /// [`Reply::ImageAccepted`]: the image is well-formed.
     ImageAccepted,
@@ -45,14 +45,14 @@ pub enum Answer {
 }
 
 impl<'a> Wire<'a> {
-    /// Creates a micro card after power-on whose DRAM is `memory`.
+    /// Creates a card of the micro chip, as after power-on, whose DRAM is `memory`.
     pub fn new(memory: &'a mut [Line]) -> Self {
         Self::of_kind(memory)
     }
 }
 
 impl<'a, K: FixedKind> Wire<'a, K> {
-    /// Creates a card of kind `K` after power-on whose DRAM is `memory`.
+    /// Creates a card of kind `K`, as after power-on, whose DRAM is `memory`.
     pub fn of_kind(memory: &'a mut [Line]) -> Self {
         let card = Box::new(Card::new(Dram::new(memory)));
         Self { card, host: Transport::host(), session: 0, layers: false }
@@ -66,8 +66,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         self.say_all(std::slice::from_ref(command))
     }
 
-    /// Sends commands without waiting for answers in between, and runs the card until it is idle. Returns its
-    /// answers.
+    /// Sends all commands at once, and runs the card until it is idle. Returns its answers.
     ///
     /// # Panics
     /// If there are more commands than the link's window holds, or the card sends anything but replies.
@@ -81,8 +80,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         self.work()
     }
 
-    /// Sends a raw message, which need not be a command, and runs the card until it is idle. Returns its
-    /// answers.
+    /// Sends arbitrary bytes as a message, and runs the card until it is idle. Returns its answers.
     ///
     /// # Panics
     /// If the message does not fit a frame of the link, or the card sends anything but replies.
@@ -125,7 +123,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         }
     }
 
-    /// Starts a session. Returns the number of lines written in the card's memory.
+    /// Starts a session. Returns the number of lines of the card's memory that were written.
     ///
     /// # Panics
     /// If the card does not say hello.
@@ -138,7 +136,7 @@ impl<'a, K: FixedKind> Wire<'a, K> {
         }
     }
 
-    /// Loads an image, its last lines first. Returns the card's answers.
+    /// Loads a card image, its last lines first. Returns the card's answers.
     pub fn load(&mut self, lines: &[Line]) -> Vec<Answer> {
         let begin = Command::BeginImage { lines: lines.len() as u32, checksum: image_checksum(lines) };
         let mut answers = self.say(&begin);

@@ -39,13 +39,14 @@ impl<'a> Dispatcher<'a> {
         Self { rendered, ..self }
     }
 
-    /// Locks the scheduler, which holds the remaining tiles.
+    /// Locks the scheduler of the render's tiles.
     pub fn scheduler(&self) -> MutexGuard<'_, Scheduler> {
-        // A thread that panicked holding the lock ends the render.
+        // A poisoned lock is taken over: the panic that poisoned it ends the render.
         self.scheduler.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Assigns tiles to a card until it has no free credit.
+    /// Assigns tiles to a card while it has a free credit. If the scheduler has none for it, the card does
+    /// its waiting gathers.
     pub fn supply(&self, card: CardNumber, session: &mut Session, now: Duration) {
         while session.wants_tile() {
             match self.scheduler().take(card, now) {
@@ -60,7 +61,7 @@ impl<'a> Dispatcher<'a> {
         }
     }
 
-    /// Handles the events of a session.
+    /// Passes the events of a session to the scheduler, and its finished tiles to the sinks.
     ///
     /// # Errors
     /// If cards contradict each other, or no card can render the remaining tiles.
@@ -93,7 +94,7 @@ impl<'a> Dispatcher<'a> {
         result
     }
 
-    /// Handles a tile that a card has rendered.
+    /// Passes a tile that a card has rendered to the scheduler and, once it is accepted, to the sinks.
     fn finish(&self, card: CardNumber, tile: FinishedTile, now: Duration) -> Result<(), SchedulerError> {
         let rectangle = *tile.tile();
         let order = self.order.read().unwrap_or_else(PoisonError::into_inner);
@@ -118,8 +119,8 @@ impl<'a> Dispatcher<'a> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Gives up a card that sent wrong messages, or wrong pixels of tile `about`. Revokes all tiles that no
-    /// other card has confirmed.
+    /// Gives up a card that sent wrong messages, or wrong pixels of tile `about`. Revokes those of its tiles
+    /// that no other card has confirmed.
     pub fn distrust(&self, card: CardNumber, about: Option<Tile>) {
         let _alone = self.order.write().unwrap_or_else(PoisonError::into_inner);
         let revoked = self.scheduler().expel(card, about);
@@ -132,13 +133,14 @@ impl<'a> Dispatcher<'a> {
     /// Checks whether other cards have outvoted a card whose session has ended.
     ///
     /// # Errors
-    /// [`SessionError`] that names the card's wrong tile.
+    /// [`SessionError::Outvoted`] with the card's wrong tile, if they have.
     pub fn check_card(&self, card: CardNumber) -> Result<(), SessionError> {
         let lie = self.scheduler().lie_of(card);
         lie.map_or(Ok(()), |tile| Err(SessionError::Outvoted { tile }))
     }
 
-    /// Waits at most `longest` for a change. Returns at once if all tiles are done.
+    /// Waits at most `longest` for a tile to become available, a card to be given up or the last tile to be
+    /// done. Returns at once if all tiles are done.
     pub fn wait(&self, longest: Duration) {
         let scheduler = self.scheduler();
         if !scheduler.is_complete() {

@@ -6,7 +6,7 @@
 //!
 //! | modules | contents |
 //! |---|---|
-//! | [`link`] | ports of bytes: serial, sockets, pseudo terminals, loopback; faults on purpose |
+//! | [`link`] | ports of bytes: serial, sockets, pseudo terminals, loopback; injected faults |
 //! | [`session`] | greeting, upload, tiles and their checks, without I/O |
 //! | [`scheduler`], [`dispatcher`] | which card renders which tile; finished tiles to the sinks |
 #![forbid(unsafe_code)]

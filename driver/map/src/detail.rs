@@ -24,7 +24,7 @@ const MAX_GROUND: usize = 1024;
 const MIN_SHARE: f32 = 1.0 / 8192.0;
 /// Margin of the part for rounding, relative to the distance up to which photons are stored.
 const MARGIN: f32 = 1e-3;
-/// Maximum size of a triangle near the centre of the part, relative to the part's.
+/// Maximum size of a triangle near the centre of the part, relative to the part's size.
 const SHARE_OF_PART: f32 = 1.0 / 32.0;
 
 /// Lower and upper corner of the box around all detail of a scene and its surroundings, metres; `None` unless
@@ -46,7 +46,8 @@ pub(crate) fn detailed_part(scene: &Scene) -> Option<[Vec3; 2]> {
     (is_smaller && is_plane(ground(), [low, high], MAX_HEIGHT * around)).then_some(part)
 }
 
-/// Returns whether the triangles are few and lie, with the corners of a box, within a distance of one plane.
+/// Returns whether there are 1 to [`MAX_GROUND`] triangles, which lie with `corners` within `distance` metres
+/// of one plane.
 fn is_plane<'s>(
     triangles: impl Iterator<Item = &'s Triangle> + Clone,
     corners: [Vec3; 2],
@@ -115,13 +116,14 @@ fn halves_of(scene: &mut SceneContents, triangle: &Triangle) -> [Triangle; 2] {
     [0, 1].map(|half: usize| Triangle { vertices: vertices[half], attributes: attributes[half], ..*triangle })
 }
 
-/// Index of the corner at which the longest edge of a triangle, by its coordinates, begins.
+/// Index of the corner at which a triangle's longest edge begins, by the maximum norm.
 fn longest_edge(vertices: &[Vec3; 3]) -> usize {
     let length = |edge: usize| (vertices[edge] - vertices[(edge + 1) % 3]).abs().max_element();
     (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0)
 }
 
-/// Values at the corners of both halves of a triangle, in its order.
+/// Splits values at a triangle's corners into those of its halves, which meet at the middle of edge `edge`.
+/// Corners keep their order.
 fn halves<T: Copy>(edge: usize, corners: [T; 3], middle: impl Fn(T, T) -> T) -> [[T; 3]; 2] {
     let end = (edge + 1) % 3;
     let middle = middle(corners[edge], corners[end]);

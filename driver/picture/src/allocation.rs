@@ -1,5 +1,5 @@
-//! Checks available memory before work of a known size. Memory that the process cannot have is then an error,
-//! whereas an allocation that fails during the work would abort the process.
+//! Checks, before work of a known size, that its memory can be allocated. A refusal is then an error, whereas
+//! an allocation that fails during the work aborts the process.
 
 use std::hint::black_box;
 
@@ -18,10 +18,10 @@ impl OutOfMemory {
     }
 }
 
-/// Appends to a list.
+/// Appends an element to a list.
 ///
 /// # Errors
-/// If there is no memory for it.
+/// If the list cannot grow.
 pub fn push<T>(list: &mut Vec<T>, element: T) -> Result<(), OutOfMemory> {
     list.try_reserve(1).map_err(|_| OutOfMemory::doubling::<T>(list.len()))?;
     list.push(element);
@@ -45,8 +45,8 @@ pub fn check(bytes: u64) -> Result<(), OutOfMemory> {
     Ok(())
 }
 
-/// Allocates zeroed bytes. The system provides their memory when it is first written, so that a film of which
-/// a part is rendered takes only that part's memory.
+/// Allocates zeroed bytes. The system provides a page when it is first written: a film of which only a part
+/// is rendered takes only that part's memory.
 ///
 /// # Errors
 /// If the allocation fails.

@@ -1,4 +1,4 @@
-//! Enumerations whose values have names, which options, files and reports use.
+//! Enumerations whose values have names, for options, files and reports.
 
 use photoncard_shared::address::{Stage, Structure};
 use photoncard_shared::message::{Filter, Radiance, Sampling};

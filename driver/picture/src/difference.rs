@@ -23,9 +23,9 @@ pub struct Difference {
     pub height: usize,
     /// Number of pixels that were compared.
     pub pixel_count: usize,
-    /// Errors of the pixels' channels.
+    /// Errors over the channels of all pixels.
     pub pixels: Errors,
-    /// Errors of the blocks' channel means.
+    /// Errors over the mean of each channel in each block.
     pub blocks: BlockErrors,
     /// Mean of the reference over pixels and channels.
     pub mean_reference: f64,
@@ -35,7 +35,8 @@ pub struct Difference {
     pub mean_ratio: Option<f64>,
 }
 
-/// Errors of samples `a` of the picture against samples `b` of the reference.
+/// Errors of values `a` of the picture against values `b` of the reference: channels of pixels, or their
+/// means in blocks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Errors {
     /// Mean of `(a - b)^2`.
@@ -57,15 +58,15 @@ pub struct BlockErrors {
     pub excluded: usize,
     /// Number of compared blocks whose reference is black. They have no relative errors.
     pub black: usize,
-    /// Errors of the channel means of the blocks.
+    /// Errors over the mean of each channel in each block.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Median of the relative errors `|a - b| / b` of the block means; `None` (JSON `null`) if there are
-    /// none.
+    /// Median over the blocks of `|a - b| / b`, where `a` and `b` are means over the pixels and channels of a
+    /// block; `None` (JSON `null`) if all blocks are black.
     pub relative_median: Option<f64>,
-    /// 95th percentile of the relative errors: the smallest error that 95 % of the blocks do not exceed.
+    /// 95th percentile of `|a - b| / b` over the blocks: the smallest error that 95 % of them do not exceed.
     pub relative_p95: Option<f64>,
-    /// Maximum of the relative errors.
+    /// Maximum of `|a - b| / b` over the blocks.
     pub relative_max: Option<f64>,
 }
 
@@ -120,7 +121,7 @@ pub enum DifferenceError {
 /// data windows matter, not their positions.
 ///
 /// # Errors
-/// If the sizes differ, a pixel is not finite, `block` is 0, or nothing is left to compare.
+/// If the sizes differ, a pixel is not finite, `block` is 0, or `exclude` is NaN or excludes every block.
 pub fn compare(
     reference: &RgbImage,
     image: &RgbImage,
@@ -167,7 +168,7 @@ fn check_finite(image: &RgbImage, which: &'static str) -> Result<(), DifferenceE
     }
 }
 
-/// Sums of errors of three-channel samples.
+/// Sums of errors over pixels or blocks, with three channels each.
 #[derive(Default)]
 struct ErrorSums {
     count: usize,

@@ -105,7 +105,7 @@ pub enum FilmError {
         "the samples of a film of another window, other layers or other units cannot be added; render all with equal settings"
     )]
     Other,
-    /// The film already has as many samples as the picture, or it is not complete.
+    /// The film of earlier samples has as many as the picture already, or lacks pixels.
     #[error("a complete film of {samples} samples a pixel is no part of a picture of {asked}")]
     NoMore {
         /// Number of samples of the film.
@@ -175,8 +175,8 @@ impl Film {
     /// Excludes the samples of `base` from an empty film, so that only the others are rendered.
     ///
     /// # Errors
-    /// [`FilmError::Other`] if windows, layers or units differ, [`FilmError::NoMore`] if there are no other
-    /// samples.
+    /// [`FilmError::Other`] if windows, layers or units differ, [`FilmError::NoMore`] if no sample remains or
+    /// `base` is not complete.
     pub fn begin_after(&mut self, base: &Self) -> Result<(), FilmError> {
         let more = self.format.samples.saturating_sub(base.format.samples);
         let others = self.format.of_part(base.format.samples, more);
@@ -276,7 +276,7 @@ impl Film {
     /// either film becomes missing.
     ///
     /// # Errors
-    /// [`FilmError::Other`] if the films differ in these. The film does not change then.
+    /// [`FilmError::Other`] if windows, layers or units differ. The film does not change then.
     pub fn add(&mut self, more: &Self) -> Result<(), FilmError> {
         let format = self.format.plus(&more.format).filter(|_| self.window == more.window);
         self.format = format.ok_or(FilmError::Other)?;

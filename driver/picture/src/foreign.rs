@@ -13,8 +13,8 @@ thread_local! {
     static WALLS: Cell<u32> = const { Cell::new(0) };
 }
 
-/// Runs a decoder. `panicked` creates the error if it panics. State outside the decoder that it changes must
-/// not be used after an error.
+/// Runs a decoder. `panicked` creates the error if the decoder panics. State that the decoder shares with the
+/// caller must not be used after an error.
 pub fn decode<T, E>(decoder: impl FnOnce() -> Result<T, E>, panicked: impl FnOnce() -> E) -> Result<T, E> {
     silence_walled_panics();
     WALLS.set(WALLS.get() + 1);

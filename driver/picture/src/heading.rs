@@ -35,7 +35,7 @@ pub enum HeadingFault {
     /// The file is not of this kind, in any version.
     #[error("the file is of another kind")]
     Foreign,
-    /// The file is of this kind, but of another version: the given one.
+    /// The file is of this kind, but of another version, which the error contains.
     #[error("the file is of version {0}")]
     Version(u32),
     /// The heading is truncated or damaged. The text describes how.
@@ -47,7 +47,7 @@ pub enum HeadingFault {
 }
 
 impl Kind {
-    /// Encodes the heading of a file with `head` as JSON. Returns it and the CRC-32C of both lines.
+    /// Encodes the heading of a file with `head` as JSON. Returns the heading, and the CRC-32C of both lines.
     ///
     /// # Errors
     /// If `head` cannot be encoded as JSON.

@@ -61,7 +61,8 @@ pub(crate) fn is_intact_png(bytes: &[u8]) -> bool {
     false
 }
 
-/// Kind of the first chunk, and the bytes after it; `None` if the chunk is truncated or has a wrong CRC-32.
+/// Kind of the first chunk, and the bytes after the chunk; `None` if the chunk is truncated or has a wrong
+/// CRC-32.
 fn take_chunk(bytes: &[u8]) -> Option<([u8; 4], &[u8])> {
     let (length, rest) = bytes.split_first_chunk()?;
     let checked = 4 + usize::try_from(u32::from_be_bytes(*length)).ok()?;

@@ -61,7 +61,7 @@ pub enum Layer {
     Caustic,
     /// Mean albedo of the visible surfaces, 0 to 1.
     Albedo,
-    /// Mean unit normal of the visible surfaces.
+    /// Mean of the visible surfaces' unit normals, in world space; 0 if no surface is visible.
     Normal,
     /// Mean distance along the view axis, metres; infinite if no surface is visible.
     Depth,
@@ -74,7 +74,7 @@ impl Layer {
     pub const ALL: [Self; 7] =
         [Self::Direct, Self::Indirect, Self::Caustic, Self::Albedo, Self::Normal, Self::Depth, Self::Gathers];
 
-    /// Name of the layer in channel names and in `--aov`.
+    /// Name of the layer in channel names and lists of layers.
     pub fn name(self) -> &'static str {
         match self {
             Self::Direct => "direct",
@@ -100,7 +100,8 @@ impl Layer {
         }
     }
 
-    /// Returns whether chips send the layer only in frames with layers.
+    /// Returns whether chips send the layer only in frames that ask for it
+    /// ([`photoncard_shared::message::FrameParameters::layers`]).
     fn is_of_chip(self) -> bool {
         matches!(self, Self::Direct | Self::Indirect | Self::Caustic | Self::Gathers)
     }
@@ -112,19 +113,19 @@ impl Layer {
     }
 }
 
-/// Layers of a picture in addition to radiance: the argument of `--aov`.
+/// Layers of a picture besides radiance, each once, in the order of [`Layer::ALL`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Layers(Vec<Layer>);
 
 impl Default for Layers {
-    /// Albedo, normals and depth. Denoisers and compositors need them, and they cost nothing.
+    /// Albedo, normals and depth, which denoisers and compositors need. Chips send them in every frame.
     fn default() -> Self {
         Self(vec![Layer::Albedo, Layer::Normal, Layer::Depth])
     }
 }
 
 impl Layers {
-    /// Absence of layers.
+    /// No layers.
     pub const NONE: Self = Self(Vec::new());
 
     /// All layers.
@@ -137,12 +138,14 @@ impl Layers {
         self.0.iter().copied()
     }
 
-    /// Returns whether chips must render frames with layers.
+    /// Returns whether frames must ask chips for layers
+    /// ([`photoncard_shared::message::FrameParameters::layers`]): direct light, indirect light, caustics or
+    /// final gathers.
     pub fn are_of_chip(&self) -> bool {
         self.iter().any(Layer::is_of_chip)
     }
 
-    /// Layers among these that chips render. Chips render all of them or none.
+    /// Layers that chips send only on request: all four of them if one is among these layers, otherwise none.
     pub fn of_chip(&self) -> Self {
         let are_of_chip = self.are_of_chip();
         Self(Layer::ALL.into_iter().filter(|layer| are_of_chip && layer.is_of_chip()).collect())

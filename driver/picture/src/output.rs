@@ -48,7 +48,7 @@ pub enum OutputError {
 /// Checks, before long work starts, that `path` can be written when the work is done.
 ///
 /// # Errors
-/// If the folder is missing or cannot be written to, or `path` is not a regular file.
+/// If the folder is missing or cannot be written to, or `path` names something other than a regular file.
 pub fn check_writable(path: &Path) -> Result<(), OutputError> {
     PendingFile::create(path).map(drop)
 }
@@ -63,7 +63,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
     file.commit()
 }
 
-/// Temporary file that [`Self::commit`] renames to its path. It is removed if it is dropped before.
+/// Temporary file that [`Self::commit`] renames to the output's path. It is removed if the value is dropped
+/// before.
 #[derive(Debug)]
 pub struct PendingFile {
     file: NamedTempFile,
@@ -82,7 +83,7 @@ impl PendingFile {
         Ok(Self { file, target, path: path.to_owned() })
     }
 
-    /// Renames the file to its path, replacing an existing file.
+    /// Renames the temporary file to the output's path, replacing an existing file.
     ///
     /// # Errors
     /// If the disk is full or fails.
@@ -110,8 +111,9 @@ impl Write for PendingFile {
     }
 }
 
-/// Returns whether two paths name one file, or would after it is written. For files that do not exist yet,
-/// names that the file system treats as equal, such as names that differ only in case, count as different.
+/// Returns whether two paths name one file, or would name one after it is written. For files that do not
+/// exist yet, names that the file system treats as equal, such as names that differ only in case, count as
+/// different.
 pub fn is_same_file(a: &Path, b: &Path) -> bool {
     let absolute = |path: &Path| {
         let folder = || Some(fs::canonicalize(folder_of(path)).ok()?.join(path.file_name()?));
@@ -179,7 +181,8 @@ fn create_beside(target: &Path, path: &Path) -> Result<NamedTempFile, OutputErro
     }
     let mut builder = Builder::new();
     builder.prefix(".photoncard-").suffix(".part");
-    // A temporary file is private by default; this one becomes an ordinary file, as the umask has it.
+    // A temporary file is private by default; this one gets the permissions of an ordinary file under the
+    // umask.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
     builder.tempfile_in(folder).map_err(|source| OutputError::Write { path: path.to_owned(), source })

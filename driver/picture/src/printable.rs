@@ -10,7 +10,7 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     if text.bytes().all(|byte| matches!(byte, b' '..=b'~')) {
         return Cow::Borrowed(text);
     }
-    // `escape_debug` knows which characters print, but escapes these too.
+    // `escape_debug` knows which characters print, but would escape quotes and backslashes too.
     let kept = ['\'', '"', '\\'];
     let piece = |piece: &str| {
         let body = piece.trim_end_matches(kept);

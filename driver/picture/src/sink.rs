@@ -18,14 +18,14 @@ pub struct FinishedTile {
 }
 
 impl FinishedTile {
-    /// Creates a tile from encoded sums; `None` unless there is one for each pixel.
+    /// Creates a tile from encoded sums; `None` unless there is one record for each pixel.
     pub fn new(tile: Tile, records: Vec<u8>, format: SumFormat, counters: Counters) -> Option<Self> {
         let bytes = tile.pixels().checked_mul(format.record_bytes() as u64)?;
         (records.len() as u64 == bytes).then_some(Self { tile, records, format, counters })
     }
 
-    /// Creates a tile from the sums of its pixels, row by row, with zero counters; `None` unless there is one
-    /// for each pixel.
+    /// Creates a tile from the sums of its pixels, row by row, with zero counters; `None` unless each pixel
+    /// has sums.
     pub fn of_pixels(
         tile: Tile,
         pixels: impl IntoIterator<Item = PixelSums>,
@@ -57,7 +57,7 @@ impl FinishedTile {
         pixel_positions(&self.tile).zip(records.map(|record| PixelSums::read(record).unwrap_or_default()))
     }
 
-    /// Returns whether a pixel is dazzling ([`SumFormat::is_dazzling`]).
+    /// Returns whether any pixel is dazzling ([`SumFormat::is_dazzling`]).
     pub fn is_dazzling(&self) -> bool {
         self.sums().any(|(_, sums)| self.format.is_dazzling(&sums))
     }

@@ -8,8 +8,7 @@ use photoncard_shared::message::{
 /// Binary logarithm of the light per sample, in units of 2^-40 radiance units, above which a pixel is
 /// dazzling.
 const DAZZLING_SAMPLE: u32 = 40 + 16;
-/// Sum of light above which a pixel is dazzling whatever its number of samples: a fourth of the range of
-/// sums.
+/// Sum of light above which a pixel is dazzling whatever its number of samples: a fourth of the greatest sum.
 const DAZZLING: i64 = 1 << 61;
 
 /// Format of the sums in a tile or a film.
@@ -40,7 +39,7 @@ impl SumFormat {
     pub const ONE: Self =
         Self { layers: false, samples: 1, probes: 0, scale: SumScale { radiance: 1.0, depth: 1.0 } };
 
-    /// Format of a frame of the image with the header `header`.
+    /// Format of a frame of the card image with the header `header`.
     pub fn new(header: &Header, frame: &FrameParameters) -> Self {
         let is_adaptive = frame.adaptive_threshold.is_some();
         Self::of_range(frame.layers, (frame.first_sample, frame.samples), is_adaptive, header.sum_scale())
@@ -58,7 +57,7 @@ impl SumFormat {
         Self::of_range(self.layers, (first, samples), self.probes > 0, self.scale)
     }
 
-    /// Number of the samples.
+    /// Numbers of samples and of probes among them.
     pub fn count(&self) -> SampleCount {
         SampleCount { samples: self.samples, probes: self.probes }
     }
@@ -68,7 +67,7 @@ impl SumFormat {
         record_bytes(self.layers)
     }
 
-    /// Values that sums represent.
+    /// Values of a pixel with the sums `sums`: means over the samples.
     pub fn values(&self, sums: &PixelSums) -> FilmPixel {
         FilmPixel {
             pixel: sums.pixel(self.count(), &self.scale),
@@ -90,7 +89,8 @@ impl SumFormat {
         if self.layers { sums.with_nearest_layers(layers, self.count(), &self.scale) } else { sums }
     }
 
-    /// Format of sums over the samples of both; `None` if their units or layers differ.
+    /// Format of sums over the samples of both; `None` if units or layers differ, or the number of samples
+    /// overflows.
     pub fn plus(&self, more: &Self) -> Option<Self> {
         let is_alike = self.layers == more.layers && self.scale == more.scale;
         let samples = self.samples.checked_add(more.samples)?;

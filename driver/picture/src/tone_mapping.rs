@@ -2,9 +2,9 @@
 //!
 //! Radiance is scaled by `2^exposure`. Without an exposure it is scaled so that the log-average luminance of
 //! the lit pixels becomes 0.18, middle grey (Reinhard, Stark, Shirley, Ferwerda 2002, *Photographic tone
-//! reproduction for digital images*, equations 1 and 2). A [`ToneCurve`] then compresses it, and it is
-//! clipped to 1 and encoded with the sRGB transfer function. Negative radiance is shown black, infinite
-//! radiance white.
+//! reproduction for digital images*, equations 1 and 2). A [`ToneCurve`] then compresses the scaled radiance,
+//! which is clipped to 1 and encoded with the sRGB transfer function. Negative radiance is shown black,
+//! infinite radiance white.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -86,11 +86,11 @@ const MOST: f32 = 1e18;
 /// Log-average luminance after automatic exposure.
 const MIDDLE_GREY: f64 = 0.18;
 
-/// Error of [`write_png`].
+/// Error of writing or encoding a PNG.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum PngError {
-    /// Path of the output file.
+    /// The file cannot be written.
     #[cfg(not(target_family = "wasm"))]
     #[error(transparent)]
     Output(#[from] OutputError),
@@ -143,7 +143,7 @@ pub fn write_png(
     Ok(output::write(path, &bytes)?)
 }
 
-/// Encodes the file that [`write_png`] writes. `path` is its name in errors.
+/// Encodes the file that [`write_png`] writes. `path` is the file's name in errors.
 ///
 /// # Errors
 /// As [`write_png`], except for errors of files.
@@ -175,15 +175,15 @@ pub fn is_of_photoncard(path: &Path) -> bool {
     texts(path).is_some_and(|texts| texts.iter().any(|(keyword, _)| keyword == PROVENANCE))
 }
 
-/// Reads the provenance of a PNG that was tone-mapped by `mapping`, without its pixels; `None` for any other
-/// file.
+/// Reads the provenance of a PNG that was tone-mapped by `mapping`, without decoding pixels; `None` for any
+/// other file.
 pub fn read_form(path: &Path, mapping: ToneMapping) -> Option<String> {
     let texts = texts(path)?;
     let text = |name: &str| texts.iter().find(|(keyword, _)| keyword == name).map(|(_, text)| text);
     text(PROVENANCE).filter(|_| text(TONE_MAPPING) == Some(&mapping.to_json())).cloned()
 }
 
-/// Keywords and texts that precede the pixels of a PNG; `None` if the file is not a PNG.
+/// Keywords and texts of the text chunks before the pixels of a PNG; `None` if the file is not a PNG.
 fn texts(path: &Path) -> Option<Vec<(String, String)>> {
     let file = BufReader::new(File::open(path).ok()?);
     let reader = foreign::decode(|| png::Decoder::new(file).read_info().map_err(drop), || ()).ok()?;
@@ -251,7 +251,7 @@ fn encode(linear: f32) -> u8 {
 mod tests {
     use super::*;
 
-    /// Radiance of a picture of 4 x 3 pixels.
+    /// Grey radiance of 4 x 3 pixels, row by row.
     fn grey(radiance: impl Fn(u32, u32) -> f32) -> Vec<[f32; 3]> {
         (0..3).flat_map(|y| (0..4).map(move |x| (x, y))).map(|(x, y)| [radiance(x, y); 3]).collect()
     }

@@ -1,4 +1,4 @@
-//! Addresses of cards, as in the arguments of `--card`.
+//! Addresses of cards, and their text form.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use photoncard_picture::choice::Choice;
 use super::RenderError;
 use crate::emulator::EmulatedKind;
 
-/// Address of one card, or of several emulated cards: an argument of `--card`.
+/// Address of one card, or of several emulated cards: an element of `cards.addresses`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CardAddress {
     /// Emulated chips in this process.
@@ -40,7 +40,8 @@ impl CardAddress {
         Self::Emulated { kind, chips }
     }
 
-    /// Address with emulated chips of the kind that `change` returns for theirs.
+    /// Replaces the kind of emulated chips by `change` of the kind. The address of a remote card does not
+    /// change.
     #[must_use]
     pub fn of_kind(self, change: impl Fn(EmulatedKind) -> EmulatedKind) -> Self {
         match self {
@@ -69,8 +70,8 @@ impl CardAddress {
         }
     }
 
-    /// Name in errors of card number `index` at this address. It includes the address if the card is not
-    /// emulated.
+    /// Name in errors of the card `index` of a render, which is at this address. The name of a remote card
+    /// includes the address.
     pub(super) fn name_of(&self, index: usize) -> String {
         match self {
             Self::Emulated { .. } => format!("card {index}"),

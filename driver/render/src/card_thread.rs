@@ -19,9 +19,9 @@ struct CardAtWork<'a> {
     crew: &'a Crew<'a>,
 }
 
-/// Loads the image into a card and renders tiles on it until none is left. A lost card is retried as long as
-/// there are others. A card that answers wrongly, or fails repeatedly, is given up. Returns the time when the
-/// card was loaded, since the start of the crew; zero if it was not loaded.
+/// Loads the card image into a card and renders tiles on the card until none is left. A lost card is greeted
+/// again while other cards render. A card that answers wrongly, or fails repeatedly, is given up. Returns the
+/// time from the crew's start until the card was loaded; zero if it was not loaded.
 pub(super) fn render_on(
     number: CardNumber,
     greeted: &mut GreetedCard,
@@ -39,7 +39,7 @@ pub(super) fn render_on(
 }
 
 impl CardAtWork<'_> {
-    /// Moves bytes and tiles once. Returns false if the card is given up.
+    /// Moves bytes and tiles once. Returns false if the card failed and is not retried.
     fn go_on(&mut self) -> Result<bool, RenderError> {
         let Self { number, crew, .. } = *self;
         let dispatcher = &crew.dispatcher;
@@ -51,7 +51,7 @@ impl CardAtWork<'_> {
         let GreetedCard { card, session, .. } = &mut *self.greeted;
         let exchanged =
             dispatcher.check_card(number).and_then(|()| exchange(session, card, slowest, crew.start));
-        // Answers before the error count.
+        // Answers that came before the error are valid.
         self.collect()?;
         self.is_lost &= !self.greeted.session.is_loaded();
         exchanged.map_or_else(|error| self.recover(error), |()| Ok(true))

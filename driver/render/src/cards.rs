@@ -27,8 +27,8 @@ use crate::emulator::memory_model::MemoryTraffic;
 use crate::emulator::trace::TraceFile;
 use crate::emulator::{MemoryModel, SharedImage, TileLines};
 
-/// Maximum time without a render after which a remote card is used without a new greeting, because it may
-/// close a silent link.
+/// Maximum pause between renders after which a remote card is used without a new greeting: the card may close
+/// a silent link.
 const MAX_REST: Duration = Duration::from_secs(5);
 
 /// Cards that answered the greeting.
@@ -42,18 +42,18 @@ pub(super) struct Cards {
     known: Vec<String>,
     start: Instant,
     shared: SharedImage,
-    /// Image that was last loaded into the cards.
+    /// Card image that was last loaded into the cards, and its upload.
     upload: Option<(Arc<CardImage>, Arc<Upload>)>,
     /// Number of cards that did not answer the greeting, were left out because of their budget, or were given
     /// up in an earlier render.
     lost: usize,
-    /// Time when the last render ended, or of the greeting.
+    /// End of the last render; end of the greetings before the first.
     used: Instant,
 }
 
 impl Cards {
     /// Starts and greets all cards in parallel. Their memory is modelled if the settings ask for it; the
-    /// first card's model has the trace. A card that does not answer counts as lost.
+    /// model of the first card writes the trace. A card that does not answer counts as lost.
     ///
     /// # Errors
     /// If the trace cannot be written, or fewer cards are left than needed.
@@ -98,7 +98,7 @@ impl Cards {
     pub(super) fn serve(&self, settings: &RenderSettings) -> bool {
         let is_remote = |address: &CardAddress| matches!(address, CardAddress::Remote(_));
         let is_fresh = !self.set.addresses.iter().any(is_remote) || self.used.elapsed() <= MAX_REST;
-        // Each record of a modelled memory is of one render.
+        // The counts of a modelled memory are those of one render, so that its card serves no other.
         let is_modelled = settings.modelled_caches().is_some();
         self.set == settings.cards && !is_modelled && is_fresh && self.cards.len() >= settings.needed_cards()
     }
@@ -113,7 +113,7 @@ impl Cards {
     /// Reports cards that did not answer the greeting, or have too small a budget, to the observer.
     ///
     /// # Errors
-    /// The error of the last lost card, if too few are left.
+    /// The error of the last lost card, if fewer than `needed` cards are left.
     fn lose(
         &self,
         mut errors: Vec<(String, CardError)>,
@@ -125,9 +125,9 @@ impl Cards {
         last.map_or(Ok(()), |(card, source)| Err(RenderError::Card { card, source }))
     }
 
-    /// Shares the image with emulated cards into which nothing was loaded, instead of sending it over their
-    /// links. Unless `is_image_kept`, the first card is loaded over its link, so that its loading is counted.
-    /// Cards on faulty links are always loaded.
+    /// Gives the card image by reference to emulated cards into which nothing was loaded, instead of sending
+    /// it over their links. Unless `is_image_kept`, the first card is loaded over its link, so that
+    /// statistics count one loading. Cards on faulty links are always loaded.
     fn share(&mut self, image: &Arc<CardImage>, checksum: u64, is_image_kept: bool) {
         let is_faulty = self.set.faults.is_some();
         for (index, (_, GreetedCard { card, session, .. })) in self.cards.iter_mut().enumerate() {
@@ -141,7 +141,8 @@ impl Cards {
         }
     }
 
-    /// Upload of the image. Cards that have the previous image receive only the differences.
+    /// Returns the upload of a card image. Cards that have the previous image receive only the lines that
+    /// differ.
     fn upload(&mut self, image: &Arc<CardImage>) -> Arc<Upload> {
         let upload = match self.upload.take() {
             Some((last, upload)) if Arc::ptr_eq(&last, image) => upload,
@@ -152,7 +153,7 @@ impl Cards {
         upload
     }
 
-    /// Tiles of the last picture, with the numbers of their cards.
+    /// Tiles of the last picture, each with the number of the card that rendered it.
     fn homes(&self) -> impl Iterator<Item = (CardNumber, &Tile)> {
         let cards = self.cards.iter().enumerate();
         cards.flat_map(|(number, (_, card))| card.tiles.iter().map(move |tile| (number, tile)))
@@ -237,7 +238,6 @@ impl Cards {
         Ok(sum)
     }
 
-    /// Budgets of the cards.
     pub(super) fn budgets(&self) -> Vec<Budget> {
         self.cards.iter().map(|(_, card)| card.budget).collect()
     }
@@ -246,7 +246,7 @@ impl Cards {
     /// names to the observer.
     ///
     /// # Errors
-    /// The failure of a card, if too few are left.
+    /// The failure of a card, if fewer than `needed` cards are left.
     pub(super) fn leave_out(
         &mut self,
         check: BudgetCheck,
@@ -267,10 +267,11 @@ impl Cards {
         self.lost += misfits.len();
         let is_alike = |(_, error): &(String, RenderError)| error.to_string() == misfits[0].1.to_string();
         if self.cards.is_empty() && misfits.iter().all(is_alike) {
-            // The setting is at fault, and no card.
+            // All cards fail alike: the setting is at fault.
             return misfits.pop().map_or(Ok(()), |(_, error)| Err(error));
         }
-        // The last card that is missing is the error of the picture, known or not.
+        // If too few cards are left, the last misfit is the error of the picture, even if it was reported
+        // before.
         let has_enough = self.cards.len() >= needed;
         let misfits = misfits.into_iter().filter(|(name, _)| !has_enough || !self.known.contains(name));
         let misfits = misfits.map(|(name, error)| (name, CardError::of_budget(&error)));
@@ -280,11 +281,10 @@ impl Cards {
     /// Renders the tiles and stores them in the sinks.
     ///
     /// # Errors
-    /// If the tiles cannot be rendered, or the observer stops the render. If the outcome so far is known, the
-    /// error is in [`Outcome::failure`] instead.
+    /// If the trace cannot be written. All other errors are in [`Outcome::failure`], with the outcome so far.
     pub(super) fn run(&mut self, work: Work) -> Result<Outcome, RenderError> {
         let Work { settings, image, is_image_kept, frame, tiles, film, sinks, outputs } = work;
-        // Emulated cards that receive the shared image store no copy of it.
+        // Emulated cards that receive the shared card image over their links store no copy of it.
         self.shared.give(image.clone(), None);
         let (scene_image, _) = image.view();
         let limits = PixelLimits::new(&scene_image.header, frame);
@@ -318,7 +318,8 @@ fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) 
 /// Latest time when a card was loaded.
 ///
 /// # Errors
-/// The first failure, which stopped the other cards.
+/// The first failure other than [`RenderError::Stopped`], which it made the other cards return; else
+/// [`RenderError::Stopped`].
 fn latest(results: Vec<Result<Duration, RenderError>>) -> Result<Duration, RenderError> {
     let mut latest = Duration::ZERO;
     let mut is_stopped = false;
@@ -336,8 +337,8 @@ impl RenderSettings {
     /// Checks that tiles can be verified, if requested.
     ///
     /// # Errors
-    /// If there are fewer than two cards, the share is not valid, or reads are counted, which would be those
-    /// of both cards.
+    /// If there are fewer than two cards, the share is not valid, or memory is modelled, which would count
+    /// the reads of both cards.
     pub(super) fn check_verification(&self) -> Result<(), RenderError> {
         let Some(share) = self.cards.verify else { return Ok(()) };
         let [reason, remedy] = if !(share > 0.0 && share <= 1.0) {
@@ -364,7 +365,7 @@ impl RenderSettings {
     /// Creates the scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice,
     /// because all reads count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
-        // Modelled caches are read in the order of the picture.
+        // The counts of modelled caches depend on the order of the tiles: it is that of the picture.
         if self.modelled_caches().is_some() {
             return Scheduler::new(tiles, cards);
         }

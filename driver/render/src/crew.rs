@@ -20,7 +20,8 @@ pub(super) struct Crew<'a> {
     pub(super) failed: AtomicBool,
 }
 
-/// Guard that stops the threads of the other cards if its own panics. They would wait for its tiles forever.
+/// Guard that stops the threads of the other cards if its own thread panics. They would wait for the tiles of
+/// that thread forever.
 pub(super) struct EndOthersOnPanic<'a>(pub(super) &'a AtomicBool);
 
 impl Drop for EndOthersOnPanic<'_> {
@@ -63,17 +64,17 @@ impl Crew<'_> {
         Ok(true)
     }
 
-    /// Stops the threads of all cards with an error.
+    /// Tells the threads of all cards to stop. Returns `error`.
     pub(super) fn fail(&self, error: RenderError) -> RenderError {
         self.failed.store(true, Ordering::Relaxed);
         error
     }
 
-    /// Handles a card that is lost or given up; other cards render its tiles. `was_lost` is true if its loss
+    /// Handles a card that is lost or given up; other cards render its tiles. `was_lost` is true if the loss
     /// was already reported.
     ///
     /// # Errors
-    /// If no other card is left.
+    /// If no card is left that renders, unless this one was lost before and may return.
     pub(super) fn lose(
         &self,
         card: CardNumber,
@@ -98,7 +99,8 @@ impl Crew<'_> {
         }))
     }
 
-    /// Stops the render with an error of the scheduler.
+    /// Tells the threads of all cards to stop because of an error of the scheduler. Returns the error of the
+    /// render.
     pub(super) fn end(&self, error: SchedulerError) -> RenderError {
         let name = |source: &Source| match *source {
             Source::Card(card) => self.names[card].clone(),

@@ -50,7 +50,7 @@ pub enum CardError {
 }
 
 impl CardError {
-    /// Error of a card whose budget fails a check with `error`.
+    /// Error of a card whose budget failed a check with `error`.
     pub(super) fn of_budget(error: &RenderError) -> Self {
         let remedy = error.help().map_or("choose other settings".to_owned(), |help| help.to_string());
         Self::Budget { reason: error.to_string(), remedy }
@@ -64,8 +64,8 @@ pub enum RenderError {
     #[error("`{field}` {value} is not possible: {reason}")]
     #[diagnostic(help("{remedy}"))]
     Setting {
-        /// Path of its field in [`RenderSettings`](crate::RenderSettings), such as `integrator.samples`.
-        /// Texts of errors have such paths between backticks.
+        /// Path of the setting's field in [`RenderSettings`](crate::RenderSettings), such as
+        /// `integrator.samples`. Texts of errors have such paths between backticks.
         field: &'static str,
         /// Value of the field.
         value: String,
@@ -90,14 +90,14 @@ pub enum RenderError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     Photons(PhotonError),
-    /// The image is malformed although it was just packed.
+    /// The card image is malformed although it was just packed.
     #[error("the packed card image is malformed: {0}")]
     #[diagnostic(help("this is a fault of the program: please report it with the scene"))]
     Image(Fault),
     /// The last remaining card failed.
     #[error("{card}: {source}")]
     Card {
-        /// Number of the card, and its address if it is not emulated.
+        /// Name of the card: its number, and its address if it is remote.
         card: String,
         /// Error of the card.
         #[source]
@@ -110,7 +110,7 @@ pub enum RenderError {
         "render with a third card, which decides; or with one that you trust. Tiles that only one of these cards has rendered are not kept"
     ))]
     Disagreement {
-        /// Tile in the form of the argument of `--crop`.
+        /// Rectangle of the tile, `X0,X1,Y0,Y1`.
         tile: String,
         /// Names of the cards.
         cards: String,
@@ -121,14 +121,14 @@ pub enum RenderError {
     )]
     #[diagnostic(help("remove that file, and render all tiles"))]
     KeptDiffers {
-        /// Tile in the form of the argument of `--crop`.
+        /// Rectangle of the tile, `X0,X1,Y0,Y1`.
         tile: String,
     },
     /// A tile must be verified, but only one card is left.
     #[error("no second card is left to verify the tile {tile}")]
     #[diagnostic(help("go on with `outputs.partial.resume` and another card, or without `cards.verify`"))]
     Unverified {
-        /// Tile in the form of the argument of `--crop`.
+        /// Rectangle of the tile, `X0,X1,Y0,Y1`.
         tile: String,
     },
     /// Cards crash at some tiles. All other tiles are done.
@@ -138,7 +138,7 @@ pub enum RenderError {
          go on with `outputs.partial.resume` and another kind of card"
     ))]
     Unrendered {
-        /// Tiles in the form of arguments of `--crop`.
+        /// Rectangles of the tiles, `X0,X1,Y0,Y1`, with "and" between them.
         tiles: String,
     },
     /// The threads of the pilot's chips cannot be started.
@@ -178,7 +178,7 @@ impl From<PhotonError> for RenderError {
 }
 
 impl RenderError {
-    /// Returns whether the arguments or the scene cause the error.
+    /// Returns whether the settings, the scene or the caller's files cause the error.
     pub fn is_input(&self) -> bool {
         match self {
             Self::Setting { .. } | Self::Scene(_) | Self::Film(_) | Self::Pack(_) | Self::Photons(_) => true,

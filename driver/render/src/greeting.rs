@@ -41,7 +41,7 @@ pub(super) enum GreetingError {
 }
 
 impl GreetingError {
-    /// Error of the card with this name.
+    /// Converts to the error of a render, in which the card has the name `card`.
     pub(super) fn of_card(self, card: String) -> RenderError {
         match self {
             Self::Card(source) => RenderError::Card { card, source },

@@ -1,4 +1,4 @@
-//! Statistics of reads from card memory, the key `memory` of `--stats`.
+//! Statistics of reads from card memory, part of the statistics of a render.
 
 use photoncard_firmware::memory::Stage;
 use photoncard_shared::address::Structure;
@@ -9,7 +9,7 @@ use crate::emulator::memory_model::{CacheSettings, MemoryTraffic};
 /// Reads of card memory by all tiles, summed over all chips. The sums do not depend on the number of chips.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct MemoryStatistics {
-    /// Caches, in the form of the argument of `--cache`.
+    /// Caches, in the text form of [`CacheSettings`].
     pub caches: String,
     /// Reads of the photon map.
     pub photon_map: ReadStatistics,
@@ -19,7 +19,7 @@ pub struct MemoryStatistics {
     pub structures: StructureReads,
     /// Reads by stage.
     pub stages: StageReads,
-    /// Bytes of the image written into every card.
+    /// Bytes written into card memory: card images and kept irradiance records.
     pub written_bytes: u64,
 }
 

@@ -66,8 +66,8 @@ impl NoiseEstimate {
 
     /// Noise of the last picture, relative to its mean; `None` before a pass has doubled the samples.
     pub(super) fn noise(&self) -> Option<f64> {
-        // Linear from one doubling to the next: the last samples of the sequence are not stratified against
-        // the first.
+        // The squared noise is linear from one doubling to the next: the last samples of the sequence are not
+        // stratified against the first.
         let doubled = (self.all / self.samples - 1.0).min(1.0);
         Some((self.squared? * (1.0 - doubled * (1.0 - RATIO))).sqrt())
     }

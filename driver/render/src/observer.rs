@@ -17,7 +17,7 @@ pub enum Phase {
     Photons,
     /// Construction of the photon map and the card image. There is no progress.
     Pack,
-    /// Loading of the image into the cards. Progress counts bytes.
+    /// Loading of the card image into the cards. Progress counts bytes.
     Load,
     /// Rendering. Progress counts tiles.
     Tiles,

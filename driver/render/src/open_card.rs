@@ -34,7 +34,7 @@ enum Connection {
 
 impl OpenCard {
     /// Starts, or connects to, the first card at an address. An emulated card can have a model of its memory,
-    /// and shares the host's image. Injected faults depend on the card's number `index`.
+    /// and shares the host's card image. Injected faults depend on the card's number `index`.
     pub(super) fn open(
         index: usize,
         address: &CardAddress,
@@ -58,7 +58,8 @@ impl OpenCard {
         matches!(self.connection, Connection::Emulated(_))
     }
 
-    /// Closes the link to a card. Returns the address for reconnecting; `None` for an emulated card.
+    /// Closes the link to a remote card and returns its address, for reconnecting; `None` for an emulated
+    /// card.
     pub(super) fn close(&mut self) -> Option<RemoteAddress> {
         match &mut self.connection {
             Connection::Emulated(_) => None,
@@ -76,7 +77,7 @@ impl OpenCard {
         }
     }
 
-    /// Takes the empty memory of an emulated card ([`EmulatedCard::take_empty_memory`]).
+    /// Takes the handle of an emulated card's empty memory ([`EmulatedCard::take_empty_memory`]).
     pub(super) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         match &mut self.connection {
             Connection::Emulated(card) => card.take_empty_memory(),
@@ -179,8 +180,8 @@ pub(super) fn exchange(
 /// Pause before each attempt to reconnect.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// Tries to reconnect to a card until it succeeds, or all tiles are done. `wait_for_end` waits for at most
-/// the given time and returns whether all tiles are done.
+/// Tries to reconnect to a card until it succeeds and returns the port, or until all tiles are done and
+/// returns `None`. `wait_for_end` waits for at most the given time and returns whether all tiles are done.
 pub(super) fn reopen(
     address: &RemoteAddress,
     wait_for_end: &dyn Fn(Duration) -> Result<bool, RenderError>,

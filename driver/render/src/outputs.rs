@@ -12,12 +12,12 @@ use super::{Observer, RenderSettings};
 use crate::display::Display;
 use crate::partial::{PartialError, PartialRender};
 
-/// Outputs that are written while a render runs, as the settings ask for.
+/// Outputs that the settings ask for, and that are written while a render runs.
 pub(super) struct Outputs<'a> {
     partial: Option<PartialRender>,
     /// Earlier samples that the render adds to. All tiles that are shown include them.
     pub(super) base: Option<Arc<Film>>,
-    /// Number of dazzling tiles among samples that the file of finished tiles has kept.
+    /// Number of dazzling tiles in the complete samples that are taken over from the file of finished tiles.
     pub(super) kept_dazzling: usize,
     viewers: Vec<Box<dyn Viewer>>,
     pub(super) observer: &'a dyn Observer,
@@ -38,7 +38,8 @@ impl<'a> Outputs<'a> {
     ) -> Result<Self, PartialError> {
         let begin = |partial| {
             let mut identity = settings.identity(scene);
-            // The file is of any number of samples, and states those that rays are divided among.
+            // The file may have any number of samples. With irradiance records, pixels depend on the planned
+            // number.
             identity.remove("spp");
             if settings.integrator.irradiance_error.is_some() {
                 identity.insert("planned-spp".to_owned(), settings.integrator.planned().into());

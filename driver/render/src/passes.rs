@@ -26,8 +26,8 @@ const PLANNED_SHARE: f64 = 0.95;
 /// 4096 samples per pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Aim {
-    /// Time of the render. The first pass may take longer, and so may the second if a card has no room for
-    /// irradiance records.
+    /// Time limit of the render. The first pass may exceed it, and so may the second if a card has no room
+    /// for irradiance records.
     pub time: Option<Duration>,
     /// Noise: estimated root mean square standard error of the pixels, relative to the mean of the picture.
     pub noise: Option<f64>,
@@ -155,8 +155,8 @@ fn next_pass(
 /// Model of the time of passes: a constant, plus a time in proportion to the samples.
 #[derive(Default)]
 struct Pace {
-    /// Samples and seconds of the last two passes, without a first pass that gathers irradiance records for
-    /// all passes.
+    /// Samples and seconds of the last pass but one, and of the last. A first pass that gathers irradiance
+    /// records for all passes is left out.
     last: [Option<(f64, f64)>; 2],
 }
 
@@ -165,13 +165,12 @@ impl Pace {
         self.last = [self.last[1], Some((f64::from(samples), seconds))];
     }
 
-    /// Number of samples that a pass of this time can have.
+    /// Number of samples that a pass of `seconds` seconds can have.
     fn samples_in(&self, seconds: f64) -> u32 {
         let Some((samples, time)) = self.last[1] else { return u32::from(seconds > 0.0) };
         let slope = self.last[0].filter(|(before, _)| *before != samples);
         let slope = slope.map(|(before, other)| (time - other) / (samples - before));
-        // The time of a sample is at most what it would be without a part that each pass has, and not much
-        // less.
+        // The time per sample is at most that without a constant part of a pass, and at least a fourth of it.
         let most = time / samples;
         let each = slope.unwrap_or(most).clamp(0.25 * most, most).max(f64::MIN_POSITIVE);
         let fixed = time - each * samples;

@@ -32,9 +32,9 @@ impl Provenance {
         budgets: &[Budget],
     ) -> Self {
         let mut pixels = settings.identity(scene);
-        // All layers of the picture: those of the host are in the identity of no tile.
+        // All layers of the picture. The identity has only those that chips send on request.
         pixels.insert("aov".to_owned(), json!(settings.picture.layers.to_string()));
-        // The automatic distance, if none is given.
+        // The distance in use, which is derived from the photons if none is stated.
         pixels.insert("max-distance".to_owned(), json!(frame.max_distance));
         pixels.insert("view".to_owned(), view(camera));
         let mut work = settings.of_work();

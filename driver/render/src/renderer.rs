@@ -33,10 +33,10 @@ type Choice<'a> = &'a dyn Fn(&PackedScene) -> Chosen;
 
 /// Renders pictures one after another on the same cards, which stay open between pictures.
 ///
-/// If only the camera changes, the host traces no photons and sends no image; it sends only tiles. If the
-/// scene or its photons change, the host makes a new image, and a card receives only the changed lines. The
-/// card checks the checksum of the whole image, and receives the whole image if the checksum differs or the
-/// card was reset or lost. A picture never depends on earlier pictures.
+/// If only the camera changes, the host traces no photons and sends no card image; it sends only tiles. If
+/// the scene or its photons change, the host makes a new image, and a card receives only the changed lines.
+/// The card checks the checksum of the whole image, and receives the whole image if the checksum differs or
+/// the card was reset or lost. A picture never depends on earlier pictures.
 ///
 /// Cards are connected again if the settings have other cards, for each picture with modelled memory, after a
 /// failed render, and, if any card is remote, after some seconds without a picture.
@@ -67,7 +67,7 @@ impl Renderer {
     }
 
     /// Adds samples to a picture: renders the samples that `base` lacks, and returns the picture with all
-    /// samples of the settings. It equals, bit for bit, the picture of a single render.
+    /// samples of the settings, which equals, bit for bit, the picture of a single render.
     /// [`Integrator::planned_samples`] and everything else that pixels depend on must be equal to those of
     /// the base.
     ///
@@ -188,7 +188,7 @@ impl Renderer {
     }
 }
 
-/// Error of a picture whose samples cannot be added to another picture.
+/// Creates the error of samples that cannot be added to a picture.
 fn not_more(settings: &RenderSettings) -> impl Fn(FilmError) -> RenderError {
     let samples = settings.integrator.samples;
     move |error| RenderError::Setting {
@@ -205,7 +205,7 @@ fn connected<'c>(
     settings: &RenderSettings,
     observer: &dyn Observer,
 ) -> Result<&'c mut Cards, RenderError> {
-    // Others are closed before: a card serves one host at a time.
+    // Other cards are closed before new ones are connected: a card serves one host at a time.
     let open = cards.take().filter(|cards| cards.serve(settings));
     Ok(cards.insert(match open {
         Some(mut open) => {
@@ -226,7 +226,7 @@ pub(super) struct Kept {
 }
 
 impl Kept {
-    /// Returns whether the image is of this scene, with the photons of the settings.
+    /// Returns whether the card image is of this scene, with the photons of the settings.
     fn is_of(&self, scene: &Scene, settings: &RenderSettings) -> bool {
         self.scene == scene.checksum_without_cameras() && self.photons == settings.photon_settings(scene)
     }
@@ -234,14 +234,14 @@ impl Kept {
 
 /// Origin of a picture's card image.
 pub(super) enum Source {
-    /// The image of an earlier picture.
+    /// The card image of an earlier picture, or of a prepared scene.
     Kept(Kept),
     /// A packed scene whose photons must be traced.
     Packed(Box<PackedScene>),
 }
 
 impl Source {
-    /// Determines the source of the image, and the settings as stated or chosen.
+    /// Determines the source of the card image, and the settings as stated or chosen.
     pub(super) fn new(
         scene: &Scene,
         settings: &RenderSettings,
@@ -274,7 +274,7 @@ impl Source {
     /// Creates or reuses the card image.
     ///
     /// # Errors
-    /// If it does not fit the chips, the photons cannot be traced, or the observer stops the render.
+    /// If the image does not fit the chips, the photons cannot be traced, or the observer stops the render.
     pub(super) fn prepare(
         self,
         scene: &Scene,

@@ -1,4 +1,4 @@
-//! Statistics of a render. The field names are the keys of `--stats`.
+//! Statistics of a render. The field names are the keys of their JSON.
 
 use photoncard_cards::session::LinkBytes;
 use photoncard_map::photon_map::Guiding;
@@ -11,7 +11,7 @@ use super::work::{Outcome, Prepared, Times};
 use super::{MemoryStatistics, Provenance, RenderSettings};
 use crate::cost_model::Flops;
 
-/// Name, in place of a card's, of a render whose finished tiles were kept.
+/// Name, in a list of cards, of an earlier render whose finished tiles were kept.
 pub const EARLIER_RENDER: &str = "an earlier render";
 
 /// Contents of the statistics file. The keys are stable.
@@ -29,7 +29,7 @@ pub struct Statistics {
     pub photons: u64,
     /// Number of paths traced from the lights for the photons.
     pub photon_paths: u64,
-    /// Guiding of these paths; absent if photons are for any camera.
+    /// Guiding of the photon paths; absent if photons are for any camera.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub photon_guiding: Option<Guiding>,
     /// Maximum distance of a gather, metres.
@@ -40,13 +40,14 @@ pub struct Statistics {
     pub cards_given_up: usize,
     /// Number of tiles that two cards rendered with equal pixels.
     pub verified_tiles: usize,
-    /// Number of tiles rendered once more, for verification or because another card took too long. Not
-    /// included in the other counts.
+    /// Number of tiles rendered once more, for verification or because another card took too long. The other
+    /// counts include such a tile once.
     pub repeated_tiles: usize,
-    /// Number of tiles with light far above that of the scene's surfaces that were not verified because there
-    /// was no second card, and of such tiles that were kept.
+    /// Number of tiles with light far above that of the scene's surfaces that no second card verified,
+    /// including tiles kept from an earlier render.
     pub dazzling_tiles: usize,
-    /// Names of the cards that rendered these tiles; [`EARLIER_RENDER`] for kept ones.
+    /// Names of the cards that rendered the [`dazzling_tiles`](Self::dazzling_tiles); [`EARLIER_RENDER`] for
+    /// kept ones.
     #[serde(skip)]
     pub dazzling_cards: Vec<String>,
     /// Number of tiles rendered again because their card was outvoted. The other counts include such a tile
@@ -162,8 +163,8 @@ impl Statistics {
     }
 }
 
-/// Number of photons in an image's map, for which `count` were requested. They are counted if the map's
-/// leaves have no room for as many.
+/// Number of photons in the map of a card image, of `count` requested ones. They are counted only if the map
+/// has no room for `count` photons.
 fn photons(count: u64, prepared: &Prepared) -> u64 {
     let leaves = prepared.image.section(SectionKind::PhotonLeaves);
     let nodes = prepared.image.section(SectionKind::Photons).len() * Photon::PER_LINE;
@@ -178,8 +179,8 @@ fn photons(count: u64, prepared: &Prepared) -> u64 {
 /// Numbers of rays by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Rays {
-    /// Number of eye rays. Each sample casts one twice, or three times with the irradiance cache. Rays to
-    /// points of the cache's lattice are included.
+    /// Number of eye rays: two per sample, more for samples that see their surface through specular ones, and
+    /// those to lattice points of the irradiance cache.
     pub eye: u64,
     /// Shadow rays.
     pub shadow: u64,
@@ -194,9 +195,9 @@ pub struct Rays {
 /// Bytes transferred over all links.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LinkStatistics {
-    /// Bytes of image lines sent to each card. Only lines that the card lacked are sent.
+    /// Bytes of card image lines sent to each card. Only lines that the card lacked are sent.
     pub image_bytes: Vec<u64>,
-    /// Bytes of image lines and pixels.
+    /// Bytes of card image lines and pixels.
     pub payload_bytes: u64,
     /// Total number of bytes in both directions.
     pub wire_bytes: u64,

@@ -22,10 +22,10 @@ use crate::emulator::memory_model::MemoryTraffic;
 /// Function that checks whether a chip with a budget can render a picture.
 pub(super) type BudgetCheck<'a> = &'a dyn Fn(&Budget) -> Result<(), RenderError>;
 
-/// Function that applies a check to all chips.
+/// Function that applies a check to the budgets of all chips.
 pub(super) type FitChips<'a> = dyn FnMut(BudgetCheck) -> Result<(), RenderError> + 'a;
 
-/// Work that cards get.
+/// Work of the cards on a picture.
 pub(super) struct Work<'a> {
     pub(super) settings: &'a RenderSettings,
     pub(super) image: &'a Arc<CardImage>,
@@ -77,14 +77,14 @@ pub(super) struct Prepared {
     pub(super) caustics: Option<CausticGather>,
     /// Number of paths that were traced for the photons.
     pub(super) paths: u64,
-    /// Guiding of these paths; `None` if photons are for any camera.
+    /// Guiding of the photon paths; `None` if photons are for any camera.
     pub(super) guiding: Option<Guiding>,
 }
 
 /// Adds the photon maps to a packed scene.
 ///
 /// # Errors
-/// If the image does not fit the chips, the photons cannot be traced, or the observer stops the render.
+/// If the card image does not fit the chips, the photons cannot be traced, or the observer stops the render.
 pub(super) fn prepare(
     scene: &Scene,
     packed: PackedScene,

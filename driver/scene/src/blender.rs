@@ -10,12 +10,12 @@ const NAME: &str = "Khronos glTF Blender I/O";
 /// write watts.
 const PHOTOMETRIC_SINCE: (u32, u32) = (3, 4);
 
-/// Remedy of a file without light.
+/// Help of the error that a file of Blender's exporter has no light.
 pub(super) const NO_LIGHT: &str = "tick Include > Data > Punctual Lights in Blender's export dialog, or pass \
      export_lights=True to export_scene.gltf; area lights and the world are not exported: make emissive planes of area \
      lights, and add the world by --environment; or give a material an Emission Strength above 0";
 
-/// Remedy of a file without a camera.
+/// Help of the error that a file of Blender's exporter has no camera.
 pub(super) const NO_CAMERA: &str = "tick Include > Data > Cameras in Blender's export dialog, or pass \
      export_cameras=True to export_scene.gltf";
 
@@ -24,7 +24,8 @@ pub(super) fn is_exporter(generator: Option<&str>) -> bool {
     generator.is_some_and(|name| name.starts_with(NAME))
 }
 
-/// Units of the lights in a file with this `asset.generator`; `None` if it is not of Blender's exporter.
+/// Returns the units of the lights in a file with this `asset.generator`; `None` if the file is not of
+/// Blender's exporter.
 ///
 /// The exporter's *Lighting Mode* is not in the file: it is taken to be the default, *Standard*.
 pub(super) fn light_units(generator: Option<&str>) -> Option<LightUnits> {
@@ -33,7 +34,7 @@ pub(super) fn light_units(generator: Option<&str>) -> Option<LightUnits> {
     Some(if is_early { LightUnits::Watts } else { LightUnits::Photometric })
 }
 
-/// Major and minor version of ` v5.0.21`.
+/// Parses the major and minor version of a text such as ` v5.0.21`.
 fn version(text: &str) -> Option<(u32, u32)> {
     let mut numbers = text.trim_start().strip_prefix('v')?.split('.').map(str::parse);
     Some((numbers.next()?.ok()?, numbers.next()?.ok()?))

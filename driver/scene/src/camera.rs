@@ -30,8 +30,8 @@ impl Camera {
         Some(if aspect >= 1.0 { (side, shorter(1.0 / aspect)) } else { (shorter(aspect), side) })
     }
 
-    /// Returns whether a picture of this size shows more or less to the sides than the file's aspect ratio,
-    /// by more than a pixel.
+    /// Returns whether the aspect ratio of a picture of this size differs from the file's by more than one
+    /// pixel of the shorter side.
     pub fn is_cropped(&self, width: u32, height: u32) -> bool {
         let meant = self.aspect.map(|aspect| (width as f32 - height as f32 * aspect).abs());
         meant.is_some_and(|pixels| pixels > self.aspect.unwrap_or(1.0).max(1.0))

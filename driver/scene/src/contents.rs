@@ -29,7 +29,7 @@ pub struct SceneContents {
     pub materials: Vec<Material>,
     /// Textures, mappings of images to surfaces; the indices in [`Material`] refer to this list.
     pub textures: Vec<Texture>,
-    /// Images. One that textures use in two encodings is listed twice.
+    /// Images of the textures. An image that textures use in two encodings is listed twice.
     pub images: Vec<Image>,
     /// Point, spot and directional lights (`KHR_lights_punctual`).
     pub lights: Vec<PunctualLight>,
@@ -69,7 +69,7 @@ pub enum Concern {
 }
 
 impl SceneContents {
-    /// Checksum of the triangles and texels.
+    /// Checksum of the triangles with their attributes and tangents, and of all texels.
     pub(crate) fn bulk_checksum(&self) -> Checksum {
         let mut sum = Checksum::default();
         for triangle in &self.triangles {
@@ -101,8 +101,8 @@ impl SceneContents {
         format!("{:08x}", sum.value())
     }
 
-    /// Text of all contents except triangles, attributes and texels. Its floating-point numbers parse back
-    /// exactly.
+    /// Text of all contents that a render reads, except those in [`Self::bulk_checksum`]. Its floating-point
+    /// numbers parse back exactly.
     fn description(&self, cameras: &[Camera]) -> String {
         let mut text = String::new();
         let _ = write!(text, "{:?}{:?}{:?}{:?}", self.materials, cameras, self.textures, self.lights);

@@ -10,23 +10,23 @@ use rayon::prelude::*;
 
 use super::{Scene, Triangle};
 
-/// Distance within which two surfaces count as coplanar, in units in the last place of their greatest
-/// coordinate.
+/// Distance within which two surfaces count as coplanar, in units of `f32::EPSILON` times their greatest
+/// absolute coordinate.
 const SHARED: f64 = 16.0;
-/// Distance by which a lamp is lifted, in units in the last place of the larger of its greatest coordinate
-/// and its viewing distance.
+/// Distance by which a lamp is lifted, in units of `f32::EPSILON` times the sum of the lamp's greatest
+/// absolute coordinate and its viewing distance.
 const LIFT: f64 = 64.0;
-/// Greatest viewing distance at which a lifted lamp is seen whole, in lengths of its longest edge.
+/// Greatest viewing distance at which a lifted lamp is seen whole, in units of the lamp's longest edge.
 const SEEN_FROM: f64 = 32.0;
 
 impl Scene {
-    /// Lifts emissive triangles off coplanar, overlapping triangles that do not emit. They move along their
-    /// own normal. Double-sided emissive ones move towards the front of a one-sided surface.
+    /// Lifts emissive triangles, along their own normal, off coplanar, overlapping triangles that do not
+    /// emit. Double-sided emissive triangles are lifted to the front of a one-sided surface.
     ///
     /// # Errors
     /// If the process cannot have the memory.
     pub(crate) fn lift_lamps(&mut self) -> Result<(), OutOfMemory> {
-        // Lists grow to twice their length, and are halved into others.
+        // The factor 4: a list's capacity may be twice its length, and a split copies half of the list.
         allocation::check(4 * (self.emitters().count() * size_of::<Lamp>()) as u64)?;
         let lamps: Vec<Lamp> = self.emitters().map(|(index, triangle)| Lamp::new(index, triangle)).collect();
         if lamps.is_empty() {
@@ -114,14 +114,15 @@ impl Lamp {
         Self { index, triangle: *triangle, bounds: Box3::of(triangle) }
     }
 
-    /// Returns whether `surface` lies in the lamp's plane and overlaps it by more than an edge.
+    /// Returns whether `surface` lies in the lamp's plane and shares more than an edge with the lamp.
     fn is_covered_by(&self, surface: &Triangle) -> bool {
         let up = normal(&self.triangle);
         let [lamp, surface_corners] =
             [&self.triangle, surface].map(|triangle| triangle.vertices.map(DVec3::from));
         let rounding = f64::from(f32::EPSILON) * magnitude(&self.triangle).max(magnitude(surface));
         let is_in_plane = |corner: DVec3| (corner - lamp[0]).dot(up).abs() <= SHARED * rounding;
-        // A small triangle beside the plane may have its corners near it.
+        // The corners of a small triangle may be near the lamp's plane although the triangle is not parallel
+        // to it.
         let is_parallel = up.dot(normal(surface)).abs() > 0.999;
         let across = up.any_orthonormal_vector();
         let along = up.cross(across);
@@ -132,7 +133,7 @@ impl Lamp {
     }
 }
 
-/// Returns whether two triangles overlap by more than a distance along each normal of their edges (the
+/// Returns whether two triangles overlap by more than `distance` along each normal of their edges (the
 /// separating axis theorem).
 fn overlap(one: &[DVec2; 3], other: &[DVec2; 3], distance: f64) -> bool {
     let is_apart = |along: DVec2| {

@@ -32,7 +32,7 @@ pub struct Environment {
     pub height: u32,
     /// Texels, rows from the top; finite, and 0 or more.
     pub texels: Vec<[f32; 3]>,
-    /// Factor of the texels, 0 or more.
+    /// Factor by which the texels are multiplied, 0 or more.
     pub strength: f32,
 }
 
@@ -45,8 +45,8 @@ impl Environment {
     /// Reads a map from a Radiance picture (`.hdr`) or the first part of an `OpenEXR` picture (`.exr`) that
     /// has the channels R, G and B. The first bytes of the file determine its format.
     ///
-    /// Invalid channels are clamped: negative and NaN ones to 0, those above [`BRIGHTEST`] to it, and
-    /// infinite ones to the brightest finite channel of the map.
+    /// Invalid channels are clamped: negative and NaN ones to 0, finite ones above [`BRIGHTEST`] to that
+    /// limit, and infinite ones to the brightest finite channel of the map.
     ///
     /// # Errors
     /// [`SceneError::Unreadable`] if there is no such file, and [`SceneError::Environment`] if it is damaged,

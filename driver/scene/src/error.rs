@@ -97,7 +97,7 @@ pub enum SceneError {
     OtherFormat {
         /// Path of the file.
         file: PathBuf,
-        /// Format of the file.
+        /// What the path names, such as `a folder` or `an FBX file`.
         what: &'static str,
         /// Remedy. Where a program converts the format to glTF, it contains the command.
         remedy: String,
@@ -109,7 +109,7 @@ pub enum SceneError {
     Truncated {
         /// Path of the file.
         file: PathBuf,
-        /// Truncated part.
+        /// Part of the file that is truncated, such as `a chunk`.
         what: &'static str,
         /// Stated size of the part, bytes.
         needed: u64,
@@ -128,7 +128,7 @@ pub enum SceneError {
         file: String,
         /// The parser's message.
         message: String,
-        /// Text around the fault.
+        /// Excerpt of the text around the fault.
         #[source_code]
         text: Arc<Excerpt>,
         /// Position of the fault in the text.
@@ -199,7 +199,7 @@ pub enum SceneError {
         remedy: &'static str,
     },
 
-    /// Error of a vertex attribute that is not finite or out of range.
+    /// Error of a vertex attribute that is out of range or not finite.
     #[error("{location}: vertex {vertex} of mesh '{mesh}', primitive {primitive}, {reason}")]
     #[diagnostic(code(scene::vertex), help("repair the mesh in the modelling tool and export it again"))]
     Vertex {
@@ -221,17 +221,17 @@ pub enum SceneError {
     )]
     #[diagnostic(code(scene::index), help("repair the mesh in the modelling tool and export it again"))]
     IndexOutOfRange {
-        /// Location of the index accessor.
+        /// Location of the primitive's `indices`.
         location: Location,
         /// Name of the mesh.
         mesh: String,
         /// Index of the primitive in the mesh.
         primitive: usize,
-        /// Position in the list of indices.
+        /// Position of the faulty index in the list of indices.
         position: u64,
-        /// Value of the index.
+        /// Faulty index, which should be less than `vertices`.
         index: u64,
-        /// Number of vertices.
+        /// Number of vertices of the primitive.
         vertices: u64,
     },
 
@@ -383,7 +383,7 @@ pub enum SceneError {
         assignment: String,
         /// Requested name.
         material: String,
-        /// Names of the scene that are most similar.
+        /// Material names of the scene that are most similar to the requested one.
         nearest: String,
     },
 

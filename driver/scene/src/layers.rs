@@ -31,9 +31,9 @@ pub struct Layers {
 /// A tangent-space normal texture (linear).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NormalMap {
-    /// The texture.
+    /// Index of the texture in [`Scene::textures`](super::SceneContents::textures).
     pub texture: u32,
-    /// Scale of x and y.
+    /// Scale of the x and y of the map's normals.
     pub scale: f32,
 }
 

@@ -69,7 +69,7 @@ pub struct Scene {
 /// Properties of a scene that take a pass over all triangles and texels, computed when first used.
 #[derive(Clone, Debug, Default)]
 struct Known {
-    /// Checksum of the triangles and texels.
+    /// [`SceneContents::bulk_checksum`].
     bulk: OnceLock<Checksum>,
     checksum: OnceLock<String>,
     without_cameras: OnceLock<String>,
@@ -250,7 +250,7 @@ impl Scene {
         if self.is_of_blender() { -90.0 } else { 0.0 }
     }
 
-    /// Returns whether any triangle has one of the [`Self::specular_materials`].
+    /// Returns whether any triangle's material focuses light ([`Self::specular_materials`]).
     pub fn is_specular(&self) -> bool {
         *self.known.is_specular.get_or_init(|| {
             let is_specular = self.specular_materials();
@@ -258,8 +258,8 @@ impl Scene {
         })
     }
 
-    /// Flags of the materials that focus light. They reflect or transmit perfectly specularly, or have a lobe
-    /// that rays follow.
+    /// Returns for each material whether it focuses light: it reflects or transmits perfectly specularly, or
+    /// has a lobe that rays follow.
     pub fn specular_materials(&self) -> Vec<bool> {
         self.materials.iter().map(|material| material.is_specular(self.minimum_roughness(material))).collect()
     }
@@ -269,8 +269,8 @@ impl Scene {
         material.has_narrow_lobe(self.minimum_roughness(material))
     }
 
-    /// Flags of the materials with partial coverage: they have cut-outs, or an alpha below 1 with `alphaMode`
-    /// `BLEND`.
+    /// Returns for each material whether its coverage is partial: it has cut-outs, or an alpha below 1 with
+    /// `alphaMode` `BLEND`.
     pub fn uncovered_materials(&self) -> Vec<bool> {
         let mut uncovered: Vec<bool> =
             self.materials.iter().map(|material| self.is_uncovered(material)).collect();

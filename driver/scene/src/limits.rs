@@ -1,8 +1,8 @@
 //! Limits of emission.
 
-/// Maximum emission in each channel: W/(sr m^2) of surfaces and the environment, the unit of intensity of
-/// punctual lights. Products and squares of it are finite in single precision.
+/// Maximum emission in each channel: W/(sr m^2) of surfaces and the environment, W/sr or W/m^2 of punctual
+/// lights. It leaves single precision, up to 3e38, room for products.
 pub const BRIGHTEST: f32 = 1e20;
 
-/// Range of non-zero emission. Its products and squares neither overflow nor underflow in single precision.
+/// Range of non-zero emission, which leaves single precision, 1e-38 to 3e38, room for products.
 pub(super) const EMISSION: std::ops::RangeInclusive<f32> = 1e-20..=BRIGHTEST;

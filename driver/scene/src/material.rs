@@ -51,8 +51,8 @@ pub struct Material {
 pub enum Reflection {
     /// Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi)
     /// max(0, cos alpha)^exponent`; alpha is the angle to the mirror direction. A file states it in `extras`.
-    /// A material that is neither metallic nor transmissive and has a `specularFactor` of 0 is one without a
-    /// lobe.
+    /// Materials that are neither metallic, transmissive nor layered, and have a `specularFactor` of 0,
+    /// become one without a lobe.
     Phong {
         /// Lambertian albedo, 0 to 1.
         diffuse: Vec3,
@@ -119,7 +119,7 @@ impl Material {
         Self::phong(name, albedo, Vec3::ZERO, 0.0)
     }
 
-    /// Creates a one-sided material with a Lambertian albedo and a Phong lobe that does not emit.
+    /// Creates a one-sided material that does not emit, with a Lambertian albedo and a Phong lobe.
     pub fn phong(name: impl Into<String>, diffuse: Vec3, specular: Vec3, exponent: f32) -> Self {
         Self::new(name, Reflection::Phong { diffuse, specular, exponent })
     }
@@ -129,8 +129,8 @@ impl Material {
         self.emission.max_element() > 0.0
     }
 
-    /// Returns whether the material focuses light. It reflects or transmits perfectly specularly (mirrors,
-    /// smooth coats, glass), or has a lobe that rays follow: a narrow one, a coat, a sheen. `texel` is the
+    /// Returns whether the material focuses light: it reflects or transmits perfectly specularly (mirrors,
+    /// smooth coats, glass), or has a lobe that rays follow (a narrow one, a coat, a sheen). `texel` is the
     /// minimum of its roughness texture, 1 without one.
     pub(super) fn is_specular(&self, texel: f32) -> bool {
         if self.layers.as_ref().is_some_and(|layers| layers.coat.is_some() || layers.sheen.is_some()) {

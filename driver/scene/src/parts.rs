@@ -28,9 +28,9 @@ struct Side {
     is_forward: bool,
 }
 
-/// Splits triangles into connected parts, in the order of their first triangles. An edge of two triangles
-/// connects them. At an edge of more, as where solids touch, it connects each pair with the inside of a solid
-/// between them.
+/// Splits triangles into connected parts, in the order of their first triangles. Two triangles at an edge are
+/// connected. Of more triangles at an edge, as where solids touch, each pair is connected that has the inside
+/// of a solid between them.
 pub fn parts(triangles: &[[Vec3; 3]]) -> Vec<Part> {
     let mut sides: Vec<Side> =
         triangles.iter().zip(0..).flat_map(|(corners, index)| sides(corners, index)).collect();
@@ -91,7 +91,8 @@ fn partners(triangles: &[[Vec3; 3]], around: &[Side]) -> impl Iterator<Item = [u
             // greater angles.
             let angle = f32::atan2(across.dot(v), across.dot(u));
             let step = ((angle * ANGLE_STEPS).round() as i32).rem_euclid(turn);
-            // Where two solids touch, the inside of the one that faces to greater angles is at lesser ones.
+            // Of triangles at one angle the forward ones come first, because the solid behind them is at
+            // lesser angles.
             (step, !side.is_forward, side.triangle)
         })
         .collect();

@@ -31,7 +31,7 @@ fn ends_early() -> Fault {
 
 struct Header {
     size: [u32; 2],
-    /// Flags of mirrored axes: the first column is the rightmost, and the first row is the lowest.
+    /// True where the file's first column is the rightmost one, and where its first row is the lowest.
     flipped: [bool; 2],
     /// Factor by which the stored radiance was multiplied.
     exposure: f32,

@@ -5,7 +5,7 @@ use photoncard_shared::layout::TexelFormat;
 /// Maximum width and height of an image or an environment, texels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// Maximum number of texels of all images of a scene together, and of an environment.
+/// Maximum number of texels of all images of a scene together.
 pub(crate) const MAX_TEXELS: u64 = 1 << 28;
 
 /// Mapping of an image to surfaces: transform of coordinates, wrap modes and filter.
@@ -19,8 +19,8 @@ pub struct Texture {
     pub wrap: [Wrap; 2],
     /// True for the nearest texel (`magFilter` `NEAREST`), false for bilinear interpolation.
     pub nearest: bool,
-    /// Rows of the matrix M of `KHR_texture_transform`; the image is sampled at `M (u, v) + offset`. The
-    /// identity without the extension.
+    /// Rows of the matrix M of `KHR_texture_transform`, the identity without the extension; the image is
+    /// sampled at `M (u, v) + offset`.
     pub matrix: [[f32; 2]; 2],
     /// Offset of `KHR_texture_transform`, in widths and heights of the image.
     pub offset: [f32; 2],
@@ -85,18 +85,18 @@ impl Image {
     }
 }
 
-/// Encoding of the red, green and blue channel of texels. Alpha is always linear.
+/// Encoding of the red, green and blue channel of texels. Alpha, where it is stored, is linear.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Encoding {
     /// sRGB transfer function (IEC 61966-2-1), for colours.
     Srgb,
     /// Linear, for roughness and metalness.
     Linear,
-    /// Linear, nine bits per channel with a shared exponent (OpenGL's `RGB9_E5`), without alpha. It keeps
-    /// emission of more than 8 bits.
+    /// Linear, nine bits per channel with a shared exponent (OpenGL's `RGB9_E5`), without alpha, for emission
+    /// of more than 8 bits per channel.
     SharedExponent,
-    /// Two linear 16-bit channels, little-endian: the first in the bytes of red and blue, the second in those
-    /// of green and alpha.
+    /// Two linear 16-bit channels, little-endian, without alpha. The first is read as red and as blue, the
+    /// second as green.
     LinearPair,
     /// x and y of a normal map, linear, 16 bits each, little-endian; z follows from the unit length. Without
     /// alpha.

@@ -50,12 +50,13 @@ pub enum AxisError {
     },
 }
 
-/// Axes of a sweep. Its points are the Cartesian product of their values; the last axis varies fastest.
+/// Axes of a sweep. The sweep's points are the Cartesian product of the axes' values; the last axis varies
+/// fastest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Axes(Vec<Axis>);
 
 impl Axes {
-    /// Checks axes.
+    /// Creates the axes of a sweep.
     ///
     /// # Errors
     /// If an axis has no value, a name or a value is repeated, or there are more than [`MAX_POINTS`]
@@ -87,7 +88,7 @@ impl Axes {
         &self.0
     }
 
-    /// Combinations of values, as indices of the value on each axis.
+    /// Combinations of values in the order of their points, each as the index of the value on each axis.
     pub(super) fn combinations(&self) -> impl Iterator<Item = Vec<usize>> {
         let count = self.0.iter().map(|axis| axis.values.len()).product();
         (0..count).map(|point| self.combination(point))
@@ -111,7 +112,7 @@ impl Axes {
         self.0.iter().zip(indices).fold(0, |point, (axis, index)| point * axis.values.len() + index)
     }
 
-    /// Names of the axes and values of a combination.
+    /// Name and value of each axis for a combination.
     pub(super) fn values(&self, indices: &[usize]) -> Vec<(&str, &str)> {
         let pairs = self.0.iter().zip(indices);
         pairs.map(|(axis, &index)| (axis.name.as_str(), axis.values[index].as_str())).collect()

@@ -14,13 +14,13 @@ use super::laboratory::Laboratory;
 use super::report::{FIGURES, Figure, ReportError, figures_csv, slug};
 use super::scale::Scale;
 
-/// Scene of the check.
+/// Scene of [`check`].
 const SCENE: &str = "cornell.gltf";
-/// Scale of the check. It takes about a second.
+/// Scale of [`check`], which takes about a second.
 const SCALE: Scale = Scale { side: 64, photons: 20_000, gather_rays: 25, ..Scale::QUICK };
 
 /// Measures figures on which all other figures depend: the versions of program and card image layout, and the
-/// exact bytes of two small renders. They differ if another program made the file.
+/// exact bytes of two small renders. A difference shows that another version of the program made a file.
 ///
 /// # Errors
 /// If the scene is missing, or a point cannot be measured or stored.
@@ -45,7 +45,7 @@ pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
 }
 
 /// Writes a file with the figures of the check, the settings that all points share, and the figures of
-/// studies. A file of a trial says so.
+/// studies. A trial has a figure `trial`.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -22,7 +22,7 @@ use super::laboratory::{StudyObserver, load_scene};
 use super::point::identity;
 use super::store::PointStore;
 
-/// Displacement of moving lights, relative to the scene's diagonal.
+/// Displacement of moving lights, as a fraction of the scene's diagonal.
 pub(crate) const LIGHT_STEP: f32 = 0.01;
 
 /// Host's work for the photon map of one scene, and the effects of changes of its light.
@@ -36,9 +36,9 @@ pub(crate) struct HostFrame {
     pub(crate) threads: usize,
     /// Time to trace photons, seconds.
     pub(crate) tracing: f64,
-    /// Time to build the map and the other sections of the image, seconds.
+    /// Time to build the map and the other sections of the card image, seconds.
     pub(crate) building: f64,
-    /// Time to measure distances and disc fractions, seconds.
+    /// Time to measure the maximum distance of gathers and the disc fractions, seconds.
     pub(crate) measuring: f64,
     /// Effects of the measured changes.
     pub(crate) changes: Vec<Changed>,
@@ -58,18 +58,18 @@ pub(crate) enum Change {
     Dimmed,
     /// All lights move by [`LIGHT_STEP`].
     Moved,
-    /// This fraction of the photons is traced anew.
+    /// This fraction of the photons is replaced by photons of another seed.
     Replaced(f64),
 }
 
-/// Lines that a change affects.
+/// Size of the lines of the card image that differ after a change.
 #[derive(Clone, Copy, Debug, Deserialize, Serialize)]
 pub(crate) struct Changed {
     /// The change of light.
     pub(crate) change: Change,
     /// Size of all changed lines, bytes.
     pub(crate) bytes: u64,
-    /// Size of all lines of the new image, bytes.
+    /// Size of all lines of the new card image, bytes.
     pub(crate) of: u64,
 }
 
@@ -185,7 +185,7 @@ impl<'a> HostBench<'a> {
     }
 }
 
-/// Moves all emissive triangles.
+/// Moves all emissive triangles along +x by [`LIGHT_STEP`] of the scene's diagonal.
 fn move_lights(scene: &mut Scene) {
     let corners = || scene.triangles.iter().flat_map(|triangle| triangle.vertices);
     let lower = corners().fold(Vec3::INFINITY, Vec3::min);

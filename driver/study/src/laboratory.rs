@@ -31,7 +31,7 @@ pub trait StudyObserver: Sync {
     fn is_stopped(&self) -> bool;
 }
 
-/// Result of measuring a point. The variant depends on its [`Task`].
+/// Result of measuring a point. The variant depends on the point's [`Task`].
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(crate) enum Outcome {
     /// Result of [`Task::Traffic`].
@@ -86,7 +86,7 @@ pub struct Laboratory<'a> {
     loaded: HashMap<String, Scene>,
     /// Card image of the last point. The next point may share it.
     last: Option<LastImage>,
-    /// Last reference. Points with other images but the same photons may share it.
+    /// Reference of the last quality point, which the next one may share.
     reference: Option<SceneReference>,
 }
 
@@ -154,7 +154,7 @@ impl<'a> Laboratory<'a> {
         Ok(Results::new(results))
     }
 
-    /// Adds a scene with a name. It replaces the file with this name in the folder of scenes.
+    /// Adds a scene, which replaces the file of this name in the folder of scenes.
     pub fn add(&mut self, name: &str, scene: Scene) {
         self.loaded.insert(name.to_owned(), scene);
     }

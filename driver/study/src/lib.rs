@@ -4,7 +4,7 @@
 //! A study is a list of [`Point`]s and a function from their [`Results`] to a report. [`run`] measures the
 //! points in a [`Laboratory`], which keeps their outcomes, and writes the report.
 //! [`photoncard_render::cost_model`] predicts the number of chips that a frame rate needs; `load_balance`
-//! simulates how evenly tiles load them.
+//! simulates how evenly a picture's tiles load these chips.
 #![forbid(unsafe_code)]
 
 mod axes;

@@ -51,7 +51,7 @@ pub struct Measurement {
     pub tiles: Vec<TileMeasurement>,
     /// Number of tiles that were rendered.
     pub rendered: usize,
-    /// Size of the photon map in the image.
+    /// Size of the photon map in the card image.
     pub map: PhotonMapSize,
 }
 

@@ -25,7 +25,7 @@ pub struct Point {
     /// Settings of the render.
     pub settings: RenderSettings,
     /// True to do all gathers of the frame along one Hilbert curve instead of in the order of the settings.
-    /// No chip has room for them: it is the bound with which orders are compared.
+    /// No chip has room for all gathers: the curve is the bound with which orders are compared.
     pub is_along_curve: bool,
     /// Quantity to measure.
     pub task: Task,
@@ -143,7 +143,8 @@ impl Point {
     }
 }
 
-/// Everything that pixels of a scene with this checksum depend on, with the settings as they are stated.
+/// Everything that pixels depend on: settings as stated, program, card image layout, and the checksum `scene`
+/// of the scene.
 pub(super) fn identity(settings: &RenderSettings, scene: &str) -> NamedSettings {
     let mut identity = settings.of_pixels();
     identity.insert("program".to_owned(), json!(PROGRAM));

@@ -1,15 +1,15 @@
 //! Error of indirect light against a reference with many more gather rays.
 //!
 //! Sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels. The
-//! order of gathers, tiles, the layout of the photon map and caches do not. Only the light that they change
-//! is compared, the light that gather rays bring from the photon map:
+//! order of gathers, tiles, the layout of the photon map and caches do not. Only the light that the former
+//! change is compared, which gather rays bring from the photon map:
 //!
 //! ```text
 //! L_indirect(x, w) = integral of f(x, w', w) L_map(y, -w') cos(theta') dw'
 //! ```
 //!
-//! where `y` is the surface point that the ray from `x` in the direction `w'` hits, and `L_map` is its
-//! radiance estimated from photons. Direct light is excluded, because shadow rays add noise to it, and
+//! where `y` is the surface point that the ray from `x` in the direction `w'` hits, and `L_map` is the
+//! radiance at `y` estimated from photons. Direct light is excluded, because shadow rays add noise to it, and
 //! because gather rays and irradiance records contribute parts of it that depend on the number of rays. The
 //! card image therefore has no emission: its layer of indirect light is `L_indirect` for every technique.
 
@@ -34,13 +34,13 @@ pub struct TileDeviation {
     pub squares: f64,
     /// Unbiased estimate of the part of [`Self::squares`] that is noise of the reference.
     pub noise: f64,
-    /// Sum of the pixels.
+    /// Sum of the pixels' channels.
     pub sum: f64,
-    /// Sum of the reference.
+    /// Sum of the reference's channels.
     pub reference: f64,
 }
 
-/// Error of a render's indirect light compared with that of a path tracer.
+/// Error of a render's indirect light against that of a reference with many gather rays.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Errors by tile. All pixels have equal weight.
@@ -134,7 +134,7 @@ impl Reference {
         rays: u32,
     ) -> Result<Self, RenderError> {
         let settings = Self::settings(settings, rays);
-        // Eye rays alone see emission and nothing else.
+        // Without gather rays and shadow rays a picture shows emission alone.
         let emitters = settings.clone().with(|s| s.integrator.gather_rays = 0);
         let emission = emitted(bench, &emitters, tiles)?;
         let rays = halves(rays);
@@ -228,7 +228,7 @@ fn comparable(settings: &RenderSettings) -> RenderSettings {
 /// Colours of the pixels by tile, W/(sr m^2).
 type TilePixels = Vec<Vec<[f64; 3]>>;
 
-/// Indirect light in `count` tiles, rendered from an image that has the scene's photons but no emission.
+/// Indirect light in `count` tiles, rendered from a card image that has the scene's photons but no emission.
 fn indirect(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<TilePixels, RenderError> {
     let MappedImage { image, max_distance, caustics, paths, guiding, times } = bench.mapped;
     let (max_distance, caustics) = (*max_distance, *caustics);

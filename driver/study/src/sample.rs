@@ -147,8 +147,8 @@ impl Ratio {
     /// Ratio of an estimate to itself.
     pub(super) const ONE: Self = Self { value: 1.0, lower: 1.0, upper: 1.0 };
 
-    /// Ratio of two independent estimates. The relative half-width of its logarithm is the root of the sum of
-    /// the squares of both relative half-widths and of `further`, all of which are independent.
+    /// Ratio of two independent estimates. The half-width of its logarithm is the root of the sum of the
+    /// squares of both relative half-widths and of `further`, all of which are independent.
     pub(super) fn new(numerator: Estimate, denominator: Estimate, further: f64) -> Self {
         let relative = |estimate: Estimate| estimate.half_width / estimate.value;
         let spread = relative(numerator).hypot(relative(denominator)).hypot(further).exp();

@@ -15,7 +15,7 @@ use super::sample::SampleRate;
 
 /// Side of the dissertation's tiles, pixels.
 pub(super) const TILE: u32 = 16;
-/// Side of the largest tile for which the reference chip has room, pixels.
+/// Side of the largest square tile for which the reference chip has room, pixels.
 pub(super) const WIDEST_TILE: u32 = REFERENCE.tile_pixels.isqrt();
 
 /// Settings that all points of a study have in common, and the number of points.
@@ -75,7 +75,7 @@ impl Scale {
         machine: Machine::NOMINAL,
     };
 
-    /// Returns true if all points have the settings of the dissertation's nominal frame. Only figures at such
+    /// Returns whether all points have the settings of the dissertation's nominal frame. Only figures at such
     /// a scale may be compared with published ones.
     pub(crate) fn is_nominal(&self) -> bool {
         let frame =
@@ -134,7 +134,7 @@ impl Scale {
     }
 
     /// Settings with all techniques: gathers sorted over the largest tiles, combined sampling, the irradiance
-    /// cache, photons in leaves.
+    /// cache, the line layout.
     pub fn all_on(&self) -> RenderSettings {
         self.settings(GatherOrder::Sort).with(|s| {
             s.photons.layout = PhotonLayout::Lines;
@@ -162,8 +162,8 @@ impl Scale {
         Point { scene: scene.to_owned(), assignments: Vec::new(), settings, is_along_curve: false, task }
     }
 
-    /// Point that measures the traffic of all tiles on one chip of kind `chip`, which has them in flight,
-    /// behind `caches`.
+    /// Point that measures the traffic of all tiles on chips of kind `chip` behind `caches`, on a single chip
+    /// if it has several tiles in flight.
     pub(super) fn on_one_chip(
         &self,
         scene: &str,

@@ -1,4 +1,4 @@
-//! Does all gathers of a frame along one Hilbert curve. It is the bound with which the orders of a chip are
+//! Does all gathers of a frame along one Hilbert curve, the bound with which the orders of a chip are
 //! compared.
 //!
 //! No chip can do this, because the gathers of a frame take gigabytes. Emulated chips pass their gathers to
@@ -86,7 +86,7 @@ pub struct WholeFrame<'a> {
 
 /// Picture, work and memory traffic of a frame.
 pub struct FrameOutcome {
-    /// Tiles of the picture, which is that of any other order.
+    /// Tiles of the picture, equal to those of any other order.
     pub tiles: Vec<FinishedTile>,
     /// Counters of the work.
     pub counters: Counters,
@@ -141,7 +141,7 @@ impl WholeFrame<'_> {
         tiles.par_iter().map_init(|| EmulatedKind::Reference.emulated().chip(), cast_one).collect()
     }
 
-    /// Does gathers in their order.
+    /// Does gathers one after another, with caches that are empty at first.
     fn gather(&self, waiting: &[Waiting]) -> Result<Gathered, Fault> {
         let (scene, lines) = self.image.view();
         let mut memory = Measured::new(self.caches.over(lines));
@@ -156,7 +156,7 @@ impl WholeFrame<'_> {
         Ok(Gathered { brought, counters, traffic: memory.traffic() })
     }
 
-    /// Tiles with the sums of a frame.
+    /// Finished tiles from the sums of a frame.
     fn finished(&self, all: &Frame) -> Result<Vec<FinishedTile>, Fault> {
         let (scene, _) = self.image.view();
         let format = SumFormat::new(&scene.header, self.frame);

@@ -26,7 +26,7 @@ struct Frame {
     camera: u8,
     seed: u32,
     photons: usize,
-    /// Emission of the lamp, over the file's.
+    /// Factor of the lamp's emission in the file.
     lamp: u8,
     /// Green of the first wall, tenths.
     wall: u8,
@@ -257,7 +257,8 @@ fn other_cards_and_modelled_memory_are_connected_anew() {
     }
 }
 
-/// Of a queue that is too long for it a card is left out, and it is told once until it fits again.
+/// A card is left out while the setting `queue` exceeds its capacity, which is reported once until the card
+/// fits again.
 #[test]
 fn a_card_that_was_left_out_has_part_in_the_next_picture_that_fits_it() {
     #[derive(Default)]

@@ -14,7 +14,7 @@ use serde_json::{Value, json};
 
 use crate::support::{load_changed, load_with, push, triangle_bytes, triangle_json};
 
-/// The triangle, dark, with a light at the node `lamp`, which turns -z to -x.
+/// Loads the triangle of the tests without emission, with `light` at a node that turns -z to -x.
 fn lit(light: &Value) -> Result<Scene, SceneError> {
     load_changed(|json| {
         json["materials"][0]["emissiveFactor"] = json!([0, 0, 0]);
@@ -338,7 +338,7 @@ fn the_unit_of_radiance_is_not_far_below_the_brightest_texel_of_the_environment(
     assert!(unit >= brightest / 4096.0, "{unit}");
 }
 
-/// A panel in the plane of a wall, which is emissive or not, beside a second copy of the wall.
+/// A panel with the emission `emission` in the plane of a wall, beside a second copy of the wall.
 fn panel_in_a_wall(emission: f32) -> Scene {
     load_changed(|json| {
         let mut wall = json["materials"][0].clone();

@@ -22,7 +22,7 @@ fn room() -> Value {
     json
 }
 
-/// The room with its nodes below one that is translated.
+/// The room with all its nodes below one translated node.
 fn wrapped(offset: DVec3) -> Value {
     let mut json = room();
     let children = json["scenes"][0]["nodes"].clone();

@@ -161,7 +161,7 @@ fn a_card_that_comes_no_further_is_not_waited_for_without_end() {
 fn a_tile_has_time_for_all_its_rays() {
     let (error, after, events) = fail(sound);
     assert!(matches!(error, SessionError::Standstill(_)), "{error}");
-    // 16 pixels of 10 samples of a hundred rays and some.
+    // 16 pixels of 10 samples, each with a hundred gather rays and some others.
     assert!((120 + 320..120 + 500).contains(&after.as_secs()), "{after:?}");
     assert_eq!(events, [Event::Ready, Event::TileLost { tile: TILE, was_at_work: true }]);
 }
@@ -320,10 +320,10 @@ fn a_greeting_has_its_time_from_the_first_answer_on() {
     assert_eq!(bench.session.link_bytes().resets, 0);
 }
 
-/// Place of the sum of red in a record.
+/// Offset of the sum of red in the record of a pixel, bytes.
 const RED: usize = 36;
 
-/// Pixels of a tile whose first sum of red is this.
+/// Runs a session until it fails, with a card that sends a tile whose first pixel has the sum of red `$red`.
 macro_rules! pixels_of_red {
     ($red:expr) => {{
         const PIXELS: [u8; PIXEL_BYTES * 16] = {

@@ -1,17 +1,17 @@
-//! Interface between a board's hardware and the code that all images share.
+//! Interface between a board's hardware and the code that all board images share.
 
 /// Board with one UART, one clock and one processor. Functions have no `self`, because there is one of each.
-/// Every image defines its `ThisBoard` in a module `hardware`.
+/// Every board image names its board `ThisBoard` in its module `hardware`.
 pub(crate) trait Board {
     const NAME: &'static str;
 
-    /// Prepares the board for its first message.
+    /// Prepares the output of diagnostics; called before anything else.
     fn prepare() {}
 
     /// Initializes clock and UART, and enables interrupts.
     fn start();
 
-    /// Reads a byte from the UART's receiver, if there is one.
+    /// Takes a received byte from the UART; `None` if none has arrived.
     fn receive() -> Option<u8>;
 
     /// Writes a byte to the UART's transmitter. Returns false if the transmitter is full.
@@ -26,7 +26,7 @@ pub(crate) trait Board {
     /// Runs `work` with interrupts masked.
     fn masked<R>(work: impl FnOnce() -> R) -> R;
 
-    /// Sleeps until an interrupt is pending, masked or not. It is the UART's, or within a millisecond the
+    /// Sleeps until an interrupt is pending, masked or not: the UART's, or at most a millisecond later the
     /// clock's.
     fn sleep();
 }

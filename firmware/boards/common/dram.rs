@@ -1,4 +1,4 @@
-//! Card memory, at the address in the linker script.
+//! Card memory, which lies between two symbols of the linker script.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 

@@ -1,6 +1,6 @@
 //! Instruction counts. One tile is rendered three times, each time with one more kind of work; the
 //! differences are the costs of gather rays and of the gathers at their ends. `tests/instructions.sh` runs
-//! it.
+//! the measurement.
 
 use photoncard_firmware::chip::{MicroChip, Progress};
 use photoncard_firmware::gather::GatherRequest;
@@ -37,8 +37,8 @@ impl GatherOutlet for Nowhere {
     fn take(&mut self, _: u32, _: GatherRequest) {}
 }
 
-/// Renders the tile. The line after the image holds the length of the frame's parameters and the encoded
-/// parameters. Returns the counters; `None` if the memory holds anything else.
+/// Renders the tile and returns its counters. The line after the card image holds the length of the encoded
+/// frame parameters, one byte, and these parameters. Returns `None` if the lines hold anything else.
 pub(crate) fn render(chip: &mut MicroChip, lines: &[Line], work: Work) -> Option<Counters> {
     let scene = SceneImage { header: Header::read(lines.first_chunk()?).ok()? };
     let (&length, bytes) = lines.get(scene.header.lines as usize)?.0.split_first()?;

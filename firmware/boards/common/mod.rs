@@ -1,4 +1,4 @@
-//! Code that the images of all boards share, including `main`. A board adds registers, time and interrupts.
+//! Code that all board images share, including `main`. A board adds registers, time and interrupts.
 
 mod board;
 #[expect(unsafe_code, reason = "the linker script defines the address of card memory")]
@@ -38,10 +38,10 @@ pub(crate) use self::port::receive_all;
 use self::report::StackCheck;
 use crate::hardware::ThisBoard;
 
-/// The card. It is initialised at compile time, so that its buffers are never on the stack.
+/// The card, initialised at compile time so that its buffers are never on the stack.
 static CARD: Once<MicroCard<Dram<'static>>> = Once::new(MicroCard::new(Dram::new(&mut [])));
 
-// The image's buffers besides the card's fit into the memory that the budget has for caches.
+// The card with the budget's caches and stack, and the port's buffer, fit the budget's SRAM.
 const _: () = assert!(sram_bytes::<Micro>() + port::STATIC_BYTES <= MICRO.sram_bytes as usize);
 
 #[entry]

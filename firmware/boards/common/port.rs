@@ -8,8 +8,8 @@ use photoncard_shared::link::{Port, PortError};
 use super::board::Board;
 use super::ring::Ring;
 
-/// Capacity of the ring of received bytes. It is far larger than the few tile commands that a host sends
-/// while a card computes.
+/// Capacity of the ring of received bytes, far more than the few tile commands that a host sends while a card
+/// computes.
 const RECEIVED_BYTES: usize = 512;
 
 static RECEIVED: Ring<RECEIVED_BYTES> = Ring::new();
@@ -17,8 +17,8 @@ static RECEIVED: Ring<RECEIVED_BYTES> = Ring::new();
 /// On-chip memory of the port, bytes.
 pub(super) const STATIC_BYTES: usize = size_of::<Ring<RECEIVED_BYTES>>();
 
-/// Handles the UART's interrupt: moves received bytes into the ring. It does not wait if the ring is full:
-/// the remaining bytes stay in the UART, whose interrupt is disabled until [`BoardPort`] has read.
+/// Handles the UART's interrupt: moves received bytes into the ring until the ring is full. Further bytes
+/// stay in the UART, whose interrupt is disabled until [`BoardPort`] has read.
 pub(crate) fn receive_all<B: Board>() {
     while !RECEIVED.is_full() {
         let Some(byte) = B::receive() else { return };
@@ -37,7 +37,7 @@ impl<B: Board> BoardPort<B> {
     }
 }
 
-/// Time limit of a wait.
+/// Time limit of a wait: start and length, milliseconds.
 struct Deadline {
     start: u32,
     wait: u32,

@@ -1,6 +1,5 @@
 //! Memory-mapped registers of devices.
 
-/// Memory-mapped register of a device.
 pub(crate) struct Register<T>(*mut T);
 
 impl<T: Copy> Register<T> {

@@ -1,4 +1,4 @@
-//! Reports of an image's memory: to a debugger at the start, and to hosts on request.
+//! Reports of a board image's memory: to a debugger at the start, and to hosts on request.
 
 use core::time::Duration;
 
@@ -31,7 +31,7 @@ fn zeroed_bytes() -> usize {
     bytes(&raw const __sbss, &raw const __ebss)
 }
 
-/// Prints the sizes of the image's sections.
+/// Prints the sizes of the board image's sections.
 pub(super) fn sections(board: &str) {
     semihosting::print(format_args!(
         "photoncard on {board}: code {}, constants {}, data {}, zeroed data {}, stack {} bytes\n",
@@ -43,7 +43,7 @@ pub(super) fn sections(board: &str) {
     ));
 }
 
-/// Sizes of the image's static data and stack, and the maximum use of the stack.
+/// Sizes of the board image's static data and stack, and the maximum use of the stack.
 pub(super) fn memory_use() -> MemoryUse {
     MemoryUse {
         static_bytes: (data_bytes() + zeroed_bytes()) as u32,
@@ -52,8 +52,7 @@ pub(super) fn memory_use() -> MemoryUse {
     }
 }
 
-/// Port wrapper that stops the image when the stack has overflowed, because data below the stack may be
-/// corrupt.
+/// Port wrapper that ends the program after a stack overflow, because data below the stack may be corrupt.
 pub(super) struct StackCheck<P>(pub(super) P);
 
 impl<P: Port> Port for StackCheck<P> {

@@ -1,5 +1,5 @@
-//! Semihosting: messages and exit through a debugger or QEMU (Arm's specification "Semihosting"). On RISC-V
-//! only the trap instructions differ.
+//! Semihosting: text output and exit through a debugger or QEMU (Arm's specification "Semihosting"). On
+//! RISC-V only the trap instructions differ.
 
 use core::arch::asm;
 use core::fmt::{self, Write};
@@ -49,7 +49,7 @@ unsafe fn call(operation: usize, argument: *const ()) {
     }
 }
 
-/// Buffer that passes text on in zero-terminated pieces.
+/// Buffer that passes text to the debugger in zero-terminated pieces.
 struct Console {
     bytes: [u8; 128],
     length: usize,
@@ -97,7 +97,6 @@ pub(crate) fn fail(message: fmt::Arguments) -> ! {
     exit(FAILED);
 }
 
-/// Ends the program with an exit status.
 pub(crate) fn exit(status: usize) -> ! {
     let exit = [APPLICATION_EXIT, status];
     // SAFETY: the two words that this operation takes.

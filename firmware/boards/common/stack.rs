@@ -4,11 +4,11 @@
 /// Pattern of unused words.
 const PAINT: u32 = 0x5AFE_57AC;
 
-/// Number of words at the end of the stack that must stay unused. There are several because a stack frame may
-/// leave some of its words unwritten.
+/// Number of words at the low end of the stack that must stay unused. There are several because a stack frame
+/// may leave some of its words unwritten.
 const GUARD: usize = 16;
 
-/// Number of bytes below the caller's stack frame that painting itself may use.
+/// Number of bytes below the stack frame of [`paint`] that are not painted, because calls may use them.
 const MARGIN: usize = 512;
 
 unsafe extern "C" {
@@ -41,7 +41,7 @@ pub(super) fn paint() {
     }
 }
 
-/// Returns whether the stack was used down to its guard words.
+/// Returns whether one of the [`GUARD`] lowest words of the stack was used.
 pub(super) fn is_used_up() -> bool {
     // SAFETY: as below.
     (0..GUARD).any(|word| (unsafe { lowest().add(word).read_volatile() }) != PAINT)

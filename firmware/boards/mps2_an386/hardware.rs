@@ -37,7 +37,7 @@ const MIN_DIVISOR: u32 = 16;
 
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
 
-/// Arm's MPS2 board with the image AN386.
+/// Arm's MPS2 board with the FPGA image AN386.
 pub(crate) struct Mps2An386;
 
 pub(crate) type ThisBoard = Mps2An386;

@@ -1,5 +1,5 @@
-//! The card on Arm's MPS2 board with the image AN386 (Cortex-M4F), as QEMU's machine `mps2-an386` emulates
-//! it.
+//! The card on Arm's MPS2 board with the FPGA image AN386 (Cortex-M4F), as QEMU's machine `mps2-an386`
+//! emulates it.
 #![no_std]
 #![no_main]
 

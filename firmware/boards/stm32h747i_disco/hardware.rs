@@ -37,8 +37,8 @@ impl Disco {
         unsafe { &*USART1::ptr() }
     }
 
-    /// Maps card memory as normal, cacheable memory. Without this mapping its addresses are device memory,
-    /// which is slow and faults at unaligned accesses.
+    /// Maps card memory as normal, cacheable memory. By default its addresses are device memory, which is
+    /// slow and faults at unaligned accesses.
     fn make_cacheable(mpu: &MPU, scb: &mut SCB) {
         // SAFETY: the region is not in use yet. Full access, normal memory, write-through, execute never.
         unsafe {
@@ -57,8 +57,8 @@ impl Disco {
 impl Board for Disco {
     const NAME: &'static str = "stm32h747i-disco";
 
-    /// Prepares for a start without a debugger: messages are dropped, and a failure is a fault whose handler
-    /// resets the chip.
+    /// Prepares for a start without a debugger: text output is dropped, and a failure is a fault whose
+    /// handler resets the chip.
     fn prepare() {
         if !DCB::is_debugger_attached() {
             semihosting::leave_alone();
@@ -83,7 +83,7 @@ impl Board for Disco {
         let mut memory = sdram::controller(chip.FMC, ports, clocks.peripheral.FMC, &clocks.clocks);
         let mut delay = core.SYST.delay(clocks.clocks);
         let _: *mut u32 = memory.init(&mut delay);
-        // Only now: the processor may prefetch normal memory, which answers no earlier.
+        // After `init`: the processor may prefetch normal memory, and SDRAM does not answer before `init`.
         Self::make_cacheable(&core.MPU, &mut core.SCB);
         let gpioa = chip.GPIOA.split(clocks.peripheral.GPIOA);
         let pins = (gpioa.pa9.into_alternate(), gpioa.pa10.into_alternate());

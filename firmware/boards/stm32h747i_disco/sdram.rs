@@ -7,7 +7,7 @@ use stm32h7xx_hal::pac::FMC;
 use stm32h7xx_hal::prelude::*;
 use stm32h7xx_hal::rcc::{CoreClocks, rec};
 
-/// GPIO ports that the memory's pins belong to.
+/// GPIO ports with the pins of external memory.
 pub(crate) struct Ports {
     pub(crate) d: gpiod::Parts,
     pub(crate) e: gpioe::Parts,
@@ -23,7 +23,7 @@ macro_rules! pins {
     };
 }
 
-/// Creates the memory controller without starting it.
+/// Configures pins and creates the controller of external memory; `init` starts it.
 pub(crate) fn controller(
     fmc: FMC,
     Ports { d, e, f, g, h, i }: Ports,

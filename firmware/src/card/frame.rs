@@ -4,7 +4,7 @@ use photoncard_shared::budget::{Budget, MAX_BINS};
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::message::{Fault, FrameParameters, Parameter, Radiance};
 
-/// Checks a frame's parameters against the budget and the image.
+/// Checks a frame's parameters against the budget and the card image.
 ///
 /// # Errors
 /// The fault of the first parameter out of range.
@@ -49,13 +49,14 @@ fn is_irradiance_error(error: f32) -> bool {
     (MIN_IRRADIANCE_ERROR..=1.0).contains(&error)
 }
 
-/// Returns true if an image has irradiance points, or has no photons to compute them from.
+/// Returns true if a card image has irradiance points, or has no photons to compute them from.
 fn has_irradiance(header: &Header) -> bool {
     let holds = |kind| header.section(kind).records > 0;
     holds(SectionKind::IrradianceLeaves) || !holds(SectionKind::Photons) && !holds(SectionKind::PhotonLeaves)
 }
 
-/// Minimum error bound of interpolated irradiance. Smaller errors are below rounding.
+/// Minimum error bound of interpolated irradiance. A smaller bound would lie below the rounding errors of
+/// irradiance.
 pub const MIN_IRRADIANCE_ERROR: f32 = 1e-6;
 
 /// Maximum width and height of a picture, pixels. At this size an `f32` holds a pixel's index and 7 bits of a

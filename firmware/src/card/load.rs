@@ -9,10 +9,10 @@ use crate::memory::{CardMemory, Stage};
 use crate::scene::SceneImage;
 use crate::self_test::MemoryTester;
 
-/// Fault of a command that requires another command before it.
+/// Fault of a command that the card does not accept in its present state.
 pub(super) const OUT_OF_ORDER: Fault = Fault { code: FaultCode::Order, detail: 0 };
 
-/// State of the image in memory, or of a memory test.
+/// State of the card image in memory, or of a memory test.
 pub(super) enum ImageState {
     None,
     Loading(Loader),
@@ -24,10 +24,10 @@ pub(super) enum ImageState {
 }
 
 impl ImageState {
-    /// Returns the loader of the image.
+    /// Returns the loader of the card image.
     ///
     /// # Errors
-    /// [`FaultCode::Order`] if no image is being loaded.
+    /// [`FaultCode::Order`] if no card image is being loaded.
     pub(super) fn loader(&self) -> Result<Loader, Fault> {
         match self {
             Self::Loading(loader) => Ok(*loader),
@@ -35,7 +35,7 @@ impl ImageState {
         }
     }
 
-    /// Returns the scene if an image was loaded and checked.
+    /// Returns the scene if a card image was loaded and checked.
     pub(super) fn scene(&self) -> Option<&SceneImage> {
         match self {
             Self::Ready(scene) => Some(scene),
@@ -44,7 +44,7 @@ impl ImageState {
     }
 }
 
-/// Loader of an image into memory.
+/// The card image that is being loaded: its announced number of lines and checksum.
 #[derive(Clone, Copy)]
 pub(super) struct Loader {
     lines: u32,
@@ -63,7 +63,7 @@ impl Loader {
     /// Writes lines from line `first` on. Returns the index past the last line.
     ///
     /// # Errors
-    /// [`FaultCode::Lines`] if `data` is not whole lines of the image. Nothing is written then.
+    /// [`FaultCode::Lines`] if `data` is not whole lines of the card image. Nothing is written then.
     pub(super) fn write(self, memory: &mut impl CardMemory, first: u32, data: &[u8]) -> Result<u32, Fault> {
         let fault = Fault { code: FaultCode::Lines, detail: first };
         let (lines, rest) = data.as_chunks::<LINE_BYTES>();
@@ -79,7 +79,7 @@ impl Loader {
     }
 }
 
-/// Compares an image with its checksum, chunk by chunk.
+/// Check of a loaded card image against the announced checksum, chunk by chunk.
 pub(super) struct Check {
     loader: Loader,
     next: u32,
@@ -90,7 +90,7 @@ impl Check {
     /// Adds the next chunk to the checksum. Returns the scene after the last chunk, `None` before.
     ///
     /// # Errors
-    /// [`FaultCode::ImageChecksum`] or [`FaultCode::ImageHeader`] if the image is not the announced one.
+    /// [`FaultCode::ImageChecksum`] or [`FaultCode::ImageHeader`] if the card image is not the announced one.
     pub(super) fn step(&mut self, memory: &mut impl CardMemory) -> Result<Option<SceneImage>, Fault> {
         let Loader { lines, checksum } = self.loader;
         let known = memory.known_checksum(lines);
@@ -126,7 +126,7 @@ impl Check {
 /// Maximum length of the checksums in one reply, bytes.
 pub(super) const CHECKSUMS_BYTES: usize = 8 * CHECKSUMS_PER_REPLY as usize;
 
-/// Computes the checksums that the host requested, chunk by chunk.
+/// Computation of the checksums that the host requested, one chunk a step.
 pub(super) struct Checksums {
     pub(super) first: u32,
     end: u32,

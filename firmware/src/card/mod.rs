@@ -42,13 +42,13 @@ impl<K: ChipKind, M: CardMemory> Card<K, M> {
         Self { memory, transport: Transport::card(), engine: Engine::new(chip) }
     }
 
-    /// Memory of the card, including its counters if it counts.
+    /// Card memory, with its counters of memory traffic if it has any.
     pub fn memory(&mut self) -> &mut M {
         &mut self.memory
     }
 
-    /// Sets the function that measures on-chip memory. [`Reply::Hello`] reports its result; without a
-    /// function it reports none.
+    /// Sets the function that measures on-chip memory. [`Reply::Hello`] reports the result; without a
+    /// function it reports `None`.
     pub fn measure_memory_by(&mut self, measure: fn() -> MemoryUse) {
         self.engine.measure = Some(measure);
     }

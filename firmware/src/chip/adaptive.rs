@@ -16,8 +16,9 @@
 //! ([`PixelSample::stratified`](crate::render::PixelSample::stratified)): the expectation of later paths
 //! depends neither on `k` nor on the probes.
 //!
-//! Frames are divided by samples, with adaptive sampling or without: a path is a function of pixel, sample
-//! and `k`, and `k` is a function of the pixel's probes. A frame of later samples traces the probes again.
+//! A picture may be divided into frames by samples, with adaptive sampling or without: a path is a function
+//! of pixel, sample and `k`, and `k` is a function of the pixel's probes. A frame of later samples traces the
+//! probes again.
 
 use glam::Vec3;
 use photoncard_shared::message::{FrameParameters, MAX_PATHS, PROBES, WEIGHT_OF_PROBE};
@@ -34,12 +35,12 @@ pub(super) struct Paths(u8);
 impl Paths {
     pub(super) const ONE: Self = Self(1);
 
-    /// Number of paths of sample number `sample`.
+    /// Number of paths of sample number `sample`: 1 for a probe.
     pub(super) fn of_sample(self, sample: u32) -> u32 {
         if sample < PROBES { 1 } else { self.0.into() }
     }
 
-    /// Index in the pixel of path `path` of sample `sample`.
+    /// Index, among all paths of the pixel, of path `path` of sample `sample`.
     pub(super) fn index(self, sample: u32, path: u32) -> u32 {
         let later = sample.saturating_sub(PROBES).wrapping_mul(self.0.into());
         sample.min(PROBES).wrapping_add(later).wrapping_add(path)
@@ -55,7 +56,7 @@ impl Paths {
     }
 }
 
-/// Statistics of the light of a pixel's probes.
+/// Sums of a pixel's probes by channel: of their light, W/(sr m^2), and of its square.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probes {
     sum: Vec3,
@@ -71,7 +72,8 @@ impl Probes {
         self.squares += light * light;
     }
 
-    /// Number of paths per sample that follows from all probes and a threshold, W^(1/2)/(sr^(1/2) m).
+    /// Number of paths per sample, `s / (threshold sqrt(L))` rounded to 1 to 16, after all probes are added:
+    /// `L` is the mean of their light, `s` its standard deviation, the threshold in W^(1/2)/(sr^(1/2) m).
     pub(super) fn paths(&self, threshold: f32) -> Paths {
         let probes = PROBES as f32;
         let mean = self.sum.element_sum() / (3.0 * probes);
@@ -79,7 +81,7 @@ impl Probes {
         if !(mean > 0.0 && variance > 0.0) {
             return Paths::ONE;
         }
-        // Saturates where the probes' light is infinite.
+        // The conversion saturates.
         let paths = libm::sqrtf(variance / mean) / threshold + 0.5;
         Paths((paths as u32).clamp(1, MAX_PATHS) as u8)
     }
@@ -105,8 +107,8 @@ mod tests {
         }
     }
 
-    /// Estimates the fraction of a pixel that is lit, if its left part up to `coverage` is lit. Returns the
-    /// estimate and the number of paths.
+    /// Estimates the lit fraction of a pixel whose left part, up to the abscissa `coverage` in [0, 1], is
+    /// lit. Returns the estimate and the number of paths.
     fn lit_share(frame: &FrameParameters, pixel: u32, coverage: f32) -> (f64, u32) {
         let mut probes = Probes::NONE;
         let [mut sum, mut weights] = [0.0, 0.0];

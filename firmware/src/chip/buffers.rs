@@ -27,7 +27,8 @@ impl<K: ChipKind> Shared<K> {
         }
     }
 
-    /// Sets the capacities that a budget states, and the one for gather points, unless the types do.
+    /// Sets the capacities that the types leave open: for gather points to `points`, all others by the
+    /// budget.
     pub(super) fn reserve(&mut self, budget: &Budget, points: usize) {
         self.points.reserve(points);
         self.sums.reserve(budget.tile_pixels as usize);

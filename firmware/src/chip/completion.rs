@@ -2,8 +2,8 @@
 //!
 //! Pixels without gather rays are completed first, as soon as the irradiance records of their block are
 //! gathered. Each of their paths is traced once. The same pass finds the pixels with gather rays. These are
-//! completed when no gather of the block waits; each of their paths is traced again, because no chip has
-//! memory to keep it.
+//! completed when no gather of the block waits; each of their paths is then traced again, because a chip has
+//! no memory to keep paths.
 //!
 //! Probes ([`super::adaptive`]) are traced here as well. For a pixel without gather rays they are its first
 //! samples, or precede the samples of a frame that begins later. Other pixels have a separate pass for their
@@ -30,10 +30,11 @@ use crate::render::{Context, PixelSample, Purpose, RenderJob, eye};
 /// Purpose for which the light of a path is computed.
 #[derive(Clone, Copy)]
 enum Use {
-    /// Light is added to the pixel's sum with this weight. Direct light of a path with gather rays is not:
-    /// [`Pass::Direct`] adds it.
+    /// The path is a term of the pixel's sum, with this weight. If the path has gather rays, [`Pass::Direct`]
+    /// adds its light of shadow rays and caustics.
     Term(f32),
-    /// Light only determines the number of paths. Every path gets its direct light from shadow rays.
+    /// The path's light only determines the number of paths. Shadow rays and caustics are part of it, gather
+    /// rays are not.
     Probe,
 }
 
@@ -51,7 +52,7 @@ impl<K: ChipKind> Flight<K> {
     /// have gather rays is left for a later pass.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     pub(super) fn complete<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -97,7 +98,7 @@ impl<K: ChipKind> Flight<K> {
     /// Traces the next probe of the next pixel with gather rays.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     pub(super) fn probe<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<(), Fault> {
         let Some(pixel) = self.first_with_rays(self.position.index..self.block.pixels()) else {
             self.position = Position::at(Pass::Eye);
@@ -116,7 +117,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Sets the number of paths of a pixel from its probes.
+    /// Sets a pixel's number of paths per sample from its probes, if samples of the frame depend on them.
     fn end_probes(&mut self, frame: &FrameParameters, pixel: u32, probes: &Probes) -> Result<(), Fault> {
         match frame.adaptive_threshold.filter(|_| adaptive::needs_probes(frame)) {
             Some(threshold) => self.set_paths(pixel, probes.paths(threshold)),
@@ -124,7 +125,7 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Traces the current path of a completion. Returns whether it has gather rays.
+    /// Traces the current path of a completion. Returns whether the path has gather rays.
     fn look_at<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -168,7 +169,7 @@ impl Completion {
         }
     }
 
-    /// Adds light of the current path, in the image's radiance units.
+    /// Adds light of the current path, in the card image's radiance units.
     fn add(&mut self, frame: &FrameParameters, as_what: Use, component: Component, light: Vec3) {
         self.of_path += light;
         if let Use::Term(weight) = as_what {
@@ -176,7 +177,8 @@ impl Completion {
         }
     }
 
-    /// Ends the light of the current path. `unit` is the image's radiance unit, W/(sr m^2).
+    /// Ends the current path: adds its light to the probes if the path is one. `unit` is the radiance unit,
+    /// W/(sr m^2).
     fn end_light(&mut self, unit: f32) {
         let light = core::mem::replace(&mut self.of_path, Vec3::ZERO);
         if self.sample < PROBES {
@@ -185,8 +187,9 @@ impl Completion {
     }
 }
 
-/// Adds the light of one of a sample's `paths` paths: emission and interpolated irradiance and, for a probe
-/// or without gather rays, shadow rays and caustics. Returns whether the path has gather rays.
+/// Adds the light of a path in a sample of `paths` paths: emission and interpolated irradiance; and, for a
+/// probe or a path without gather rays, the light of shadow rays and caustics. Returns whether the path has
+/// gather rays.
 fn light_path<K: ChipKind, M: MemoryPort>(
     context: &mut Context<M>,
     cache: &IrradianceCache<K::IrradianceRecords>,
@@ -219,11 +222,11 @@ fn light_path<K: ChipKind, M: MemoryPort>(
         return Ok(true);
     }
     if has_rays {
-        // Without photons, which take a search.
+        // Not from photons, which would take a search.
         point.directions = DirectionTable::of_reflection(&point.reflector());
     }
     context.memory.enter(Stage::Shadow);
-    // The bits of a surface depend on the way it is read.
+    // The last bits of a surface depend on how it is read: here as by [`Pass::Direct`].
     if let Some(seen) = &view.seen {
         eye::surface(context, view.film, seen, &mut point.surface)?;
     }

@@ -14,18 +14,18 @@ use crate::render::features::Features;
 /// A complete pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct FinishedPixel {
-    /// Number of the pixel's tile.
+    /// [`Tile::id`](photoncard_shared::message::Tile::id) of the pixel's tile.
     pub tile: u32,
     /// Row-major index of the pixel in the tile.
     pub index: u32,
-    /// Light of the pixel.
+    /// Sums of the pixel's light.
     pub light: PixelLight,
-    /// Albedo, normal and depth of the pixel.
+    /// Sums of the pixel's albedo, normal and depth.
     pub view: PixelView,
 }
 
 impl FinishedPixel {
-    /// Sums of the pixel, as they are sent.
+    /// Sums of the pixel as a card sends them to its host.
     pub fn sums(&self, frame: &FrameParameters) -> PixelSums {
         self.view.sums(self.light.sums(frame))
     }
@@ -38,13 +38,13 @@ pub struct PixelView(PixelSums);
 impl PixelView {
     pub(super) const NOTHING: Self = Self(PixelSums::NOTHING);
 
-    /// Adds a sample that sees a surface at a depth, metres.
+    /// Adds a sample: the features of the surface that it sees, and the surface's depth, metres.
     pub(super) fn add(&mut self, header: &Header, features: &Features, depth: f32) {
         let Self(sums) = self;
         let albedo = features.albedo.clamp(Vec3::ZERO, Vec3::ONE) * ALBEDO_STEPS as f32;
         let normal = features.normal * NORMAL_STEPS as f32;
-        // Conversions are towards zero and saturate; no number of samples of a budget overflows the first
-        // two.
+        // Conversions round towards zero and saturate. No number of samples in a budget overflows the sums of
+        // albedo and normal.
         for (axis, (albedo, normal)) in albedo.to_array().into_iter().zip(normal.to_array()).enumerate() {
             let (Some(albedo_sum), Some(normal_sum)) = (sums.albedo.get_mut(axis), sums.normal.get_mut(axis))
             else {
@@ -76,22 +76,22 @@ impl PixelView {
 pub(super) struct Completion {
     pub(super) light: PixelLight,
     pub(super) view: PixelView,
-    /// Number in the pixel of the next sample.
+    /// Number of the next sample among all samples of the pixel.
     pub(super) sample: u32,
-    /// Number in its sample of the next path.
+    /// Number of the next path in its sample.
     pub(super) path: u32,
-    /// Light of the current path, in the image's radiance units.
+    /// Light of the current path, in the card image's radiance units.
     pub(super) of_path: Vec3,
-    /// Statistics of the probes' light.
+    /// Sums of the probes' light.
     pub(super) probes: Probes,
-    /// Number of paths that see a surface with a Lambertian part.
+    /// Number of paths, in a frame with gather rays, that see a surface with a Lambertian part.
     pub(super) lambertian: u32,
     /// Number of paths whose irradiance is interpolated.
     pub(super) interpolated: u32,
 }
 
 impl Completion {
-    /// Begins the completion of a pixel at sample `sample`. `light` is the light of its gather rays.
+    /// Begins the completion of a pixel at sample `sample`. `light` is the pixel's light from earlier passes.
     pub(super) const fn new(light: PixelLight, sample: u32) -> Self {
         Self {
             light,

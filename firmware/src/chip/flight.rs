@@ -16,13 +16,13 @@ use crate::render::PixelSample;
 /// Capacity of the stack of blocks, sufficient for all halvings of a tile.
 const MAX_BLOCKS: usize = 32;
 
-/// Code in place of a sum's number: the pixel is not known to have gather rays.
+/// Value in [`Flight::sums`] of a pixel that is not known to have gather rays.
 const PLAIN: u16 = u16::MAX;
-/// Code in place of a sum's number: the pixel has gather rays, but no sum yet.
+/// Value in [`Flight::sums`] of a pixel that has gather rays, but no sum yet.
 const UNSUMMED: u16 = PLAIN - 1;
 
-/// State of a tile in flight. A tile is one block. If its irradiance records do not fit into the cache, it is
-/// divided into smaller blocks, which are rendered one after another.
+/// State of a tile in flight. A tile begins as one block. A block whose irradiance records do not fit into
+/// the cache is halved into blocks that are rendered one after another.
 pub(super) struct Flight<K: ChipKind> {
     pub(super) tile: Tile,
     pub(super) counters: Counters,
@@ -33,9 +33,10 @@ pub(super) struct Flight<K: ChipKind> {
     /// Number of queued gathers that belong to the block.
     pub(super) waiting: u32,
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
-    /// Number of each pixel's sum in [`super::pixel_sums::PixelSums`]; or [`PLAIN`], or [`UNSUMMED`].
+    /// For each pixel of the block, its number in the tile's run of [`super::pixel_sums::PixelSums`]; or
+    /// [`PLAIN`], or [`UNSUMMED`].
     sums: <K::TilePixels as Capacity>::Buffer<u16>,
-    /// Number of paths per sample, by pixel.
+    /// Number of paths per sample, by pixel of the block.
     paths: <K::TilePixels as Capacity>::Buffer<Paths>,
     /// State of the pixel that is being completed, or whose probes are traced.
     pub(super) completion: Option<Completion>,
@@ -57,7 +58,7 @@ impl<K: ChipKind> Vacant for Flight<K> {
 }
 
 impl<K: ChipKind> Flight<K> {
-    /// Sets the capacities for pixels and irradiance records, unless the types do.
+    /// Sets the capacities for pixels and for irradiance records, if the types leave them open.
     pub(super) fn reserve(&mut self, pixels: usize, records: usize) {
         self.sums.reserve(pixels);
         self.paths.reserve(pixels);
@@ -85,7 +86,7 @@ impl<K: ChipKind> Flight<K> {
         self.position.pass
     }
 
-    /// Returns true if pixels of the block are being completed, or can be.
+    /// Returns true if pixels of the block are being completed, or can be because none of its gathers waits.
     pub(super) fn is_completable(&self) -> bool {
         match self.pass() {
             Pass::CompletePlain | Pass::Complete => true,
@@ -110,7 +111,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Returns true if blocks are left.
+    /// Returns true if blocks of the tile have not begun.
     pub(super) fn has_blocks(&self) -> bool {
         !self.blocks.is_empty()
     }
@@ -126,7 +127,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Skips irradiance records: the pass of all pixels' gather rays begins.
+    /// Goes on without irradiance records: gives all pixels of the block gather rays.
     pub(super) fn do_without_records(&mut self) -> Result<(), Fault> {
         self.cache.forget();
         self.set_all_sums(UNSUMMED)?;
@@ -152,7 +153,7 @@ impl<K: ChipKind> Flight<K> {
         PixelSample { x: self.tile.x + column, y: self.tile.y + row, sample }
     }
 
-    /// Current path of the block's pixel `index`, for which gather points are stored, and its weight.
+    /// Current path of the block's pixel `index`, and the path's weight in the pixel's sum.
     pub(super) fn present_path(&self, frame: &FrameParameters, index: u32) -> (PixelSample, f32) {
         let sample = self.position.sample_of(frame);
         (self.path(index, sample, self.position.path), self.paths(index).weight(frame, sample))
@@ -181,24 +182,24 @@ impl<K: ChipKind> Flight<K> {
         row * self.tile.width + column
     }
 
-    /// Number of the sum of the block's pixel `index`; `None` if it has none.
+    /// Number of the block's pixel `index` in the tile's run of sums; `None` if the pixel has no sum.
     pub(super) fn sum(&self, index: u32) -> Option<u16> {
         self.sums.values().get(index as usize).copied().filter(|&number| number < UNSUMMED)
     }
 
-    /// First pixel with gather rays among `pixels` of the block; `None` if there is none.
+    /// Index of the first pixel with gather rays among `pixels` of the block; `None` if there is none.
     pub(super) fn first_with_rays(&self, pixels: Range<u32>) -> Option<u32> {
         let states = self.sums.values().get(pixels.start as usize..pixels.end as usize)?;
         let index = states.iter().position(|&state| state != PLAIN)?;
         Some(pixels.start + index as u32)
     }
 
-    /// Records that the block's pixel `index` has gather rays.
+    /// Marks the block's pixel `index` as one with gather rays.
     pub(super) fn give_rays(&mut self, index: u32) -> Result<(), Fault> {
         self.set_sum(index, UNSUMMED)
     }
 
-    /// Sets the number of the sum of the block's pixel `index`.
+    /// Sets the number of the block's pixel `index` in the tile's run of sums.
     pub(super) fn set_sum(&mut self, index: u32, number: u16) -> Result<(), Fault> {
         let sum = self.sums.values_mut().get_mut(index as usize);
         *sum.ok_or(Invariant::Pixels.fault())? = number;
@@ -206,7 +207,8 @@ impl<K: ChipKind> Flight<K> {
     }
 }
 
-/// Error bound of interpolated irradiance; `None` if the frame does not interpolate.
+/// Relative error bound of interpolated irradiance; `None` in a frame without irradiance cache or gather
+/// rays.
 pub(super) fn allowed_error(frame: &FrameParameters) -> Option<f32> {
     frame.irradiance_error.filter(|_| frame.gather_rays > 0)
 }

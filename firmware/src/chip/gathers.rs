@@ -21,13 +21,13 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         Self { candidates: CandidateStorage::EMPTY, queue: GatherQueue::new() }
     }
 
-    /// Sets the capacities for candidates and queued gathers, unless the types do.
+    /// Sets the capacities for candidates and for queued gathers, if the types leave them open.
     pub(super) fn reserve(&mut self, candidates: usize, queue: usize) {
         self.candidates.reserve(candidates);
         self.queue.reserve(queue);
     }
 
-    /// Candidate buffer, for a photon search that is not a gather.
+    /// Candidate buffer, for the photon search of a direction table.
     pub(super) fn candidates(&mut self) -> Candidates<'_> {
         self.candidates.view()
     }
@@ -53,11 +53,11 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.len() >= (frame.queue as usize).clamp(1, self.queue.capacity())
     }
 
-    /// Queues a gather, or does it at once and returns its radiance. It is done at once without deferred
-    /// reordering, and if the queue filled up since the last check of [`Self::is_full`].
+    /// Queues a gather, or does it at once and returns its radiance. It is done at once in a frame without
+    /// deferred reordering ([`Drain::Immediate`]), and if the queue is full.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     pub(super) fn submit<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -71,13 +71,14 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         }
     }
 
-    /// Queues a gather as if a ray of its tile had caused it. Returns whether there was room.
+    /// Queues a gather that no tile counts as waiting. Returns whether there was room.
     #[cfg(test)]
     pub(super) fn wait_for_test(&mut self, request: GatherRequest) -> bool {
         self.queue.push(request).is_ok()
     }
 
-    /// Begins a drain. Returns the number of waiting gathers and the first of them; `None` if none waits.
+    /// Begins a drain. Returns the number of waiting gathers, and the one that is done first; `None` if none
+    /// waits.
     pub(super) fn begin_drain(&mut self, drain: Drain) -> Option<(usize, &GatherRequest)> {
         if self.queue.is_empty() {
             return None;
@@ -94,7 +95,7 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
     /// Does a gather and returns its radiance.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     pub(super) fn gather<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,

@@ -23,7 +23,8 @@ pub enum Component {
 }
 
 impl Component {
-    /// Index of the component's sum of pixel number `pixel` in an array with the sums of consecutive pixels.
+    /// Index of this component of pixel number `pixel` in an array of the sums of consecutive pixels. Without
+    /// layers, all components of a pixel have one sum.
     #[inline(always)]
     pub fn sum_of(self, frame: &FrameParameters, pixel: usize) -> usize {
         if frame.layers { pixel * SUMS_WITH_LAYERS as usize + self as usize } else { pixel }
@@ -34,21 +35,21 @@ impl Component {
 const GATHERS: usize = Component::Caustic as usize + 1;
 const _: () = assert!(GATHERS + 1 == SUMS_WITH_LAYERS as usize);
 
-/// Sums of one pixel, in the image's radiance units.
+/// Sums of one pixel's light, in the card image's radiance units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelLight([ColourSum; SUMS_WITH_LAYERS as usize]);
 
 impl PixelLight {
     pub(super) const NONE: Self = Self([ColourSum::ZERO; SUMS_WITH_LAYERS as usize]);
 
-    /// Converts stored sums, which may be fewer than the maximum.
+    /// Creates the light of a pixel from its stored sums, at most [`SUMS_WITH_LAYERS`]; missing ones are 0.
     pub(super) fn of(sums: &[ColourSum]) -> Self {
         let mut light = Self::NONE;
         light.0.iter_mut().zip(sums).for_each(|(sum, stored)| *sum = *stored);
         light
     }
 
-    /// Adds light, in the image's radiance units, to a component.
+    /// Adds light, in the card image's radiance units, to a component.
     #[inline]
     pub(super) fn add(&mut self, frame: &FrameParameters, component: Component, brought: Vec3) {
         if let Some(sum) = self.0.get_mut(component.sum_of(frame, 0)) {

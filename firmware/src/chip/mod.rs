@@ -1,12 +1,14 @@
 //! One chip: its tiles in flight, and their passes.
 //!
-//! A tile goes through the passes of `position`, block by block. Every pass is done for all gather points
-//! before the next pass begins, so that gathers of neighbouring points are adjacent.
+//! A tile goes through the passes that the module `position` lists, block by block. A pass is done for all
+//! gather points that the chip stores before the next pass begins, so that gathers of neighbouring points
+//! follow one another.
 //!
 //! When all rays of a block's irradiance records, or of its pixels, are cast, their gathers wait in the queue
 //! with those of other tiles, and another tile proceeds. The queue is drained when it is full or nothing else
-//! can be done. Pixels are completed when the last of their gathers is done; pixels that need only irradiance
-//! records come first. Each call of [`Chip::step`] does a small piece of this work.
+//! can be done. A block's pixels that need only irradiance records are completed when the records are
+//! gathered, the others when no gather of the block waits. Each call of [`Chip::step`] does a small piece of
+//! this work.
 //!
 //! | state | kept from the command to the last pixel, of each tile in flight |
 //! |---|---|
@@ -62,19 +64,19 @@ pub type MicroChip = Chip<Micro>;
 pub struct Chip<K: ChipKind> {
     kind: K,
     flights: <K::Flights as Capacity>::Array<Flight<K>>,
-    /// Number of the tile in flight whose rays are being cast.
+    /// Index in `flights` of the tile whose rays are being cast.
     active: Option<usize>,
     shared: Shared<K>,
 }
 
-/// Number of rays and gathers after which a step ends.
+/// Number of rays and gathers after which [`Chip::step`] returns.
 const WORK_OF_STEP: u64 = 16;
-/// Maximum number of pieces of work in one step, because some pieces cast no ray.
+/// Maximum number of calls of [`Chip::piece`] in one step; it bounds a step whose pieces cast no rays.
 const PIECES_PER_STEP: u32 = 64;
 /// Maximum number of queued gathers done in one piece of work.
 const GATHERS_PER_PIECE: u64 = 16;
 
-/// Result of a step.
+/// Result of [`Chip::step`].
 #[derive(Clone, Copy, Debug)]
 pub enum Progress {
     /// There is more work to do.
@@ -82,7 +84,7 @@ pub enum Progress {
     /// A pixel is complete. Within each block of a tile, pixels without gather rays come first, row by row,
     /// then the others, row by row.
     Pixel(FinishedPixel),
-    /// A tile is complete, after its last pixel: number of the tile, and counters of its work.
+    /// A tile is complete, after its last pixel: [`Tile::id`], and the counters of the work on the tile.
     Tile(u32, Counters),
     /// There is nothing to do before the next [`Chip::begin`], for which there is room, or [`Chip::flush`].
     Idle,
@@ -95,7 +97,7 @@ impl<K: FixedKind> Default for Chip<K> {
 }
 
 impl<K: FixedKind> Chip<K> {
-    /// On-chip memory that each technique adds to the chip.
+    /// On-chip memory that each technique adds to the chip, bytes.
     pub const TECHNIQUES: TechniqueMemory = TechniqueMemory {
         reordering: size_of::<GatherQueue<K::GatherQueue>>(),
         irradiance_cache: K::Flights::ENTRIES * size_of::<IrradianceCache<K::IrradianceRecords>>(),
@@ -114,8 +116,8 @@ impl<K: ChipKind> Chip<K> {
         Self { kind, flights: Array::VACANT, active: None, shared: Shared::new() }
     }
 
-    /// A chip without a tile, of a kind whose capacities are values: those of its budget, and `points` gather
-    /// points whose rays are cast together.
+    /// Creates a chip without tiles whose capacities are values instead of types: those of the kind's budget,
+    /// and `points` gather points whose rays are cast together.
     pub fn sized(kind: K, points: usize) -> Self {
         let budget = *kind.budget();
         let mut chip = Self::vacant_of(kind);
@@ -132,12 +134,12 @@ impl<K: ChipKind> Chip<K> {
         &self.kind
     }
 
-    /// Maximum number of pixels of a tile in a frame.
+    /// Maximum number of pixels of a tile in `frame`: a fourth if the frame has layers.
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
         u64::from(self.kind.budget().pixels_of_tile(frame.layers))
     }
 
-    /// Drops all tiles.
+    /// Drops all tiles and their queued gathers.
     pub fn clear(&mut self) {
         self.active = None;
         self.shared.gathers.clear();
@@ -147,13 +149,14 @@ impl<K: ChipKind> Chip<K> {
         }
     }
 
-    /// Begins a frame. `room` are the lines of card memory beyond the image, where irradiance records may be
-    /// kept. Without this call no records are kept.
+    /// Begins a frame. Irradiance records may be kept in `room`, a range of line addresses of card memory
+    /// past the card image. Without this call no records are kept.
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         self.shared.store.begin_frame(frame, room);
     }
 
-    /// Drops the irradiance records of earlier frames. To be called when the image changes.
+    /// Drops the irradiance records that earlier frames have kept. Must be called when the card image
+    /// changes.
     pub fn forget_records(&mut self) {
         self.shared.store.forget();
     }
@@ -175,18 +178,18 @@ impl<K: ChipKind> Chip<K> {
         true
     }
 
-    /// Number of a free place for a tile in flight.
+    /// Index of the first entry of `flights` without a tile, among those that the frame may use.
     fn vacant(&self, frame: &FrameParameters) -> Option<usize> {
         let flights = self.flights.values().iter().take(frame.in_flight.max(1) as usize);
         flights.map(Flight::pass).position(|pass| pass == Pass::Vacant)
     }
 
-    /// Number of the first tile in flight for which `holds` is true.
+    /// Index of the first entry of `flights` for which `holds` is true.
     fn find(&self, holds: impl Fn(&Flight<K>) -> bool) -> Option<usize> {
         self.flights.values().iter().position(holds)
     }
 
-    /// Begins to do the waiting gathers, because no tile follows. Returns false if there are none.
+    /// Begins a drain of the gather queue, because no tile follows. Returns false if no gather waits.
     pub fn flush(&mut self, frame: &FrameParameters) -> bool {
         let waits = !self.shared.gathers.is_empty();
         if waits && !self.shared.gathers.is_draining() {
@@ -199,7 +202,8 @@ impl<K: ChipKind> Chip<K> {
     /// are short, for a prompt reply, but long enough that the cost of polling is negligible.
     ///
     /// # Errors
-    /// If the image is invalid, or an [`Invariant`] is violated. All tiles should be dropped then.
+    /// If the card image is invalid, or an [`Invariant`] is violated. The caller should then drop all tiles
+    /// ([`Self::clear`]).
     pub fn step<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<Progress, Fault> {
         let mut work = 0;
         for _ in 0..PIECES_PER_STEP {
@@ -214,8 +218,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Does the next piece of work: some of the queued gathers, one sample of a pixel's completion, or a part
-    /// of a pass. Adds the number of its rays and gathers to `work`.
+    /// Does the next piece of work: up to [`GATHERS_PER_PIECE`] queued gathers, one path of a pixel's
+    /// completion, or one step of a pass. Adds the piece's number of rays and gathers to `work`.
     #[inline(always)]
     fn piece<M: MemoryPort>(&mut self, job: &mut RenderJob<M>, work: &mut u64) -> Result<Progress, Fault> {
         if self.shared.gathers.is_draining() {
@@ -252,8 +256,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Begins the next block of a tile in flight, or the gather rays of its pixels. If there is no such tile,
-    /// the chip has room for a tile or must drain its queue.
+    /// Begins, for a tile in flight, the passes of a block's pixels with gather rays, or else its next block.
+    /// Without such a tile, begins a drain if there is no room for another tile; otherwise the chip is idle.
     fn go_on(&mut self, frame: &FrameParameters) -> Result<Progress, Fault> {
         let of_pass = |pass| self.find(|flight| flight.pass() == pass);
         if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock)) {
@@ -271,8 +275,8 @@ impl<K: ChipKind> Chip<K> {
         Ok(if must_drain { Progress::Busy } else { Progress::Idle })
     }
 
-    /// Completes the next sample of a block whose gathers are done. After its last pixel follow the pixels
-    /// with gather rays, another block, or the end of the tile.
+    /// Completes the next path of a pixel in a block of which no gather waits. After the block's last pixel,
+    /// the tile goes on with the block's pixels with gather rays or with the next block, or it ends.
     fn complete<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -309,7 +313,7 @@ impl<K: ChipKind> Chip<K> {
         Ok(finished.map_or(Progress::Busy, Progress::Pixel))
     }
 
-    /// Begins a drain of the queue. The tile of its first gather counts it.
+    /// Begins a drain of the gather queue. The tile whose gather is first in the drain counts it.
     fn begin_drain(&mut self, frame: &FrameParameters) {
         // An empty queue has nothing to drain.
         let Some((waiting, first)) = self.shared.gathers.begin_drain(frame.drain) else { return };
@@ -319,7 +323,8 @@ impl<K: ChipKind> Chip<K> {
         }
     }
 
-    /// Does some of the queued gathers and adds their radiance to records or pixels.
+    /// Does up to [`GATHERS_PER_PIECE`] queued gathers and adds their radiance to irradiance records or pixel
+    /// sums.
     fn drain<M: MemoryPort>(&mut self, job: &mut RenderJob<M>) -> Result<(), Fault> {
         let Self { flights, shared, .. } = self;
         for _ in 0..GATHERS_PER_PIECE {

@@ -1,8 +1,8 @@
-//! Sums of the pixels with gather rays, of all tiles in flight.
+//! Sums of light of the pixels with gather rays, for all tiles in flight.
 //!
-//! Only these pixels have light that waits; all other light is added when a pixel is completed. The sums are
-//! in a ring. The sums of one tile are consecutive, a run, which grows while the tile's eye rays are cast and
-//! ends with the tile.
+//! Only these pixels receive light before they are completed: from gather rays, shadow rays and caustics. The
+//! sums are in a ring buffer. Those of a block's pixels are consecutive, a run, which grows while the block's
+//! eye rays are cast and ends when its pixels are complete.
 
 use core::num::NonZeroU32;
 
@@ -14,11 +14,11 @@ use super::light::{Component, PixelLight};
 use crate::fixed_point::ColourSum;
 use crate::kind::{Buffer, Capacity};
 
-/// Ring of sums, in the image's radiance units. Each pixel has [`sums_of_pixel`] of them.
+/// Ring buffer of sums, in the card image's radiance units, with [`sums_of_pixel`] sums for each pixel.
 pub(super) struct PixelSums<C: Capacity> {
     sums: C::Buffer<ColourSum>,
     runs: [Run; MAX_IN_FLIGHT as usize],
-    /// Position in the ring of the next pixel.
+    /// Position in the ring, in pixels, of the next pixel.
     end: u32,
 }
 
@@ -43,21 +43,21 @@ impl<C: Capacity> PixelSums<C> {
         Self { sums: Buffer::EMPTY, runs: [Run::EMPTY; MAX_IN_FLIGHT as usize], end: 0 }
     }
 
-    /// Sets the capacity for sums, unless the type does.
+    /// Sets the capacity to `sums` sums, if the type leaves it open.
     pub(super) fn reserve(&mut self, sums: usize) {
         self.sums.reserve(sums);
     }
 
-    /// Number of pixels in the ring's capacity, at least 1.
+    /// Number of pixels for which the ring has sums, at least 1.
     fn places(&self, frame: &FrameParameters) -> NonZeroU32 {
         NonZeroU32::new(self.sums.capacity() as u32 / sums_of_pixel(frame.layers)).unwrap_or(NonZeroU32::MIN)
     }
 
-    /// Begins the run of a tile in flight, after all other runs.
+    /// Begins an empty run for tile in flight `flight`, after all other runs.
     pub(super) fn begin(&mut self, flight: usize) {
         // Always fits: the buffer's own capacity.
         let _ = self.sums.resize(self.sums.capacity(), ColourSum::ZERO);
-        // The ring of a frame with layers has fewer places.
+        // A frame with layers has fewer places, so that `end` may be past them.
         if self.runs.iter().all(|run| run.count == 0) {
             self.end = 0;
         }
@@ -66,7 +66,7 @@ impl<C: Capacity> PixelSums<C> {
         }
     }
 
-    /// Ends the run of a tile in flight after its sums were read.
+    /// Ends the run of tile in flight `flight`, whose sums were read.
     pub(super) fn end(&mut self, flight: usize) {
         if let Some(run) = self.runs.get_mut(flight) {
             *run = Run::EMPTY;
@@ -79,8 +79,8 @@ impl<C: Capacity> PixelSums<C> {
         !self.runs.iter().any(|run| run.holds(self.end, places))
     }
 
-    /// Appends a pixel without light to the run that began last. Returns its number in the run.
-    /// [`Self::has_room`] must be true.
+    /// Appends a pixel without light to the run of tile in flight `flight`, which must have begun last.
+    /// Returns the pixel's number in the run. [`Self::has_room`] must be true.
     pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> Result<u16, Fault> {
         let (count, places) = (sums_of_pixel(frame.layers) as usize, self.places(frame));
         let first = self.end as usize * count;
@@ -89,7 +89,7 @@ impl<C: Capacity> PixelSums<C> {
         sums.fill(ColourSum::ZERO);
         self.end = (self.end + 1) % places;
         run.count += 1;
-        // Below the pixels of a tile, which fit 15 bits.
+        // A tile has at most 2^15 pixels.
         Ok((run.count - 1) as u16)
     }
 
@@ -99,7 +99,7 @@ impl<C: Capacity> PixelSums<C> {
         Ok(((run.first + u32::from(number)) % self.places(frame)) as usize)
     }
 
-    /// Adds light, in the image's radiance units, to a component of pixel `number` of a tile in flight.
+    /// Adds light, in the card image's radiance units, to a component of pixel `number` in the run of a tile.
     #[inline]
     pub(super) fn add(
         &mut self,
@@ -114,7 +114,7 @@ impl<C: Capacity> PixelSums<C> {
         Ok(())
     }
 
-    /// Light of the tile's pixel `number`.
+    /// Light of pixel `number` in the run of a tile.
     pub(super) fn light(
         &self,
         frame: &FrameParameters,

@@ -20,7 +20,7 @@ use crate::render::{
 };
 use crate::scene::Seen;
 
-/// Gather point of one of a sample's `paths` paths, with uninitialised directions.
+/// Gather point of a path in a sample of `paths` paths. Its directions are not chosen yet.
 pub(super) fn pixel_point(
     frame: &FrameParameters,
     at: PixelSample,
@@ -29,11 +29,13 @@ pub(super) fn pixel_point(
     paths: u32,
 ) -> GatherPoint {
     let pattern = pattern(frame, at);
-    // With the cache, gather rays are a pixel's in number, without it a sample's.
+    // The frame's number of gather rays is that of a whole pixel with the irradiance cache, of a sample
+    // without.
     let is_of_pixel = allowed_error(frame).is_some();
     let samples = if is_of_pixel { frame.planned_samples.max(1) } else { 1 };
-    // Paths are for noise that probes see: that of direct light, and of highlights, which gather rays bring
-    // as well.
+    // The paths of a Lambertian surface share the gather rays of a sample. On other surfaces each path has
+    // all of them: paths are added for noise of direct light and highlights, and gather rays bring highlights
+    // too.
     let sharing = if view.surface.reflection.is_lambertian() { paths.max(1) } else { 1 };
     let rays = frame.gather_rays.div_ceil(samples).div_ceil(sharing);
     if purpose == Purpose::Lobe {
@@ -43,7 +45,7 @@ pub(super) fn pixel_point(
     }
 }
 
-/// Error bound for interpolating the irradiance of a sample; `None` if it must be gathered.
+/// Error bound of a sample's interpolated irradiance; `None` if no irradiance records may light the sample.
 pub(super) fn allowed_error_at(frame: &FrameParameters, view: &View) -> Option<f32> {
     // Records lie where eye rays meet surfaces, not behind mirrors and glass.
     allowed_error(frame).filter(|_| view.is_first && view.surface.reflection.has_lambertian())
@@ -54,8 +56,8 @@ pub(super) fn seen_sample(at: PixelSample, view: &View) -> SeenSample<'_> {
     SeenSample { pixel: [at.x, at.y], film: view.film, surface: &view.surface }
 }
 
-/// Gather point of one of a sample's `paths` paths, determined by geometry only, with uninitialised
-/// directions.
+/// Gather point of a path in a sample of `paths` paths: for the lobe alone if irradiance records cover the
+/// sample, which geometry decides. Its directions are not chosen yet.
 fn gather_point<M, R: Capacity>(
     context: &Context<M>,
     cache: &IrradianceCache<R>,
@@ -70,7 +72,7 @@ fn gather_point<M, R: Capacity>(
 }
 
 impl<K: ChipKind> Flight<K> {
-    /// Number of pixels of the stripe. Each of them may have one of the `points` gather points.
+    /// Number of pixels of the stripe, at most `points`: one for each gather point that can be stored.
     fn stripe(&self, points: u32) -> u32 {
         self.block.pixels().saturating_sub(self.position.first).min(points)
     }
@@ -81,8 +83,8 @@ impl<K: ChipKind> Flight<K> {
         shared.sums.has_room(frame) || next().is_none_or(|pixel| self.sum(pixel).is_some())
     }
 
-    /// Next of the stripe's `stripe` pixels that has gather rays and whose samples have the current path;
-    /// `None` after the last.
+    /// Index in the block of the next of the stripe's `stripe` pixels that has gather rays and, in the
+    /// current sample, a path with the current number; `None` after the last.
     fn next_pixel(&self, frame: &FrameParameters, stripe: u32) -> Option<u32> {
         let first = self.position.first;
         self.first_with_path(frame, first + self.position.index..first + stripe)
@@ -114,8 +116,8 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// First pixel among `pixels` of the block that has gather rays and whose samples have the current path;
-    /// `None` if there is none.
+    /// Index of the first pixel among `pixels` of the block that has gather rays and, in the current sample,
+    /// a path with the current number; `None` if there is none.
     fn first_with_path(&self, frame: &FrameParameters, pixels: Range<u32>) -> Option<u32> {
         let Range { mut start, end } = pixels;
         let sample = self.position.sample_of(frame);
@@ -128,7 +130,7 @@ impl<K: ChipKind> Flight<K> {
         }
     }
 
-    /// Casts the eye ray of a pixel's current path. Stores its gather point if it has gather rays.
+    /// Traces a pixel's current path from the eye. Stores the gather point at its end if the point has rays.
     fn store_point<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -158,8 +160,8 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Adds the light of shadow rays and caustics to the pixel of the current gather point, with the weight
-    /// of its path.
+    /// Adds the light of shadow rays and caustics at the current gather point to the point's pixel, with the
+    /// weight of its path.
     pub(super) fn gather_direct_light<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -247,7 +249,8 @@ impl<K: ChipKind> Flight<K> {
     }
 }
 
-/// Light of shadow rays and caustics at a gather point, for one sample, in the image's radiance units.
+/// Light of shadow rays and caustics that one path's gather point reflects, in the card image's radiance
+/// units.
 pub(super) fn direct_light<M: MemoryPort>(
     context: &mut Context<M>,
     at: PixelSample,

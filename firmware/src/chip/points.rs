@@ -10,12 +10,12 @@ use crate::kind::{Buffer, Capacity};
 use crate::sampler::Pattern;
 
 /// Gather points with their owners. The owner is the index of a pixel in its block, or of an irradiance
-/// record.
+/// record in the cache.
 pub(super) struct Points<C: Capacity> {
     points: C::Buffer<StoredPoint>,
     owners: C::Buffer<u16>,
-    /// Direction bin of each point's next ray; after the last ray, the bin of that ray. The array is separate
-    /// from the points because most points have no ray in a bin.
+    /// Direction bin of each point's next ray; after the last ray, the bin of that ray. A separate array,
+    /// because most points have no ray in the current bin and are passed over.
     bins: C::Buffer<u8>,
 }
 
@@ -24,7 +24,7 @@ impl<C: Capacity> Points<C> {
         Self { points: Buffer::EMPTY, owners: Buffer::EMPTY, bins: Buffer::EMPTY }
     }
 
-    /// Sets the capacity for points, unless the type does.
+    /// Sets the capacity to `points` points, if the type leaves it open.
     pub(super) fn reserve(&mut self, points: usize) {
         self.points.reserve(points);
         self.owners.reserve(points);
@@ -46,8 +46,8 @@ impl<C: Capacity> Points<C> {
         self.owners.values().len() as u32
     }
 
-    /// Appends a point with the bin of its first ray. There is room for one point per pixel of a stripe, and
-    /// per record of a block.
+    /// Appends a point; `bin` is the direction bin of its first ray. There is room for one point per pixel of
+    /// a stripe, and per record of a block.
     pub(super) fn push(&mut self, owner: u16, point: StoredPoint, bin: u32) -> Result<(), Fault> {
         let full = Invariant::Points.fault();
         self.points.push(point).map_err(|_| full)?;
@@ -63,7 +63,8 @@ impl<C: Capacity> Points<C> {
         point.ok_or(Invariant::Points.fault())
     }
 
-    /// Index and owner of the next point with rays in the current bin; `None` if there is none.
+    /// Index and owner of the next point whose next ray is in the current direction bin; `None` if there is
+    /// none.
     #[inline(always)]
     pub(super) fn next(&self, position: &Position) -> Option<(u32, u16)> {
         let first = position.index as usize;
@@ -72,7 +73,8 @@ impl<C: Capacity> Points<C> {
         Some((index as u32, *self.owners.values().get(index)?))
     }
 
-    /// Takes the next rays of point `index` in the current bin, of `bins`. Advances the position past them.
+    /// Takes the next rays of point `index` in the current one of `bins` direction bins. Advances `position`
+    /// past these rays.
     #[inline(always)]
     pub(super) fn take_rays(
         &mut self,

@@ -23,7 +23,7 @@ impl Block {
         self.width * self.height
     }
 
-    /// Column and row in the tile of the block's pixel `index`, row-major.
+    /// Column and row in the tile of the pixel with row-major index `index` in the block.
     pub(super) fn pixel(&self, index: u32) -> [u32; 2] {
         let width = self.width.max(1);
         [self.x + index % width, self.y + index / width]
@@ -47,7 +47,8 @@ impl Block {
 
 /// Passes of a block, in order. Without the irradiance cache, [`Pass::ReadKept`] to [`Pass::WaitForRecords`]
 /// are skipped; with kept records, all of these but [`Pass::ReadKept`] are. [`Pass::CompletePlain`] is
-/// skipped if every sample has gather rays. The passes after it are for pixels with gather rays only.
+/// skipped without the cache if the frame has gather rays. The passes after [`Pass::CompletePlain`] are for
+/// pixels with gather rays only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
     /// There is no tile.
@@ -58,7 +59,7 @@ pub(super) enum Pass {
     ReadKept,
     /// Survey: placement of irradiance records, level by level of the lattice.
     Survey,
-    /// Directions of the gather rays of the records.
+    /// Choice of the direction tables of the records.
     RecordPoints,
     /// Gather rays of the records, by direction bin.
     RecordRays,
@@ -72,9 +73,9 @@ pub(super) enum Pass {
     Probe,
     /// Eye rays of one path of each pixel in a stripe.
     Eye,
-    /// Shadow rays and caustic gathers of the paths with gather rays.
+    /// Shadow rays and caustic gathers of the stripe's paths with gather rays.
     Direct,
-    /// Gather rays of the paths, by direction bin.
+    /// Gather rays of the stripe's paths, by direction bin.
     Rays,
     /// All rays are cast; the gathers wait.
     Wait,
@@ -86,7 +87,7 @@ pub(super) enum Pass {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Position {
     pub(super) pass: Pass,
-    /// Number of the current sample in the frame.
+    /// Number of the current sample, counted from the frame's first.
     sample: u32,
     /// Number of the current path in the sample.
     pub(super) path: u32,
@@ -115,8 +116,8 @@ impl Position {
         self.rays
     }
 
-    /// Advances by `rays` rays of the gather point `index` in the current bin: to its remaining rays or, if
-    /// these were the last, to the next point.
+    /// Advances by `rays` rays of gather point `index` in the current direction bin: to the point's remaining
+    /// rays or, with `are_last`, to the next point.
     pub(super) fn pass_rays(&mut self, index: u32, rays: u32, are_last: bool) {
         [self.index, self.rays] = if are_last { [index + 1, 0] } else { [index, self.rays + rays] };
     }
@@ -133,7 +134,7 @@ impl Position {
         next(&mut self.index, count)
     }
 
-    /// Number of the current sample in the pixel.
+    /// Number of the current sample among all samples of a pixel.
     pub(super) fn sample_of(&self, frame: &FrameParameters) -> u32 {
         frame.first_sample.wrapping_add(self.sample)
     }

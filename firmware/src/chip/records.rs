@@ -65,7 +65,7 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Chooses the directions of the gather rays of one record.
+    /// Chooses the direction table for the gather rays of the next record.
     pub(super) fn choose_record_point<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
@@ -122,13 +122,14 @@ impl<K: ChipKind> Flight<K> {
         Ok(())
     }
 
-    /// Ends the gather of the block's records. Keeps the records if the frame asks for it.
+    /// Converts the gathered light of the block's records to irradiance. Keeps the records in card memory if
+    /// the frame asks for it.
     pub(super) fn end_records<M: MemoryPort>(
         &mut self,
         job: &mut RenderJob<M>,
         shared: &mut Shared<K>,
     ) -> Result<(), Fault> {
-        // Records are gathered in frames with an error bound alone.
+        // Only frames with an error bound gather records.
         let allowed = allowed_error(job.frame).ok_or(Invariant::Record.fault())?;
         self.cache.end_gather(&mut job.context(&mut self.counters), allowed)?;
         if job.frame.keep_records {

@@ -1,4 +1,4 @@
-//! A gather point as it is stored between two direction bins.
+//! Part of a gather point that a chip stores from one direction bin to the next.
 
 use core::ops::Range;
 
@@ -11,15 +11,16 @@ use crate::render::{Context, GatherPoint, PixelSample, Purpose, eye};
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::{Seen, Surface};
 
-/// Maximum number of gather rays in one piece of work.
+/// Maximum number of gather rays of one point in one piece of work.
 const RAYS_PER_STEP: u32 = 64;
 
-/// Part of a gather point that is stored between two direction bins, 48 bytes. The remainder is computed
-/// again.
+/// Part of a gather point that is stored from one direction bin to the next, 48 bytes. The remainder is
+/// computed again in each bin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
-    /// For a pixel, the triangle and the position on it, or [`Seen::ELSEWHERE`] if the point is seen through
-    /// perfectly specular surfaces.
+    /// For a pixel, the triangle and the position on it, or [`Seen::ELSEWHERE`] if only the eye path leads
+    /// there again: through perfectly specular surfaces, or to one of several material layers. Unused for an
+    /// irradiance record.
     pub(super) seen: Seen,
     pub(super) directions: DirectionTable,
     /// Number of rays to cast, and their purpose.
@@ -28,7 +29,7 @@ pub(super) struct StoredPoint {
 
 const _: () = assert!(size_of::<StoredPoint>() == 48);
 
-/// Number of a point's rays, and whether they are for the lobe only.
+/// Number of a point's rays in 15 bits, and the flag [`Self::OF_LOBE`] of rays for the lobe only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct StoredRays(u16);
 
@@ -54,7 +55,7 @@ impl StoredRays {
 }
 
 impl StoredPoint {
-    /// Stores the point of an irradiance record. The surface is omitted, because the record has it.
+    /// Stores the gather point of an irradiance record without its surface, which the record has.
     pub(super) fn of_record(point: &GatherPoint) -> Self {
         Self { seen: Seen::NOWHERE, directions: point.directions, rays: StoredRays::new(point) }
     }
@@ -86,7 +87,7 @@ impl StoredPoint {
         (first..number, None)
     }
 
-    /// Restores the gather point of a pixel's sample, except for its surface.
+    /// Restores the gather point of a pixel's path, with weight 1 and without its surface.
     #[inline(always)]
     pub(super) fn point(&self, pattern: Pattern) -> GatherPoint {
         GatherPoint {
@@ -99,10 +100,10 @@ impl StoredPoint {
         }
     }
 
-    /// Reads the surface of a pixel's sample into `surface`.
+    /// Reads the surface at a pixel's gather point into `surface`. `at` is the path whose point it is.
     ///
     /// # Errors
-    /// If the image is invalid, or no surface is seen.
+    /// If the card image is invalid, or the eye path ends at no surface.
     #[inline(always)]
     pub(super) fn read_surface<M: MemoryPort>(
         &self,
@@ -111,7 +112,7 @@ impl StoredPoint {
         surface: &mut Surface,
     ) -> Result<(), Fault> {
         if self.seen.is_elsewhere() {
-            // The way there is followed again.
+            // The eye path is traced again.
             *surface = eye::view(context, at)?.surface().ok_or(Invariant::Surface.fault())?.surface;
         } else {
             let film = eye::film_position(context, at);
@@ -121,7 +122,7 @@ impl StoredPoint {
     }
 }
 
-/// Random numbers for the gather rays of a sample.
+/// Random numbers for the gather rays of a path.
 #[inline(always)]
 pub(super) fn pattern(frame: &FrameParameters, at: PixelSample) -> Pattern {
     Pattern::new(frame.seed, at.x, at.y, at.sample, Dimension::Gather)

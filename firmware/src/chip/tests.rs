@@ -1,4 +1,4 @@
-//! Invariants of a chip, violated on purpose. Each violation is a numbered fault and loses no light.
+//! Violations of a chip's invariants. Each is a numbered fault, so that no light is lost in silence.
 
 use std::boxed::Box;
 
@@ -117,7 +117,7 @@ fn one_gather_point_too_many_is_a_fault() {
     assert_eq!(points.push(0, stored, 0), Err(broken));
 }
 
-/// Does a piece of work in a scene without surfaces.
+/// Calls `work` in a scene without surfaces.
 fn in_empty_scene<T>(
     work: impl FnOnce(&mut Context<Lines>, &GatherPoint) -> Result<T, Fault>,
 ) -> Result<T, Fault> {

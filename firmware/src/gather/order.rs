@@ -5,25 +5,25 @@ use photoncard_shared::message::Drain;
 
 use crate::sampler::hash;
 
-/// Number of upper bits of a grid coordinate, which determine the cell of the Hilbert curve.
+/// Number of upper bits of a grid coordinate: they are the coordinate of a cell of the Hilbert curve.
 const CURVE_BITS: u32 = 10;
-/// Number of lower bits of a grid coordinate, which are its offset in a cell of the curve.
+/// Number of lower bits of a grid coordinate: they are the offset in the cell of the Hilbert curve.
 const REST_BITS: u32 = GRID_BITS - CURVE_BITS;
 const REST_MASK: u64 = (1 << REST_BITS) - 1;
-/// Number of bits of a hash cell's coordinates: 16 cells along each axis of the grid.
+/// Number of bits of each coordinate of a hash cell: 16 cells along each axis of the grid.
 const CELL_BITS: u32 = 4;
-/// Number of buckets that cells are hashed to.
+/// Number of buckets that hash cells are hashed to.
 const BUCKETS: u32 = 256;
 
-/// Number of low bits of a code that hold a length. Three grid coordinates take the others.
+/// Number of low bits of a [`HilbertCode`] that hold a ray's length. Three grid coordinates take the others.
 const LENGTH_BITS: u32 = u64::BITS - 3 * GRID_BITS;
 const MAX_LENGTH: u64 = (1 << LENGTH_BITS) - 1;
-/// Minimum length that is resolved, in cells of the grid.
+/// Length, in cells of the photon grid, as which all shorter rays are coded.
 const LEAST_LENGTH: f32 = 64.0;
 
 /// Position of a gather, rounded to the photon grid: its index along the Hilbert curve through 1024 cells per
-/// axis, and the offset within the cell. The low four bits hold the binary exponent of the length of the
-/// gather ray that ends there.
+/// axis, and the offset within the cell. The low four bits hold a code of the length of the gather ray that
+/// ends there: 0 below 64 grid cells, and 1 more for each doubling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct HilbertCode(u64);
 
@@ -37,7 +37,7 @@ impl HilbertCode {
         Self(point.into_iter().fold(curve as u64, rest) << LENGTH_BITS)
     }
 
-    /// Adds the length, metres, of the ray that ends at the position.
+    /// Returns the code with the length, metres, of the gather ray that ends at the position.
     #[inline(always)]
     #[must_use]
     pub fn with_length(self, grid: &PhotonGrid, length: f32) -> Self {
@@ -47,8 +47,8 @@ impl HilbertCode {
         Self(self.0 & !MAX_LENGTH | code)
     }
 
-    /// Upper bound of the ray's length, metres, at most twice the length. It is 64 grid cells for all shorter
-    /// rays and infinite for long ones.
+    /// Upper bound of the gather ray's length, metres, at most twice the length. It is 64 grid cells for all
+    /// shorter rays, and infinite from 2^20 grid cells on.
     #[inline(always)]
     pub fn upper_length(self, grid: &PhotonGrid) -> f32 {
         match self.0 & MAX_LENGTH {
@@ -72,13 +72,13 @@ impl HilbertCode {
         grid.position(self.point())
     }
 
-    /// Bucket of the hash cell.
+    /// Bucket, below [`BUCKETS`], of the hash cell that contains the position.
     fn bucket(self) -> u32 {
         let [x, y, z] = self.point().map(|coordinate| coordinate >> (GRID_BITS - CELL_BITS));
         hash((x << CELL_BITS | y) << CELL_BITS | z) % BUCKETS
     }
 
-    /// Sort key of a queued request.
+    /// Sort key of a gather at this position in the order `drain`.
     #[inline(always)]
     pub fn key(self, drain: Drain) -> u64 {
         match drain {
@@ -89,14 +89,14 @@ impl HilbertCode {
     }
 }
 
-/// Masks of a level of the curve: its bit in a coordinate, and all bits below it.
+/// Masks of a level of the curve: the level's bit in a coordinate, and all lower bits.
 #[inline(always)]
 fn level_masks(level: u32) -> (u32, u32) {
     (1 << level, (1 << level) - 1)
 }
 
-/// Elementary transform of the curve: mirrors the lower bits of `x`, or exchanges the lower bits of `x` and
-/// `other`. Returns the new `other`.
+/// Elementary transform of the curve: mirrors the lower bits of `x` if `other` has the level's bit, else
+/// exchanges the lower bits of `x` and `other`. Returns the new `other`.
 #[inline(always)]
 fn turn(x: &mut u32, other: u32, (bit, below): (u32, u32)) -> u32 {
     if other & bit != 0 {

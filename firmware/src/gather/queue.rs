@@ -25,7 +25,7 @@ impl<C: Capacity> GatherQueue<C> {
         Self { waiting: Buffer::EMPTY, draining: false }
     }
 
-    /// Sets the capacity for requests, unless the type does.
+    /// Sets the capacity to `requests` requests, if the type leaves it open.
     pub fn reserve(&mut self, requests: usize) {
         self.waiting.reserve(requests);
     }
@@ -71,7 +71,7 @@ impl<C: Capacity> GatherQueue<C> {
         self.draining = true;
     }
 
-    /// First request of a drain that has begun.
+    /// Request that [`Self::take`] returns next in a drain that has begun; `None` if the queue is empty.
     pub fn first(&self) -> Option<&GatherRequest> {
         self.waiting.values().last()
     }

@@ -1,4 +1,4 @@
-//! Record of a waiting gather: position, partial reflection, and the sum that its result is added to.
+//! A waiting gather: position, partial reflection, and the sum that the gathered radiance is added to.
 
 use photoncard_shared::budget::{MAX_IN_FLIGHT, MAX_TILE_PIXELS};
 
@@ -8,18 +8,18 @@ use crate::scene::PartialReflection;
 /// Request to gather photons at a position and add the radiance to a gather point's sum; 24 bytes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GatherRequest {
-    /// Position on the photon grid.
+    /// Position on the photon grid, and length of the gather ray that ends there.
     pub position: HilbertCode,
-    /// Partial reflection times the gather ray's weight. It converts photon power units to radiance units.
+    /// Partial reflection times the gather ray's weight and the photon power unit over the radiance unit.
     pub reflection: PartialReflection,
-    /// Sum to which the result is added.
+    /// Sum to which the gathered radiance is added.
     pub target: GatherTarget,
 }
 
 const _: () = assert!(size_of::<GatherRequest>() == 24);
 
-/// Sum to which the result of a gather is added, 3 bytes: the tile in flight, the gather point in it, and the
-/// cell of the hemisphere.
+/// Sum to which the radiance of a gather is added, 3 bytes: the tile in flight, the gather point in it, and
+/// the cell of the hemisphere that contains the gather ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct GatherTarget {
     /// Index of the gather point in 15 bits, and the flag [`Self::OF_RECORD`]; little-endian.
@@ -31,9 +31,9 @@ pub struct GatherTarget {
 /// Index of a gather point in a tile in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointIndex {
-    /// Number of a pixel's sum.
+    /// Number of a pixel in the tile's run of pixel sums.
     Pixel(u16),
-    /// Index of an irradiance record.
+    /// Index of an irradiance record in the tile's cache.
     Record(u16),
 }
 
@@ -46,7 +46,7 @@ impl GatherTarget {
     /// Flag of an irradiance record.
     const OF_RECORD: u16 = 1 << 15;
 
-    /// Target of the gathers of a point in tile in flight `flight`, which is below [`MAX_IN_FLIGHT`].
+    /// Target of the gathers of `point` in tile in flight `flight`, below [`MAX_IN_FLIGHT`]; cell 0.
     pub const fn new(flight: usize, point: PointIndex) -> Self {
         let bits = match point {
             PointIndex::Pixel(index) => index & !Self::OF_RECORD,
@@ -55,7 +55,7 @@ impl GatherTarget {
         Self { point: bits.to_le_bytes(), cell_and_flight: (flight as u8) << CELL_BITS }
     }
 
-    /// Adds the cell of the hemisphere that contains the gather ray.
+    /// Returns the target with `cell`, the hemisphere cell of the gather ray.
     #[inline(always)]
     #[must_use]
     pub const fn in_cell(self, cell: u8) -> Self {
@@ -69,7 +69,7 @@ impl GatherTarget {
         (self.cell_and_flight >> CELL_BITS) as usize
     }
 
-    /// Cell of the hemisphere.
+    /// Cell of the hemisphere that contains the gather ray.
     #[inline(always)]
     pub const fn cell(self) -> u8 {
         self.cell_and_flight & ((1 << CELL_BITS) - 1)

@@ -93,7 +93,7 @@ mod tests {
             let end = direction_in(Vec3::Z, cell, [1.0, 1.0]);
             let [row, next_row] = [cell, cell + 1].map(|cell| row_and_step(cell)[0]);
             let start = direction_in(Vec3::Z, cell + 1, [0.0, if row == next_row { 1.0 } else { 0.0 }]);
-            // From a row to the next the azimuth turns back: the walk goes on at the same place.
+            // Between two rows the azimuth turns back, so that the next row begins where the last one ended.
             assert!(end.distance(start) < 1e-3, "{cell}: {end} {start}");
         }
     }

@@ -21,17 +21,19 @@ use crate::sampler::radical_inverse;
 use crate::scene::Reflector;
 use crate::vector::{max, unit};
 
-/// Uniform share of the cells in a product table (defensive sampling), because light varies within a cell and
-/// may come through a cell without photons. It bounds the weight of a ray by about twice the albedo.
-/// `docs/techniques.md` has the measurement.
+/// Fraction of the flux in a product table that is spread evenly over the cells (defensive sampling), because
+/// light varies within a cell and may come through a cell without photons. It bounds the weight of a ray by
+/// about twice the albedo. `docs/techniques.md` has the measurement.
 const EVEN_SHARE: f32 = 0.55;
-/// Flux of an empty cell as a fraction of the mean flux: the small energy of Jensen 1995.
+/// Minimum flux of a cell in a photon table, as a fraction of the mean flux: the small energy of Jensen 1995.
 const EMPTY_CELL: f32 = 0.1;
-/// Number of sampled directions by which the lobe is distributed over the cells.
+/// Number of directions sampled from the lobe to distribute it over the cells.
 const LOBE_POINTS: u32 = 32;
-/// Sharpness of a lobe whose solid angle is about that of two cells. Cells take one half of such a lobe.
+/// Sharpness ([`Reflector::lobe_sharpness`]) of a lobe with about the solid angle of two cells. Half of such
+/// a lobe goes to the cells, half to the lobe's own entry.
 const HALF_HELD_SHARPNESS: f32 = 16.0;
-/// Minimum fraction of the lobe's share of the albedos that the lobe's entry has.
+/// Minimum of the lobe entry's share of the rays, as a fraction of the lobe's share of the sum of the
+/// albedos.
 const LOBE_PART: f32 = 0.25;
 
 /// Flux through the cells of the hemisphere: photon power weighted by a colour, in photon power units.
@@ -42,9 +44,10 @@ pub struct IncidentFlux {
 }
 
 impl IncidentFlux {
-    /// Flux of the nearest photons on the point's surface, without photons straight from a light. The
-    /// channels of their power are weighted by `colour`, at most about 1. `normal_code` is the code of
-    /// `normal`.
+    /// Flux of the nearest photons on the point's surface, without photons straight from a light. `colour`,
+    /// at most about 1, weights the channels of their power. `normal` is the shading normal, the axis of the
+    /// hemisphere; `normal_code` is the code of the geometric normal, by which photons of the surface are
+    /// recognised.
     pub fn new(nearest: &NearestPhotons, normal: Vec3, normal_code: u8, colour: Vec3) -> Self {
         let mut flux = Self { cells: [Sum::ZERO; CELLS], squares: Sum::ZERO };
         let mut same_surface = SameSurface::new(normal_code);
@@ -70,7 +73,7 @@ impl IncidentFlux {
         if cells.iter().any(|&cell| cell > 0.0) { cells } else { [1.0; CELLS] }
     }
 
-    /// Flux of each cell, shrunk towards the mean.
+    /// Flux of each cell, shrunk towards the mean by the module's formula.
     fn shrunk(&self) -> [f32; CELLS] {
         let cells = self.raw();
         let mean = mean(&cells);
@@ -107,8 +110,8 @@ fn mean(cells: &[f32; CELLS]) -> f32 {
     cells.iter().sum::<f32>() * (1.0 / CELLS as f32)
 }
 
-/// Table of flux times reflection, for the Lambertian part and for the part of the lobe that is as wide as
-/// the cells.
+/// Product table: flux times reflection. The lobe is divided between the cells and its own entry, which has
+/// the greater part of a lobe that is narrower than two cells.
 fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     let [diffuse, specular] = reflector.albedos();
     let even = EVEN_SHARE * mean(flux);
@@ -124,7 +127,7 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
         let (Some(reflected), Some(flux)) = (cells.get_mut(cell as usize), flux.get(cell as usize)) else {
             continue;
         };
-        // Flux of the cell at the sampled direction, weighted by f / p.
+        // Reflected flux at the sampled direction, weighted by f / p.
         let cosine = reflector.normal.dot(direction);
         let brought = scale * flux * cosine * reflector.lobe_gain(direction);
         *reflected += held * brought;
@@ -135,7 +138,7 @@ fn product(flux: &[f32; CELLS], reflector: &Reflector) -> DirectionTable {
     DirectionTable::new(&cells, max(lobe, least))
 }
 
-/// Sampled directions of the lobe with their cells. Directions below the surface are omitted.
+/// Directions sampled from the lobe, each with its cell. Directions below the shading horizon are omitted.
 fn lobe_points(reflector: &Reflector) -> impl Iterator<Item = (u8, Vec3)> {
     (0..LOBE_POINTS).filter_map(move |index| {
         let point = [radical_inverse(index), (index as f32 + 0.5) / LOBE_POINTS as f32];

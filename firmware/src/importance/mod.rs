@@ -2,8 +2,8 @@
 //! both.
 //!
 //! Every surface point that gather rays start from has a [`DirectionTable`]: 4x8 cells of the hemisphere and
-//! the reflection's lobe as one more entry, each with a share of the rays. A stratified pattern is sent
-//! through the table's inverse cumulative distribution, and the density of the whole mixture weights each
+//! the reflection's lobe as one more entry, each with a share of the rays. A stratified pattern is mapped by
+//! the table's inverse cumulative distribution function, and the density of the whole mixture weights each
 //! ray, so that no choice of shares biases the picture. The sampling methods differ only in the source of the
 //! shares:
 //!

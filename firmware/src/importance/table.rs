@@ -52,7 +52,8 @@ impl DirectionTable {
         sum(&self.cells) + self.lobe as u32
     }
 
-    /// Fraction of all rays that a cell's entry has, without the lobe's rays through the cell.
+    /// Fraction of all rays that a cell's entry has. Rays of the lobe's entry that pass through the cell are
+    /// not included.
     pub(crate) fn cell_share(&self, cell: usize) -> f32 {
         self.cells.get(cell).map_or(0.0, |&share| share as f32) / self.total() as f32
     }
@@ -69,8 +70,9 @@ impl DirectionTable {
         sum(cells) + if entry > LOBE { self.lobe as u32 } else { 0 }
     }
 
-    /// Index of the first of `count` rays that is in direction bin `bin` of `bins` or in a later bin. Bins
-    /// divide the sequence of entries into equal parts, so that the rays of a bin are consecutive.
+    /// Index of the first of `count` rays that is in direction bin `bin`, of `bins`, or in a later bin;
+    /// `count` if there is none. Bins divide the sequence of entries into equal parts, so that the rays of a
+    /// bin are consecutive.
     ///
     /// `count` is at most [`MAX_GATHER_RAYS`](photoncard_shared::budget::MAX_GATHER_RAYS), `bins` at most
     /// [`MAX_BINS`](photoncard_shared::budget::MAX_BINS).
@@ -83,7 +85,7 @@ impl DirectionTable {
         let (entry, part) = ((place / bins) as usize, place % bins);
         // At least 1 in every table, which the compiler cannot prove.
         let total = (self.total() * bins).max(1);
-        // In units of a share over `bins`: integers.
+        // Sum of the shares before the bin, times `bins`, so that it is an integer.
         let beginning = self.before(entry) * bins + self.share(entry) * part;
         first_ray(pattern, count, beginning, total)
     }
@@ -95,8 +97,8 @@ impl DirectionTable {
             return 0;
         }
         let Place { entry, offset, size } = self.place(pattern, index, count);
-        // Of `bins` parts of the entry the ray's, estimated to within 1 and corrected: a division of integers
-        // takes long.
+        // Index of the ray's part if the entry is divided into `bins` parts, estimated in `f32` to within 1
+        // and corrected: a division of 64-bit integers takes long.
         let mut part = (self::part(offset, size) * bins as f32) as u32;
         let begins = |part: u32| part as u64 * size <= offset * bins as u64;
         if !begins(part) {
@@ -111,8 +113,8 @@ impl DirectionTable {
     #[inline(always)]
     fn place(&self, pattern: Pattern, index: u32, count: u32) -> Place {
         let target = stratum_point(pattern, index) * self.total() as u64;
-        // Below the sum of the shares: an entry's end is a whole number of shares, so that the fraction of
-        // one decides nothing.
+        // Number of the share that contains the ray, below the sum of the shares. Entries end at whole
+        // shares, so that the position within the share does not matter.
         let shares = (target >> JITTER_BITS) as u32 / count.max(1);
         let (entry, before) = self.entry_at(shares);
         let [before, size] = [before, self.share(entry)].map(|shares| shares as u64 * whole(count));
@@ -139,8 +141,8 @@ impl DirectionTable {
         (LOBE, before)
     }
 
-    /// Entry of ray `index` of `count`, and the ray's two coordinates within the entry: along the order of
-    /// the cells, and across it.
+    /// Entry of ray `index` of `count`, and the ray's two coordinates in [0, 1] within the entry, in the
+    /// order of [`direction_in`].
     #[inline(always)]
     fn entry(&self, pattern: Pattern, index: u32, count: u32) -> (usize, [f32; 2]) {
         let Place { entry, offset, size } = self.place(pattern, index, count);
@@ -204,8 +206,8 @@ impl DirectionTable {
     }
 }
 
-/// Position of a ray in the sequence of entries: its entry and the offset in it. One share has the length of
-/// all strata together.
+/// Position of a ray in the sequence of entries: the entry, the offset in the entry, and the size of the
+/// entry. Lengths are in units of which one share has `whole(count)`.
 struct Place {
     entry: usize,
     offset: u64,
@@ -215,7 +217,7 @@ struct Place {
 /// Number of bits of a point's offset in its stratum.
 const JITTER_BITS: u32 = 24;
 
-/// Length of all `count` strata together.
+/// Length of all `count` strata together, `2^JITTER_BITS` each.
 #[inline(always)]
 fn whole(count: u32) -> u64 {
     (count as u64) << JITTER_BITS
@@ -237,7 +239,7 @@ fn jitter(pattern: Pattern, index: u32) -> u32 {
 #[inline(always)]
 fn first_ray(pattern: Pattern, count: u32, beginning: u32, total: u32) -> u32 {
     let (ray, remainder) = divide([beginning, count], total);
-    // Begins the stratum: no ray of it is before.
+    // The share begins with a stratum: no ray of this stratum is before it.
     if remainder == 0 {
         return ray;
     }
@@ -298,7 +300,7 @@ mod tests {
         Reflector { normal: Vec3::Y, geometric_normal: Vec3::Y, outgoing: outgoing.normalize(), reflection }
     }
 
-    /// A table with cells between 1 and 255 and a lobe.
+    /// A table with pseudo-random shares of the cells, 1 to 255, and a lobe.
     fn uneven(seed: u32, lobe: f32) -> DirectionTable {
         let mut cells = [0.0; CELLS];
         for (cell, share) in cells.iter_mut().enumerate() {
@@ -388,7 +390,7 @@ mod tests {
         assert!((without_lobe - 0.75).abs() < 5e-3, "{without_lobe}");
     }
 
-    /// The reflector on a triangle that its normal is not of. A part of its lobe is below the triangle.
+    /// The reflector on a triangle with another normal, so that a part of the lobe lies below the triangle.
     fn on_another_triangle(reflector: Reflector) -> Reflector {
         Reflector { geometric_normal: Vec3::new(-0.5, 1.0, 0.2).normalize(), ..reflector }
     }
@@ -403,7 +405,7 @@ mod tests {
             for index in 0..1000 {
                 let Some(sampled) = table.sample(&reflector, pattern(1), index, 1000) else { continue };
                 let density = table.density(&reflector, sampled.direction);
-                // On the border of two cells the rounding of the direction may choose the other.
+                // Near the border of two cells, rounding of the direction may select the other cell.
                 others += u32::from((density / sampled.density - 1.0).abs() > 1e-4);
             }
             assert!(others <= 2, "{others}");

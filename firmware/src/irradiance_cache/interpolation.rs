@@ -9,7 +9,7 @@ use crate::kind::{Capacity, Map};
 use crate::scene::Surface;
 use crate::vector::{max, min};
 
-/// Minimum sum of the weights of the records for a sample.
+/// Minimum sum of the records' weights at which a sample is interpolated.
 const MIN_WEIGHT: f32 = 0.05;
 
 /// Records at the corners of a cell; `None` for a corner without a record.
@@ -21,7 +21,7 @@ impl<'a> Corners<'a> {
     }
 
     /// Error of each corner's record at a surface point; infinite without a record. Radii of validity are
-    /// clamped by those of neighbours (Křivánek 2006): by the triangle inequality,
+    /// clamped by those of the other corners (Křivánek 2006): by the triangle inequality,
     /// `R_i <= R_j + |p_i - p_j|`.
     pub(super) fn errors(&self, allowed: f32, position: Vec3, normal: Vec3) -> impl Iterator<Item = f32> {
         let mut errors = [f32::INFINITY; 4];
@@ -45,7 +45,7 @@ pub struct SeenSample<'a> {
     pub pixel: [u32; 2],
     /// Position in the picture, pixels from the upper left corner.
     pub film: [f32; 2],
-    /// Visible surface.
+    /// Surface that the sample sees.
     pub surface: &'a Surface,
 }
 
@@ -64,7 +64,7 @@ impl<R: Capacity> IrradianceCache<R> {
         Corners(records)
     }
 
-    /// The undivided cell that contains a pixel.
+    /// The undivided cell that contains a pixel; `None` outside the block.
     fn undivided_cell(&self, [x, y]: [u32; 2]) -> Option<Cell> {
         let mut cell = Cell::coarsest(x, y);
         let (_, divided) = self.roots.iter().find(|(corner, _)| *corner == cell.corner)?;
@@ -74,7 +74,7 @@ impl<R: Capacity> IrradianceCache<R> {
         Some(cell)
     }
 
-    /// Weights of the records for a sample; `None` if the sample cannot be interpolated.
+    /// Weights of the records for a sample; `None` if their sum is below [`MIN_WEIGHT`].
     fn weights(&self, sample: &SeenSample, allowed: f32) -> Option<Weights> {
         let SeenSample { pixel, film, surface } = *sample;
         // By pixel, as the filter may move `film` out of the pixel.
@@ -92,14 +92,14 @@ impl<R: Capacity> IrradianceCache<R> {
         (weights.iter().sum::<f32>() >= MIN_WEIGHT).then_some(Weights { cell, weights })
     }
 
-    /// Returns true if a sample is interpolated. This depends only on the geometry of the records, whether
-    /// they are gathered or not.
+    /// Returns true if the records suffice to interpolate a sample. The result depends on their geometry
+    /// alone, and is the same before and after they are gathered.
     pub fn covers(&self, sample: &SeenSample, allowed: f32) -> bool {
         self.weights(sample, allowed).is_some()
     }
 
-    /// Interpolated indirect irradiance at a sample divided by pi, W/(sr m^2); `None` if the sample needs a
-    /// final gather.
+    /// Interpolated indirect irradiance over pi, `E / pi`, at a sample, W/(sr m^2); `None` if the sample
+    /// needs a final gather.
     pub fn interpolate(&self, sample: &SeenSample, allowed: f32) -> Option<Vec3> {
         let Weights { cell, weights } = self.weights(sample, allowed)?;
         let surface = sample.surface;

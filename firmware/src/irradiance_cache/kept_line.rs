@@ -18,7 +18,7 @@ pub(super) fn words_of(line: &Line) -> [u32; WORDS] {
     words
 }
 
-/// Joins words to a line.
+/// Joins words into a line.
 pub(super) fn line_of(words: [u32; WORDS]) -> Line {
     let mut line = Line::ZERO;
     for (bytes, word) in line.0.as_chunks_mut().0.iter_mut().zip(words) {
@@ -27,18 +27,18 @@ pub(super) fn line_of(words: [u32; WORDS]) -> Line {
     line
 }
 
-/// Makes a line of its first words. The others are 0.
+/// Builds a line from its first words. The others are 0.
 fn line_of_first(first: impl IntoIterator<Item = u32>) -> Line {
     let mut words = [0; WORDS];
     words.iter_mut().zip(first).for_each(|(word, value)| *word = value);
     line_of(words)
 }
 
-/// First line of a block of records.
+/// Head of a kept block: the line before its records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct BlockHead {
     pub(super) window: Window,
-    /// Line of the next older block with the same hash; 0 if there is none.
+    /// Line address of the [`BlockHead`] of the next older block with the same hash; 0 if there is none.
     pub(super) older: u32,
     /// Number of records in the following lines; `None` if the records of the window do not fit into the
     /// cache.
@@ -47,7 +47,7 @@ pub(super) struct BlockHead {
     pub(super) divided: [u32; MAX_ROOTS],
 }
 
-/// Number that marks records that do not fit into the cache.
+/// Stored value of [`BlockHead::records`] for a block whose records do not fit into the cache.
 const FULL: u32 = u32::MAX;
 
 impl BlockHead {
@@ -89,7 +89,7 @@ impl KeptRecord {
         Some(line_of_first([x, y, geometric_normal].into_iter().chain(values.map(f32::to_bits))))
     }
 
-    /// Decodes a line with any content.
+    /// Decodes a line, whatever its content.
     pub(super) fn read(line: &Line) -> Option<Self> {
         let [x, y, geometric_normal, magnitude, distance, radius, rest @ ..] = words_of(line);
         let vectors = rest.as_chunks::<3>().0.first_chunk()?;

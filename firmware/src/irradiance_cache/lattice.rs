@@ -15,7 +15,7 @@ const fn side(level: u32) -> u32 {
     if side == 0 { 1 } else { side }
 }
 
-/// A corner of the lattice, pixels from the picture's upper left corner.
+/// Corner of a lattice cell, pixels from the picture's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LatticePoint {
     /// Distance to the right, pixels.
@@ -30,7 +30,7 @@ pub struct LatticePoint {
 const FILM_OFFSET: [f32; 2] = [1.0 / 32.0, 1.0 / 64.0];
 
 impl LatticePoint {
-    /// Position in the picture of the eye ray of this point's record, pixels.
+    /// Position in the picture, pixels, through which the eye ray of this point's record goes.
     pub(super) fn film_position(&self) -> [f32; 2] {
         let [right, down] = FILM_OFFSET;
         [self.x as f32 + right, self.y as f32 + down]

@@ -7,18 +7,18 @@
 //! is a reconstruction. The positions of the records depend only on the geometry seen in one cell of a
 //! lattice over the picture:
 //!
-//! - Records are at the corners of the cells, 16 pixels apart. A survey determines the surface that each
-//!   record sees, and the harmonic mean of its distances to surrounding surfaces along a few rays, without a
-//!   gather.
+//! - Records are at the corners of the cells, 16 pixels apart. A survey determines the surface that the eye
+//!   sees at each corner, and the harmonic mean of the distances to surrounding surfaces along a few rays,
+//!   without a gather.
 //! - A cell is divided in four, down to a side of 2 pixels, unless its corners cover it: every corner, and
 //!   every point that a division would add, is within the allowed error of all four corner records.
 //! - A sample interpolates those of the four corner records of its undivided cell that are valid at the
-//!   surface it sees. Weights are continuous across cells of one size. A sample without a valid record casts
-//!   gather rays.
-//! - All records are gathered. The survey determines the coefficients of their gradients, so that their
-//!   gathers can be reordered like all others and wait together with those of pixels. Geometry alone decides
-//!   which samples are interpolated; their light is added when all gathers of the block are done. Hardly
-//!   any record is wasted, because each is a corner of an undivided cell.
+//!   surface it sees. Weights are continuous across cells of one size. A sample at which they sum to too
+//!   little casts gather rays.
+//! - All records are gathered. The survey determines the coefficients of their gradients, so that gathers of
+//!   records can be reordered like all others and wait together with those of pixels. Geometry alone decides
+//!   which samples are interpolated; their light is added when all gathers of the block's records are done.
+//!   Hardly any record is wasted, because each is a corner of an undivided cell.
 //!
 //! Two tiles with a common lattice point therefore compute the same record, and there are no seams. A tile
 //! whose records do not fit into the cache is rendered in smaller blocks. More records are then computed
@@ -63,10 +63,10 @@ pub const MIN_RECORDS: usize = 4 + 5 * (lattice::LEVELS as usize - 1);
 
 /// Irradiance records of a block.
 pub struct IrradianceCache<R: Capacity> {
-    /// Records by lattice point; `None` at a point that sees no surface with a Lambertian part.
+    /// Records by lattice point; `None` where the eye ray meets no surface with a Lambertian part first.
     records: R::Map<LatticePoint, Option<Record>>,
-    /// Coarsest cells, each with a bit mask of the divided cells in its quadtree
-    /// ([`lattice::Cell::tree_number`]).
+    /// Upper left corners of the coarsest cells, each with a bit mask of the divided cells in the cell's
+    /// quadtree ([`lattice::Cell::tree_number`]).
     roots: Vec<(LatticePoint, u32), MAX_ROOTS>,
     survey: Survey,
 }
@@ -87,7 +87,7 @@ impl<R: Capacity> IrradianceCache<R> {
         Self { records: Map::EMPTY, roots: Vec::new(), survey: Survey::BEGIN }
     }
 
-    /// Sets the capacity for records, a power of two, unless the type does.
+    /// Sets the capacity to `records` records, a power of two, if the type leaves it open.
     pub fn reserve(&mut self, records: usize) {
         self.records.reserve(records);
     }
@@ -95,7 +95,7 @@ impl<R: Capacity> IrradianceCache<R> {
     /// Removes all records and sets up the coarsest cells of a window of the picture.
     ///
     /// # Errors
-    /// [`Full`] if the window overlaps too many cells.
+    /// [`Full`] if the window overlaps too many coarsest cells.
     pub fn begin(&mut self, window: &Window) -> Result<(), Full> {
         self.forget();
         let steps = |from: u32, to: u32| {
@@ -117,7 +117,7 @@ impl<R: Capacity> IrradianceCache<R> {
         self.survey = Survey::BEGIN;
     }
 
-    /// Number of lattice points, with or without a record.
+    /// Number of lattice points that the cache holds, with or without a record.
     pub fn lattice_points(&self) -> u32 {
         self.records.entries() as u32
     }
@@ -131,8 +131,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Some(GatherPoint::record(record.as_ref()?.surface(), pattern, frame.gather_rays))
     }
 
-    /// Begins the gather of a record. The directions of its gather point determine the coefficients of its
-    /// gradient.
+    /// Begins the gather of record `index`. The direction table of `point`, its gather point, determines the
+    /// coefficients of the record's translational gradient.
     ///
     /// # Errors
     /// [`Invariant::Record`] if the record was not surveyed.
@@ -147,7 +147,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Err(Invariant::Record.fault())
     }
 
-    /// Adds the radiance of a gather ray, in a cell of the hemisphere, to a record that is being gathered.
+    /// Adds the weighted radiance of a gather ray in cell `cell` of the hemisphere, in the card image's
+    /// radiance units, to record `index`.
     ///
     /// # Errors
     /// [`Invariant::Record`] if the record is not being gathered.
@@ -163,7 +164,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Err(Invariant::Record.fault())
     }
 
-    /// Ends the gather of all records: converts their sums to irradiance over pi, W/(sr m^2).
+    /// Ends the gather of all records: converts their sums to irradiance over pi, W/(sr m^2). `allowed` is
+    /// the error bound of interpolation.
     ///
     /// # Errors
     /// [`Invariant::Record`] if a record is not being gathered.

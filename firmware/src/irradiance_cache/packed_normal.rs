@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use crate::vector::{max, min, unit};
 
-/// Maximum of a coordinate.
+/// Code of the octahedral coordinate 1.
 const SCALE: f32 = 32_767.0;
 
 /// A unit vector in 32 bits.

@@ -17,31 +17,32 @@ pub(super) enum Content {
     /// During the survey: inverse distance to the surroundings by cell of the hemisphere, 1/m, bfloat16. It
     /// is 0 in cells that are not surveyed yet.
     Surveying([u16; CELLS]),
-    /// After the survey: distances to the surroundings.
+    /// After the survey: distances to the surroundings by cell of the hemisphere.
     Surveyed(Distances),
-    /// During the gather: sums of radiance, and the strongest term.
+    /// During the gather: the strongest gather ray, and sums of radiance over all rays.
     Gathering(Strongest, GatherSums),
     /// After the gather: irradiance and gradients.
     Gathered(Irradiance),
 }
 
-/// Sums of a record that is being gathered, in the image's radiance units.
+/// Sums over the gather rays of a record, in the card image's radiance units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GatherSums {
-    /// Coefficients of the translational gradient by cell, bfloat16.
+    /// Coefficients of the translational gradient by cell of the hemisphere, bfloat16.
     coefficients: [[u16; 2]; CELLS],
     mean: ColourSum,
     translation: [ColourSum; 2],
     rotation: [ColourSum; 2],
 }
 
-/// Strongest term of a record, and the strength of the second strongest, whatever the order of the terms. The
-/// bytes have no alignment: they lie in front of the sums in [`Content`], and take no memory.
+/// Strongest term of a record's sums, and the strength, the sum of channels, of the second strongest; both
+/// independent of the order of the terms. Without alignment the bytes fit beside the tag of [`Content`] and
+/// take no memory of their own.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Strongest {
     light: Rgbe,
     cell: u8,
-    /// Sum of channels, bfloat16.
+    /// Strength of the second strongest term, bfloat16.
     second: [u8; 2],
 }
 
@@ -51,7 +52,7 @@ impl Strongest {
     /// No term.
     pub(super) const NONE: Self = Self { light: Rgbe([0; 4]), cell: 0, second: [0; 2] };
 
-    /// Takes account of a term.
+    /// Takes account of a term: the weighted radiance of a gather ray in cell `cell` of the hemisphere.
     #[inline]
     pub(super) fn add(&mut self, cell: u8, light: Vec3) {
         if upper_half(light.element_sum()) < self.second() {
@@ -71,15 +72,16 @@ impl Strongest {
         u16::from_ne_bytes(self.second)
     }
 
-    /// Order of terms: by strength, then by all that distinguishes them. Bits of non-negative numbers have
-    /// the numbers' order.
+    /// Sort key of a term: strength, then cell and encoded radiance. The bits of non-negative `f32` numbers
+    /// have the numbers' order.
     fn key(&self) -> [u32; 3] {
         [self.light().element_sum().to_bits(), self.cell.into(), u32::from_le_bytes(self.light.0)]
     }
 }
 
-/// Maximum of a lone strong term, divided by the sum of the other terms. A place that brings more, for which
-/// directions are not sampled, is found by one record in many, and shows as a disc of that record's radius.
+/// Maximum of a single strong term, divided by the sum of the others. A small bright place that the direction
+/// table does not favour is hit by a ray of one record in many, and would show as a disc of that record's
+/// radius.
 const LONE_SHARE: f32 = 0.25;
 
 impl GatherSums {
@@ -93,7 +95,7 @@ impl GatherSums {
         }
     }
 
-    /// Adds the radiance of a gather ray in a cell of the hemisphere.
+    /// Adds the weighted radiance of a gather ray in cell `cell` of the hemisphere.
     #[inline]
     pub(super) fn add(&mut self, cell: u8, brought: Vec3) {
         self.mean.add(brought);
@@ -107,8 +109,8 @@ impl GatherSums {
         }
     }
 
-    /// Converts the sums to irradiance. `unit` is the radiance unit, `distance` the record's harmonic mean
-    /// distance, metres.
+    /// Converts the sums to irradiance over pi, W/(sr m^2). `unit` is the radiance unit, W/(sr m^2),
+    /// `distance` the record's harmonic mean distance, metres.
     pub(super) fn irradiance(&self, unit: f32, distance: f32) -> Irradiance {
         Irradiance {
             mean: self.mean.value() * unit,
@@ -117,8 +119,8 @@ impl GatherSums {
         }
     }
 
-    /// Limits the strongest term to the second strongest, or to [`LONE_SHARE`] of the others' sum if that is
-    /// more, and to 1/128 of itself by its rounding. The only term is kept.
+    /// Limits the strongest term to the second strongest or, if more, to [`LONE_SHARE`] of the sum of the
+    /// others. By rounding it may exceed the limit by 1/128 of itself. A record's only term is kept.
     pub(super) fn limited(mut self, strongest: &Strongest) -> Self {
         let [strength, second] = [strongest.light().element_sum(), from_upper_half(strongest.second())];
         let others = self.mean.value().element_sum() - strength;
@@ -155,7 +157,7 @@ pub(super) struct Record {
     pub(super) magnitude: f32,
     /// Harmonic mean of the distances to the surroundings, metres; undefined before the survey ends.
     pub(super) distance: f32,
-    /// Radius of validity, metres: `distance`, but at least so large that the record is valid over some
+    /// Radius of validity, metres: `distance`, but at least so large that the record is valid over a few
     /// pixels.
     pub(super) radius: f32,
     pub(super) content: Content,
@@ -208,16 +210,17 @@ impl Record {
         Ok(())
     }
 
-    /// White Lambertian surface at the record's position.
+    /// White Lambertian surface with the record's position and normals.
     pub(super) fn surface(&self) -> Surface {
         let geometric_normal = self.geometric_normal.get().unwrap_or(self.normal);
         Surface { geometric_normal, ..Surface::white(self.position, self.normal, self.magnitude) }
     }
 
-    /// Error of the record at a point: `|p - p_i|^2 / R^2 + 1 - n n_i`, where R is `radius`. It is of second
-    /// order in distance and angle, because gradients remove the first-order error of Ward, Rubinstein, Clear
-    /// 1988. It is infinite for points off the record's tangent plane (the tolerance shrinks with the
-    /// distance of the surroundings) and for normals at 90 degrees or more.
+    /// Error of the record at a point `p` with the normal `n`: `|p - p_i|^2 / R^2 + 1 - n.n_i`, where `p_i`
+    /// and `n_i` are the record's, and `R` is `radius`. It is of second order in distance and angle, because
+    /// gradients remove the first-order error of Ward, Rubinstein, Clear 1988. It is infinite for points off
+    /// the record's tangent plane (the tolerance shrinks with the distance of the surroundings) and for
+    /// normals at 90 degrees or more.
     pub(super) fn error(&self, radius: f32, allowed: f32, position: Vec3, normal: Vec3) -> f32 {
         let way = position - self.position;
         let cosine = self.normal.dot(normal);
@@ -244,8 +247,8 @@ impl Irradiance {
         changed.max(Vec3::ZERO)
     }
 
-    /// Limits the translational gradient to `mean / distance`, averaged over channels. Steeper gradients are
-    /// noise.
+    /// Limits the translational gradient to `mean / distance`, both averaged over channels. Steeper gradients
+    /// are noise.
     pub(super) fn limited(mut self, distance: f32) -> Self {
         let greatest = self.mean.element_sum() * (1.0 / 3.0) / distance;
         let [x, y] = self.translation.map(|component| component.element_sum() * (1.0 / 3.0));
@@ -261,7 +264,7 @@ impl Irradiance {
 mod tests {
     use super::*;
 
-    /// Mean of a record of terms, each of a cell and of channels 1 : 1/2 : 1/4.
+    /// Irradiance of a record whose terms are the pairs of a cell and a light, in channels 1 : 1/2 : 1/4.
     fn mean(terms: impl IntoIterator<Item = (u8, f32)>) -> Irradiance {
         let (mut strongest, mut sums) = (Strongest::NONE, GatherSums::new(&[[0.5, 0.25]; CELLS]));
         for (cell, light) in terms {
@@ -302,7 +305,7 @@ mod tests {
 
     #[test]
     fn a_record_does_not_depend_on_the_order_of_its_rays() {
-        // Strengths that are equal, and that differ by less than they are rounded.
+        // Strengths that are equal, and strengths that differ by less than their rounding error.
         let near = 171.2 / 256.0;
         for strong in [[(3, 4.0), (9, 4.0), (4, 5.0), (2, 5.0)], [(1, near), (2, near), (9, near), (9, 0.1)]]
         {

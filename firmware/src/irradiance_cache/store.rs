@@ -1,12 +1,12 @@
-//! Irradiance records that a chip keeps in card memory, beyond the image, from one frame of a picture to the
-//! next.
+//! Irradiance records that a chip keeps in card memory, past the card image, from one frame of a picture to
+//! the next.
 //!
 //! Records depend on the scene and the camera, not on the samples of a frame or its order of work. The
 //! gathered records of a block are written together with the division of its cells. A frame with other
 //! samples reads them back instead of surveying and gathering. The store also notes blocks whose records do
 //! not fit into the cache, so that their survey is not repeated. Blocks that are not found are surveyed and
 //! gathered again, with the same bits: blocks for which there was no room, and all blocks after a change of
-//! the image or of the frame.
+//! the card image or of another parameter of the frame.
 //!
 //! | lines | contents |
 //! |---|---|
@@ -30,14 +30,15 @@ const DIRECTORY_LINES: u32 = 128;
 /// Upper bound of the length of a frame's encoded parameters, bytes.
 const KEY_BYTES: usize = 128;
 
-/// Parameters that the records of a frame depend on, encoded. Floats are compared by their bits.
+/// Encoded parameters of a frame, those that no record depends on replaced by constants. Floats are compared
+/// by their bits.
 type Key = [u8; KEY_BYTES];
 
-/// Location of the kept records of one picture in the lines beyond the image.
+/// Location of the kept records of one picture in the lines past the card image.
 pub struct RecordStore {
     /// Key of the picture; `None` if no records may be kept.
     key: Option<Key>,
-    /// First line beyond the image; `limit` is past the last one.
+    /// First line past the card image; `limit` is the line past the last one.
     first: u32,
     limit: u32,
     /// End of the lines in use; equal to `first` if there is no directory.
@@ -55,13 +56,14 @@ pub enum Recalled {
     Nothing,
 }
 
-// Not inlined: the stack of rays and gathers would have the lines of these functions as well.
+// Not inlined: the lines in these functions would enlarge the stack frames of rays and gathers.
 impl RecordStore {
     /// Store without lines.
     pub const EMPTY: Self = Self { key: None, first: 0, limit: 0, end: 0 };
 
-    /// Begins a frame with the lines `room` beyond the image. Keeps records of earlier frames with the same
-    /// key, and drops others. If the image has changed, [`Self::forget`] must be called.
+    /// Begins a frame with the lines `room` past the card image. Keeps the records of earlier frames if these
+    /// had the same lines and differ only in samples and order of work; else drops them. If the card image
+    /// has changed, [`Self::forget`] must be called.
     #[inline(never)]
     pub fn begin_frame(&mut self, frame: &FrameParameters, room: Range<u32>) {
         let key = key(frame);
@@ -124,19 +126,19 @@ impl RecordStore {
         }
         let count = records().count() as u32;
         let head = BlockHead { window: *window, older: 0, records: Some(count), divided };
-        // Without room the next frame gathers them again.
+        // Without room the next frame gathers the records again.
         let _ = self.append(memory, &head, records());
     }
 
-    /// Records that the irradiance records of a window do not fit into the cache, if there is room.
+    /// Notes, if there is room, that the irradiance records of a window do not fit into the cache.
     #[inline(never)]
     pub fn keep_full<M: MemoryPort>(&mut self, memory: &mut M, window: &Window) {
         let head = BlockHead { window: *window, older: 0, records: None, divided: [0; MAX_ROOTS] };
-        // Without room the next frame finds it again.
+        // Without room the next frame surveys the window again.
         let _ = self.append(memory, &head, core::iter::empty());
     }
 
-    /// Finds the head of a window's block, and its address.
+    /// Finds a window's block. Returns its head and the head's line address; `None` if it is not kept.
     fn find<M: MemoryPort>(
         &self,
         memory: &mut M,
@@ -160,7 +162,7 @@ impl RecordStore {
         Ok(None)
     }
 
-    /// Line of the directory for a window, and the word in that line.
+    /// Line address of a window's directory entry, and the index of its word in that line.
     fn place(&self, window: &Window) -> (u32, usize) {
         let hash = hash(window.x0 ^ hash(window.y0));
         (self.first + hash % DIRECTORY_LINES, (hash / DIRECTORY_LINES) as usize % WORDS)

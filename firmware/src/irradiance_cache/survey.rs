@@ -21,18 +21,19 @@ use crate::sampler::{Dimension, Pattern, unit_interval};
 use crate::scene::{BUNDLE_RAYS, Ray, Surface, closest_hits};
 use crate::vector::min;
 
-/// Minimum radius of validity of a record, pixels. It bounds the number of records in corners.
+/// Minimum distance up to which a record is valid, pixels: radius of validity times `sqrt(allowed error)`. It
+/// bounds the number of records in corners of a scene.
 const MIN_REACH: f32 = 3.0;
-/// Error bound below which the minimum radius shrinks in proportion, so that the picture converges to that
-/// without records.
+/// Error bound below which [`MIN_REACH`] shrinks in proportion, so that with the bound the picture converges
+/// to that without records.
 const ERROR_OF_MIN_REACH: f32 = 0.1;
 
 impl<R: Capacity> IrradianceCache<R> {
-    /// Does the next piece of the survey: one lattice cell, or one ray for each of some records. Returns
-    /// whether it was the last.
+    /// Does the next piece of the survey: one lattice cell, or a bundle of rays for up to [`BUNDLE_RAYS`]
+    /// records. Returns whether the survey is done.
     ///
     /// # Errors
-    /// A [`Fault`] if the image is invalid; `Ok(Err(Full))` if the records do not fit into the cache.
+    /// A [`Fault`] if the card image is invalid; `Ok(Err(Full))` if the records do not fit into the cache.
     pub fn survey<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -79,7 +80,7 @@ impl<R: Capacity> IrradianceCache<R> {
         None
     }
 
-    /// Places records at the corners of a cell.
+    /// Places records at those corners of a cell that have none.
     fn place<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,
@@ -141,8 +142,8 @@ impl<R: Capacity> IrradianceCache<R> {
         Ok(())
     }
 
-    /// Returns whether all four corners have records, and the other corners and all points that a division
-    /// would add are within the error bound of each.
+    /// Returns whether four records suffice for a cell: each has an error below `allowed` at every corner and
+    /// at every point that a division would add.
     fn is_covered<M: MemoryPort>(
         &self,
         context: &mut Context<M>,
@@ -183,7 +184,7 @@ fn new_record<M: MemoryPort>(
     allowed: f32,
 ) -> Result<Option<Record>, Fault> {
     let seen = eye::see(context, point.film_position())?;
-    // A surface seen in a mirror or through glass is not where the lattice point is.
+    // Records lie where eye rays meet surfaces, not behind mirrors and glass.
     let surface = seen.filter(|surface| surface.reflection.has_lambertian() && surface.specular.is_none());
     Ok(surface.map(|surface| {
         let reach = MIN_REACH * min(allowed / ERROR_OF_MIN_REACH, 1.0) * eye::pixel_side(context, &surface);

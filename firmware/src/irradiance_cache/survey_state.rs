@@ -1,14 +1,14 @@
 //! State of the survey of a block.
 
-/// Progress of the survey.
+/// Progress of a block's survey, level by level of the lattice.
 pub(super) struct Survey {
     pub(super) level: u32,
     pub(super) task: Task,
     /// Index of the next item of the task: a cell of the level, counted over all coarsest cells, or a record.
     pub(super) index: usize,
-    /// Number of the current cell of the hemisphere.
+    /// Cell of the hemisphere in which rays are cast.
     pub(super) direction: u8,
-    /// Number of records already surveyed; they come first.
+    /// Number of lattice points that earlier levels have surveyed; they come first in the cache.
     pub(super) first: usize,
 }
 
@@ -19,7 +19,7 @@ pub(super) enum Task {
     Placing,
     /// Rays are cast from the new records, one in each cell of the hemisphere.
     Rays,
-    /// Cells are divided.
+    /// Cells that their corner records do not cover are divided.
     Division,
 }
 

@@ -15,7 +15,7 @@ pub trait Capacity: 'static {
     type Buffer<T>: Buffer<T>;
     /// A hash map, whose capacity must be a power of two.
     type Map<K: Copy + Eq + Hash, V>: Map<K, V>;
-    /// An array of values that always exist.
+    /// An array of fixed length, whose values exist from the start.
     type Array<T: Vacant>: Array<T>;
     /// A buffer of candidates of a photon search.
     type Candidates: CandidateStorage;
@@ -46,7 +46,7 @@ pub trait Buffer<T> {
     /// Vector without values.
     const EMPTY: Self;
 
-    /// Sets the capacity, unless the type does.
+    /// Sets the capacity; has no effect if the type determines it.
     fn reserve(&mut self, _entries: usize) {}
 
     /// Maximum number of values.
@@ -70,8 +70,8 @@ pub trait Buffer<T> {
     /// Removes the last value.
     fn pop(&mut self) -> Option<T>;
 
-    /// Sets the number of values. Added values are `value`. Returns false, and changes nothing, if the number
-    /// exceeds the capacity.
+    /// Sets the number of values. Values that are added are clones of `value`. Returns false, and changes
+    /// nothing, if the number exceeds the capacity.
     #[must_use]
     fn resize(&mut self, count: usize, value: T) -> bool
     where
@@ -120,18 +120,18 @@ impl<T, const N: usize> Buffer<T> for Vec<T, N> {
     }
 }
 
-/// A large value that is initialised in place and never moved.
+/// A large value that is initialised where it stays: its type has a constant initial value.
 pub trait Vacant {
-    /// Value that is not in use.
+    /// Initial value: not in use.
     const VACANT: Self;
 }
 
-/// An array of values without a use at first.
+/// An array of values, all [`Vacant::VACANT`] at first.
 pub trait Array<T> {
-    /// Array of values that are not in use, before [`Self::reserve`].
+    /// Array of [`Vacant::VACANT`] values, before [`Self::reserve`].
     const VACANT: Self;
 
-    /// Sets the length, unless the type does.
+    /// Sets the length; has no effect if the type determines it.
     fn reserve(&mut self, _entries: usize) {}
 
     /// Values, read-only.
@@ -160,7 +160,7 @@ pub trait Map<K, V> {
     /// The map without entries.
     const EMPTY: Self;
 
-    /// Sets the capacity, unless the type does.
+    /// Sets the capacity; has no effect if the type determines it.
     fn reserve(&mut self, _entries: usize) {}
 
     /// Maximum number of entries.

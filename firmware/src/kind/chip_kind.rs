@@ -9,21 +9,21 @@ use crate::memory::CacheEntry;
 
 /// A kind of chip: the containers of its buffers, and their capacities.
 pub trait ChipKind: 'static {
-    /// Capacity [`Budget::tile_pixels`].
+    /// Containers with capacity [`Budget::tile_pixels`].
     type TilePixels: Capacity;
-    /// Capacity [`gather_candidates`] of [`Budget::neighbors`].
+    /// Containers with capacity [`gather_candidates`] of [`Budget::neighbors`].
     type Candidates: Capacity;
-    /// Capacity [`Budget::gather_queue`].
+    /// Containers with capacity [`Budget::gather_queue`].
     type GatherQueue: Capacity;
-    /// Capacity [`Budget::irradiance_records`].
+    /// Containers with capacity [`Budget::irradiance_records`].
     type IrradianceRecords: Capacity;
-    /// Number of gather points whose rays are cast together. They belong to the records of a block, or to as
-    /// many of its pixels.
+    /// Containers for the gather points whose rays are cast together: those of the irradiance records of a
+    /// block, or of a run of its pixels.
     type Points: Capacity;
-    /// Capacity [`Budget::in_flight`].
+    /// Containers with capacity [`Budget::in_flight`].
     type Flights: Capacity;
 
-    /// Capacities, as a card reports them when a session begins.
+    /// Budget of the kind, which a card reports when a session begins.
     fn budget(&self) -> &Budget;
 }
 
@@ -38,9 +38,9 @@ pub trait FixedKind:
         Flights: FixedCapacity,
     >
 {
-    /// The kind as a value.
+    /// The value of the kind's type.
     const KIND: Self;
-    /// [`ChipKind::budget`].
+    /// Budget of the kind, as [`ChipKind::budget`] returns it.
     const BUDGET: Budget;
     /// Upper limits of the on-chip memory that each technique adds.
     const TECHNIQUE_LIMITS: TechniqueMemory;
@@ -51,7 +51,7 @@ pub trait FixedKind:
 pub struct TechniqueMemory {
     /// Deferred reordering: the gather queue.
     pub reordering: usize,
-    /// Irradiance cache: the records of all tiles in flight, and their sums.
+    /// Irradiance cache: the irradiance records of all tiles in flight, and the sums of their gathers.
     pub irradiance_cache: usize,
     /// Combined importance sampling: a direction table for every gather point.
     pub importance_sampling: usize,

@@ -3,7 +3,7 @@
 //!
 //! Each file here is a kind: the constant of its budget, the limits of its techniques, and implementations of
 //! [`ChipKind`] and [`FixedKind`]. The kind is the only capacity parameter of [`Chip`](crate::chip::Chip) and
-//! [`Card`](crate::card::Card). An emulator adds one kind, whose capacities are values, so that one copy of
+//! [`Card`](crate::card::Card). An emulator adds one kind whose capacities are values, so that one copy of
 //! the chip's code emulates all kinds.
 
 mod capacity;

@@ -53,6 +53,6 @@ impl FixedKind for Reference {
     };
 }
 
-/// Buffer of candidates for a search with the maximum number of neighbours of [`REFERENCE`], used for
-/// searches on the host.
+/// Buffer of candidates for photon searches on the host, with up to as many neighbours as [`REFERENCE`]
+/// allows.
 pub type ReferenceCandidates = CandidateBuffer<{ gather_candidates(REFERENCE.neighbors) }>;

@@ -1,4 +1,4 @@
-//! A memory port that counts reads.
+//! A memory port that counts reads and written bytes.
 
 use core::ops::Range;
 
@@ -7,8 +7,8 @@ use photoncard_shared::message::Fault;
 
 use super::{CardMemory, MemoryPort, Stage, Traffic};
 
-/// A memory and its traffic. Above a cache it counts the chip's requests, below a cache the misses of the
-/// cache.
+/// Memory port that counts the traffic to the memory it wraps. Above a cache it counts the chip's requests,
+/// below a cache the cache's misses and the reads that fill its lines.
 pub struct Counted<M> {
     memory: M,
     stage: Stage,
@@ -16,7 +16,7 @@ pub struct Counted<M> {
 }
 
 impl<M> Counted<M> {
-    /// Wraps `memory` and counts its reads.
+    /// Wraps `memory` and counts its traffic.
     pub const fn new(memory: M) -> Self {
         Self { memory, stage: Stage::Begin, traffic: Traffic::ZERO }
     }

@@ -76,7 +76,8 @@ impl CardMemory for Dram<'_> {
     }
 
     fn write_byte(&mut self, address: LineAddress, place: usize, byte: u8) -> Option<()> {
-        // The compiler, which does not know the place, cannot join this store with others to one of a word.
+        // `black_box` hides the place from the compiler, which could otherwise join this store with others to
+        // one of a word.
         *black_box(self.lines.get_mut(address.0 as usize)?.0.get_mut(place)?) = byte;
         Some(())
     }

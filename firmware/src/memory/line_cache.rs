@@ -1,8 +1,9 @@
 //! Set-associative caches of lines with LRU replacement.
 //!
-//! One type serves two purposes. On a board with slow DRAM, a cache keeps lines in on-chip memory; over a
-//! [`super::Counted`] it simulates the fetches of a chip with a cache of this shape. It holds data in both
-//! cases, so that hits are equal by construction, and a wrong line would be visible in the picture.
+//! [`LineCaches`] serves two purposes. On a board with slow DRAM, it keeps lines in on-chip memory; over a
+//! [`super::Counted`] it simulates the fetches of a chip with caches of this shape. The cached data are used
+//! in both cases, so that simulated hits are hits by construction, and a wrong line would show in the
+//! picture.
 
 use core::fmt;
 use core::ops::Range;
@@ -23,7 +24,7 @@ pub enum SetIndex {
     Hashed,
 }
 
-/// Shape of a cache: size, line, associativity and set index.
+/// Shape of a cache: size, line size, associativity and set index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CacheShape {
     sets: u32,
@@ -114,10 +115,10 @@ impl CacheShape {
     }
 }
 
-/// Tag of a cache line.
+/// Tag of a cache line: the block that it holds.
 #[derive(Clone, Copy, Debug)]
 pub struct CacheEntry {
-    /// Index of the block in card memory.
+    /// Index of the block in card memory; [`NOTHING`] for an empty cache line.
     block: u32,
     /// Index of the cache line that holds the block.
     slot: u32,
@@ -131,17 +132,17 @@ impl CacheEntry {
     pub const EMPTY: Self = Self { block: NOTHING, slot: 0 };
 }
 
-/// A cache in buffers of the caller, such as arrays on a board and vectors on a host: [`CacheShape::entries`]
-/// tags and [`CacheShape::lines`] lines.
+/// Set-associative cache with LRU replacement, in buffers of the caller: [`CacheShape::entries`] tags and
+/// [`CacheShape::lines`] lines, as arrays on a board and vectors on a host.
 pub struct LineCache<E, L> {
     shape: CacheShape,
     /// Tags by set; within a set, from the most to the least recently used.
     entries: E,
     lines: L,
-    /// True if the cache is known to be empty. The thousands of writes that load an image then need not
+    /// True if the cache is known to be empty. The thousands of writes that load a card image then need not
     /// invalidate lines.
     is_clear: bool,
-    /// End of the memory, once a fill of the last cache line has found it; `u32::MAX` before.
+    /// End of the memory, lines, once a fill of a cache line across it has found it; `u32::MAX` before.
     end: u32,
 }
 
@@ -166,7 +167,7 @@ impl<E: AsRef<[CacheEntry]> + AsMut<[CacheEntry]>, L: AsRef<[Line]> + AsMut<[Lin
         self.end = u32::MAX;
     }
 
-    /// Invalidates lines that were written.
+    /// Invalidates the cache lines that hold lines in `written`.
     fn forget(&mut self, written: &Range<u32>) {
         // A cache line at the end of a memory that grows is incomplete.
         if written.end > self.end {
@@ -250,8 +251,8 @@ fn fill(
     Ok(None)
 }
 
-/// A memory behind caches: one for the photon maps and one for the scene, or one for both. Every tile begins
-/// with empty caches, so that its misses do not depend on earlier tiles.
+/// A memory behind caches: one for the photon maps and one for the scene, or one for both. A tile that begins
+/// while no other is in flight finds empty caches, so that its misses do not depend on earlier tiles.
 pub struct LineCaches<M, E, L> {
     memory: M,
     /// Cache of the photon maps; of everything if there is no cache of the scene.
@@ -289,7 +290,7 @@ where
     #[inline(always)]
     fn read(&mut self, structure: Structure, address: LineAddress, _: Range<u32>) -> Result<&Line, Fault> {
         if structure == Structure::IrradianceRecords {
-            // Each line is read once: it would take the place of others.
+            // Each line of kept records is read once, and would evict lines that are read again.
             self.memory.missed(structure);
             return self.memory.read(structure, address, 0..LINE_BYTES as u32);
         }

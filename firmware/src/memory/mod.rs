@@ -27,8 +27,8 @@ pub trait MemoryPort {
     /// [`FaultCode::LineRange`] if the line is outside the memory.
     fn read(&mut self, structure: Structure, address: LineAddress, used: Range<u32>) -> Result<&Line, Fault>;
 
-    /// Returns a line to be prefetched, if the processor addresses the memory directly. It does not count as
-    /// a read. `None` if reads are cached or counted.
+    /// Returns a line to be prefetched, if the processor addresses the memory directly; `None` if reads are
+    /// cached or counted. The call is not counted as a read.
     #[inline(always)]
     fn near(&self, _: LineAddress) -> Option<&Line> {
         None
@@ -44,15 +44,16 @@ pub trait MemoryPort {
     #[inline(always)]
     fn enter(&mut self, _: Stage) {}
 
-    /// Notifies that the last reads filled one line of the cache above.
+    /// Notifies the port that its last reads filled one line of the cache above.
     #[inline(always)]
     fn missed(&mut self, _: Structure) {}
 
-    /// Begins a tile. Caches are cleared, so that the misses of a tile do not depend on earlier tiles.
+    /// Begins a tile while no other is in flight. Caches are cleared, so that the tile's misses do not depend
+    /// on earlier tiles.
     #[inline(always)]
     fn begin_tile(&mut self) {}
 
-    /// Ends a tile, before its end is reported to the host.
+    /// Ends the tile with this number, before the card reports the end to its host.
     #[inline(always)]
     fn end_tile(&mut self, _: u32) {}
 }
@@ -67,8 +68,8 @@ pub trait CardMemory: MemoryPort {
     fn stored(&self, first: LineAddress, count: u32) -> Option<&[Line]>;
 
     /// [`image_checksum`](photoncard_shared::checksum::image_checksum) of the first `lines` lines, if it is
-    /// known without reading them. An emulated card knows it: its memory is an image whose checksum the host
-    /// computed.
+    /// known without reading them. An emulated card knows it: its memory is a card image whose checksum the
+    /// host computed.
     fn known_checksum(&self, _lines: u32) -> Option<u64> {
         None
     }

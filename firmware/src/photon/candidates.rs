@@ -76,7 +76,7 @@ impl Candidate {
         Photon::normal_of_flags(self.flags())
     }
 
-    /// Code of the photon's disc fraction.
+    /// Code of the photon's disc fraction; in the caustic map, of its kernel radius.
     #[inline(always)]
     pub fn disc(&self) -> u8 {
         Photon::disc_of_flags(self.flags())
@@ -90,12 +90,12 @@ impl Candidate {
     }
 }
 
-/// Storage of a number of candidates.
+/// Storage for candidates, with a capacity that is part of its type or set at run time.
 pub trait CandidateStorage {
     /// Zeroed storage.
     const EMPTY: Self;
 
-    /// Sets the number of candidates, unless the type does.
+    /// Sets the capacity, if the type leaves it open.
     fn reserve(&mut self, _entries: usize) {}
 
     /// View of the whole storage.
@@ -148,14 +148,14 @@ impl<const N: usize> CandidateBuffer<N> {
     }
 }
 
-/// View of candidates in a buffer. It has as many distances as contents.
+/// Mutable view of candidates: two slices of equal length, of distance bits and of contents.
 pub struct Candidates<'a> {
     pub(super) distances: &'a mut [u32],
     pub(super) contents: &'a mut [u64],
 }
 
 impl<'a> Candidates<'a> {
-    /// View of as many distances as contents.
+    /// View of two slices of equal length: bits of squared distances, m^2, and contents of photons.
     #[inline(always)]
     pub fn new(distances: &'a mut [u32], contents: &'a mut [u64]) -> Self {
         Self { distances, contents }
@@ -197,7 +197,7 @@ impl<'a> Candidates<'a> {
         }
     }
 
-    /// Converts the view to cells.
+    /// Converts the view to one with interior mutability.
     #[inline(always)]
     pub(super) fn cells(self) -> CandidateCells<'a> {
         CandidateCells {

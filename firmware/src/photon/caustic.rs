@@ -25,27 +25,27 @@ use crate::vector::max;
 /// Light that caustic photons bring to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Caustics {
-    /// Radiance, in the units of the reflection.
+    /// Reflected radiance, in the unit to which the partial reflection converts photon power units/m^2.
     pub radiance: Vec3,
-    /// Number of photons whose radius includes the point.
+    /// Number of photons of the point's surface whose discs contain the point.
     pub photons: u32,
     /// Number of photon normals decoded.
     pub normals_decoded: u32,
 }
 
-/// Photons that light a lobe. All photons light the Lambertian part.
+/// Photons that light a lobe. The Lambertian part is lit by all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LitBy {
     /// All photons.
     All,
-    /// Photons from lights without an area.
+    /// Photons of point, spot and distant lights, which have no area.
     Punctual,
 }
 
 /// Radiance of caustic photons reflected at a position ([`CausticSearch`]).
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(always)]
 pub fn reflected_caustics(search: CausticSearch<'_, impl MemoryPort>) -> Result<Caustics, Fault> {
     simd::run(search)
@@ -59,7 +59,7 @@ pub struct CausticSearch<'s, M> {
     pub memory: &'s mut M,
     /// Query position, metres.
     pub position: Vec3,
-    /// Maximum kernel radius of a photon, metres, which the last code stands for.
+    /// Maximum kernel radius of a photon, metres: that of the last code of [`kernel_share`].
     pub max_radius: f32,
     /// Reflection at the position.
     pub reflection: &'s PartialReflection,
@@ -74,14 +74,15 @@ pub struct CausticSearch<'s, M> {
 
 /// Maximum of `n.i / g.i`, for light at grazing incidence on the triangle.
 const MAX_SHADING: f32 = 4.0;
-/// Distance to a box within which a search visits it, cells of the photon grid. It allows for rounding at the
+/// Maximum distance of a box that a search visits, cells of the photon grid. It allows for rounding at the
 /// borders of the scene.
 const MARGIN_CELLS: f32 = 2.0;
-/// Slope of the direction to a photon on a flat surface, by the coding of normals.
+/// Slope against the tangent plane that the direction to a photon may always have, as coded normals are
+/// inexact.
 const FLAT_SLOPE: f32 = 0.15;
-/// Unit of the kernels' factors, which are 1 over a disc's area as a fraction of the maximum. Fifty photons
-/// with the smallest disc stay below the limit of a [`ColourSum`], and one with the largest disc has a
-/// resolution of twenty bits.
+/// Unit of a photon's factor `(1 - d^2 / h^2) / s` in the sums, where `s` is the disc's area over the maximum
+/// area. Fifty photons with the smallest disc stay below the limit of a [`ColourSum`], and one with the
+/// largest disc has a resolution of twenty bits.
 const FACTOR_UNIT: f32 = 32_768.0;
 
 impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
@@ -116,9 +117,9 @@ impl<M: MemoryPort> Kernel for CausticSearch<'_, M> {
     }
 }
 
-/// Sums over the photons whose radius includes the position. The order of photons does not matter.
+/// Sums over the photons whose discs contain the position. The order of photons does not matter.
 struct Sums<'a> {
-    /// Squared distance to a box within which a search visits it, m^2.
+    /// Squared maximum distance of a box that the search visits, m^2.
     limit: f32,
     /// Squared maximum kernel radius, m^2.
     max_squared: f32,
@@ -127,11 +128,12 @@ struct Sums<'a> {
     lit_by: LitBy,
     normals: [Vec3; 2],
     surface: SameSurface,
-    /// Classes of the surface's normals, one bit each.
+    /// Set of the classes of normals ([`SameSurface::classes`]) that the surface's photons have, one bit
+    /// each.
     classes: u16,
-    /// Sum of power times kernel.
+    /// Sum of power times kernel factor, in units of [`FACTOR_UNIT`].
     power: ColourSum,
-    /// Sum of power times kernel times the lobe's factor.
+    /// Sum of power times kernel factor times [`PartialReflection::lobe_factor`].
     of_lobe: ColourSum,
     photons: u32,
 }
@@ -173,7 +175,7 @@ impl Sums<'_> {
         height * height <= slope_squared * across_squared + self.limit
     }
 
-    /// Factor `n.i / g.i`; 0 for light from below the shading normal's horizon.
+    /// Factor `n.i / g.i`, at most [`MAX_SHADING`]; 0 for light from below the horizon of `n`.
     #[inline(always)]
     fn shading(&self, photon: &Candidate) -> f32 {
         let [shading, geometric] = self.normals;

@@ -1,10 +1,10 @@
-//! Interface between a search of leaves and its result, which has the photons found and the search radius.
+//! Interface between a search of leaves and the collector of its photons, which sets the search radius.
 
 use photoncard_shared::layout::PhotonNode;
 
 use crate::simd::{Isa, LANES};
 
-/// Collector of the nearest photons or irradiance points, which limits the search radius.
+/// Collector of the photons or irradiance points that a search finds. It limits the search radius.
 pub(super) trait Collector {
     /// Squared search radius, m^2.
     fn limit(&self) -> f32;
@@ -14,13 +14,14 @@ pub(super) trait Collector {
     #[inline(always)]
     fn narrow(&mut self, _photon_share: f32) {}
 
-    /// Returns true if no photon below a node is searched for.
+    /// Returns true if the collector needs no photon below a node.
     #[inline(always)]
     fn skips(&self, _node: PhotonNode) -> bool {
         false
     }
 
-    /// Adds the photons in the first `count` lanes that are within the limit.
+    /// Adds those photons in the first `count` lanes that belong to the result: within [`Self::limit`], or
+    /// with a disc that contains the query.
     fn insert_lanes(&mut self, isa: impl Isa, count: u32, lanes: &Lanes);
 }
 
@@ -28,7 +29,7 @@ pub(super) trait Collector {
 pub(super) struct Lanes<'a> {
     /// Bits of the squared distances, m^2.
     pub(super) distances: &'a [u32; LANES],
-    /// Contents of the records.
+    /// Contents of the photons, each read as a little-endian `u64`.
     pub(super) contents: &'a [u64; LANES],
     /// Vectors from the photons to the query, by axis, metres.
     pub(super) ways: [&'a [f32; LANES]; 3],

@@ -34,7 +34,7 @@ pub struct FoundIrradiance {
 /// between equal distances.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(always)]
 pub fn nearest_irradiance(
     scene: &SceneImage,

@@ -27,7 +27,7 @@ struct Deferred {
 /// number of photons tested, one per visited node.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(always)]
 pub(super) fn gather(
     isa: impl Isa,

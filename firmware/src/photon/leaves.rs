@@ -1,4 +1,5 @@
-//! The photon map with leaves. Leaves of one line each are below inner nodes with up to sixteen children.
+//! Search of the line layout of a photon map: leaves of one line each, below inner nodes with up to sixteen
+//! children.
 
 use glam::Vec3;
 use photoncard_shared::budget::PHOTON_STACK;
@@ -21,7 +22,7 @@ const _: () = assert!(LEAF_LANES == LANES);
 /// accepts. The tree's nodes and leaves are in the two given sections. Returns the number of photons tested.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(always)]
 pub(super) fn gather(
     isa: impl Isa,
@@ -73,7 +74,7 @@ fn distances_to_boxes(
         let to_box = |axis: &NodeCoordinates, origin: i32, query: f32| {
             let side = |sides: &[u8; LANES]| {
                 let side = u32::from(sides.get(lane).copied().unwrap_or(0)) << axis.exponent;
-                // Wraps in unsound images only.
+                // Wraps in unsound card images only.
                 (origin.wrapping_add((axis.corner + side).cast_signed())) as f32 * grid.cell
             };
             let (below, above) = (side(axis.lower) - query, query - side(axis.upper));
@@ -89,7 +90,7 @@ fn distances_to_boxes(
     distances
 }
 
-/// Tests the photons of a leaf. Returns their number.
+/// Hands the photons of a leaf that `filter` accepts to `nearest`. Returns the number of photons in the leaf.
 #[inline(always)]
 fn test_leaf(
     isa: impl Isa,

@@ -31,7 +31,7 @@ use crate::memory::{MemoryPort, Stage};
 use crate::scene::{PartialReflection, SceneImage};
 use crate::simd::{self, Isa, Kernel};
 
-/// Selects one of the two photon maps.
+/// One of the two photon maps of a card image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PhotonMap {
     /// The photon map: every arrival of light at a surface that is not specular.
@@ -55,7 +55,7 @@ impl PhotonMap {
 /// Returns the number of photons tested.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(never)]
 pub fn gather(
     scene: &SceneImage,
@@ -67,10 +67,11 @@ pub fn gather(
     simd::run(Search { scene, memory, map, position, nearest })
 }
 
-/// Restricts [`gather`] to photons in the region that `position` sees.
+/// Collects in `nearest` the photons of a map nearest to `position` in the region that `position` sees.
+/// Returns the number of photons tested.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(never)]
 pub fn gather_visible(
     scene: &SceneImage,
@@ -83,8 +84,8 @@ pub fn gather_visible(
     simd::run(VisibleSearch { scene, memory, map, position, region, nearest })
 }
 
-/// Factor of the first search radius in a visible region, squared, relative to the radius at which the region
-/// has the area of the disc with the k nearest photons.
+/// First squared search radius in a visible region, divided by `r^2 (pi r^2 / A)`: `r` is the distance of the
+/// k-th photon of an unrestricted search, `A` the region's area within `r`.
 const VISIBLE_MOST: f32 = 1.35;
 
 /// Parameters of a gather.
@@ -94,8 +95,8 @@ pub struct GatherLimits {
     pub neighbors: u32,
     /// Maximum distance of a photon, metres.
     pub max_distance: f32,
-    /// Gather radius, metres, above which the point may be in a narrow gap, where the photons around do not
-    /// represent its light.
+    /// Gather radius, metres, above which the point is tested for an object close above it. In such a narrow
+    /// gap the photons around do not represent the point's light.
     pub free_within: f32,
 }
 
@@ -108,7 +109,7 @@ const MAX_REACH: f32 = 2.0;
 /// searches: the number of photons tested, the photons, and their light.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(never)]
 pub fn gathered_radiance(
     (scene, memory): (&SceneImage, &mut impl MemoryPort),
@@ -142,7 +143,7 @@ pub fn gathered_radiance(
     let tested = gather_visible(scene, memory, PhotonMap::Indirect, (position, &region), &mut nearest)?;
     let of_region = reflected_radiance(&nearest, cell, Some(&region.sectors), reflection);
     count(tested, &nearest, &of_region);
-    // A photon that is visible, and sees all around it, vouches for the others.
+    // The closest photon is visible, and walls hide nothing around it: all photons represent the point.
     let is_vouched = of_all.sight == Sight::Unknown && of_all.closest == of_region.closest;
     Ok(if is_vouched { of_all } else { of_region }.radiance)
 }
@@ -218,7 +219,7 @@ fn search<M: MemoryPort>(
     Ok(tested)
 }
 
-/// Kernel that only selects the nearest candidates ([`NearestPhotons`]).
+/// Kernel that selects the nearest of given candidates, as [`NearestPhotons`] does during a search.
 pub struct Selection<'a> {
     /// Candidates to select from.
     pub candidates: Candidates<'a>,

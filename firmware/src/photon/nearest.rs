@@ -20,7 +20,7 @@ pub struct NearestPhotons<'a> {
     candidates: Candidates<'a>,
     length: usize,
     neighbors: usize,
-    /// Number of candidates that triggers a selection.
+    /// Number of candidates at which a selection drops all but the nearest.
     full: usize,
     limit: f32,
     /// Squared search radius without narrowing, m^2.
@@ -60,15 +60,15 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Limits the search radius of an empty set, given squared, m^2, because there are no photons beyond. The
-    /// maximum distance stays.
+    /// Limits the squared search radius of an empty set to `limit`, m^2, because there are no photons beyond.
+    /// [`Self::max_distance_squared`] stays.
     pub(super) fn limit_to(&mut self, limit: f32) {
         self.widest = if limit < self.widest { limit } else { self.widest };
         self.limit = if self.widest < self.limit { self.widest } else { self.limit };
     }
 
-    /// Narrows a search before it begins, once, because there are most likely enough photons within `limit`,
-    /// m^2.
+    /// Narrows the squared search radius of an empty set to `limit`, m^2, because there are most likely
+    /// enough photons within. Later calls have no effect.
     #[inline(always)]
     pub(super) fn narrow_to(&mut self, limit: f32) {
         // False for NaN.
@@ -78,8 +78,8 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Starts the search again with a larger radius, if narrowing excluded photons that are needed. Returns
-    /// whether it does so.
+    /// Empties the set and enlarges the search radius if a narrowed search has found fewer than k photons.
+    /// Returns whether it has: the search must then be repeated.
     #[inline(always)]
     pub(super) fn widen(&mut self) -> bool {
         let is_short = self.is_narrowed && !self.is_full() && self.limit < self.widest;
@@ -178,7 +178,7 @@ impl<'a> NearestPhotons<'a> {
         libm::sqrtf(farthest.map_or(self.max_distance_squared, f32::from_bits))
     }
 
-    /// Squared maximum distance, as given, m^2.
+    /// Square of the maximum distance given to [`Self::new`], m^2.
     #[inline(always)]
     pub fn max_distance_squared(&self) -> f32 {
         self.max_distance_squared

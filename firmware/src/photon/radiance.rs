@@ -35,7 +35,7 @@ const MIN_RADIUS_SQUARED: f32 = 1.0 / PI;
 /// Light that photons bring to a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflected {
-    /// Radiance, in the units of the reflection.
+    /// Reflected radiance, in the unit to which the partial reflection converts photon power units/m^2.
     pub radiance: Vec3,
     /// Number of photon normals decoded.
     pub normals_decoded: u32,
@@ -48,17 +48,17 @@ pub struct Reflected {
 /// Visibility of a gather's photons from its point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sight {
-    /// All relevant photons are visible, or the search was limited to a visible region.
+    /// No wall hides photons around the closest one, or the search was limited to a visible region.
     Free,
-    /// Walls hide photons around the closest one.
+    /// Walls hide part of the closest photon's disc.
     Walled,
-    /// The closest photon is far away, or of another surface, so that it does not represent the point.
+    /// The closest photon of the point's surface is too far away to represent the point, or there is none.
     Unknown,
 }
 
-/// Maximum ratio of two areas: the disc up to the closest photon, and the mean area per photon. Beyond it the
-/// photon's disc does not represent the point's. On a wall, one gather in 1,100 has its closest photon
-/// farther away.
+/// Maximum area of the disc up to the closest photon, divided by the mean area per photon. Beyond it the
+/// photon's disc fraction does not represent the point's. On a wall, one gather in 1,100 has its closest
+/// photon farther away.
 const APART: f32 = 7.0;
 
 /// Radiance of a gather: the reflected power of the photons, divided by the area of their disc or of the
@@ -127,7 +127,8 @@ impl Kernel for Estimate<'_, '_> {
     }
 }
 
-/// Candidate with the extreme distance by `choose`; among equal distances, the one that `is_better`.
+/// Candidate with the distance that `choose` prefers to all others; among equal distances, the one that
+/// `is_better`.
 #[inline(always)]
 fn extreme(
     nearest: &NearestPhotons,
@@ -148,7 +149,8 @@ fn extreme(
     best
 }
 
-/// Closest photon of the surface, and the sums over the surface's photons, without `farthest` if given.
+/// Closest photon of the surface, and the sums over the surface's photons, both without `farthest` if given;
+/// `None` if no photon is left.
 #[inline(always)]
 fn sum<'a>(
     nearest: &NearestPhotons,
@@ -195,10 +197,10 @@ fn are_all_of(normal: u8, contents: &[u64]) -> bool {
     differ & 0xff << NORMAL_SHIFT == 0
 }
 
-/// Position of the normal's code in a photon's content: number of its lowest bit.
+/// Number of the lowest bit of the normal's code in a photon's content.
 const NORMAL_SHIFT: u32 = 50;
 
-/// Sum of the photons' power, and sum of power times the lobe's factor.
+/// Sum of the photons' power, and sum of power times [`PartialReflection::lobe_factor`].
 struct Sums<'a> {
     reflection: &'a PartialReflection,
     decoded: DecodedLobe,

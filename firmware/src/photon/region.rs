@@ -27,10 +27,11 @@ use crate::vector::{max, max_component, min, tangents, unit};
 /// Number of sectors.
 pub const SECTORS: usize = BUNDLE_RAYS;
 
-/// Height of the rays above the surface, divided by the radius of a gather. Lower objects hide nothing.
+/// Height of the rays above a surface that nothing covers closely, divided by the gather radius. Lower
+/// objects hide nothing.
 const HEIGHT: f32 = 0.03;
-/// Distance of the reference point from the surface, divided by the radius of a gather. A cell of the photon
-/// grid is added to it.
+/// Distance from the surface at which the vertical rays begin, divided by the gather radius. A cell of the
+/// photon grid is added to it.
 const LIFT: f32 = 1e-3;
 /// Maximum tangent of the angle between the surface and the direction to a photon.
 const MAX_SLOPE: f32 = 0.4;
@@ -46,12 +47,12 @@ const TAN_PI_8: f32 = 0.414_213_57;
 /// Cosines of the multiples of `pi / 8` up to `pi / 2`.
 const COSINES: [f32; 5] = [1.0, 0.923_879_5, 0.707_106_77, 0.382_683_43, 0.0];
 
-/// Region of a tangent plane, in sectors around a point.
+/// Region around a point in sixteen sectors of the tangent plane, with a maximum distance from the plane.
 #[derive(Clone, Copy, Debug)]
 pub struct Sectors {
     /// Squared radius of each sector, m^2.
     limits: [f32; SECTORS],
-    /// Squared maximum height of a photon of the surface, m^2.
+    /// Squared maximum distance of a point of the region from the tangent plane, at the centre, m^2.
     lift_squared: f32,
 }
 
@@ -60,7 +61,7 @@ pub struct Sectors {
 pub struct VisibleRegion {
     /// Two unit tangents and the unit normal.
     pub axes: [Vec3; 3],
-    /// Region that is visible as a whole.
+    /// Region of which every part is visible.
     pub sectors: Sectors,
     /// Region that contains everything visible.
     pub outer: Sectors,
@@ -77,7 +78,7 @@ impl Sectors {
         Self { limits: self.limits.map(|limit| limit * per_unit), lift_squared: self.lift_squared * per_unit }
     }
 
-    /// Area of the region within a radius, given squared.
+    /// Area of the sectors within a radius, given squared, in the tangent plane.
     pub fn area(&self, radius_squared: f32) -> f32 {
         let squares: f32 = self.limits.iter().map(|limit| min(*limit, radius_squared)).sum();
         squares * (PI / SECTORS as f32)
@@ -119,8 +120,8 @@ impl Sectors {
     }
 }
 
-/// Number of the sector that contains a direction. Bits 0 and 1 count from the first axis to the second; bits
-/// 2 and 3 are the signs.
+/// Number of the sector that contains a direction. Bits 0 and 1 count the sectors of a quadrant from the
+/// first axis to the second; bits 2 and 3 are set for negative `u` and `v`.
 #[inline(always)]
 fn sector(u: f32, v: f32) -> u32 {
     let (a, b) = (max(u, -u), max(v, -v));
@@ -128,7 +129,7 @@ fn sector(u: f32, v: f32) -> u32 {
     steps | u32::from(u < 0.0) << 2 | u32::from(v < 0.0) << 3
 }
 
-/// Numbers of the two rays at the borders of a sector. Rays are counted around the normal.
+/// Numbers of the two rays at the borders of a sector. Rays are numbered by azimuth.
 fn borders(sector: usize) -> [usize; 2] {
     let steps = sector % 4;
     let ray = |steps: usize| match sector / 4 {
@@ -140,7 +141,7 @@ fn borders(sector: usize) -> [usize; 2] {
     [ray(steps), ray(steps + 1)]
 }
 
-/// Cosine and sine of the azimuth of a ray.
+/// Cosine and sine of the azimuth of a ray, `ray pi / 8`.
 fn azimuth(ray: usize) -> [f32; 2] {
     let (quarter, steps) = (ray / 4, ray % 4);
     let [c, s] = [steps, 4 - steps].map(|steps| COSINES.get(steps).copied().unwrap_or(0.0));
@@ -154,10 +155,10 @@ fn azimuth(ray: usize) -> [f32; 2] {
 
 impl VisibleRegion {
     /// Region that a point sees on a surface whose normal has the code `normal`, within `reach` metres, for
-    /// gathers with a radius of about `radius`. It depends only on the scene.
+    /// gathers with a radius of about `radius`. The result depends on the scene, not on photons.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     #[inline(never)]
     pub fn new(
         scene: &SceneImage,
@@ -201,9 +202,9 @@ impl VisibleRegion {
         })
     }
 
-    /// Free height above a point, infinite beyond the distance `up`, and normal of the surface below it. The
-    /// normal is that of the triangle within the distance `down` below, if it agrees with the coded normal;
-    /// otherwise the coded normal.
+    /// Free height above the point `above`, metres, infinite if nothing is hit within `up`; and unit normal
+    /// of the surface below the point: that of the triangle hit within `down`, if it agrees with `coded`,
+    /// else `coded`.
     fn clear_height(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -221,7 +222,7 @@ impl VisibleRegion {
     }
 }
 
-/// Distance of the reference point from the surface for gathers of a radius, metres.
+/// Distance from the surface, metres, at which the vertical rays begin for gathers of a radius.
 fn lift(scene: &SceneImage, radius: f32) -> f32 {
     LIFT * radius + scene.header.photon_grid.cell
 }
@@ -230,7 +231,7 @@ fn lift(scene: &SceneImage, radius: f32) -> f32 {
 /// photons for the surface's. The code of the surface's normal is `normal`.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(never)]
 pub(super) fn is_covered(
     scene: &SceneImage,
@@ -250,7 +251,7 @@ pub(super) fn is_covered(
 fn normal_of(hit: &Hit, towards: Vec3) -> Vec3 {
     let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
     let (b, c) = (b - a, c - a);
-    // Without the triangle's size: its square must not overflow.
+    // Edges are divided by the triangle's size, whose square may overflow.
     let size = max(max_component(b.abs()), max_component(c.abs()));
     let normal = if size > 0.0 { unit((b * (1.0 / size)).cross(c * (1.0 / size))) } else { Vec3::ZERO };
     if normal.dot(towards) < 0.0 { -normal } else { normal }
@@ -258,11 +259,11 @@ fn normal_of(hit: &Hit, towards: Vec3) -> Vec3 {
 
 /// Criterion for the photons that a search accepts, by their positions.
 pub(super) trait Filter {
-    /// Sets the distances of photons that are not accepted to `u32::MAX`. The arguments are vectors from the
-    /// photons to the query.
+    /// Sets the distance bits of photons that are not accepted to `u32::MAX`. `ways` are the vectors from the
+    /// photons to the query, by axis.
     fn filter(&self, isa: impl Isa, ways: [&[f32; LANES]; 3], distances: &mut [u32; LANES]);
 
-    /// Returns true if a photon is accepted. The argument is the vector from the photon to the query.
+    /// Returns true if a photon is accepted. `way` is the vector from the photon to the query.
     fn takes(&self, way: [f32; 3]) -> bool;
 }
 

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use photoncard_shared::layout::{decode_normal, normal_class};
 
-/// Minimum cosine between the normals of a photon and of the query that are taken as one surface.
+/// Minimum cosine between the normals of a photon and of the query at which both are taken as of one surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
 
 /// Number of codes of a normal.
@@ -28,7 +28,8 @@ const fn computed_normal(code: u8) -> Vec3 {
     Vec3::new(x * inverse, y * inverse, z * inverse)
 }
 
-/// Classes of the normals that are taken as of one surface with the normal of each code, one bit each.
+/// For the normal of each code, set of the classes ([`normal_class`]) of all normals that are taken as of one
+/// surface with it, one bit each.
 #[expect(clippy::indexing_slicing, reason = "computed at compile time")]
 static CLASSES: [u16; CODES] = {
     let mut classes = [0; CODES];
@@ -65,7 +66,7 @@ const fn root(square: f32) -> f32 {
 /// last result is cached.
 pub struct SameSurface {
     normal: Vec3,
-    /// Code of the last normal, and its cosine.
+    /// Code of the last normal tested, and its cosine to `normal`.
     last: (u8, f32),
     /// Number of normals decoded so far.
     decoded: u32,
@@ -79,7 +80,8 @@ impl SameSurface {
         Self { normal, last: (code, normal.dot(normal)), decoded: 0 }
     }
 
-    /// Classes of the normals that [`Self::holds`] accepts, one bit each.
+    /// Set of the classes, one bit each, of all normals that [`Self::holds`] accepts for a surface whose
+    /// normal has this code.
     #[inline(always)]
     pub(super) fn classes(code: u8) -> u16 {
         CLASSES.get(usize::from(code)).copied().unwrap_or_default()
@@ -97,7 +99,7 @@ impl SameSurface {
         self.cosine(code) >= MIN_NORMAL_COSINE
     }
 
-    /// Cosine between the surface's normal and that with a code.
+    /// Cosine between the surface's normal and the normal that has this code.
     #[inline(always)]
     pub(super) fn cosine(&mut self, code: u8) -> f32 {
         if self.last.0 != code {

@@ -3,9 +3,9 @@
 //! On a surface the squared distance of the k-th photon is proportional to k. Interpolation therefore guesses
 //! an interval of distances that contains the k-th and few others; counting the candidates below its ends
 //! verifies and corrects the guess. One pass then keeps the candidates below the interval, and sets aside
-//! those in the interval, the first of which complete the k. If no guess succeeds, as with many candidates at
-//! one distance, quickselect (Hoare 1961) is used and, after a bounded number of pivots, a radix selection by
-//! bits of the sort key. All methods give equal sets.
+//! those in the interval, the nearest of which complete the k. If no guess succeeds, as with many candidates
+//! at one distance, quickselect (Hoare 1961) is used and, after a bounded number of pivots, a radix selection
+//! by bits of the sort key. All methods give equal sets.
 
 use super::candidates::{Candidate, CandidateCells, Candidates};
 use crate::simd::{Isa, LANES};
@@ -50,8 +50,8 @@ pub(super) fn select(
 }
 
 /// Number of comparisons of a selection. Every distance is compared with the greatest so far and, in each
-/// pass, with both ends of the interval. Every candidate in the interval is compared with all lanes and with
-/// the last one.
+/// pass, with both ends of the interval. Every candidate in the interval is compared with [`BETWEEN`] others
+/// and with the k-th one.
 #[inline(always)]
 fn comparisons(length: usize, passes: u32, between: usize) -> u32 {
     length as u32 * (1 + 2 * passes) + (between * (BETWEEN + 1)) as u32
@@ -97,8 +97,8 @@ fn count_nearer(distances: &[u32], low: u32, high: u32) -> [usize; 2] {
     nearer.map(|count| count as usize)
 }
 
-/// Does [`select`] with an interval from [`guess`]. Returns the farthest candidate, and the number of
-/// candidates in the interval.
+/// Does [`select`] with an interval of squared distances from [`guess`]. Returns the farthest selected
+/// candidate, and the number of candidates in the interval.
 #[inline(always)]
 fn keep(
     isa: impl Isa,

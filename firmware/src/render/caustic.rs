@@ -11,10 +11,10 @@ use crate::memory::{MemoryPort, Stage};
 use crate::photon::{CausticSearch, LitBy, reflected_caustics};
 use crate::scene::{PartialReflection, Reflection, Reflector};
 
-/// Radiance of caustics reflected at a point, in the image's radiance units.
+/// Radiance that a point reflects of caustics, in the card image's radiance units.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -> Result<Vec3, Fault> {
     let frame = context.frame;
     let Some(CausticGather { max_distance, .. }) = frame.caustics else { return Ok(Vec3::ZERO) };
@@ -27,7 +27,7 @@ pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -
     context.counters.caustic_gathers += 1;
     let header = &context.scene.header;
     let unit = header.caustic_power_unit / header.radiance_unit;
-    // Reflection is by the shading normal; photons carry the geometric one.
+    // The reflection depends on the shading normal; photons have the code of the geometric normal.
     let surface = &point.surface;
     let reflector = Reflector { reflection, ..surface.reflector() };
     let (record, lobe) =
@@ -54,8 +54,9 @@ pub fn reflected<M: MemoryPort>(context: &mut Context<M>, point: &GatherPoint) -
     Ok(caustics.radiance)
 }
 
-/// Part of a reflection that the caustic map lights, and the photons that light its lobe. Gather rays of a
-/// narrow lobe hit lights with an area, but rarely the highlights of other lights.
+/// Part of a reflection that the caustic map lights, and the photons that light the lobe. With gather rays, a
+/// narrow lobe takes from the map at most the light of lights without an area, as its gather rays find the
+/// other lights.
 fn lit(reflection: &Reflection, gather_rays: u32) -> (Reflection, LitBy) {
     if gather_rays == 0 || !reflection.has_narrow_lobe() {
         (*reflection, LitBy::All)

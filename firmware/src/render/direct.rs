@@ -8,15 +8,16 @@
 //! first. The two weights of a path add up to 1, so that direct light is counted once.
 //!
 //! Emission that rays of an irradiance record hit is interpolated for the samples around the record; their
-//! shadow rays add the remainder. Both must compute equal weights. The record's density is therefore replaced
-//! by `cos(theta) / pi`, because samples do not know its direction table, and the number of shadow rays is
-//! that of all planned samples of a pixel. The power heuristic leaves small emitters, which would make a
-//! record noisy, to shadow rays, and a sky to records.
+//! shadow rays add the remainder. Rays of both kinds must compute equal weights. The record's density is
+//! therefore replaced by `cos(theta) / pi`, because samples do not know its direction table, and the number
+//! of shadow rays is that of all planned samples of a pixel. The power heuristic leaves small emitters, which
+//! would make a record noisy, to shadow rays, and a sky to records.
 //!
 //! No gather ray hits point, spot and distant lights, so that only shadow rays contribute their light.
 //!
-//! Flat glass does not hide lights. Shadow rays pass it with its transmittance. A gather ray that has passed
-//! only flat glass hits a light with the same weights as if it had passed nothing.
+//! Flat glass does not hide lights: a shadow ray that passes flat glass is multiplied by the glass's
+//! transmittance. A gather ray that has passed only flat glass hits a light with the same weights as if it
+//! had passed nothing.
 //!
 //! Light samples are stratified over all samples of a pixel: many samples with one or two shadow rays each
 //! are as good as one sample with many.
@@ -37,10 +38,11 @@ use crate::scene::light::{
 use crate::scene::{BUNDLE_RAYS, Passed, Ray, Surface, transmittances};
 use crate::vector::max_component;
 
-/// Direct light from shadow rays reflected at a point, weighted, W/(sr m^2).
+/// Radiance that a point reflects of direct light: the estimate of its shadow rays, weighted against gather
+/// rays, W/(sr m^2).
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn reflected<M: MemoryPort>(
     context: &mut Context<M>,
     pixel: PixelSample,
@@ -84,7 +86,7 @@ impl ShadowRays {
         Self { rays: Vec::new(), lights: Vec::new() }
     }
 
-    /// Adds a ray. There must be room for it.
+    /// Adds the shadow ray of a light sample.
     fn push(&mut self, origin: Vec3, light: LightSample) -> Result<(), Fault> {
         let LightSample { direction, distance, .. } = light;
         let ray = Ray { origin, direction, max_distance: distance * SHORTER };
@@ -116,7 +118,7 @@ impl ShadowRays {
     }
 }
 
-/// Reflected radiance of an unoccluded light sample, W/(sr m^2).
+/// Radiance that a point reflects of an unoccluded light sample, weighted against gather rays, W/(sr m^2).
 fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample) -> Vec3 {
     let surface = &point.surface;
     let LightSample { direction, irradiance, density, .. } = *light;
@@ -142,7 +144,7 @@ fn from_light<M>(context: &Context<M>, point: &GatherPoint, light: &LightSample)
 /// `met.distance` is the distance from the point, `gather_density` the ray's probability density, 1/sr.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(always)]
 pub fn seen_by_gather_ray<M: MemoryPort>(
     context: &mut Context<M>,
@@ -154,7 +156,7 @@ pub fn seen_by_gather_ray<M: MemoryPort>(
     if max_component(met.emission) <= 0.0 {
         return Ok(Vec3::ZERO);
     }
-    // Emissive surfaces that are too dark for the light tree are met by gather rays only: weight 1.
+    // An emissive surface that is too dark for the light tree is found by gather rays only: weight 1.
     let density = match met.emitter {
         Some(emitter) => {
             let receiver = Receiver::new(&point.surface);
@@ -171,7 +173,7 @@ pub fn seen_by_gather_ray<M: MemoryPort>(
 /// shadow rays, W/(sr m^2). `gather_density` is the ray's probability density, 1/sr.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn escaped<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
@@ -186,7 +188,8 @@ pub fn escaped<M: MemoryPort>(
     Ok(radiance * weight_of_gather_ray(context, point, direction, gather_density, density))
 }
 
-/// Weight of a gather ray against light samples, whose density in the ray's direction is `density`, 1/sr.
+/// Weight of a gather ray's emission against shadow rays. `density` is the density of light samples in the
+/// ray's direction, 1/sr.
 #[inline(always)]
 fn weight_of_gather_ray<M>(
     context: &Context<M>,
@@ -210,7 +213,7 @@ fn rays_of_record<M>(context: &Context<M>, cosine: f32) -> (u32, f32) {
     (context.frame.gather_rays, cosine * FRAC_1_PI)
 }
 
-/// Number of shadow rays that share direct light with a record's rays, and the density of each, 1/sr.
+/// Number of shadow rays against which a record's gather rays are weighted, and the density of each, 1/sr.
 #[inline(always)]
 fn shadow_rays_for_records<M>(context: &Context<M>, density: f32) -> (u32, f32) {
     (context.frame.shadow_rays * context.frame.planned_samples, density)

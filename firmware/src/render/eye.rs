@@ -12,8 +12,8 @@ use crate::scene::light::environment_radiance;
 use crate::scene::{Ray, Seen, Surface, closest_hit, read_surface};
 use crate::vector::unit;
 
-/// Position of a sample in the picture, pixels from the upper left corner. The samples of a pixel are
-/// stratified over the pixel filter, which can extend beyond the pixel and the picture.
+/// Position of a path in the picture, pixels from the upper left corner. The paths of a pixel are stratified
+/// over the pixel filter, which can extend beyond the pixel and the picture.
 pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     let PixelSample { x, y, .. } = pixel;
     let (pattern, index) = pixel.stratified(context.frame, Dimension::Pixel);
@@ -22,16 +22,17 @@ pub fn film_position<M>(context: &Context<M>, pixel: PixelSample) -> [f32; 2] {
     [x as f32 + place(filter, jitter_x), y as f32 + place(filter, jitter_y)]
 }
 
-/// Surface that a sample sees.
+/// Surface at which an eye path ends.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// The visible surface. Its reflection and emission are multiplied by the throughput of the eye path.
+    /// The surface, with reflection and emission multiplied by the throughput of the eye path.
     pub surface: Surface,
-    /// Hit of the eye ray; `None` behind perfectly specular surfaces, and for a surface of several layers.
+    /// Hit of the eye ray, from which the surface can be read again; `None` behind perfectly specular
+    /// surfaces, and if a random choice between layers was made.
     pub seen: Option<Seen>,
-    /// True if the eye ray hits the surface directly.
+    /// True if no perfectly specular surface lies between the eye and the surface.
     pub is_first: bool,
-    /// Position of the sample in the picture ([`film_position`]).
+    /// Position of the eye ray in the picture ([`film_position`]).
     pub film: [f32; 2],
     /// Depth of the eye ray's hit along the view axis, metres.
     pub depth: f32,
@@ -43,7 +44,8 @@ pub struct View {
 pub enum Sight {
     /// A surface.
     Surface(View),
-    /// The environment with its radiance, W/(sr m^2); zero if there is none.
+    /// The environment. The radiance, W/(sr m^2), includes the throughput of the eye path; it is zero without
+    /// an environment, and for a path that contributes nothing.
     Background(Vec3),
 }
 
@@ -57,17 +59,17 @@ impl Sight {
     }
 }
 
-/// Follows the eye path of a sample through perfectly specular surfaces to its end.
+/// Traces an eye path: the eye ray, and its continuation at perfectly specular surfaces.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Result<Sight, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
     let film = film_position(context, pixel);
     let ray = eye_ray(context, film);
     let (pattern, index) = pixel.stratified(context.frame, Dimension::Specular);
-    // The first choices are stratified over all samples of a pixel.
+    // The first two random choices of a path are stratified over all paths of a pixel.
     let first = || pattern.point(index);
     let first_layer = surface_choice(0, 0);
     let random = |choice| match choice {
@@ -83,7 +85,7 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     let mut surface = Surface::NOWHERE;
     read_surface(context.scene, context.memory, &ray, &hit, &of_surface, &mut surface)?;
     let is_first = surface.specular.is_none();
-    // A layer is chosen again by the eye path alone.
+    // Only the eye path can repeat a random choice between layers.
     let is_stored = is_first && surface.probability >= 1.0;
     if !is_first {
         match path.follow(context, &mut surface, &mut hit, &random)? {
@@ -102,16 +104,16 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     }))
 }
 
-/// Radiance of the environment at the end of a path that has left the scene.
+/// Radiance of the environment at the end of a path that has left the scene, times the path's throughput.
 fn background<M: MemoryPort>(context: &mut Context<M>, path: &SpecularPath) -> Result<Sight, Fault> {
     let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
     Ok(Sight::Background(radiance * path.throughput))
 }
 
-/// Finds the hit of the eye ray at position `film` in the picture.
+/// Finds the first hit of the eye ray through position `film` of the picture.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn look<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Seen>, Fault> {
     context.memory.enter(Stage::Eye);
     context.counters.eye_rays += 1;
@@ -119,10 +121,10 @@ pub fn look<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<O
     Ok(hit.map(|hit| Seen::new(&hit)))
 }
 
-/// Reads the surface at a stored hit of the eye ray at position `film` into `surface`.
+/// Reads the surface at a stored hit of the eye ray through position `film` of the picture into `surface`.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(always)]
 pub fn surface<M: MemoryPort>(
     context: &mut Context<M>,
@@ -133,10 +135,10 @@ pub fn surface<M: MemoryPort>(
     seen.surface(context.scene, context.memory, &eye_ray(context, film), surface)
 }
 
-/// Finds the surface that the eye ray at position `film` hits.
+/// Finds the surface that the eye ray through position `film` of the picture hits first.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Surface>, Fault> {
     let Some(seen) = look(context, film)? else { return Ok(None) };
     let mut found = Surface::NOWHERE;

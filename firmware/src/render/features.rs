@@ -1,7 +1,8 @@
-//! Features of a sample, which guide a denoiser: albedo and normal of what the sample shows.
+//! Features of a sample, which guide a denoiser: albedo and normal of the surface that the sample shows.
 //!
-//! Eye paths follow perfectly specular surfaces, so that features are those of the first other surface. An
-//! eye path ends at a sharp lobe. There one ray of the lobe is followed on, as in Cycles.
+//! An eye path ends at the first surface that is not perfectly specular, whose features these are. If that
+//! surface has a sharp lobe, one ray sampled from the lobe finds another surface, whose features count
+//! instead, as in Cycles.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -34,10 +35,10 @@ impl Features {
     }
 }
 
-/// Features of a sample that sees a surface.
+/// Features of a sample whose eye path ends at a surface.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn features<M: MemoryPort>(
     context: &mut Context<M>,
     pixel: PixelSample,
@@ -52,7 +53,7 @@ pub fn features<M: MemoryPort>(
     Ok(Features { albedo: surface.reflector().lambertian_albedo() + albedo, normal })
 }
 
-/// Features that a ray of the surface's lobe finds.
+/// Features of the surface that a ray sampled from `surface`'s lobe finds.
 #[inline(never)]
 fn reflected<M: MemoryPort>(
     context: &mut Context<M>,

@@ -25,9 +25,9 @@ use crate::scene::{
 /// Contribution of one final gather ray.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherRayEnd {
-    /// Cell of the hemisphere that contains the ray's direction.
+    /// Cell of the gather point's hemisphere that contains the ray's direction.
     pub cell: u8,
-    /// Weighted emission of the surface or environment that the ray hits, in the image's radiance units.
+    /// Weighted emission of the surface or environment that the ray hits, in the card image's radiance units.
     pub direct: Vec3,
     /// Gather of the reflected light at the end of the ray; `None` at a black surface.
     pub request: Option<GatherRequest>,
@@ -36,18 +36,18 @@ pub struct GatherRayEnd {
 /// Contributions of the rays of a bundle.
 pub type GatherRayEnds = Vec<GatherRayEnd, BUNDLE_RAYS>;
 
-/// Divides a range of rays into parts for one [`cast`] each.
+/// Divides a range of rays into parts of at most [`BUNDLE_RAYS`] rays, for one [`cast`] each.
 pub fn bundles(rays: Range<u32>) -> impl Iterator<Item = Range<u32>> {
     let Range { start, end } = rays;
     (start..end).step_by(BUNDLE_RAYS).map(move |first| first..end.min(first + BUNDLE_RAYS as u32))
 }
 
 /// Casts at most [`BUNDLE_RAYS`] rays of a gather point and stores their contributions in `ends`. Rays that
-/// hit neither a surface nor the environment have none. A contribution is one term of the mean over the
-/// point's rays; the gather's result is added to the sum `target`.
+/// hit neither a surface nor the environment have none. A contribution is a term of the mean over the point's
+/// rays. `target` is the sum to which the gathers' results are to be added.
 ///
 /// # Errors
-/// If the image is invalid, or there are more than [`BUNDLE_RAYS`] rays.
+/// If the card image is invalid, or there are more than [`BUNDLE_RAYS`] rays.
 pub fn cast<M: MemoryPort>(
     context: &mut Context<M>,
     point: &GatherPoint,
@@ -89,7 +89,7 @@ fn arrive<M: MemoryPort>(
     (ray, hit): (&Ray, &mut Option<Hit>),
 ) -> Result<Option<GatherRayEnd>, Fault> {
     let mut path = SpecularPath::new(*ray, Carried::Radiance, Passes::NarrowLobes);
-    // The division by the number of rays is done here: sums stay within the fixed-point range.
+    // Divided by the number of rays here, so that sums stay within the fixed-point range.
     let weight = sampled.weight * (point.weight / point.rays as f32);
     let Some(hit) = hit else {
         return escaped(context, point, &path, sampled, weight);
@@ -156,8 +156,8 @@ fn escaped<M: MemoryPort>(
     Ok(Some(GatherRayEnd { cell: sampled.cell, direct, request: None }))
 }
 
-/// Weighted light of point, spot and distant lights that the path collected at narrow lobes, in the image's
-/// radiance units. It is zero where the caustic map contains this light.
+/// Light of point, spot and distant lights that narrow lobes on the path reflect, times the ray's weight, in
+/// the card image's radiance units. Zero if the gather point takes this light from the caustic map.
 fn collected<M>(
     context: &Context<M>,
     point: &GatherPoint,
@@ -175,8 +175,8 @@ fn collected<M>(
 }
 
 /// Weight of emission at the end of a gather ray that passed specular surfaces or narrow lobes, not only flat
-/// glass. No shadow ray finds this light. Without a caustic map the weight is `weight`. With one it is only
-/// the part of the narrow lobe, because the map brings the light to all other reflection.
+/// glass. No shadow ray finds this light. Without a caustic map the weight is `weight`. With one it is the
+/// narrow lobe's part of `weight`, because the caustic map lights all other reflection.
 fn beyond_specular<M>(
     context: &Context<M>,
     point: &GatherPoint,
@@ -195,10 +195,11 @@ fn beyond_specular<M>(
     weight * Vec3::select(whole.cmpgt(Vec3::ZERO), part / whole, Vec3::ZERO)
 }
 
-/// Executes a gather. Returns its radiance, in the image's radiance units.
+/// Executes a gather. Returns the radiance that it contributes to its target, in the card image's radiance
+/// units.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn gathered<M: MemoryPort>(
     context: &mut Context<M>,
     request: &GatherRequest,
@@ -206,7 +207,7 @@ pub fn gathered<M: MemoryPort>(
 ) -> Result<Vec3, Fault> {
     context.memory.enter(Stage::Gather);
     let position = request.position.position(&context.scene.header.photon_grid).into();
-    // Irradiance has no directions, which a lobe needs.
+    // A lobe needs the directions of photons, which precomputed irradiance lacks.
     if context.frame.radiance == Radiance::Precomputed && request.reflection.is_lambertian() {
         return Ok(
             request.reflection.lambertian() * irradiance(context, position, request.reflection.normal())?
@@ -226,8 +227,8 @@ pub fn gathered<M: MemoryPort>(
     gathered_radiance((scene, *memory), position, reflection, limits, candidates, &mut count)
 }
 
-/// Precomputed irradiance at the nearest irradiance point of a surface, photon power units/m^2; 0 if there is
-/// none.
+/// Irradiance at the nearest irradiance point of the surface, photon power units/m^2; 0 if there is none
+/// within the maximum distance of gathers.
 #[inline(always)]
 fn irradiance<M: MemoryPort>(context: &mut Context<M>, position: Vec3, normal: u8) -> Result<Vec3, Fault> {
     let max_distance = context.frame.max_distance;

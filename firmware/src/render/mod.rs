@@ -1,5 +1,5 @@
-//! Passes of a tile. Each is a function of one pixel or one ray: eye ray, direct light, caustics, final
-//! gather.
+//! Passes of a tile: eye ray, direct light, caustics, final gather. Each is a function that handles one
+//! pixel, or one ray of it.
 
 pub mod caustic;
 pub mod direct;
@@ -20,8 +20,8 @@ use crate::gather::GatherRequest;
 use crate::sampler::{Dimension, Pattern};
 use crate::scene::SceneImage;
 
-/// Length of a shadow ray divided by the distance of its light. The ray ends before the emitter's surface in
-/// spite of rounding.
+/// Length of a shadow ray divided by the distance of its light: below 1, so that rounding does not let the
+/// ray hit the light itself.
 const SHORTER: f32 = 1.0 - 8.0 * f32::EPSILON;
 
 /// Arguments of every pass: scene, memory, frame parameters and counters.
@@ -36,7 +36,7 @@ pub struct Context<'a, M> {
     pub counters: &'a mut Counters,
 }
 
-/// Arguments of a chip's work on all of its tiles.
+/// Arguments of a chip's work that are common to all of its tiles.
 pub struct RenderJob<'a, M> {
     /// Sections of the card image.
     pub scene: &'a SceneImage,
@@ -44,7 +44,7 @@ pub struct RenderJob<'a, M> {
     pub memory: &'a mut M,
     /// Frame parameters.
     pub frame: &'a FrameParameters,
-    /// Receiver of the gathers of pixels, if the chip does not do them itself.
+    /// Receiver of the gathers of pixels; `None` if the chip executes them itself.
     pub outlet: Option<&'a mut dyn GatherOutlet>,
 }
 
@@ -70,25 +70,26 @@ impl<M> RenderJob<'_, M> {
 /// Receiver of the gathers of pixels: a host that has memory for the gathers of a whole frame
 /// (`--order hilbert`).
 pub trait GatherOutlet {
-    /// Takes a gather of the pixel at a row-major index in the tile.
+    /// Takes a gather of the pixel with the row-major index `pixel` in its tile.
     fn take(&mut self, pixel: u32, request: GatherRequest);
 }
 
-/// Sample or path of a pixel, from which random numbers are derived.
+/// Identity of a path of a pixel, from which the path's random numbers are derived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelSample {
     /// Column of the pixel in the whole picture.
     pub x: u32,
     /// Row of the pixel in the whole picture.
     pub y: u32,
-    /// Index of the sample or path in the pixel.
+    /// Index of the path in the pixel: that of the sample, unless samples have several paths (adaptive
+    /// sampling).
     pub sample: u32,
 }
 
 impl PixelSample {
-    /// Pattern that is stratified over the pixel's samples, and the index of this sample in it. With adaptive
-    /// sampling, probes and other paths have separate patterns: in a common pattern, later points would fill
-    /// the strata that the probes left free, and their mean would depend on what the probes found.
+    /// Pattern that is stratified over the pixel's paths, and the index of this path in the pattern. With
+    /// adaptive sampling, probes have a pattern of their own: in a common pattern, later points would fill
+    /// the strata that the probes left free, so that their mean would depend on the probes.
     #[inline(always)]
     pub fn stratified(self, frame: &FrameParameters, dimension: Dimension) -> (Pattern, u32) {
         let Self { x, y, sample } = self;

@@ -1,10 +1,11 @@
-//! Pixel filters: samples are placed by inverse cumulative distribution functions.
+//! Pixel filters. Positions of samples in a pixel are drawn from the filter, by its inverse cumulative
+//! distribution function.
 
 use photoncard_shared::message::Filter;
 
 use crate::vector::min;
 
-/// Number of steps of a table.
+/// Number of intervals of a table of [`Quantiles`].
 const STEPS: usize = 32;
 
 /// Quantiles of a filter on one axis: entry `i` is the distance from the centre, pixels, within which the
@@ -25,8 +26,8 @@ const BLACKMAN_HARRIS: Quantiles = [
     0.439136, 0.75,
 ];
 
-/// Position of a sample on one axis, pixels from the left or upper border of its pixel, for a random number
-/// in [0, 1).
+/// Position of a sample on one axis, drawn by a random number in [0, 1): pixels from the left or upper border
+/// of the sample's pixel.
 #[inline(always)]
 pub(super) fn place(filter: Filter, number: f32) -> f32 {
     match filter {
@@ -64,7 +65,7 @@ mod tests {
             let number = |i: i32| (i as f32 + 0.5) / count as f32;
             let is_within = |i: &i32| f64::from((place(filter, number(*i)) - 0.5).abs()) <= distance;
             let found = (0..count).filter(is_within).count() as f64 / f64::from(count);
-            // Half of a step: places are uniform between quantiles.
+            // Half of an interval, as positions are uniform between quantiles.
             assert!(
                 (found - expected).abs() < 0.5 / STEPS as f64,
                 "{filter:?} {distance}: {found} {expected}"

@@ -14,17 +14,17 @@ use crate::scene::{Reflector, Surface};
 /// Origin of final gather rays.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherPoint {
-    /// Surface at the point. It has its whole reflection, whatever the purpose of the rays.
+    /// Surface at the point, with its whole reflection, whatever the purpose of the rays.
     pub surface: Surface,
-    /// Random numbers of the rays.
+    /// Random pattern from which the rays are sampled.
     pub pattern: Pattern,
     /// Number of rays. Without rays, all direct light comes from shadow rays.
     pub rays: u32,
-    /// Shares of the rays by direction.
+    /// Direction table from which the rays are sampled.
     pub directions: DirectionTable,
     /// The purpose of the rays.
     pub purpose: Purpose,
-    /// Weight of the rays' light in the sum that it is added to.
+    /// Weight with which the light of the rays is added to its sum.
     pub weight: f32,
 }
 
@@ -33,19 +33,20 @@ pub struct GatherPoint {
 pub enum Purpose {
     /// The rays gather all light that a sample reflects.
     Sample,
-    /// The rays gather the light that a sample's lobe reflects. Irradiance records light its Lambertian part.
+    /// The rays gather the light that a sample's lobe reflects. The light of the Lambertian part is
+    /// interpolated between irradiance records.
     Lobe,
-    /// The rays gather the irradiance of a record, which many samples share.
+    /// The rays gather the irradiance of an irradiance record, from which many samples are interpolated.
     Record,
 }
 
-/// Minimum number of gather rays for which photons are searched for a direction table. The search costs as
-/// much as a gather ray, and fewer rays are spread too thinly over the cells to profit
+/// Minimum number of gather rays of a point whose direction table depends on photons. The search for photons
+/// costs as much as a gather ray, and fewer rays are too thinly spread over the cells to profit
 /// (`docs/techniques.md`).
 const MIN_RAYS_OF_SEARCH: u32 = 8;
 
 impl GatherPoint {
-    /// Point with rays for all light that a sample reflects.
+    /// Creates the point of a sample, with `rays` rays for all reflected light; none if the surface is black.
     pub fn sample(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = if surface.reflection.is_black() { 0 } else { rays };
         Self {
@@ -58,7 +59,7 @@ impl GatherPoint {
         }
     }
 
-    /// Point with rays for the irradiance of a record. Its surface is white.
+    /// Creates the point of an irradiance record. `surface` must be white.
     pub fn record(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         Self {
             surface,
@@ -70,7 +71,8 @@ impl GatherPoint {
         }
     }
 
-    /// Point with rays for a surface's lobe. It has [`Reflector::lobe_share`] of the rays.
+    /// Creates the point of a sample with rays for the lobe alone: [`Reflector::lobe_share`] times `rays`,
+    /// rounded up.
     pub fn lobe(surface: Surface, pattern: Pattern, rays: u32) -> Self {
         let rays = libm::ceilf(rays as f32 * surface.reflector().lobe_share()) as u32;
         Self {
@@ -83,7 +85,7 @@ impl GatherPoint {
         }
     }
 
-    /// Part of the reflection that the rays serve, seen from the eye.
+    /// Reflection whose light the rays gather, the whole or the lobe alone, seen from the eye.
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
         let reflector = self.surface.reflector();
@@ -93,11 +95,11 @@ impl GatherPoint {
         Reflector { reflection, ..reflector }
     }
 
-    /// Chooses the shares of the directions. Points with few rays use the reflection, others the frame's
-    /// sampling method, which may search for the nearest photons.
+    /// Sets the direction table: that of the reflection for few rays, else that of the frame's sampling
+    /// method, which may search for the nearest photons.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     pub fn choose_directions<M: MemoryPort>(
         &mut self,
         context: &mut Context<M>,

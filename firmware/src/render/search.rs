@@ -1,4 +1,4 @@
-//! Photon search at points that the eye sees, and counters of the reflection of photons.
+//! Photon search for direction tables, and counters of the reflection of photons.
 
 use glam::Vec3;
 use photoncard_shared::counters::Counters;
@@ -9,7 +9,8 @@ use crate::memory::MemoryPort;
 use crate::photon::{NearestPhotons, PhotonMap, Reflected, gather};
 use crate::scene::PartialReflection;
 
-/// Counts the photons that a lobe reflects, and the normals decoded for a reflection.
+/// Counts the photons found by a gather whose reflection has a lobe, and the photon normals that were
+/// decoded.
 #[inline(always)]
 pub(super) fn count_reflection(
     counters: &mut Counters,
@@ -26,8 +27,8 @@ pub(super) fn count_reflection(
     }
 }
 
-/// Collects in `nearest` the photons of a map nearest to a position, for direction tables and caustics. These
-/// searches are few and share one copy of the code, unlike gathers at the ends of rays.
+/// Collects in `nearest` the photons of a map nearest to a position, for a direction table. Returns the
+/// number of photons tested.
 #[inline(never)]
 pub(super) fn search<M: MemoryPort>(
     context: &mut Context<M>,

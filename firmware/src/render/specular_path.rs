@@ -1,11 +1,11 @@
 //! Paths through specular surfaces: mirrors, smooth coats and smooth glass. For gather rays and photons,
 //! narrow lobes ([`crate::scene::Reflection::has_narrow_lobe`]) are specular too.
 //!
-//! At such a surface a path takes one continuation at random, in proportion to its share of the light:
-//! reflection, transmission, a direction of the narrow lobe, or an end at the surface for the rest of its
-//! reflection. The samples of a pixel cover all of them. After [`FREE_BOUNCES`] bounces a path survives with
-//! the probability of its throughput (Russian roulette), and after [`SPECULAR_BOUNCES`] it contributes
-//! nothing.
+//! At a specular surface a path takes one continuation at random, in proportion to the continuation's share
+//! of the light: reflection, transmission, a direction of the narrow lobe, or an end at the surface for the
+//! rest of the surface's reflection. The samples of a pixel cover all continuations. After [`FREE_BOUNCES`]
+//! bounces a path survives with the probability of its throughput (Russian roulette), and after
+//! [`SPECULAR_BOUNCES`] it contributes nothing.
 //!
 //! Absorption follows the Beer-Lambert law, with the coefficient of the glass that the path entered last;
 //! nested glass is not tracked. Flat glass changes neither direction nor medium.
@@ -23,8 +23,8 @@ use crate::scene::{
 };
 use crate::vector::{max, max_component, min};
 
-/// Minimum ratio of two probabilities, to end at a surface and to continue, if the surface's reflection is
-/// not black.
+/// Minimum of the probability that a path ends at a surface, divided by the probability that it continues, if
+/// the surface's reflection is not black.
 const MIN_STAY: f32 = 1.0 / 16.0;
 
 /// A path through specular surfaces, up to its current ray.
@@ -34,16 +34,16 @@ pub struct SpecularPath {
     pub ray: Ray,
     /// Throughput between the path's origin and the current ray, dimensionless.
     pub throughput: Vec3,
-    /// Light of point, spot and distant lights that the path's narrow lobes reflect towards its origin, W/(sr
-    /// m^2). No ray can hit such a light.
+    /// Light of point, spot and distant lights, which no ray can hit, that narrow lobes on the path reflect
+    /// towards the path's origin, W/(sr m^2).
     pub collected: Vec3,
-    /// Number of specular surfaces passed.
+    /// Number of specular surfaces that the path has passed.
     pub bounces: u32,
-    /// Distance of the first specular surface from the origin, metres.
+    /// Distance from the path's origin to the first specular surface, metres.
     pub first_distance: f32,
-    /// True while the path has passed only flat glass, so that it is a straight line.
+    /// True while the path has passed nothing but flat glass, so that the path is a straight line.
     pub is_straight: bool,
-    /// Length of the path up to the current ray, metres.
+    /// Length of the path up to the origin of the current ray, metres.
     pub travelled: f32,
     /// Transported quantity.
     carried: Carried,
@@ -59,14 +59,14 @@ pub struct SpecularPath {
 pub enum Carried {
     /// Radiance. The path is followed from the eye, against the light.
     Radiance,
-    /// Power. The path is a photon's.
+    /// Power. The path is that of a photon, from a light.
     Power,
 }
 
 /// Kinds of surfaces that a path passes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passes {
-    /// Perfectly specular surfaces. Used for eye paths, because their gather points have rays for the lobes.
+    /// Perfectly specular surfaces. Used for eye paths, which end at lobes: gather rays are cast there.
     Specular,
     /// Perfectly specular surfaces and narrow lobes ([`crate::scene::Reflection::has_narrow_lobe`]). Used for
     /// gather rays and photons.
@@ -81,7 +81,7 @@ pub enum Passes {
 pub enum Arrival {
     /// The path ends at the surface.
     Ends,
-    /// The path continues along its new ray.
+    /// The path continues along a new ray.
     GoesOn,
     /// The path contributes nothing, because it has passed too many specular surfaces, or reached one that
     /// absorbs everything.
@@ -131,10 +131,10 @@ impl SpecularPath {
         self.passes != Passes::Specular && surface.reflection.has_narrow_lobe()
     }
 
-    /// Arrives at a surface. The first of the three numbers in `random`, in [0, 1), chooses the continuation,
-    /// the others a direction. If the path ends, the surface loses any lobe that the path would pass. If a
-    /// photon goes on by a lobe, the surface's `outgoing` becomes the direction that the photon is taken to
-    /// come from ([`Reflector::sample_photon`]).
+    /// Continues or ends the path at a surface. The first of the three numbers in `random`, in [0, 1),
+    /// chooses the continuation, the others the direction in a lobe. A lobe that the path passes is removed
+    /// from the surface, for the case that the path ends there. If a photon goes on by a lobe, the surface's
+    /// `outgoing` becomes the direction that the photon is taken to come from ([`Reflector::sample_photon`]).
     #[inline(always)]
     pub fn arrive(&mut self, surface: &mut Surface, random: [f32; 3]) -> Arrival {
         if !self.may_pass(surface) && self.absorption == Vec3::ZERO {
@@ -175,7 +175,8 @@ impl SpecularPath {
         if goes <= 0.0 {
             return if stays > 0.0 { Arrival::Ends } else { Arrival::Lost };
         }
-        // A minimum probability bounds the weight of ending here: no fireflies. At an emitter it is one half.
+        // A minimum of the probability of ending here bounds the weight of the path: no fireflies. At an
+        // emitter the minimum is one half.
         let stays = if stays > 0.0 { max(stays, goes * MIN_STAY) } else { 0.0 };
         let stays = if max_component(surface.emission) > 0.0 { max(stays, goes) } else { stays };
         let all = goes + stays;
@@ -219,8 +220,8 @@ impl SpecularPath {
         Arrival::GoesOn
     }
 
-    /// Applies Russian roulette to a path with many bounces. The path survives with the probability of its
-    /// throughput, which is then divided by that probability.
+    /// Applies Russian roulette after [`FREE_BOUNCES`] bounces. The path survives with the probability
+    /// `min(1, throughput)`, by the maximum channel; the throughput is then divided by that probability.
     fn survives(&mut self, random: &dyn Fn(u32) -> f32) -> bool {
         if self.bounces <= FREE_BOUNCES {
             return true;
@@ -234,11 +235,11 @@ impl SpecularPath {
     }
 
     /// Follows the path from `surface` to its end. `surface` and `hit` are replaced by those of the last
-    /// surface that the path reaches. `random` maps the number of a random choice to a value in [0, 1); no
-    /// two choices of a path have the same number.
+    /// surface that the path reaches. `random` maps the number of a random choice to a value in [0, 1). Each
+    /// choice of a path has a number of its own.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     #[inline(never)]
     pub fn follow<M: MemoryPort>(
         &mut self,
@@ -273,7 +274,7 @@ impl SpecularPath {
     }
 }
 
-/// A random choice of a path at a surface.
+/// Kind of random choice that a path makes at a surface.
 #[derive(Clone, Copy, Debug)]
 struct Choice(u32);
 
@@ -283,10 +284,11 @@ impl Choice {
     const LIGHT: [Self; 2] = [Self(3), Self(4)];
     const LAYER: Self = Self(5);
     const SURVIVAL: Self = Self(Self::LAYER.0 + SURFACE_CHOICES);
-    /// Number of choices per surface.
+    /// Number of choices that a path makes at a surface.
     const ALL: u32 = Self::SURVIVAL.0 + 1;
 
-    /// Number of the choice's random number after `bounces` bounces. It is unique.
+    /// Number of this choice at the surface after `bounces` bounces: unique in the path, and an argument of
+    /// `random` in [`SpecularPath::follow`].
     fn number(self, bounces: u32) -> u32 {
         const NUMBERED: u32 = FREE_BOUNCES + 1;
         match bounces.checked_sub(NUMBERED) {
@@ -296,13 +298,13 @@ impl Choice {
     }
 }
 
-/// Number of the random number by which a path chooses the layer of a surface.
+/// Number, in a path, of random choice `choice` of [`read_surface`] at the surface after `bounces` bounces.
 pub fn surface_choice(bounces: u32, choice: u32) -> u32 {
     Choice(Choice::LAYER.0 + choice).number(bounces)
 }
 
-/// Light that a surface's narrow lobe reflects from one sampled light, W/(sr m^2), if the light has no area.
-/// The path itself hits lights with an area.
+/// Radiance that a surface's narrow lobe reflects of one light sample, W/(sr m^2); zero if the light has an
+/// area, because rays of the lobe hit such lights.
 #[inline(never)]
 fn punctual_light<M: MemoryPort>(
     context: &mut Context<M>,

@@ -24,8 +24,8 @@ use crate::wide_tree::{BEYOND, Descent, Order};
 /// Maximum number of rays of a bundle.
 pub const BUNDLE_RAYS: usize = LANES;
 
-/// Mask of the lower half of the bits pushed with a child: one bit per ray of the bundle. The upper half
-/// holds the upper half of the `f32` bits of the rays' least distance, rounded down.
+/// Mask of the lower half of the 32 bits that are pushed with a child: one bit per ray of the bundle. The
+/// upper half is that of the `f32` bits of the least distance at which a ray enters the child's box.
 const RAYS: u32 = (1 << BUNDLE_RAYS) - 1;
 
 /// Finds [`closest_hit`] for each of up to [`BUNDLE_RAYS`] rays and stores it in `hits`, which must be `None`
@@ -75,7 +75,7 @@ pub struct Bundle<'a, M, S> {
     pub memory: &'a mut M,
     /// Rays of the bundle, at most [`BUNDLE_RAYS`].
     pub rays: &'a [Ray],
-    /// Result of each ray, initially nothing found.
+    /// Result of each ray, `None` or [`Passed::ALL`] at first.
     pub searches: &'a mut [S; BUNDLE_RAYS],
 }
 
@@ -88,7 +88,7 @@ fn cast<M: MemoryPort, S: Search>(bundle: Bundle<M, S>) -> Result<(), Fault> {
     simd::run(bundle)
 }
 
-/// A ray of a bundle, with its slab and triangle test data.
+/// A ray of a bundle, prepared for tests of boxes and triangles.
 struct Way<'a> {
     ray: &'a Ray,
     frame: RayFrame,
@@ -98,7 +98,7 @@ struct Way<'a> {
 /// State of a bundle's traversal.
 struct Rays<'a, S> {
     ways: Vec<Way<'a>, BUNDLE_RAYS>,
-    /// Bits of the maximum distance of each ray.
+    /// Maximum distance of each ray's further hits, metres, as `f32` bits.
     until: [u32; BUNDLE_RAYS],
     searches: &'a mut [S; BUNDLE_RAYS],
 }
@@ -126,7 +126,7 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
             && let Some((bits, child)) = descent.pop()?
         {
             let here = rays.within(isa, bits) & waiting;
-            // Each ray requests the line: the first by reading it.
+            // Each ray requests the line once; the first ray's request is the read below.
             let others = 1..here.count_ones();
             match child {
                 _ if here == 0 => {}
@@ -163,7 +163,7 @@ impl<'a, S: Search> Rays<'a, S> {
         Self { ways, until, searches }
     }
 
-    /// Rays of a child's bits whose maximum distance is not below the distance in the bits.
+    /// Rays in the bits pushed with a child whose maximum distance is not below the distance in these bits.
     #[inline(always)]
     fn within(&self, isa: impl Isa, bits: u32) -> u32 {
         match S::ORDER {
@@ -172,15 +172,15 @@ impl<'a, S: Search> Rays<'a, S> {
         }
     }
 
-    /// Bits to push with each child of a node: the rays of `here` that enter its box, and the least distance
-    /// at which one of them does.
+    /// Bits to push with each child of a node: the rays of `here` that enter the child's box, and the least
+    /// distance at which one of them does.
     #[inline(always)]
     fn enter(&self, isa: impl Isa, node: BvhNode, mut here: u32) -> [u32; LANES] {
         let children = WideNode(node.0).children() as usize;
         let mut entered = [0; LANES];
         let mut nearest = [BEYOND; LANES];
         while let Some(index) = take(&mut here) {
-            // Always there: a bit is set of rays of the bundle alone.
+            // Always there: only bits of rays in the bundle are set.
             let (Some(way), Some(&until)) = (self.ways.get(index), self.until.get(index)) else { continue };
             let distances = way.slabs.enter(isa, node, children, f32::from_bits(until));
             let lanes = entered.iter_mut().zip(&mut nearest).zip(distances);

@@ -21,7 +21,7 @@ use crate::wide_tree::{Descent, Order, Stack};
 /// Closest hit of a ray. The lower triangle index breaks ties between equal distances.
 ///
 /// # Errors
-/// If the image is invalid: a record is out of range, or the hierarchy is deeper than the stack.
+/// If the card image is invalid: a record is out of range, or the hierarchy is deeper than the stack.
 #[inline(never)]
 pub fn closest_hit(
     scene: &SceneImage,
@@ -32,7 +32,7 @@ pub fn closest_hit(
 }
 
 /// Fraction of a light's radiance that arrives along a ray: the product of the transmittances of the flat
-/// glass that the ray hits, 0 if it hits anything else.
+/// glass that the ray hits, 0 if the ray hits anything else.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -85,18 +85,19 @@ impl<M: MemoryPort> Kernel for ShadowRay<'_, M> {
     }
 }
 
-/// Search along a ray, for the closest hit or for the light that passes.
+/// State of a search along a ray: the closest hit, or the fraction of light that passes.
 pub(super) trait Search {
     /// Order in which a node's children are visited.
     const ORDER: Order;
     /// True if the search continues behind flat glass.
     const PASSES_FLAT_GLASS: bool;
 
-    /// Takes a hit of the triangle with this index, in a slot of its leaf. Returns the maximum distance of
-    /// further hits, or [`ControlFlow::Break`] if no further hit is needed.
+    /// Takes a hit of triangle `index`, which is in slot `at.1` of the leaf `at.0`. Returns the maximum
+    /// distance of further hits, or [`ControlFlow::Break`] if no further hit is needed.
     fn meet(&mut self, hit: Intersection, index: u32, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
 
-    /// Passes flat glass with this transmittance.
+    /// Takes a hit of flat glass with a transmittance. Returns [`ControlFlow::Break`] if no further hit is
+    /// needed.
     fn pass(&mut self, _transmittance: Vec3) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -156,7 +157,7 @@ impl Search for Passed {
     }
 }
 
-/// Follows a ray through the hierarchy.
+/// Follows a ray through the hierarchy and passes its hits to `search`.
 #[inline(always)]
 fn descend<S: Search>(
     isa: impl Isa,
@@ -183,7 +184,7 @@ fn descend<S: Search>(
                 if sheared.may_meet == 0 {
                     continue;
                 }
-                // A copy: textures of cut-outs are read beside it.
+                // A copy, because reading textures of cut-outs borrows the memory too.
                 let line = *line;
                 let place = (ray, &frame, leaf);
                 match meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)? {
@@ -196,10 +197,10 @@ fn descend<S: Search>(
     Ok(())
 }
 
-/// Stack of a traversal of the hierarchy.
 pub(super) type BvhStack = Stack<{ BVH_STACK + LANES }>;
 
-/// Finds the hits of a ray in a leaf up to the distance `until`. Returns the new maximum distance.
+/// Passes the hits of a ray in a leaf, up to the distance `until`, to `search`. Returns the new maximum
+/// distance, or [`ControlFlow::Break`] if no further hit is needed.
 #[inline(always)]
 pub(super) fn meet_leaf<S: Search>(
     scene: &SceneImage,
@@ -213,7 +214,7 @@ pub(super) fn meet_leaf<S: Search>(
     while may_meet != 0 {
         let slot = may_meet.trailing_zeros() as usize;
         may_meet &= may_meet - 1;
-        // Most triangles that may be met are not.
+        // The exact test excludes most of the triangles in `may_meet`.
         let Some(intersection) = frame.intersect_slot(sheared, slot, until) else { continue };
         let index = leaf.wrapping_mul(LEAF_TRIANGLES as u32).wrapping_add(slot as u32);
         let weights = intersection.barycentric;

@@ -12,7 +12,7 @@ use crate::vector::unit;
 
 const ATTRIBUTES_PER_LINE: u32 = Attributes::PER_LINE as u32;
 
-/// Vertex attributes of a triangle, to be interpolated at a point.
+/// Vertex attributes of a triangle, and the point at which they are interpolated.
 pub(super) struct Corners {
     leaf: LeafAttributes,
     slot: u32,
@@ -21,8 +21,8 @@ pub(super) struct Corners {
 }
 
 impl Corners {
-    /// Reads the attributes of triangle `index`, for the point with barycentric `weights`; `None` if it has
-    /// no attributes.
+    /// Reads the attributes of triangle `index`, for the point with barycentric `weights`; `None` if the
+    /// triangle has no attributes.
     pub(super) fn read(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
@@ -44,9 +44,9 @@ impl Corners {
         self.attributes.normals.map(|normals| unit(self.interpolated(normals)))
     }
 
-    /// Tangent, bitangent and normal on the front, interpolated but not normalised, as programs that bake
-    /// normal maps assume. `front_normal` is used if the triangle has no shading normals. The material must
-    /// have a normal map.
+    /// Tangent, bitangent and normal on the front, interpolated and not normalised, as programs that bake
+    /// normal maps assume. The normal is `front_normal` if the triangle has no shading normals. The material
+    /// must have a normal map.
     pub(super) fn frame(
         &self,
         scene: &SceneImage,

@@ -16,7 +16,7 @@ use crate::sampler::{hash, unit_interval};
 /// rays and photons agree on the mean. The back of a one-sided surface with partial coverage is never hit.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(never)]
 pub(super) fn is_met(
     scene: &SceneImage,
@@ -26,7 +26,7 @@ pub(super) fn is_met(
     weights: [f32; 3],
 ) -> Result<bool, Fault> {
     let material = read_material(scene, memory, triangle.material)?;
-    // Glass has two sides always: a ray inside meets its back.
+    // Glass always has two sides: a ray inside hits the back.
     let is_glass = matches!(material.reflectance, Reflectance::Glass { .. });
     if material.flags & (BLENDS | DOUBLE_SIDED) == BLENDS && !is_glass && is_back(ray, triangle) {
         return Ok(false);
@@ -44,7 +44,7 @@ fn is_back(ray: &Ray, triangle: &Triangle) -> bool {
 /// partial coverage.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(never)]
 pub(super) fn coverage(
     scene: &SceneImage,
@@ -60,7 +60,7 @@ pub(super) fn coverage(
     Ok(covered(material, texture * colour))
 }
 
-/// Coverage of a material where texture and vertex colour have the product `alpha`.
+/// Coverage of a material where the alphas of base texture and vertex colour have the product `alpha`.
 pub(super) fn covered(material: &Material, alpha: f32) -> f32 {
     if material.flags & BLENDS != 0 {
         alpha * material.cutoff
@@ -71,7 +71,7 @@ pub(super) fn covered(material: &Material, alpha: f32) -> f32 {
     }
 }
 
-/// Random number in [0, 1) for a ray and a triangle.
+/// Random number in [0, 1): a hash of a ray and a triangle's index.
 fn chance(ray: &Ray, triangle: u32) -> f32 {
     let [a, b, c] = ray.origin.to_array().map(f32::to_bits);
     let [d, e, f] = ray.direction.to_array().map(f32::to_bits);

@@ -1,4 +1,4 @@
-//! Test for cut-outs at a point.
+//! Test whether a point of a triangle is cut out.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -13,7 +13,7 @@ use crate::memory::MemoryPort;
 /// projected onto it.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn is_there(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

@@ -11,7 +11,7 @@ use crate::memory::MemoryPort;
 /// Transmittance of a flat glass triangle along a ray, at the point with barycentric `weights`.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 #[inline(never)]
 pub(super) fn of_flat_glass(
     scene: &SceneImage,
@@ -21,7 +21,7 @@ pub(super) fn of_flat_glass(
     weights: [f32; 3],
 ) -> Result<Vec3, Fault> {
     let mut surface = Surface::NOWHERE;
-    // Of several layers the base alone transmits.
+    // The random value 0 chooses the base, the only layer that transmits.
     surface_of(scene, memory, ray, place, weights, &|_| 0.0, &mut surface)?;
     Ok(surface.specular.transmitted * surface.specular.straight)
 }

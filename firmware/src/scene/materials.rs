@@ -24,7 +24,7 @@ pub(super) fn read_material(
     Ok(Material::read(bytes))
 }
 
-/// Returns true if surfaces of a material have several layers, or need random numbers as rough glass does.
+/// Returns whether a material has [`Layers`] or is rough glass.
 #[inline(always)]
 pub(super) fn has_layers(material: &Material) -> bool {
     material.layers.is_some()

@@ -83,8 +83,8 @@ impl SceneImage {
         read_slot(memory, kind.structure(), line, slot, first..first + N as u32).ok_or(fault)?
     }
 
-    /// Reads line `index` of a section whose records are one line each. The bytes in `used` are counted as
-    /// requested.
+    /// Reads line `index` of a section whose records are one line each. Counters of memory traffic count the
+    /// bytes `used` of the line as requested.
     ///
     /// # Errors
     /// As [`Self::record`].

@@ -10,8 +10,8 @@ use super::materials::read_layers;
 use crate::memory::MemoryPort;
 use crate::vector::unit;
 
-/// Unit normal of a material's base on the front, from its normal map or interpolated; `None` for the
-/// triangle's own normal, which is `front_normal`.
+/// Unit shading normal of a material's base on the front: that of the normal map, or interpolated between the
+/// corners; `None` if it is the geometric normal, `front_normal`.
 #[inline(always)]
 pub(super) fn base_normal(
     scene: &SceneImage,
@@ -28,8 +28,8 @@ pub(super) fn base_normal(
     mapped_normal(scene, memory, map, corners, front_normal)
 }
 
-/// Unit normal on the front from a normal texture with a scale of its x and y; interpolated if the texture is
-/// [`NO_TEXTURE`].
+/// Unit normal on the front by a normal map, whose x and y are multiplied by a scale; interpolated between
+/// the corners if the texture is [`NO_TEXTURE`].
 #[inline(never)]
 pub(super) fn mapped_normal(
     scene: &SceneImage,

@@ -18,7 +18,8 @@ pub struct Seen {
 impl Seen {
     /// Arbitrary initial value.
     pub const NOWHERE: Self = Self { triangle: 0, weights: [0.0; 2] };
-    /// Marks a point that is seen through specular surfaces. It must be found again along its path.
+    /// Marks a point that cannot be stored: it lies behind specular surfaces or on a random layer, and its
+    /// eye path must be traced again.
     pub const ELSEWHERE: Self = Self { triangle: u32::MAX, ..Self::NOWHERE };
 
     /// Returns true for [`Self::ELSEWHERE`].
@@ -34,10 +35,10 @@ impl Seen {
     }
 
     /// Reads the surface at the point into `surface`, on the side of the ray's origin. If the material has
-    /// several layers, the surface is the base. Its `distance` is 0.
+    /// several layers, the surface is the base. The surface's `distance` is 0.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     #[inline(always)]
     pub fn surface(
         &self,

@@ -1,5 +1,5 @@
 //! Makes interpolated or mapped shading normals consistent with the triangle. Otherwise surfaces would be
-//! black where the normal points away from the viewer, or reflect the view into the surface.
+//! black where the normal points away from the viewer, or their mirror direction would lie below the surface.
 
 use glam::Vec3;
 
@@ -21,13 +21,12 @@ pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Ve
     let cosine = normal.dot(outgoing);
     let turned = if cosine < MIN_COSINE { normal + outgoing * (MIN_COSINE - cosine) } else { normal };
     let turned = unit(turned);
-    // Without a direction, or on the wrong side still: flat.
+    // The geometric normal replaces a zero vector, or a normal still on the far side of the triangle.
     if turned.dot(geometric_normal) > 0.0 { turned } else { geometric_normal }
 }
 
-/// Bends a shading normal partly. `share` is the fraction of the albedo that belongs to a lobe around the
-/// mirror direction; the normal is [`bent`] by this fraction, because the Lambertian remainder reflects by
-/// the normal itself.
+/// Moves a shading normal towards the [`bent`] one by the fraction `share` of the way. `share` is the lobe's
+/// fraction of the albedo: the Lambertian remainder needs the normal itself.
 #[inline(always)]
 pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     if share <= 0.0 || normal == geometric_normal {
@@ -37,12 +36,13 @@ pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_
     if bent == normal { normal } else { unit(normal + (bent - normal) * min(share, 1.0)) }
 }
 
-/// Bends a unit shading normal towards the triangle's normal until the mirror direction of `outgoing` lies
-/// above the triangle. `outgoing` itself lies above it. The cosine of the mirror direction becomes at least
-/// 0.01, or at grazing views 0.9 times that of `outgoing`.
+/// Bends a unit shading normal towards the triangle's normal until the mirror direction of `outgoing`, which
+/// lies above the triangle, does so too. The cosine of the mirror direction to the triangle's normal becomes
+/// at least 0.01, or at grazing views 0.9 times that of `outgoing`.
 ///
-/// In the plane of the two normals, at the angle `a` from the triangle's normal, `outgoing` has the
-/// projection `r (sin b, cos b)`, and its mirror direction has the cosine `r cos(2 a - b)`.
+/// Let `r (sin b, cos b)` be the projection of `outgoing` onto the plane of the two normals, at the angle `b`
+/// from the triangle's. A shading normal at the angle `a` from the triangle's gives the mirror direction the
+/// cosine `r cos(2 a - b)`.
 pub(super) fn bent(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     let height = geometric_normal.dot(outgoing);
     let least = min(0.9 * height, MIN_COSINE);

@@ -1,8 +1,8 @@
 //! Slab test of a ray against all boxes of a node at once.
 //!
-//! A side of a box is at `corner + unit * side`, where `side` is a byte. The distance to its plane is
-//! `(corner - origin) / d + side * (unit / d)`. The first term and `unit / d` are common to all boxes of a
-//! node.
+//! On each axis, a side of a box is at `corner + unit * side`, where `side` is a byte. A ray with the
+//! direction component `d` reaches the side's plane at the distance `(corner - origin) / d + side * (unit /
+//! d)`. The first term and `unit / d` are common to all boxes of a node.
 //!
 //! The test is conservative under rounding (compare Ize 2013, *Robust BVH ray traversal*). The first term is
 //! decreased for near planes and increased for far planes by more than its rounding error plus that of the
@@ -15,7 +15,7 @@ use crate::simd::{Isa, LANES};
 use crate::vector::{max, min};
 use crate::wide_tree::BEYOND;
 
-/// Ray with precomputed values that all boxes share.
+/// Ray, prepared for slab tests: origin and reciprocal direction, by axis.
 pub(super) struct Slabs {
     axes: [SlabAxis; 3],
 }
@@ -28,7 +28,7 @@ struct SlabAxis {
     is_downwards: bool,
 }
 
-/// Relative margin for rounding errors.
+/// Margin for rounding errors, as a fraction of the distance to the planes of a node's corner.
 const MARGIN: f32 = 8.0 * f32::EPSILON;
 
 /// Minimum magnitude of a direction's component. It replaces smaller components, whose reciprocals would
@@ -43,8 +43,8 @@ impl Slabs {
         Self { axes: [SlabAxis::new(a, x), SlabAxis::new(b, y), SlabAxis::new(c, z)] }
     }
 
-    /// Bits of the distance at which the ray enters each child's box; [`BEYOND`] if it misses the box or
-    /// enters beyond `until`.
+    /// Bits of the distance at which the ray enters each child's box; [`BEYOND`] if the ray misses the box or
+    /// enters it beyond `until`.
     #[inline(always)]
     pub(super) fn enter(&self, isa: impl Isa, node: BvhNode, children: usize, until: f32) -> [u32; LANES] {
         let [x, y, z] = node.axes();
@@ -70,7 +70,7 @@ impl SlabAxis {
         Self { origin, inverse, is_downwards: inverse < 0.0 }
     }
 
-    /// Planes of a node's boxes on this axis.
+    /// Distances along the ray to the planes of a node's boxes on this axis.
     #[inline(always)]
     fn planes<'a>(&self, axis: &BvhAxis<'a>) -> Planes<'a> {
         let corner = (axis.corner - self.origin) * self.inverse;
@@ -80,12 +80,13 @@ impl SlabAxis {
     }
 }
 
-/// Planes of a node's boxes on one axis. Their distances along the ray are `first + side * unit` or
-/// `last + side * unit`.
+/// Planes of a node's boxes on one axis. Their distances along the ray are `near * unit + first` for the near
+/// sides and `far * unit + last` for the far ones.
 struct Planes<'a> {
     near: &'a [u8; NODE_CHILDREN],
     far: &'a [u8; NODE_CHILDREN],
-    /// Lower bound of the distance to the node's corner. `last` is the upper bound.
+    /// Lower bound, under rounding, of the distance to the plane of the node's corner. `last` is the upper
+    /// bound.
     first: f32,
     last: f32,
     unit: f32,

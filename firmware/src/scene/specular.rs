@@ -13,22 +13,23 @@ pub struct Specular {
     pub reflected: Vec3,
     /// Transmittance, 0 to 1.
     pub transmitted: Vec3,
-    /// Unit direction of reflected light; zero for the mirror direction about the shading normal.
+    /// Unit direction of the specular reflection; zero if it is the mirror direction about the shading
+    /// normal.
     pub beside: Vec3,
-    /// Unit direction of transmitted light, behind the surface.
+    /// Unit direction in which the path is continued behind the surface, by transmission.
     pub behind: Vec3,
-    /// Absorption coefficient behind the surface, 1/m. Meaningless where light passes straight.
+    /// Absorption coefficient behind the surface, 1/m; meaningless for flat glass.
     pub absorption: Vec3,
     /// Probability with which the layer of flat glass (a thin wall, or a face of a pane) was chosen; 0 for
     /// other surfaces. Light passes flat glass without a change of direction or medium.
     pub straight: f32,
-    /// Ratio of the radiances in front and behind at a transmittance of 1: `1 / n^2`, where n is the index of
-    /// refraction.
+    /// Radiance in front divided by radiance behind at a transmittance of 1: `1 / n^2`, where `n` is the
+    /// index of refraction behind relative to that in front.
     pub radiance_scale: f32,
 }
 
 impl Specular {
-    /// Absence of a perfectly specular part.
+    /// Value for a surface without a perfectly specular part.
     pub const NONE: Self = Self {
         reflected: Vec3::ZERO,
         transmitted: Vec3::ZERO,
@@ -64,7 +65,7 @@ impl Specular {
     /// below the surface.
     pub(crate) fn reflected_direction(outgoing: Vec3, normal: Vec3, geometric_normal: Vec3) -> Vec3 {
         let direction = mirror(outgoing, bent(normal, outgoing, geometric_normal));
-        // Rounding, at grazing views.
+        // At grazing views, rounding may take the direction below the surface.
         if direction.dot(geometric_normal) > 0.0 { direction } else { mirror(outgoing, geometric_normal) }
     }
 }
@@ -95,12 +96,12 @@ impl Bounds {
 /// Smooth dielectric at a point, with textures applied.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Glass {
-    /// Tint of one passage. For a thin wall it is the base colour, for a face of a volume the square root of
-    /// the base colour.
+    /// Tint of one passage through the surface: the base colour for a thin wall, its square root for a face
+    /// of a volume or a pane.
     pub(super) base: Vec3,
     /// Absorption coefficient inside, 1/m; for a pane, the optical depth.
     pub(super) absorption: Vec3,
-    /// Fraction of the light not reflected that is transmitted.
+    /// Fraction of the light past the Fresnel reflection that is transmitted.
     pub(super) transmission: f32,
     /// Index of refraction.
     pub(super) ior: f32,
@@ -110,8 +111,8 @@ pub(super) struct Glass {
 }
 
 impl Glass {
-    /// Fraction of the light that is scattered instead of transmitted, and the specular part. Normals are on
-    /// the side of `outgoing`, which is the inside of the body if `is_inside`.
+    /// Fraction of the light that is left for the Lambertian base, and the specular part. Normals are on the
+    /// side of `outgoing`, which is the inside of the body if `is_inside`.
     pub(super) fn at(
         &self,
         outgoing: Vec3,
@@ -182,7 +183,7 @@ impl Glass {
 fn fresnel(cosine: f32, index: f32) -> (f32, f32) {
     let sine_squared = (1.0 - cosine * cosine) / (index * index);
     let cosine_squared = 1.0 - sine_squared;
-    // NaN from an unsound image counts as total reflection.
+    // NaN from an unsound card image counts as total reflection.
     if cosine_squared.is_nan() || cosine_squared <= 0.0 {
         return (1.0, 0.0);
     }

@@ -18,10 +18,10 @@ use super::{Hit, Ray, Reflection, Reflector, SceneImage, magnitude, offset_origi
 use crate::memory::MemoryPort;
 use crate::vector::{max, max_component, min, unit};
 
-/// Number of random numbers that [`read_surface`] takes.
+/// Number of random choices that [`read_surface`] makes.
 pub const SURFACE_CHOICES: u32 = 4;
 
-/// Surface where a ray hits it, on the side of the ray's origin.
+/// Surface at a point that a ray hits, on the side of the ray's origin.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface {
     /// Position, metres.
@@ -32,28 +32,31 @@ pub struct Surface {
     pub geometric_normal: Vec3,
     /// Unit vector against the ray's direction.
     pub outgoing: Vec3,
-    /// Reflection of this side without its perfectly specular part; black on the back of a one-sided surface.
+    /// Reflection of the ray's side without the perfectly specular part; black on the back of a one-sided
+    /// surface.
     pub reflection: Reflection,
     /// The perfectly specular part.
     pub specular: Specular,
     /// Absorption coefficient of the glass that the ray passed through, 1/m; zero in air.
     pub absorption: Vec3,
-    /// Radiance that this side emits, W/(sr m^2).
+    /// Radiance that the ray's side emits, W/(sr m^2).
     pub emission: Vec3,
     /// Index of the emitter that the surface belongs to; `None` if it is not an emitter.
     pub emitter: Option<u32>,
-    /// Probability with which the surface's layer was chosen; 1 for a surface of one layer. Reflection and
-    /// emission are divided by it.
+    /// Probability of the random choices of a layer and of a part of the reflection; 1 if none was made.
+    /// `reflection` is divided by this probability, `specular` by that of the layer, `emission` by that of
+    /// all layers that emit.
     pub probability: f32,
     /// Fraction of the surface that is present; 1 without partial coverage. A ray hits the surface with this
     /// probability.
     pub coverage: f32,
-    /// True if this is the other side of a surface, seen through it. Photons are stored on the side where
-    /// they arrive.
+    /// True if this is the far side of a surface, seen through the surface (diffuse or rough transmission).
+    /// Photons are stored on the side where they arrive.
     pub is_behind: bool,
     /// Distance along the ray, metres.
     pub distance: f32,
-    /// Maximum absolute coordinate from which `position` was computed, metres. It bounds the rounding error.
+    /// Maximum absolute coordinate from which `position` was computed, metres. The rounding error of
+    /// `position` is proportional to this coordinate.
     pub magnitude: f32,
 }
 
@@ -81,7 +84,7 @@ impl Surface {
         }
     }
 
-    /// Removes smooth shading. Photons are stored on such surfaces, and gathers search on them.
+    /// Replaces the shading normal by the geometric normal, as for storing and gathering photons.
     #[inline(always)]
     pub fn flat(self) -> Self {
         Self { normal: self.geometric_normal, ..self }
@@ -102,7 +105,7 @@ impl Surface {
         self
     }
 
-    /// Replaces the surface by its other side, seen through it. The ray's side is mirrored.
+    /// Turns the surface into its far side, seen through the surface: `outgoing` is mirrored to the far side.
     fn see_through(&mut self) {
         let front = -self.normal;
         self.geometric_normal = -self.geometric_normal;
@@ -110,13 +113,13 @@ impl Surface {
         self.is_behind = true;
     }
 
-    /// Point just off the surface, from which a ray does not hit it again.
+    /// Point just off the ray's side of the surface, from which a ray does not hit the surface again.
     #[inline(always)]
     pub fn offset_origin(&self) -> Vec3 {
         offset_origin(self.position, self.geometric_normal, self.magnitude)
     }
 
-    /// Point just off the other side, from which a ray does not hit the surface again.
+    /// Point just off the far side of the surface, from which a ray does not hit the surface again.
     pub fn offset_behind(&self) -> Vec3 {
         offset_origin(self.position, -self.geometric_normal, self.magnitude)
     }
@@ -128,7 +131,7 @@ impl Surface {
         self.normal.dot(direction) > 0.0 && self.geometric_normal.dot(direction) > 0.0
     }
 
-    /// Mirror direction of the ray: a unit vector away from the surface.
+    /// Direction of the specular reflection towards `outgoing`: a unit vector away from the surface.
     pub fn mirrored(&self) -> Vec3 {
         if self.specular.beside != Vec3::ZERO {
             return self.specular.beside;
@@ -137,12 +140,12 @@ impl Surface {
     }
 }
 
-/// Reads the surface where a ray hits a triangle into `surface`. It is written in place, because a chip would
-/// copy its 230 bytes one by one. `random` returns [`SURFACE_CHOICES`] numbers in [0, 1), which choose one of
-/// the layers; number 0 at its lowest value chooses the base.
+/// Reads the surface where a ray hits a triangle into `surface`. The result is written in place, because a
+/// chip would copy its 230 bytes one by one. `random` maps the numbers 0 to [`SURFACE_CHOICES`] - 1 of random
+/// choices to values in [0, 1), which choose one of the layers; the value 0 of choice 0 chooses the base.
 ///
 /// # Errors
-/// If the triangle's material is not in the image.
+/// If the triangle's material is not in the card image.
 #[inline(always)]
 pub fn read_surface(
     scene: &SceneImage,
@@ -158,7 +161,7 @@ pub fn read_surface(
     Ok(())
 }
 
-/// Surface of a triangle at the point with barycentric `weights`, at distance 0 ([`read_surface`]).
+/// Does [`read_surface`] for the point of a triangle with barycentric `weights`; the distance is set to 0.
 #[inline(always)]
 pub(super) fn surface_of(
     scene: &SceneImage,
@@ -175,7 +178,8 @@ pub(super) fn surface_of(
     let front_normal = unit((b - a).cross(c - a));
     let is_front = front_normal.dot(ray.direction) < 0.0;
     let normal = if is_front { front_normal } else { -front_normal };
-    // From the corners, not along the ray: the rounding error is relative to the corners.
+    // Interpolated from the corners instead of computed along the ray, so that the rounding error is relative
+    // to the corners.
     let position = a * u + b * v + c * w;
     *surface = Surface::white(position, normal, magnitude(&[a, b, c, ray.origin]));
     surface.outgoing = -ray.direction;
@@ -201,8 +205,7 @@ fn is_plain(material: &Material) -> bool {
     material.textures == [NO_TEXTURE; 3] && material.flags & HAS_ATTRIBUTES == 0 && material.layers.is_none()
 }
 
-/// Applies vertex attributes, textures and material to a surface. Its emission is already that of the
-/// material.
+/// Applies vertex attributes, textures and material to a surface whose untextured emission is set.
 #[inline(never)]
 fn finish(
     scene: &SceneImage,
@@ -247,13 +250,15 @@ fn finish(
     Ok(())
 }
 
-/// Minimum probability of either of two parts that have different normals.
+/// Minimum probability of the Lambertian part and of the narrow lobe, where [`shade_by_parts`] chooses one of
+/// them.
 const MIN_PART: f32 = 1.0 / 8.0;
 
-/// Sets the shading normals of a surface's parts from the normal of its corners or texture: the Lambertian
-/// part keeps that normal, a lobe or a mirror has the bent one. If a narrow lobe and the Lambertian part have
-/// different normals, `random`, in [0, 1), chooses one of them, and its reflection is divided by the
-/// probability. A wide lobe, for which photons are stored, shares a normal with the Lambertian part.
+/// Sets the shading normal of a surface, which has that of its corners or of a normal map. The Lambertian
+/// part keeps this normal; a lobe or a mirror needs the [`bent`] one. If a narrow lobe and the Lambertian
+/// part need different normals, `random`, in [0, 1), chooses one of the parts, and its reflection is divided
+/// by the probability. A wide lobe, for which photons are stored, and the Lambertian part share a normal in
+/// between ([`bent_by_share`]).
 #[inline(never)]
 fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
     let Surface { normal, geometric_normal, outgoing, reflection, .. } = *surface;
@@ -267,8 +272,8 @@ fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
         return;
     }
     let bent = bent(turned, outgoing, geometric_normal);
-    // Not by the difference from `normal`, which rounding decides: a stored hit, read again, must give the
-    // same answer.
+    // Not decided by `bent == normal`, which depends on rounding: a stored hit that is read again must lead
+    // to the same decision.
     if bent == turned && !points_away(normal, outgoing) {
         return;
     }
@@ -283,7 +288,8 @@ fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
     surface.probability *= probability;
 }
 
-/// Applies one of a material's layers to a surface. All layers of the side emit.
+/// Sets a surface's scattering to that of one layer of its material, chosen at random. The surface emits
+/// whichever layer of the ray's side is chosen.
 #[inline(never)]
 fn take_layer(
     scene: &SceneImage,
@@ -320,7 +326,7 @@ fn take_layer(
         surface.normal = taken.normal;
     }
     let view = View { normals: [taken.normal, geometric_normal], ..*view };
-    // The first number is stratified, and free where there is one layer.
+    // Choice 0 is stratified, and unused where the material has one layer here.
     let choice = if taken.probability < 1.0 { SURFACE_CHOICES - 1 } else { 0 };
     shade_by_parts(surface, &view, random(choice));
     Ok(())

@@ -16,7 +16,7 @@ const TEXEL_BYTES: u32 = 4;
 /// Reads texture `index`.
 ///
 /// # Errors
-/// If there is none.
+/// If there is no such texture.
 pub fn read_texture(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<Texture, Fault> {
     let bytes =
         scene.record::<{ Texture::BYTES }, TEXTURES_PER_LINE>(memory, SectionKind::Textures, index)?;
@@ -26,7 +26,7 @@ pub fn read_texture(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
 /// Value of a texture at texture coordinates: linear RGBA.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn sample_texture(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -56,7 +56,7 @@ pub fn sample_texture(
     Ok(sum)
 }
 
-/// Two neighbouring texels on one axis, between whose centres a position lies.
+/// The two neighbouring texels on one axis between whose centres a position lies.
 struct TexelPair {
     /// Indices of the two texels.
     texels: [u32; 2],
@@ -67,7 +67,7 @@ struct TexelPair {
 impl TexelPair {
     fn new(coordinate: f32, size: u16, wrap: Wrap) -> Self {
         let texels = u32::from(size.max(1));
-        // Period in texels; unused by clamping.
+        // Period of the wrap mode, texels; unused for clamping.
         let period = if wrap == Wrap::Mirror { 2 * texels } else { texels };
         let turns = match wrap {
             Wrap::Clamp => coordinate,
@@ -79,7 +79,7 @@ impl TexelPair {
         let turns = if turns > -half_outside { turns } else { -half_outside };
         let turns = min(turns, period as f32 / texels as f32 + half_outside);
         let at = turns * texels as f32 + 0.5;
-        // Texel indices here start at 1: 0 is the texel before the first.
+        // Texel indices are increased by 1 here, so that the texel before the first has index 0.
         let first = at as u32;
         let wrapped = |texel: u32| match wrap {
             Wrap::Clamp => texel.saturating_sub(1).min(texels - 1),
@@ -123,7 +123,7 @@ fn texel(
 /// Minimum and maximum of each channel over all texels: linear RGBA.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub(super) fn channel_ranges(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -248,7 +248,7 @@ mod tests {
             let decoded =
                 decode_texel(TexelFormat::NormalPair, texel(x, y)).map(|channel| 2.0 * channel - 1.0);
             let error = normal.iter().zip(decoded).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
-            // The slope of z has no bound where it is 0.
+            // The slope of z as a function of x and y has no bound where z is 0.
             assert!(error < if normal[2] > 0.0 { 4e-5 } else { 8e-3 }, "{normal:?} {decoded:?}");
         }
         let outside = decode_texel(TexelFormat::NormalPair, texel(u16::MAX, u16::MAX));

@@ -14,7 +14,7 @@ use crate::vector::{max, min};
 
 const _: () = assert!(LEAF_TRIANGLES == HALF_LANES && VERTEX_LANES <= LANES);
 
-/// Ray with the shear that all triangles share.
+/// Ray, prepared for intersections with triangles: permutation of the axes, and shear.
 #[derive(Clone, Copy, Debug)]
 pub struct RayFrame {
     /// Permutation of the axes that puts the direction's greatest component last.
@@ -40,7 +40,7 @@ pub struct Hit {
     pub intersection: Intersection,
     /// The triangle.
     pub triangle: Triangle,
-    /// Index of the triangle in the image.
+    /// Index of the triangle in the card image.
     pub index: u32,
 }
 
@@ -111,7 +111,8 @@ impl RayFrame {
                 [x.get(lane).copied().unwrap_or(0.0), y.get(lane).copied().unwrap_or(0.0)]
             };
             let [u, v, w] = edges(at(&a), at(&b), at(&c));
-            // A product of zero: some sign is undecided in `f32`.
+            // If the product is zero, `f32` leaves the sign of an edge function undecided: the triangle may
+            // be hit.
             let is_missed = (min(min(u, v), w) < 0.0) & (max(max(u, v), w) > 0.0) & (u * v * w != 0.0);
             if let (Some(miss), Some(us), Some(vs), Some(ws)) =
                 (misses.get_mut(lane), us.get_mut(lane), vs.get_mut(lane), ws.get_mut(lane))
@@ -132,7 +133,7 @@ impl RayFrame {
         self.intersect_on_axes([on_axes(a), on_axes(b), on_axes(c)], max_distance)
     }
 
-    /// Does [`Self::intersect`] with triangle `slot` of a leaf.
+    /// Intersects either side of triangle `slot` of a leaf, as [`Self::intersect`] does.
     #[inline(always)]
     pub(super) fn intersect_slot(
         &self,
@@ -220,7 +221,7 @@ fn permute(
     [isa.permute(across, vertices), isa.permute(up, vertices)]
 }
 
-/// Edge functions at the origin, each for the edge opposite to a corner.
+/// Edge functions of a sheared triangle at the origin, each for the edge opposite to a corner.
 #[inline(always)]
 fn edges(a: [f32; 2], b: [f32; 2], c: [f32; 2]) -> [f32; 3] {
     [cross(c, b), cross(a, c), cross(b, a)]

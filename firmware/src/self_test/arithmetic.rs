@@ -5,7 +5,8 @@
 
 use photoncard_shared::message::{OPERAND_BYTES, RESULT_BYTES, RESULTS};
 
-/// Expressions of the results, with the operands `a`, `b` and `c`. `bits` is an operand as an integer.
+/// Expressions of the results, with the operands `a`, `b` and `c`. `bits` gives the bits of its arguments as
+/// one integer.
 pub const EXPRESSIONS: [&str; RESULTS] = [
     "a + b",
     "a - b",
@@ -30,8 +31,8 @@ pub const EXPRESSIONS: [&str; RESULTS] = [
     "a < b, a = b, a > b",
 ];
 
-/// Bits of a result. All NaNs become one value, because the processor determines which NaN an operation
-/// returns, and no pixel depends on it.
+/// Bits of a result. All NaNs become one, because processors differ in the NaN that an operation returns, on
+/// which no pixel depends.
 fn bits(value: f32) -> u32 {
     if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() }
 }

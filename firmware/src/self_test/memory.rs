@@ -10,11 +10,11 @@ use crate::memory::{CardMemory, outside};
 /// Number of lines written or read per step: 8 KB.
 const STEP_LINES: u32 = 64;
 
-/// Number of lines after which a test reports its progress: 1 MB, so that a memory faster than 9 KB/s makes
-/// progress within 120 s.
+/// Number of lines after which a test reports its progress: 1 MB, which a memory faster than 9 KB/s passes
+/// within the 120 s that a host waits for progress.
 const REPORT_LINES: u32 = 8192;
 
-/// Value of the word `index` in a pattern. It is not inlined, because each loop over words would otherwise be
+/// Value of word `index` in a pattern. The function is not inlined: otherwise each loop over words would be
 /// compiled once per pattern.
 #[inline(never)]
 pub fn expected(pattern: MemoryPattern, index: u32) -> u32 {
@@ -71,8 +71,8 @@ impl MemoryTester {
         Ok(Self { progress: MemoryTest { lines, pattern, written: 0, checked: 0, wrong } })
     }
 
-    /// Writes or reads the next lines. Returns the progress if it is to be reported: after each megabyte, and
-    /// at the end of the memory.
+    /// Writes or reads back the next lines. Returns the progress after each megabyte and at the end of the
+    /// memory, when it is to be reported.
     ///
     /// # Errors
     /// [`FaultCode::LineRange`] if the memory has fewer lines than it reports.
@@ -128,7 +128,8 @@ fn replace_bytes(memory: &mut impl CardMemory, address: u32) -> Option<()> {
     })
 }
 
-/// Adds the wrong words of a line. Its address must be above those of the lines before.
+/// Adds the wrong words of the line at `address` to `wrong`. Lines must be added in the order of their
+/// addresses.
 #[cold]
 #[inline(never)]
 fn add(wrong: &mut WrongWords, address: u32, expected: &[u8; LINE_BYTES], stored: &Line) {

@@ -9,20 +9,20 @@ pub const HALF_LANES: usize = LANES / 2;
 
 /// An instruction set. A value of an implementing type is the proof that the processor supports it.
 pub trait Isa: Copy {
-    /// Number of lanes to compute if `used` are needed. It is all lanes if that costs no more.
+    /// Number of lanes that a loop computes if `used` are needed: all lanes if that costs no more.
     fn lanes(self, used: usize) -> usize;
 
-    /// Mask of the lanes whose value is below a bound. Lane 0 is the lowest bit.
+    /// Bit mask of the lanes whose value is below `bound`. Lane 0 is the lowest bit.
     fn below(self, values: &[u32; LANES], bound: u32) -> u32;
 
-    /// Moves the lanes in a mask to the front of `packed`, in order. The remaining lanes of `packed` are
-    /// meaningless.
+    /// Copies the lanes of `values` that are set in `mask` to the front of `packed`, in order. The remaining
+    /// lanes of `packed` are meaningless.
     fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]);
 
     /// [`Isa::pack`] for 64-bit lanes.
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]);
 
-    /// Permutation: the values at these indices. Only the lower four bits of an index count.
+    /// Permutation: the values at `indices`. Only the lower four bits of an index count.
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES];
 
     /// Prefetches a line into the processor's cache, if the instruction set supports it.

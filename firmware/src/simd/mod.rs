@@ -25,7 +25,7 @@ pub fn run<K: Kernel>(kernel: K) -> K::Output {
     kernel.run(Portable)
 }
 
-/// All instruction sets, to test that they give the same bits.
+/// An instruction set by name, for tests that all sets give the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Level {
     /// The portable fallback ([`Portable`]).
@@ -64,7 +64,7 @@ mod tests {
 
     use super::*;
 
-    /// Results of every method of an [`Isa`] for one mask.
+    /// Kernel that returns the results of every vector method of an [`Isa`] for one mask.
     struct All {
         mask: u32,
         bound: u32,

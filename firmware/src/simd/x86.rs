@@ -40,7 +40,7 @@ impl Avx512 {
 
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: there is an `Avx512` only where the processor has its instructions.
+        // SAFETY: an `Avx512` exists only where the processor has the instructions.
         unsafe { self.compile(kernel) }
     }
 }
@@ -58,7 +58,7 @@ impl Avx2 {
 
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> K::Output {
-        // SAFETY: there is an `Avx2` only where the processor has its instructions.
+        // SAFETY: an `Avx2` exists only where the processor has the instructions.
         unsafe { self.compile(kernel) }
     }
 }
@@ -86,8 +86,7 @@ const CACHE_LINE_BYTES: usize = 64;
 #[inline(always)]
 fn prefetch(line: &Line) {
     for part in line.0.chunks(CACHE_LINE_BYTES) {
-        // SAFETY: every processor of this kind has the instruction, which changes nothing that a program can
-        // see.
+        // SAFETY: every x86-64 processor has the instruction, which changes nothing that a program can see.
         unsafe { _mm_prefetch::<_MM_HINT_T0>(part.as_ptr().cast()) };
     }
 }
@@ -100,7 +99,7 @@ impl Isa for Avx512 {
 
     #[inline(always)]
     fn below(self, values: &[u32; LANES], bound: u32) -> u32 {
-        // SAFETY: the instructions are there, and sixteen numbers of four bytes to read.
+        // SAFETY: the processor has AVX-512; sixteen numbers of four bytes are read, as many as there are.
         unsafe {
             let values = _mm512_loadu_si512(values.as_ptr().cast());
             u32::from(_mm512_cmplt_epu32_mask(values, _mm512_set1_epi32(bound.cast_signed())))
@@ -109,7 +108,8 @@ impl Isa for Avx512 {
 
     #[inline(always)]
     fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]) {
-        // SAFETY: the instructions are there, and sixteen numbers of four bytes to read and to write.
+        // SAFETY: the processor has AVX-512; sixteen numbers of four bytes are read and written, as many as
+        // there are.
         unsafe {
             let values = _mm512_loadu_si512(values.as_ptr().cast());
             let front = _mm512_maskz_compress_epi32(mask as u16, values);
@@ -120,8 +120,8 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]) {
         let [lower, upper] = [mask as u8, (mask >> 8) as u8];
-        // SAFETY: the instructions are there, and sixteen numbers of eight bytes to read and to write: the
-        // second eight are written after at most eight of the first.
+        // SAFETY: the processor has AVX-512; sixteen numbers of eight bytes are read and written, as many as
+        // there are: the second eight are written after at most eight of the first.
         unsafe {
             let first = _mm512_loadu_si512(values.as_ptr().cast());
             let second = _mm512_loadu_si512(values.as_ptr().add(8).cast());
@@ -135,8 +135,8 @@ impl Isa for Avx512 {
     #[inline(always)]
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES] {
         let mut permuted = [0.0; HALF_LANES];
-        // SAFETY: the instructions are there, sixteen numbers and eight indices to read, and eight numbers to
-        // write.
+        // SAFETY: the processor has AVX-512; sixteen numbers and eight indices are read and eight numbers
+        // written, as many as there are.
         unsafe {
             let indices = _mm256_loadu_si256(indices.as_ptr().cast());
             let lower = _mm256_loadu_ps(values.as_ptr());
@@ -152,7 +152,7 @@ impl Isa for Avx512 {
     }
 }
 
-/// Indices of the set lanes in each mask of eight lanes, ascending.
+/// For each mask of eight lanes, indices of the set lanes, ascending.
 const LANES_OF: [[u8; 8]; 256] = {
     let mut lanes_of = [[0; 8]; 256];
     let mut mask = 0;
@@ -201,7 +201,7 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn below(self, values: &[u32; LANES], bound: u32) -> u32 {
         let (halves, _) = values.as_chunks::<8>();
-        // SAFETY: the instructions are there, and eight numbers of four bytes to read.
+        // SAFETY: the processor has AVX2; eight numbers of four bytes are read, as many as there are.
         let below = |half: &[u32; 8]| unsafe {
             let values = _mm256_loadu_si256(half.as_ptr().cast());
             let values = _mm256_xor_si256(values, _mm256_set1_epi32(SIGN.cast_signed()));
@@ -218,8 +218,8 @@ impl Isa for Avx2 {
         for half in values.as_chunks::<8>().0 {
             let lanes = mask as u8;
             mask >>= 8;
-            // SAFETY: the instructions are there, eight numbers to read, and as many to write: the second
-            // eight are written after at most eight of the first.
+            // SAFETY: the processor has AVX2; eight numbers are read and written, as many as there are: the
+            // second eight are written after at most eight of the first.
             unsafe {
                 let order = order(&LANES_OF[usize::from(lanes)]);
                 let values = _mm256_loadu_si256(half.as_ptr().cast());
@@ -236,8 +236,8 @@ impl Isa for Avx2 {
         for quarter in values.as_chunks::<4>().0 {
             let lanes = mask & 15;
             mask >>= 4;
-            // SAFETY: the instructions are there, four numbers to read, and as many to write: before the last
-            // four at most twelve are.
+            // SAFETY: the processor has AVX2; four numbers are read and written, as many as there are: the
+            // last four are written after at most twelve others.
             unsafe {
                 let order = order(&LONG_LANES_OF[lanes as usize]);
                 let values = _mm256_loadu_si256(quarter.as_ptr().cast());
@@ -250,8 +250,8 @@ impl Isa for Avx2 {
     #[inline(always)]
     fn permute(self, values: &[f32; LANES], indices: &[u32; HALF_LANES]) -> [f32; HALF_LANES] {
         let mut permuted = [0.0; HALF_LANES];
-        // SAFETY: the instructions are there, sixteen numbers and eight indices to read, and eight numbers to
-        // write.
+        // SAFETY: the processor has AVX2; sixteen numbers and eight indices are read and eight numbers
+        // written, as many as there are.
         unsafe {
             let indices = _mm256_loadu_si256(indices.as_ptr().cast());
             let half = |first: *const f32| _mm256_permutevar8x32_ps(_mm256_loadu_ps(first), indices);

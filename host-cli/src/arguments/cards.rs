@@ -61,7 +61,7 @@ pub(crate) struct CardOptions {
 }
 
 impl CardOptions {
-    /// Settings of the cards that these options state.
+    /// Returns the cards that these options state, or one emulated reference chip.
     pub(super) fn settings(&self) -> CardSet {
         let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
         let addresses = if self.cards.is_empty() { emulated() } else { self.cards.clone() };
@@ -89,18 +89,18 @@ pub(crate) struct ChipOption {
 }
 
 impl ChipOption {
-    /// The kind of the file, or `kind` without one.
+    /// Kind of chip in the file of `--chip`, or `kind` without such a file.
     pub(crate) fn or(&self, kind: EmulatedKind) -> EmulatedKind {
         self.chip.unwrap_or(kind)
     }
 
-    /// Returns whether a file is stated.
+    /// Returns whether `--chip` is stated.
     pub(crate) fn is_stated(&self) -> bool {
         self.chip.is_some()
     }
 }
 
-/// Parser of the name of a file with a kind of chips.
+/// Parser of the path of a JSON file, which reads the kind of chip in it.
 fn kind_of_file() -> impl TypedValueParser<Value = EmulatedKind> {
     PathBufValueParser::new().try_map(|path| Emulated::read(&path).map(EmulatedKind::File))
 }

@@ -1,9 +1,9 @@
-//! Parsers of arguments that are one of several names.
+//! Parsers of arguments whose values have names.
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use photoncard_driver::choice::Choice;
 
-/// Parser of the names of a choice.
+/// Parser of the names of an enumeration's variants.
 pub(super) fn choice<T: Choice>() -> impl TypedValueParser<Value = T> {
     PossibleValuesParser::new(T::ALL.iter().copied().map(possible_value))
         .try_map(|name: String| T::of_name(&name))
@@ -14,7 +14,7 @@ pub(super) fn switch() -> impl TypedValueParser<Value = bool> {
     PossibleValuesParser::new(["on", "off"]).map(|name: String| name == "on")
 }
 
-/// Possible value of a choice, with its help.
+/// Clap's possible value for a variant: its name and its help.
 pub(super) fn possible_value<T: Choice>(value: T) -> PossibleValue {
     let possible = PossibleValue::new(value.name());
     if value.about().is_empty() { possible } else { possible.help(value.about()) }

@@ -51,14 +51,14 @@ impl PictureOutput {
         (self.path.as_os_str() != STANDARD_OUTPUT).then_some(&self.path)
     }
 
-    /// Name for messages.
+    /// Name for messages: the path, or that of standard output.
     pub(crate) fn name(&self) -> String {
         self.file().map_or("standard output".to_owned(), |path| path.display().to_string())
     }
 }
 
-/// Formats that are not written: suffixes, name, and the end of the command that converts a PNG or an EXR to
-/// the format.
+/// Formats that are not written: suffixes, name of the format, and what to give `-o` instead, with the
+/// command that converts it.
 const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
     (&["jpg", "jpeg", "jpe"], "JPEG", "out.png, then: magick out.png out.jpg"),
     (&["webp"], "WebP", "out.png, then: magick out.png out.webp"),
@@ -74,7 +74,7 @@ const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
     (&["card"], "a prepared scene", "SCENE.card to photoncard prepare"),
 ];
 
-/// Error of a suffix that is not that of a supported picture format.
+/// Error of a suffix that is not that of a picture format, with a remedy.
 fn other_format(ending: Option<&str>) -> String {
     let other =
         OTHER_FORMATS.iter().find(|(endings, ..)| ending.is_some_and(|ending| endings.contains(&ending)));
@@ -86,7 +86,7 @@ fn other_format(ending: Option<&str>) -> String {
     }
 }
 
-/// Parser of the outputs for pictures. The suffix states the format.
+/// Parser of the path of a picture, whose suffix states the format.
 pub(super) fn picture() -> impl TypedValueParser<Value = PictureOutput> {
     PathBufValueParser::new().try_map(|path| {
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
@@ -102,7 +102,7 @@ pub(super) fn picture() -> impl TypedValueParser<Value = PictureOutput> {
     })
 }
 
-/// Parser of the output for a PNG picture.
+/// Parser of the path of a PNG file.
 pub(super) fn png() -> impl TypedValueParser<Value = PathBuf> {
     picture().try_map(|output| match output {
         PictureOutput { path, format: PictureFormat::Png } if path.as_os_str() != STANDARD_OUTPUT => Ok(path),
@@ -110,7 +110,7 @@ pub(super) fn png() -> impl TypedValueParser<Value = PathBuf> {
     })
 }
 
-/// Parser of the output for text.
+/// Parser of the path of a text file; `-` is standard output.
 pub(super) fn text() -> impl TypedValueParser<Value = TextOutput> {
     PathBufValueParser::new().map(|path| match path.to_str() {
         Some("-") => TextOutput::StandardOutput,
@@ -118,7 +118,7 @@ pub(super) fn text() -> impl TypedValueParser<Value = TextOutput> {
     })
 }
 
-/// Parser of an output that cannot be standard output.
+/// Parser of the path of a file that is not standard output.
 pub(super) fn file() -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(|path| match path.to_str() {
         Some("-") => {

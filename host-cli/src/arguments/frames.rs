@@ -43,7 +43,7 @@ impl FrameOptions {
         self.frames.as_ref().map(|Frames(numbers)| numbers.iter().copied())
     }
 
-    /// Names of the animations that play. All play if the list is empty.
+    /// Names of the animations that play; all of the file play if the list is empty.
     pub(crate) fn animations(&self) -> &[String] {
         &self.animations
     }
@@ -64,15 +64,15 @@ impl FrameOptions {
         Moment { animations: self.animations.clone(), seconds: f64::from(frame) / self.fps() }
     }
 
-    /// Settings of frames on which the pixels of `frame` depend.
+    /// Options that the pixels of a frame depend on: its number, frames per second and animations.
     pub(crate) fn provenance(&self, frame: u32) -> NamedSettings {
         let own = ("frame".to_owned(), json!(frame));
         self.shared_provenance().into_iter().chain([own]).collect()
     }
 }
 
-/// Path of the last existing file up to `frame` that matches a pattern with a run of `#`. A pattern without
-/// one is returned as it is.
+/// Path of the last existing file with a number up to `frame` in place of the pattern's last run of `#`. A
+/// pattern without `#` is returned as it is.
 pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     if numbered(pattern, frame).is_none() {
         return Some(pattern.to_owned());
@@ -89,8 +89,8 @@ pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     numbered(pattern, last)
 }
 
-/// Path of a frame's output: the frame's number, padded with zeros, replaces the last run of `#` in the file
-/// name. `None` without a `#`.
+/// Path of a frame's file: the number, padded with zeros to the length of the last run of `#` in the file
+/// name, replaces this run. `None` without a `#`.
 pub(crate) fn numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     let name = pattern.file_name()?.to_str()?;
     let end = name.rfind('#')? + 1;

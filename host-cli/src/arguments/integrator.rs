@@ -50,14 +50,14 @@ pub(crate) struct IntegratorOptions {
     adaptive: Option<Adaptive>,
 }
 
-/// Stated value of `--adaptive`.
+/// Value of `--adaptive`.
 #[derive(Clone, Copy)]
 enum Adaptive {
     Off,
     Threshold(f32),
 }
 
-/// Default maximum relative error of interpolated irradiance.
+/// Default of `--ic-error` if the quality has no irradiance cache.
 const DEFAULT_IC_ERROR: f32 = 0.025;
 
 impl IntegratorOptions {
@@ -81,7 +81,7 @@ impl IntegratorOptions {
         }
     }
 
-    /// Flags of the stated options among those that a quality chooses.
+    /// Returns which of the settings that a quality chooses are stated.
     pub(super) fn stated(&self) -> Stated {
         Stated {
             samples: self.spp.is_some(),
@@ -97,7 +97,7 @@ impl IntegratorOptions {
         self.irradiance_cache.unwrap_or(base.irradiance_error.is_some())
     }
 
-    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
     pub(super) fn without_effect(&self, base: &Integrator, add: &mut impl FnMut(bool, &str, &str)) {
         let is_cached = self.is_cached(base);
         let not_cached = "without --irradiance-cache on";

@@ -40,7 +40,7 @@ const LATENCY: RangeInclusive<f64> = 0.0..=10_000.0;
 const TASKS: RangeInclusive<u32> = 1..=65_536;
 
 impl RateOptions {
-    /// Nominal machine with these rates.
+    /// Nominal machine, with the rates of these options.
     pub(crate) fn machine(&self) -> Machine {
         Machine { bandwidth: 1e9 * self.bandwidth, flops: 1e9 * self.flops, ..Machine::NOMINAL }
     }
@@ -65,7 +65,7 @@ fn tasks(text: &str) -> Result<u32, String> {
     within(text, &TASKS)
 }
 
-/// Parses a number within a range.
+/// Parses a number, which must be in a range.
 fn within<T: FromStr + PartialOrd + std::fmt::Display>(
     text: &str,
     range: &RangeInclusive<T>,

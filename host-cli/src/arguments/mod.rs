@@ -77,8 +77,8 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
-/// Text of `--version`: version of the program, versions of the protocol shared with cards, and the kinds of
-/// links of this build.
+/// Text of `--version`: versions of the program, of the protocol and of the card image's layout; system; and
+/// the kinds of links in this build.
 static VERSION: LazyLock<String> = LazyLock::new(|| {
     let links = if cfg!(unix) { "serial, tcp, unix, pty" } else { "serial, tcp" };
     format!(
@@ -90,7 +90,7 @@ static VERSION: LazyLock<String> = LazyLock::new(|| {
 });
 
 impl Command {
-    /// Form in which the command reports progress and failure.
+    /// Returns the form in which the command reports progress and failure.
     pub(crate) fn progress(&self) -> ProgressForm {
         match self {
             Self::Render(options) => options.progress,
@@ -102,8 +102,8 @@ impl Command {
 }
 
 impl Arguments {
-    /// Parses the arguments of the process. Invalid ones end the process with a message in which they are
-    /// escaped.
+    /// Parses the arguments of the process. If they are invalid, ends the process with a message, in which
+    /// they are escaped.
     pub(crate) fn parse_printably() -> Self {
         let given = of_scene_alone(std::env::args_os().collect());
         Self::try_parse_from(&given).unwrap_or_else(|error| {
@@ -115,7 +115,7 @@ impl Arguments {
     }
 }
 
-/// Inserts `view --open` into arguments that consist of a scene without a command.
+/// Inserts `view --open` before a first argument that is a glTF file.
 fn of_scene_alone(mut given: Vec<OsString>) -> Vec<OsString> {
     let is_scene = |word: &OsString| {
         let ending = Path::new(word).extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
@@ -299,7 +299,7 @@ mod tests {
         assert!(said("photoncard render a.glb b.glb").contains("unexpected argument"));
     }
 
-    /// Command of this name, built so that all its options are known.
+    /// Command of this name, built so that it knows all its options.
     fn named(name: &str) -> clap::Command {
         let mut command = Arguments::command();
         command.build();

@@ -56,19 +56,18 @@ impl OutputOptions {
         self.resume
     }
 
-    /// Default outputs: a PNG beside the scene, or a numbered one for each frame. `None` if a picture is
-    /// stated.
+    /// Options with a PNG beside the scene, numbered if there are frames; `None` if a picture is stated.
     pub(crate) fn beside(&self, scene: &Path, has_frames: bool) -> Option<Self> {
         if !self.pictures.is_empty() {
             return None;
         }
-        // Frames of a prepared scene may be numbered as it is.
+        // With frames, a prepared scene's name may have a run of `#` already.
         let is_numbered = numbered(scene, 0).is_some();
         let path = scene.with_extension(if has_frames && !is_numbered { "####.png" } else { "png" });
         Some(Self { pictures: vec![PictureOutput { path, format: PictureFormat::Png }], ..self.clone() })
     }
 
-    /// Settings of the file of finished tiles; `None` for standard output.
+    /// Settings of the file of finished tiles; `None` if the picture goes to standard output.
     pub(super) fn partial(&self) -> Option<PartialSettings> {
         self.main()?.file()?;
         Some(PartialSettings { path: self.partial_path(), resume: self.resume })
@@ -81,10 +80,10 @@ impl OutputOptions {
         name.into()
     }
 
-    /// Outputs of a frame.
+    /// Returns the options with the paths of a frame.
     ///
     /// # Errors
-    /// The first path without a place for the frame's number.
+    /// The first path without a run of `#`.
     pub(crate) fn of_frame(&self, frame: u32) -> Result<Self, &Path> {
         let mut outputs = self.clone();
         for (output, pattern) in outputs.pictures.iter_mut().zip(&self.pictures) {
@@ -96,7 +95,7 @@ impl OutputOptions {
         Ok(outputs)
     }
 
-    /// Finish of the pictures.
+    /// Returns whether a denoiser follows the render.
     pub(crate) fn finish(&self) -> Finish {
         Finish::new(self.denoise)
     }
@@ -106,7 +105,7 @@ impl OutputOptions {
         self.sample_type.unwrap_or(SampleFormat::Float)
     }
 
-    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
     pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
         let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !self.has(format));
         add(self.tone.exposure.is_some() && no_png, "--exposure", "without -o OUT.png");
@@ -114,7 +113,7 @@ impl OutputOptions {
         add(self.sample_type.is_some() && no_exr, "--sample-type", "without -o OUT.exr");
     }
 
-    /// Returns whether a layer that is stored would be seen: by a file or by a viewer.
+    /// Returns whether layers are stored or shown: in an EXR or a part, or on a display server.
     pub(super) fn have_layers(&self) -> bool {
         self.display_server.is_some() || self.has(PictureFormat::Part) || self.has(PictureFormat::Exr)
     }
@@ -124,7 +123,8 @@ impl OutputOptions {
         self.pictures.iter().any(|picture| picture.format == format)
     }
 
-    /// Picture that names the render: the first EXR, or the first picture without one.
+    /// Picture that names the partial file and the picture on a display: the first EXR, else the first
+    /// picture.
     pub(crate) fn main(&self) -> Option<&PictureOutput> {
         let exr = self.pictures.iter().find(|picture| picture.format == PictureFormat::Exr);
         exr.or(self.pictures.first())
@@ -134,7 +134,7 @@ impl OutputOptions {
         self.main().map_or(Path::new(""), |picture| &picture.path)
     }
 
-    /// Display server, and the name of the picture on it, which is that of its file.
+    /// Display server, and the picture's name there: the file name of the main picture.
     pub(super) fn display(&self) -> Option<DisplaySettings> {
         let address = self.display_server.clone()?;
         let path = self.main_path();

@@ -50,7 +50,7 @@ impl PhotonOptions {
         self.photons.is_some()
     }
 
-    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
     pub(super) fn without_effect(
         &self,
         is_specular: bool,

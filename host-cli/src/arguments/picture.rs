@@ -11,21 +11,21 @@ use super::choice::choice;
 /// Default length of the longer side, pixels.
 const SIDE: u32 = 512;
 
-/// Aspect ratio of a picture that is stated like a video format.
+/// Aspect ratio of a picture whose height alone is stated, if the camera has none.
 const WIDE: f32 = 16.0 / 9.0;
 
-/// Stated size of a picture, pixels.
+/// Value of `--size`, pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Size {
     Exact(u32, u32),
     /// Length of the longer side.
     Longer(u32),
-    /// Height, as for a video format.
+    /// Height of a video format: 1080 for `1080p`.
     Height(u32),
 }
 
 impl Size {
-    /// Width and height. The camera's aspect ratio supplies what the size leaves open.
+    /// Width and height of the picture. The camera's aspect ratio supplies the one that is not stated.
     fn of(self, camera: Option<&Camera>) -> (u32, u32) {
         let aspect = camera.and_then(|camera| camera.aspect);
         match self {
@@ -148,7 +148,7 @@ fn size(text: &str) -> Result<Size, String> {
     })
 }
 
-/// Length of the longer side for a percentage of the default, at least one pixel.
+/// Length of the longer side for a percentage of [`SIDE`], at least one pixel.
 fn percent_of_side(percent: &str) -> Option<u32> {
     let percent = percent.parse().ok().filter(|percent: &f32| *percent > 0.0 && percent.is_finite())?;
     Some(((SIDE as f32 * percent / 100.0 + 0.5) as u32).max(1))

@@ -63,22 +63,22 @@ pub(crate) struct PrepareOptions {
 }
 
 impl PrepareOptions {
-    /// Kind of the cards that will render.
+    /// Returns the kind of the cards that will render.
     pub(crate) fn chip(&self) -> EmulatedKind {
         self.chip.or(self.card)
     }
 
-    /// Flags of the stated options among those that a quality chooses.
+    /// Returns which of the settings that a quality chooses are stated.
     pub(crate) fn stated(&self) -> Stated {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
-    /// Finish of the pictures.
+    /// Returns whether pictures will be denoised.
     pub(crate) fn finish(&self) -> Finish {
         Finish::new(self.denoise)
     }
 
-    /// Settings of a picture with these options. The quality supplies others without knowing the scene.
+    /// Settings of these options. Others are the quality's defaults, before a pilot.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings_for(self.finish());
         RenderSettings {

@@ -1,4 +1,4 @@
-//! Steps of a render that are commands of their own, and the option for a scene whose preparation is done.
+//! Steps of a farm's job that take an option, and `--prepared`.
 
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use clap::{Arg, Args, Command, Id};
@@ -9,7 +9,7 @@ use super::photons::PhotonOptions;
 use super::samples::SampleOptions;
 use super::scene::SceneOptions;
 
-/// Steps that take an option.
+/// Steps of a farm's job that take an option of `photoncard render`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Step {
     /// The preparation: the prepared scene depends on the option.
@@ -27,10 +27,10 @@ pub(crate) enum Step {
 }
 
 impl Step {
-    /// Step of an option of `photoncard render`, by its heading.
+    /// Returns the steps that take an option, by its heading in the help.
     pub(crate) fn of(option: &Arg) -> Self {
         match option.get_id().as_str() {
-            // Their headings, if they have any, are those of other steps.
+            // By their headings, if they have any, these options would be of other steps.
             "quality" => Self::Prepare,
             "threads" | "quiet" => Self::Both,
             "denoise" => Self::PrepareAndMerge,
@@ -46,7 +46,7 @@ impl Step {
     }
 }
 
-/// Ids of the options that belong to `photoncard prepare`.
+/// Ids of the options of `photoncard prepare`, which `--prepared` excludes.
 fn of_preparation() -> impl Iterator<Item = Id> {
     let groups = [
         SceneOptions::augment_args,
@@ -72,7 +72,7 @@ pub(crate) struct PreparedOption {
     pub(crate) prepared: bool,
 }
 
-/// Adds a remedy to an error about an option that belongs to `photoncard prepare`.
+/// Adds a remedy to the error of an option of `photoncard prepare` beside `--prepared`.
 pub(super) fn with_remedy(mut error: Error) -> Error {
     let names = |option: &str| {
         [ContextKind::InvalidArg, ContextKind::PriorArg].into_iter().any(|kind| match error.get(kind) {
@@ -81,7 +81,7 @@ pub(super) fn with_remedy(mut error: Error) -> Error {
             _ => false,
         })
     };
-    // Prepared photons are for all cameras.
+    // `photoncard prepare` has no `--photons-for`: prepared photons are for all cameras.
     if error.kind() == ErrorKind::ArgumentConflict && names("--prepared") && !names("--photons-for") {
         let remedy = "state it to photoncard prepare: the prepared scene depends on it";
         let remedy = ContextValue::StyledStrs(vec![remedy.into()]);

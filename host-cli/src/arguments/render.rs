@@ -69,31 +69,30 @@ pub(crate) struct RenderOptions {
     pub(crate) progress: ProgressForm,
 }
 
-/// Settings before a fit, which may change those that are not stated.
+/// Settings before a pilot, which changes those that are not stated.
 pub(crate) struct Unfitted {
     pub(crate) settings: RenderSettings,
-    /// Flags of the settings that are stated or taken from kept samples.
+    /// Which settings are stated or taken from kept samples.
     pub(crate) stated: Stated,
-    /// True if there are kept samples.
+    /// True if an earlier render has kept samples that this one adds to.
     pub(crate) are_kept: bool,
 }
 
 impl RenderOptions {
-    /// Flags of the stated options among those that a quality chooses.
+    /// Returns which of the settings that a quality chooses are stated.
     pub(crate) fn stated(&self) -> Stated {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
-    /// Returns whether the planned number of samples is stated.
+    /// Returns whether `--planned-spp` is stated.
     pub(crate) fn states_planned_samples(&self) -> bool {
         self.integrator.planned_spp.is_some()
     }
 
-    /// Settings before a fit. If the render continues with kept samples, theirs replace those of `settings`
-    /// that the options do not state.
+    /// Settings before a pilot. If the render adds to kept samples, their settings replace those of
+    /// `settings` that no option states.
     ///
-    /// # Errors
-    /// If the file of kept samples cannot be read.
+    /// # Errors If the file of kept samples cannot be read.
     pub(crate) fn unfitted(&self, settings: &RenderSettings) -> Result<Unfitted, PartialError> {
         let kept = settings.outputs.partial.as_ref().map(PartialSettings::kept).transpose()?.flatten();
         let (mut settings, stated) = (settings.clone(), self.stated());
@@ -102,7 +101,7 @@ impl RenderOptions {
         Ok(Unfitted { settings, stated: Stated { samples: stated.samples, ..Stated::ALL }, are_kept: true })
     }
 
-    /// Finds the settings of the quality for a scene. `None` if all that it would choose are stated or kept.
+    /// Chooses settings for a scene by a pilot; `None` if none is left to choose.
     ///
     /// # Errors
     /// As [`Quality::fit`].
@@ -121,7 +120,7 @@ impl RenderOptions {
         Ok(fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise))))
     }
 
-    /// Settings of these options. The quality supplies others without knowing the scene.
+    /// Settings of these options. Others are the quality's defaults, before a pilot.
     pub(crate) fn settings(&self) -> RenderSettings {
         self.settings_of(self.quality)
     }
@@ -145,16 +144,16 @@ impl RenderOptions {
         self.photons_for() == PhotonsFor::Auto
     }
 
-    /// Guiding of the photons. It is by the scene if several pictures share them.
+    /// Guiding of the photons: [`PhotonsFor::Scene`] if several pictures share them.
     fn photons_for(&self) -> PhotonsFor {
         let is_shared = self.frames.numbers().is_some() || self.prepared.prepared;
         if is_shared { PhotonsFor::Scene } else { self.photons_for }
     }
 
-    /// Settings of outputs that are written while a picture is rendered.
+    /// Settings of the partial file and of the display, which are written while a picture is rendered.
     pub(crate) fn tile_outputs(&self, outputs: &OutputOptions) -> TileOutputs {
         TileOutputs {
-            // Finished passes are no tiles that a render could go on with.
+            // With `--time` or `--noise` a stopped render writes its picture, and no partial file.
             partial: outputs.partial().filter(|_| self.samples.aim().is_none()),
             display: outputs.display(),
         }

@@ -1,4 +1,4 @@
-//! Options of pictures by passes: an aim that replaces the number of samples, and samples that are kept.
+//! Options of pictures by passes (`--time`, `--noise`), and of kept samples.
 
 use std::time::Duration;
 
@@ -27,12 +27,12 @@ pub(crate) struct SampleOptions {
     pub(crate) keep_samples: bool,
 }
 
-/// Ids of options that a picture by passes cannot have, because their number of samples, memory or tiles are
-/// those of a single render.
+/// Ids of options that exclude `--time` and `--noise`: they concern the number of samples, the memory or the
+/// tiles of a single pass.
 const NOT_BY_PASSES: [&str; 6] = ["spp", "resume", "cache", "trace", "verify", "frames"];
 
 impl SampleOptions {
-    /// Aim of the passes; `None` for a picture with a stated number of samples.
+    /// Time or noise that ends the passes; `None` for a picture with a stated number of samples.
     pub(crate) fn aim(&self) -> Option<Aim> {
         let Self { time, noise, keep_samples: _ } = *self;
         (time.is_some() || noise.is_some()).then_some(Aim { time, noise })

@@ -49,7 +49,7 @@ pub(crate) struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
     pub(super) fn without_effect(&self, scene: &Scene, add: &mut impl FnMut(bool, &str, &str)) {
         let has_lobe =
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });

@@ -42,7 +42,7 @@ pub(crate) struct PartOptions {
 }
 
 impl ScheduleOptions {
-    /// Passes the options that may have no effect to `add`, with whether they have none, and the reason.
+    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
     pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
         let Self { order, bins, queue, in_flight, tile: _ } = self;
         let no_bins = format!("with --order {}, which has no direction bins", order.name());

@@ -52,7 +52,7 @@ impl Selection {
     /// Name that selects all studies.
     const ALL: &str = "all";
 
-    /// Parser of the names of studies, and of the name of all.
+    /// Parser of the names of studies and of `all`.
     fn parser() -> impl TypedValueParser<Value = Self> {
         let all = PossibleValue::new(Self::ALL).help("All of them, each in a folder of its own");
         let studies = Study::ALL.iter().copied().map(possible_value);
@@ -69,7 +69,7 @@ impl Selection {
         }
     }
 
-    /// Returns whether there are several reports, each in its own folder.
+    /// Returns whether each study has a folder of its own.
     pub(crate) fn is_collection(self) -> bool {
         matches!(self, Self::All)
     }

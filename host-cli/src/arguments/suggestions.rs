@@ -1,18 +1,19 @@
-//! Remedies for arguments in the syntax of other renderers.
+//! Remedies for options of other renderers.
 
 use clap::Command;
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 
 use crate::shell;
 
-/// Commands that render a scene on any cards.
+/// Commands that render a scene on cards.
 const RENDER: &[&str] = &["render", "view", "farm"];
 /// Commands with settings of a picture.
 const PICTURE: &[&str] = &["render", "prepare", "view", "study sweep", "farm"];
 /// Commands that write pictures in several formats.
 const WRITE: &[&str] = &["render", "merge", "farm"];
 
-/// Option of another renderer with its equivalent here. The remedy uses options that only `commands` have;
+/// Option of another renderer with its remedy here. If `commands` is not empty, only these have the options
+/// that the remedy names.
 /// without commands it is valid for all.
 pub(super) struct Word {
     options: &'static [&'static str],
@@ -20,8 +21,7 @@ pub(super) struct Word {
     pub(super) commands: &'static [&'static str],
 }
 
-/// Options of other renderers. If an option occurs several times, the first entry for the given command
-/// applies.
+/// Options of other renderers. Of several entries for an option, the first one for the given command applies.
 pub(super) const OF_OTHERS: [Word; 17] = [
     Word {
         options: &["--samples", "--sample", "--num-samples", "-s"],
@@ -109,8 +109,8 @@ const VERBOSE: &[&str] = &["--verbose", "-v", "--log-level"];
 /// Suffixes of picture files.
 const PICTURES: [&str; 5] = [".png", ".exr", ".jpg", ".jpeg", ".part"];
 
-/// Adds a remedy to the error about an unknown argument, if the equivalent is known. `given` are all
-/// arguments for `program`, including its name.
+/// Replaces clap's suggestion for an unknown argument by the remedy, if the argument is known here. `given`
+/// are all arguments of the process, with the program's name.
 pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[String]) -> Error {
     if error.kind() != ErrorKind::UnknownArgument {
         return error;
@@ -118,13 +118,13 @@ pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[Strin
     let Some(ContextValue::String(argument)) = error.get(ContextKind::InvalidArg) else { return error };
     let Some(remedy) = remedy(argument, &command_of(program, given)) else { return error };
     error.remove(ContextKind::SuggestedArg);
-    // It would show the option that is suggested no more.
+    // Clap's usage line would show the option that it suggested.
     error.remove(ContextKind::Usage);
     error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![remedy.into()]));
     error
 }
 
-/// Commands of a list that this build contains.
+/// Those of `commands` that this build contains.
 pub(super) fn built(commands: &'static [&'static str]) -> impl Iterator<Item = &'static str> {
     commands.iter().copied().filter(|command| cfg!(feature = "study") || !command.starts_with("study"))
 }
@@ -142,7 +142,7 @@ pub(super) fn command_of(program: Command, given: &[String]) -> String {
 }
 
 impl Word {
-    /// Returns whether the remedy is for this command or for one that contains it.
+    /// Returns whether the remedy is for this command or for one above it.
     fn is_of(&self, command: &str) -> bool {
         let is_within = |of: &&str| {
             command.strip_prefix(*of).is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
@@ -150,7 +150,7 @@ impl Word {
         self.commands.is_empty() || self.commands.iter().any(is_within)
     }
 
-    /// Text of the remedy. It names the commands that have the option if `command` is none of them.
+    /// Text of the remedy. If it is not for `command`, names the commands that it is for.
     fn remedy_for(&self, command: &str) -> String {
         if self.is_of(command) {
             return self.remedy.to_owned();
@@ -163,7 +163,7 @@ impl Word {
 fn remedy(argument: &str, command: &str) -> Option<String> {
     let name = argument.split('=').next().unwrap_or(argument);
     let mut words: Vec<_> = OF_OTHERS.iter().filter(|word| word.options.contains(&name)).collect();
-    // The sort is stable.
+    // The sort is stable: entries keep the table's order.
     words.sort_by_key(|word| !word.is_of(command));
     if let Some(word) = words.first() {
         return Some(word.remedy_for(command));

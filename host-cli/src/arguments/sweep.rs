@@ -66,11 +66,11 @@ struct SweepSettings {
     caches: Vec<CacheSettings>,
 }
 
-/// Name of the axis that varies caches.
+/// Name of the axis whose values are caches.
 pub(crate) const CACHE: &str = "cache";
 
 impl SweepArguments {
-    /// Axes of the sweep: those of `--vary`, and the caches if there are several.
+    /// Axes of the sweep: those of `--vary`, and one of the caches if `--cache` states several.
     pub(crate) fn axes(&self) -> Vec<Axis> {
         let caches = &self.settings.caches;
         let several = (caches.len() > 1).then(|| Axis {
@@ -80,7 +80,7 @@ impl SweepArguments {
         self.vary.iter().cloned().chain(several).collect()
     }
 
-    /// Point of a sweep with these options. It has the first of the caches; `name` is that of the scene.
+    /// Point of these options, with the first of the caches. `name` is that of the scene.
     pub(crate) fn point(&self, name: &str) -> Point {
         let SweepSettings { quality, picture, photons, integrator, schedule, card, chip, caches } =
             &self.settings;
@@ -93,7 +93,7 @@ impl SweepArguments {
             schedule: schedule.settings(),
             ..base
         };
-        // With several tiles in flight no tile can be measured alone.
+        // With one tile in flight, the traffic of each tile is counted by itself.
         let settings = settings.with(|s| s.schedule.in_flight = s.schedule.in_flight.or(Some(1)));
         let task = Task::Traffic {
             chip,
@@ -131,7 +131,7 @@ fn axis(text: &str) -> Result<Axis, String> {
     Ok(Axis { name: name.to_owned(), values })
 }
 
-/// Checks that comma-separated values are whole caches and not parts of one.
+/// Checks that each value of `--vary cache=` is a whole cache setting, and not a part of one cut at a comma.
 fn check_parts(values: &[String]) -> Result<(), String> {
     let part = |value: &String| value.split_once('=').map(|(part, _)| part.to_owned());
     let parts: Vec<_> = values.iter().map(part).collect();

@@ -1,6 +1,6 @@
 //! Parser of thread counts.
 
-/// Maximum number of threads. A system that runs out of them while they start ends the process.
+/// Maximum number of threads: a system without room for more ends the process while they start.
 const MAX_THREADS: usize = 1024;
 
 /// Parses a number of threads.

@@ -57,17 +57,17 @@ pub(crate) struct ViewOptions {
 }
 
 impl ViewOptions {
-    /// Flags of the stated options among those that a quality chooses.
+    /// Returns which of the settings that a quality chooses are stated.
     pub(crate) fn stated(&self) -> Stated {
         Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
     }
 
-    /// Finish of the settled picture.
+    /// Returns whether the settled picture is denoised.
     pub(crate) fn finish(&self) -> Finish {
         Finish::new(self.denoise)
     }
 
-    /// Settings of the settled picture. The quality supplies others without knowing the scene.
+    /// Settings of these options. Others are the quality's defaults, before a pilot.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings_for(self.finish());
         RenderSettings {
@@ -81,8 +81,7 @@ impl ViewOptions {
     }
 }
 
-/// Parses the address of a page. Only the name `localhost` is resolved, because other look-ups could take
-/// long.
+/// Parses the address of the page. The only name is `localhost`: a look-up of others may take long.
 fn listen(text: &str) -> Result<SocketAddr, String> {
     let local = || Some((Ipv4Addr::LOCALHOST, text.strip_prefix("localhost:")?.parse().ok()?).into());
     let address = text.parse().ok().or_else(local);

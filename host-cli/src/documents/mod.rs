@@ -1,6 +1,6 @@
 //! Commands `photoncard completions` and `photoncard man`: documents that are generated from the arguments.
 
-// Packages have `photoncard study`, and so has the reference.
+// Released packages are built with `photoncard study`, which the reference in `docs/cli.md` therefore lists.
 #[cfg(all(test, feature = "study"))]
 mod tests;
 

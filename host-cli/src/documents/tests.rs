@@ -21,17 +21,17 @@ fn program() -> Command {
     command
 }
 
-/// Lists a command and all commands below it.
+/// Returns a command and all commands below it.
 fn with_commands_below(command: &Command) -> Vec<&Command> {
     once(command).chain(command.get_subcommands().flat_map(with_commands_below)).collect()
 }
 
-/// Name of a command within its group, without the program's name.
+/// Full name of a command, such as `photoncard card info`.
 fn name(command: &Command) -> &str {
     command.get_bin_name().unwrap_or(command.get_name())
 }
 
-/// Arguments that appear in the help, except for the help option itself.
+/// Returns the arguments that appear in the help, without `--help` and `--version`.
 fn shown(command: &Command) -> impl Iterator<Item = &Arg> {
     let hidden = ["help", "version"];
     command
@@ -99,8 +99,8 @@ fn groups(command: &Command) -> Vec<(&str, Vec<&Arg>)> {
     groups
 }
 
-/// Section of a command. `described` maps the items of earlier sections to their commands; such an item is
-/// named without its description.
+/// Returns the Markdown section of a command. `described` maps each list item of an earlier section to the
+/// command of that section: an equal item is only named, with a link to that section.
 fn section(command: &Command, described: &mut BTreeMap<String, String>) -> String {
     let about = sentence(prose(command.get_about().expect("the command has help")));
     let usage = command.clone().render_usage().to_string();
@@ -128,7 +128,7 @@ fn section(command: &Command, described: &mut BTreeMap<String, String>) -> Strin
     text
 }
 
-/// Generated part of the document: a list of commands, and a section for each.
+/// Returns the generated part of the document: a list of commands, and a section for each.
 fn reference(program: &Command) -> String {
     let commands = &with_commands_below(program)[1..];
     let line = |command: &&Command| {

@@ -6,7 +6,7 @@ use super::job::Job;
 use super::script::functions;
 use crate::shell::quoted;
 
-/// Script for GNU parallel. It calls itself for each task.
+/// Returns a shell script that runs itself by GNU parallel, once for each task.
 pub(super) fn parallel(job: &Job) -> String {
     let (home, last) = (quoted(&job.home), job.tasks() - 1);
     let functions = functions(job, "");
@@ -31,7 +31,7 @@ esac
     )
 }
 
-/// Converts text to one line, for a comment.
+/// Replaces control characters, such as line ends, by `?`: the text becomes one line of a comment.
 fn comment(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { '?' } else { c }).collect()
 }
@@ -39,7 +39,7 @@ fn comment(text: &str) -> String {
 /// Job type for Flamenco: a JavaScript file that the manager compiles to tasks.
 pub(super) fn flamenco(job: &Job) -> String {
     let shell = format!("set -eu\ncd {}\n{}\n\"$@\"\n", quoted(&job.home), functions(job, ""));
-    // A string of JSON is one of JavaScript.
+    // A JSON string literal is also a JavaScript string literal.
     let (label, shell) = (json!(format!("photoncard {}", job.name)), json!(shell));
     format!(
         r#"// A job type of Flamenco that renders one job: save it in the manager's folder of scripts, and submit a job of this type.
@@ -71,10 +71,11 @@ function compileJob(job) {{
     )
 }
 
-/// Maximum number of tasks in an array, one less than Slurm's default limit.
+/// Maximum number of tasks in a job array, one less than Slurm's default `MaxArraySize` of 1001.
 const MAX_ARRAY: u64 = 1000;
 
-/// Script for Slurm. It submits itself in three steps, each after the previous one.
+/// Returns a shell script that submits itself to Slurm as three jobs (preparation, array of tasks, merge),
+/// each dependent on the one before.
 pub(super) fn slurm(job: &Job) -> String {
     let (home, tasks) = (quoted(&job.home), job.tasks());
     let functions = functions(job, "");

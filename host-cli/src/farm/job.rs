@@ -18,16 +18,16 @@ pub(super) struct Frames {
     pub(super) last: u32,
 }
 
-/// Steps of a farm's work on a picture or on frames.
+/// Job of a render farm: preparation, tasks and merge of one picture or of frames.
 pub(super) struct Job {
-    /// Name of the job, which is that of the picture's file.
+    /// File name of the first picture, which is the name of the job.
     pub(super) name: String,
     /// Folder to which the paths of the job are relative.
     pub(super) home: String,
-    /// Folder of the prepared scene and the parts.
+    /// Folder of the prepared scenes and the parts.
     pub(super) folder: String,
     pub(super) words: Words,
-    /// Number of parts of a picture.
+    /// Number of parts that each picture is divided into.
     pub(super) parts: u32,
     pub(super) frames: Option<Frames>,
 }
@@ -64,7 +64,7 @@ impl Job {
         let output = pictures.first().map_or(Path::new("out"), |picture| &picture.path);
         let stem =
             output.file_stem().unwrap_or_default().to_string_lossy().replace(".#", "").replace('#', "");
-        // Jobs of other options share no files.
+        // The checksum of the arguments gives jobs with different options different folders.
         let folder = output.with_file_name(format!("{stem}.{:08x}.farm", checksum(print.as_bytes())));
         let home = std::env::current_dir().map_err(|error| Failure::work_error(&error))?;
         let name = output.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -80,7 +80,7 @@ impl Job {
     }
 }
 
-/// Frames of the options; `None` for a single picture.
+/// Range of `--frames`; `None` for a single picture.
 fn frames(options: &FarmOptions) -> Result<Option<Frames>, Failure> {
     let Some(numbers) = options.render.frames.numbers() else { return Ok(None) };
     let numbers: Vec<u32> = numbers.collect();

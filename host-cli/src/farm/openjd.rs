@@ -20,21 +20,22 @@ pub(super) fn template(job: &Job) -> String {
             "dataFlow": "INOUT",
             "default": ".",
         }],
-        // A variable, which no character of the path can break.
+        // The path reaches the script as an environment variable: no character of it is read as shell syntax.
         "jobEnvironments": [{"name": "Home", "variables": {"PHOTONCARD_HOME": "{{Param.Home}}"}}],
         "steps": [step(job, "prepare", &[]), render(job), after(step(job, "merge", &[]), "render")],
     });
     format!("{template:#}\n")
 }
 
-/// Name of the job in the form that the format allows: printable, at most 128 characters, without
-/// expressions.
+/// Name of the job as the specification allows: at most 128 characters, without control characters and
+/// without braces, which enclose expressions.
 fn name(job: &Job) -> String {
     let name: String = job.name.chars().filter(|c| !c.is_control() && !"{}".contains(*c)).take(100).collect();
     format!("photoncard {name}")
 }
 
-/// Step that renders all tasks. A process renders a chunk of frames at once, and parts one after another.
+/// Step that renders all tasks. One `photoncard` process renders a chunk of frames; parts have one process
+/// each, one after another.
 fn render(job: &Job) -> Value {
     let chunks = json!({"defaultTaskCount": 1, "rangeConstraint": "CONTIGUOUS"});
     let parts = format!("1-{}", job.parts);
@@ -56,7 +57,7 @@ fn render(job: &Job) -> Value {
     step
 }
 
-/// Step that calls the script with `arguments`.
+/// Step `name`, which runs the job's script with the words `name` and `arguments`.
 fn step(job: &Job, name: &str, arguments: &[&str]) -> Value {
     let words = ["{{Task.File.Job}}", name].into_iter().chain(arguments.iter().copied());
     json!({

@@ -4,8 +4,9 @@
 use super::job::{Frames, Job};
 use crate::shell::quoted;
 
-/// Definitions of the functions `prepare`, `part`, `merge` and `task`. `task` renders the task with a number
-/// from 0. `extra` are further options of renders. The script must start in the job's home.
+/// Returns the definitions of the shell functions `prepare`, `part`, `merge` and `task`, which work in the
+/// job's home. `task N` renders task N, from 0. `extra` is added to each `photoncard` command, such as `
+/// --progress openjd`.
 pub(super) fn functions(job: &Job, extra: &str) -> String {
     let parts = job.parts;
     let (folder, prepare) = (word(&job.folder), prepare(job, extra));
@@ -39,13 +40,13 @@ fn word(word: &str) -> String {
     quoted(word).replace('{', "{''").replace('}', "}''")
 }
 
-/// Name of the prepared scene in the job's folder.
+/// File name of a prepared scene; a run of `#` stands for the number of the frame.
 fn card(job: &Job) -> &'static str {
     if job.frames.is_some() { "######.card" } else { "scene.card" }
 }
 
-/// Function `prepare`. Every job prepares its scene again; parts of another scene with the same name are
-/// removed.
+/// Function `prepare`, which prepares the scene in a new folder. If the result differs from the existing one,
+/// it takes its place, and existing parts are removed.
 fn prepare(job: &Job, extra: &str) -> String {
     let words = [&job.words.scene, &job.words.prepare, &job.words.both].map(|list| words(list)).concat();
     let frames =
@@ -81,7 +82,8 @@ fn part(job: &Job, extra: &str) -> String {
     )
 }
 
-/// Function `part` of a job with frames: renders one frame, or the frames A-B.
+/// Function `part` of a job with frames: `part K N` renders part K of frame N, and `part K A-B` of frames A
+/// to B.
 fn part_of_frames(job: &Job, extra: &str) -> String {
     let parts = job.parts;
     let render = render(job, extra);
@@ -94,7 +96,7 @@ fn part_of_frames(job: &Job, extra: &str) -> String {
     )
 }
 
-/// First part of the command that renders a part.
+/// Start of the command that renders a part, without the part's number, its frames and its output.
 fn render(job: &Job, extra: &str) -> String {
     let words = [&job.words.both, &job.words.render].map(|list| words(list)).concat();
     format!("photoncard render --prepared \"$folder/cards/{}\"{words}{extra}", card(job))

@@ -4,7 +4,7 @@ use clap::{Arg, ArgAction, Command};
 
 use crate::arguments::Step;
 
-/// Ids of options that the job sets itself, or that are not possible in a job.
+/// Clap's ids of options that a job states itself, or that a job cannot have.
 const OF_NO_JOB: [&str; 12] = [
     "photons_for",
     "part",
@@ -67,8 +67,8 @@ impl Words {
         Ok(words)
     }
 
-    /// Lists of words to which an option belongs; empty for an option of the job itself, `None` for one that
-    /// is not allowed in a job.
+    /// Returns the lists that take the words of an option: none for an option of the job itself, such as
+    /// `--parts`; `None` for an option that is not allowed in a job.
     fn rooms(&mut self, option: &Arg) -> Option<Vec<&mut Vec<String>>> {
         if OF_NO_JOB.contains(&option.get_id().as_str()) {
             return None;
@@ -130,7 +130,7 @@ mod tests {
         }
     }
 
-    /// Checks that the list above contains no outdated name.
+    /// Each name in [`OF_NO_JOB`] is the id of an option.
     #[test]
     fn every_listed_name_is_an_option() {
         let command = Arguments::command();

@@ -33,7 +33,7 @@ pub(crate) struct Progress {
     percent: Option<Percent>,
 }
 
-/// Duration of a preparatory phase before its first line, seconds, without a terminal.
+/// Time for which a phase before the tiles prints no line, seconds, without a terminal.
 const SILENT_SECONDS: f64 = 1.0;
 
 struct Display {
@@ -45,7 +45,7 @@ struct Display {
     /// Number of tiles that an earlier render has finished.
     resumed: u64,
     on_terminal: bool,
-    /// Number of tenths of the phase that were printed, without a terminal.
+    /// Tenths of the phase that the last printed line states, without a terminal.
     told: u64,
 }
 
@@ -67,7 +67,7 @@ impl Progress {
         Ok(Self { stopped, kept, failed: Mutex::default(), display, percent: None })
     }
 
-    /// Sets the form of the progress. `phase` is the one that takes most of the time.
+    /// Sets the form of the progress. Open Job Description is told the percentage of `phase` alone.
     pub(crate) fn in_form(self, form: ProgressForm, phase: Phase) -> Self {
         match form {
             ProgressForm::Text => self,
@@ -93,7 +93,7 @@ impl Progress {
         self.kept.load(Ordering::Relaxed)
     }
 
-    /// Removes the statistics of the render that failed, as JSON; `None` if it failed before its cards
+    /// Takes the statistics, as JSON, of the render that failed; `None` if it failed before its cards
     /// started.
     pub(crate) fn take_failed(&self) -> Option<Value> {
         self.failed.lock().unwrap_or_else(PoisonError::into_inner).take()
@@ -160,16 +160,16 @@ impl Observer for Progress {
 
 impl Display {
     fn show(&mut self, phase: Phase, done: u64, total: u64) {
-        // A picture by passes has its tiles again; without a terminal the first pass alone is told.
+        // Each pass of a picture renders its tiles again. Without a terminal only the first pass is shown.
         let is_next_pass = phase == Phase::Tiles && done == 0 && self.bar.position() > 0 && self.on_terminal;
         if self.phase.is_none_or(|shown| (shown as u8) < phase as u8) || is_next_pass {
             self.begin(phase, total);
         }
-        // A card that is still loading reports it while another one renders already.
+        // A card that is still loading reports an earlier phase while another card renders.
         if self.phase != Some(phase) {
             return;
         }
-        // Cards are loaded in parallel; the fastest counts.
+        // Cards are loaded in parallel: the progress is that of the card with most bytes.
         let done = if phase == Phase::Load { done.max(self.bar.position()) } else { done };
         let seconds = self.bar.elapsed().as_secs_f64();
         self.remaining.report(done, total, seconds);
@@ -178,7 +178,7 @@ impl Display {
         let left = left.map_or(String::new(), |left| format!(", {left} left"));
         self.bar.set_prefix(left.clone());
         let tenths = (10 * done).checked_div(total).unwrap_or(0);
-        // A phase before the tiles that is brief prints its end alone.
+        // A short phase before the tiles prints only its last line.
         let is_brief = phase != Phase::Tiles && done < total && seconds < SILENT_SECONDS;
         if !self.on_terminal && tenths > self.told && !is_brief {
             self.told = tenths;
@@ -204,7 +204,7 @@ impl Display {
             Phase::Pilot | Phase::Pack => "{msg:8} {elapsed}",
             Phase::Photons | Phase::Tiles => "{msg:8} {bar:40} {pos}/{len}{prefix}",
         };
-        // The fallback is indicatif's own template.
+        // An invalid template would be replaced by indicatif's default.
         self.bar.set_style(
             ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()),
         );
@@ -212,12 +212,12 @@ impl Display {
     }
 }
 
-/// Time after a signal within which another counts as a repetition, because `timeout` sends each to the
+/// Time after a signal within which another one counts as the same: `timeout` sends each signal to the
 /// process and to its group.
 const REPETITIONS: Duration = Duration::from_millis(300);
 
-/// Flag that SIGINT, SIGTERM and SIGHUP set. A later SIGINT or SIGTERM that is no repetition ends the
-/// process.
+/// Returns a flag that SIGINT, SIGTERM and, on Linux, SIGHUP set. SIGINT or SIGTERM more than [`REPETITIONS`]
+/// later ends the process.
 pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
     let [stopped, ends] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
     let flags = (stopped.clone(), ends.clone());
@@ -234,9 +234,9 @@ pub(crate) fn stop_on_signals() -> std::io::Result<Arc<AtomicBool>> {
         signal_hook::flag::register(signal, stopped.clone())?;
     }
     #[cfg(target_os = "linux")]
-    // If it is not known, a hang-up ends the process as it does by default.
+    // Unless SIGHUP is known not to be ignored, the action for it stays as it is.
     if hang_up::is_ignored() == Some(false) {
-        // A terminal that is closed sends several.
+        // A closed terminal sends several hang-ups, which must not end the process.
         signal_hook::flag::register(signal_hook::consts::SIGHUP, stopped.clone())?;
     }
     Ok(stopped)
@@ -276,13 +276,13 @@ impl Percent {
         Self { phase, told: Mutex::default() }
     }
 
-    /// Prints progress of `phase`, if that is the reported phase and the percentage has increased.
+    /// Prints the percentage if `phase` is the reported phase and the percentage has increased.
     fn tell(&self, phase: Phase, done: u64, total: u64) {
         let percent = 100 * done.min(total) / total.max(1);
         let mut told = self.told.lock().unwrap_or_else(PoisonError::into_inner);
         if phase == self.phase && told.is_none_or(|told| told < percent) {
             *told = Some(percent);
-            // A reader that is gone does not end the work.
+            // A closed standard output does not end the work.
             let _ = print(&[format!("openjd_progress: {percent}")]);
         }
     }

@@ -52,7 +52,8 @@ impl Remaining {
             mean * (finished + left) as f64 / finished.max(self.workers as u64) as f64
         };
         let known = mean(self.completions.iter().copied());
-        // The next piece is finished now at the earliest.
+        // In `overdue`, a next piece takes a worker's place in the mean: it is finished at `now` at the
+        // earliest.
         let skipped = (self.completions.len() + 1).saturating_sub(self.workers);
         let overdue = mean(self.completions.iter().copied().skip(skipped).chain([now]));
         let expected = end(known, finished, left).max(end(overdue, finished + 1, left - 1));
@@ -71,8 +72,9 @@ mod tests {
 
     use super::*;
 
-    /// Simulates a render whose tiles cost `costs` seconds each, processed in this order by `workers`.
-    /// Returns time, estimate and true remaining time, at all completions and at ten times between each two.
+    /// Simulates a render of tiles that cost `costs` seconds, each taken in this order by the first of
+    /// `workers` that is free. Returns (time, estimate, true remaining time) at ten times between each two
+    /// completions.
     fn estimates(costs: &[f64], workers: usize, before: u64) -> Vec<(f64, Option<f64>, f64)> {
         let mut free = vec![0.0_f64; workers];
         let mut ends: Vec<f64> = Vec::new();
@@ -99,13 +101,13 @@ mod tests {
         found
     }
 
-    /// Costs that vary irregularly between `low` and `high`.
+    /// `count` costs from `low` to `high` seconds, by the golden ratio's additive sequence.
     fn varied(count: usize, low: f64, high: f64) -> Vec<f64> {
         (0..count).map(|index| low + (high - low) * (0.618_034 * (index + 1) as f64).fract()).collect()
     }
 
-    /// Checks that the relative error of the estimate is at most `share` after a fifth of the time, except
-    /// for the last `tail` seconds, and that consecutive estimates differ by at most that share.
+    /// Checks that the estimate, after a fifth of the time and before the last `tail` seconds, has a relative
+    /// error of at most `share`, and that a next estimate, counted down, differs by at most `share`.
     fn check_steady(estimates: &[(f64, Option<f64>, f64)], share: f64, tail: f64) {
         let end = estimates[0].2;
         let mut previous: Option<(f64, f64)> = None;
@@ -137,7 +139,8 @@ mod tests {
         for workers in [1, 2, 7, 64] {
             for (now, found, left) in estimates(&vec![30.0; 64 * 7], workers, 0) {
                 if let Some(found) = found {
-                    // Up to one piece at the end, where some workers have none left.
+                    // The error is up to the 30 s of one piece at the end, where some workers have no piece
+                    // left.
                     assert!((found - left).abs() < 30.0 + 1e-6, "{workers}: {found} for {left} after {now}");
                 }
             }
@@ -156,7 +159,7 @@ mod tests {
         }
     }
 
-    /// A fourth of the tiles cost ten times as much as the others, and are spread as in a render.
+    /// A fourth of the tiles cost ten times as much as the others; the order of tiles is that of a render.
     #[test]
     fn a_heavy_region_is_right_within_a_third_after_a_fifth() {
         for first_heavy in [0, 8, 20, 24] {
@@ -184,7 +187,7 @@ mod tests {
         remaining.report(1, 11, 1.0);
         assert_eq!(remaining.seconds(1.0), Some(10.0));
         assert_eq!(remaining.seconds(2.0), Some(9.0));
-        // The second piece has taken 9 s: ten more are as long as the mean of 1 s and 9 s.
+        // The second piece has taken 9 s and may end at once: nine more take 45 s at the mean of 1 s and 9 s.
         assert!((remaining.seconds(10.0).unwrap() - 45.0).abs() < 1e-9);
     }
 

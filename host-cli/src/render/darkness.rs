@@ -5,13 +5,13 @@ use photoncard_driver::scene::{Camera, Scene};
 
 use crate::console::say;
 
-/// Fraction of the pixels with a surface that must be black for a message.
+/// Fraction of the pixels that show a surface which must be black for a message.
 const MANY: f64 = 0.5;
 
 /// Facts about a scene and its view that explain darkness.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Circumstances {
-    /// True if Blender's exporter wrote the file and no environment was added.
+    /// True if Blender's exporter wrote the file and the scene has no environment.
     lacks_world: bool,
     /// True if the camera is outside the scene's bounding box.
     is_outside: bool,
@@ -25,7 +25,7 @@ impl Circumstances {
     }
 }
 
-/// Prints the probable reason if the picture is dark.
+/// Prints the probable reason if nothing is seen, or if at least half of what is seen is black.
 pub(super) fn say_dark(film: &Film, circumstances: Circumstances) {
     let pixels = film.pixels().map(|pixel| (pixel.radiance, pixel.depth));
     if let Some(line) = line(pixels, circumstances) {
@@ -33,7 +33,7 @@ pub(super) fn say_dark(film: &Film, circumstances: Circumstances) {
     }
 }
 
-/// Message about pixels with these radiances and depths; `None` if they are not dark.
+/// Message about a picture of pixels (radiance, depth); `None` if the picture is not dark.
 fn line(
     all: impl Iterator<Item = ([f32; 3], f32)>,
     Circumstances { lacks_world, is_outside }: Circumstances,

@@ -15,7 +15,7 @@ pub(super) struct End {
 }
 
 impl End {
-    /// Prints the result, with the options `at_once` that render an equal picture in one pass.
+    /// Prints the result, and `at_once`: the options that render an equal picture in one pass.
     pub(super) fn say(&self, at_once: &str) {
         say(format_args!("photoncard: this picture in one render: {at_once}"));
         say(format_args!("photoncard: {}", self.line()));
@@ -50,8 +50,8 @@ fn percent(share: f64) -> String {
     format!("{} %", digits.trim_end_matches('0').trim_end_matches('.'))
 }
 
-/// Options that render the picture of `statistics` in one pass, beside those of the command without its aim.
-/// `is_fitted` is true if a pilot has found settings.
+/// Options that render the picture of `statistics` in one pass, once `--time` and `--noise` are left out.
+/// `is_fitted` is true if a pilot has chosen settings.
 pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
     let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
     let are_needed = [
@@ -71,7 +71,7 @@ pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitte
     let words = valued.map(|(name, value)| format!("--{name} {value}"));
     let adaptive = (is_fitted && !stated.adaptive).then(|| {
         match pixels.get("adaptive").and_then(serde_json::Value::as_f64) {
-            // In the digits of the 32-bit number.
+            // The `f32` prints fewer digits than the `f64` of JSON.
             Some(threshold) => format!("--adaptive {}", threshold as f32),
             None => "--adaptive off".to_owned(),
         }

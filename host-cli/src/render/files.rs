@@ -25,8 +25,8 @@ use crate::console::{print_json, printable_json, say, write_bytes};
 use crate::failure::Failure;
 use crate::input;
 
-/// Checks that all files can be written, that none is an input or another output, and that no finished tiles
-/// are lost.
+/// Checks that all files can be written, that none is an input or another output, and that no file with
+/// finished tiles of an earlier render is overwritten.
 pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     part::check(options.parts.part, &outputs.pictures)?;
     check_standard_output(&outputs.pictures, outputs.stats.as_ref(), options.progress)?;
@@ -34,11 +34,11 @@ pub(super) fn check(options: &RenderOptions, outputs: &OutputOptions) -> Result<
     let mut written: Vec<&Path> = outputs.pictures.iter().filter_map(PictureOutput::file).collect();
     written.extend(outputs.stats.as_ref().and_then(TextOutput::path));
     written.extend(options.cards.trace.as_deref());
-    // A missing denoiser is told before the work.
+    // A missing denoiser is an error before the work.
     denoiser(denoises(options, outputs))?;
     crate::outputs::check(&input::files(&options.scene), &written, &[&outputs.partial_path()])?;
     match options.tile_outputs(outputs).partial.map_or(Ok(()), |partial| partial.check_free()) {
-        // Any other fault of the file of a frame is told when it is rendered: the frames before are written.
+        // Other faults of the partial file are reported at its frame, after the frames before are written.
         Err(error @ PartialError::Unfinished { .. }) => Err(Failure::input(error)),
         _ => Ok(()),
     }
@@ -64,7 +64,7 @@ pub(crate) fn check_standard_output(
     Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
 }
 
-/// Checks that there is a file for finished tiles if they are to be kept.
+/// Checks that finished tiles, if they are to be kept, have a file beside the picture's.
 fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Failure> {
     let is_piped = outputs.main().is_some_and(|picture| picture.file().is_none());
     if !is_piped || !(outputs.resume || options.samples.keep_samples) {
@@ -75,7 +75,7 @@ fn check_kept(options: &RenderOptions, outputs: &OutputOptions) -> Result<(), Fa
     Err(Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help))))
 }
 
-/// Default outputs, with a picture beside the scene; `None` if a picture is stated or a part is rendered. An
+/// Returns the options of a picture beside the scene; `None` if a picture is stated or a part is rendered. An
 /// existing file of that name is replaced only if photoncard wrote it.
 pub(super) fn beside_scene(options: &RenderOptions) -> Result<Option<OutputOptions>, Failure> {
     let has_frames = options.frames.numbers().is_some();
@@ -99,7 +99,7 @@ pub(super) fn write(
 ) -> Result<(), Failure> {
     let denoiser = denoiser(denoises(options, outputs))?;
     let start = Instant::now();
-    // A failing denoiser must not lose the render: it is written without the layer.
+    // If the denoiser fails, the picture is written without the denoised layer.
     let (denoised, failure) = match denoised(denoiser, &rendering.film, options.threads) {
         Ok(denoised) => (denoised, None),
         Err(failure) => (None, Some(failure)),
@@ -130,7 +130,7 @@ pub(super) fn write(
     failure.map_or(Ok(()), Err)
 }
 
-/// Returns whether pictures are denoised. A part is denoised when it is merged.
+/// Returns whether the render denoises its pictures. Parts are denoised when they are merged.
 pub(super) fn denoises(options: &RenderOptions, outputs: &OutputOptions) -> bool {
     outputs.denoise && options.parts.part.is_none()
 }
@@ -149,7 +149,7 @@ pub(super) fn write_statistics(
     }
 }
 
-/// Denoiser, if it is asked for. The process loads its library once.
+/// Denoiser, if it is asked for. Open Image Denoise is loaded once in a process.
 pub(crate) fn denoiser(is_asked: bool) -> Result<Option<&'static Denoiser>, Failure> {
     static FOUND: OnceLock<Denoiser> = OnceLock::new();
     if !is_asked {
@@ -161,7 +161,7 @@ pub(crate) fn denoiser(is_asked: bool) -> Result<Option<&'static Denoiser>, Fail
     Ok(FOUND.get())
 }
 
-/// Entry of a picture's provenance about its denoiser.
+/// Name and value that a picture's provenance has about the denoiser: its version.
 pub(crate) fn denoised_by(denoiser: &Denoiser) -> (String, Value) {
     ("denoise".to_owned(), Value::from(denoiser.version()))
 }
@@ -176,7 +176,7 @@ pub(crate) fn denoised(
     radiance.map_err(|error| Failure::work_error(&error))
 }
 
-/// Options of a picture beyond the format of its file.
+/// What a picture's file contains, beside the film, by its format.
 pub(crate) struct Form {
     /// Layers of an EXR.
     pub(crate) layers: Layers,
@@ -190,7 +190,7 @@ pub(crate) struct Form {
     pub(crate) part: Option<PartHead>,
 }
 
-/// Writes a picture with its provenance. The file is complete or unchanged.
+/// Writes a picture with its provenance. If it fails, an existing file stays unchanged.
 pub(crate) fn write_picture(
     picture: &PictureOutput,
     film: &Film,

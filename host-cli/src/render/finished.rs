@@ -1,5 +1,5 @@
-//! Recognises finished frames: their files are complete, and their provenance shows that a render would write
-//! them again.
+//! Recognises frames that need not be rendered: their files are complete, with the provenance that a render
+//! would write.
 
 use std::path::Path;
 
@@ -12,19 +12,18 @@ use serde_json::Value;
 use super::{files, messages};
 use crate::arguments::{OutputOptions, PictureFormat, PictureOutput, RenderOptions, TextOutput};
 
-/// Settings in a picture's provenance that a render derives from others when it traces photons and places the
-/// camera.
+/// Settings that a render finds itself when they are not stated, and then writes into the provenance.
 const FOUND: [&str; 2] = ["max-distance", "view"];
 
-/// Returns whether all files of a frame exist, so that the frame may be finished.
+/// Returns whether frames are resumed and all files of this one exist.
 pub(super) fn may_be(outputs: &OutputOptions) -> bool {
     let stats = outputs.stats.as_ref().and_then(TextOutput::path);
     let mut files = outputs.pictures.iter().map(|picture| &*picture.path).chain(stats);
     outputs.resumes() && files.all(Path::is_file)
 }
 
-/// Returns whether the pictures of a frame have these settings and `inputs`, which the library does not know,
-/// and its files are complete. Prints the name of a damaged file.
+/// Returns whether all files of a frame are complete, and its pictures have these settings and `inputs` in
+/// their provenance. Prints the name of a damaged file.
 pub(super) fn is_finished(
     options: &RenderOptions,
     outputs: &OutputOptions,
@@ -46,7 +45,7 @@ pub(super) fn is_finished(
         FOUND.into_iter().filter(|name| stated.get(*name).is_none_or(Value::is_null)).collect();
     let without_found = |mut settings: NamedSettings| {
         found.iter().for_each(|name| drop(settings.remove(*name)));
-        // Numbers as they are in a file.
+        // Settings are compared as text, in which a number has the form that it has in a file.
         serde_json::to_string(&settings).ok()
     };
     let expected = without_found(stated);
@@ -62,7 +61,7 @@ fn damaged(outputs: &OutputOptions) -> Option<&Path> {
     let is_intact = |PictureOutput { path, format }: &PictureOutput| match format {
         PictureFormat::Exr => exr::is_intact(path),
         PictureFormat::Png => tone_mapping::is_intact(path),
-        // A video is of no single frame.
+        // A video has many frames: it is no file of this one.
         PictureFormat::Video => false,
         PictureFormat::Part => {
             Parts::open(std::slice::from_ref(path)).is_ok_and(|part| part.check_pixels().is_ok())

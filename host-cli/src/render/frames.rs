@@ -19,7 +19,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::progress::Progress;
 
-/// Renders the frames with these numbers, and writes all requested outputs.
+/// Renders the frames with these numbers, and writes their outputs.
 pub(super) fn run(options: &RenderOptions, numbers: impl Iterator<Item = u32>) -> Result<(), Failure> {
     let start = Instant::now();
     let mut settings = options.settings();
@@ -28,7 +28,7 @@ pub(super) fn run(options: &RenderOptions, numbers: impl Iterator<Item = u32>) -
     let mut sequence = Sequence::open(options, &mut settings)?;
     let count = frames.len();
     if frames.iter().any(|(_, outputs)| finished::may_be(outputs)) {
-        // Settings of kept samples are those of the first frame, as without finished ones.
+        // Settings of kept samples are read from the first frame's partial file, finished or not.
         settings.outputs = frames.first().map(|(_, first)| options.tile_outputs(first)).unwrap_or_default();
         sequence.settle(&mut settings)?;
     }
@@ -57,15 +57,15 @@ pub(super) fn outputs_of(options: &RenderOptions, number: u32) -> Result<OutputO
     Ok(outputs)
 }
 
-/// Sequence of frames, with the state that they share.
+/// State that the frames of a render share.
 struct Sequence<'a> {
     options: &'a RenderOptions,
     moments: Moments<'a>,
-    /// Scene at rest, for which the settings are chosen; `None` once they are.
+    /// Scene at rest, for which a quality chooses the settings; `None` once they are chosen.
     rest: Option<Scene>,
     renderer: Renderer,
     progress: Progress,
-    /// Time of reading that was not reported yet, seconds.
+    /// Time of reading the scene since the last frame's statistics, seconds.
     scene_seconds: f64,
 }
 
@@ -87,7 +87,8 @@ impl<'a> Sequence<'a> {
         })
     }
 
-    /// Renders a frame and writes its outputs. `settings` are replaced by those chosen for the scene.
+    /// Renders a frame and writes its outputs. The first call replaces photons and integrator of `settings`
+    /// by those that the quality chooses.
     fn render(
         &mut self,
         number: u32,
@@ -125,7 +126,7 @@ impl<'a> Sequence<'a> {
         finish(self.options, outputs, finished)
     }
 
-    /// Chooses the settings before any frame is rendered, because finished frames are recognised by them.
+    /// Chooses the settings before the first frame: finished frames are recognised by them.
     fn settle(&mut self, settings: &mut RenderSettings) -> Result<(), Failure> {
         let Self { options, rest, progress, .. } = self;
         let Some(rest) = rest.take() else { return Ok(()) };
@@ -138,8 +139,8 @@ impl<'a> Sequence<'a> {
         Ok(())
     }
 
-    /// Renders the picture of the present scene. The first call chooses the settings for the scene at rest,
-    /// whichever frame it renders.
+    /// Renders the picture of the scene as it is moved. The first call chooses the settings, for the scene at
+    /// rest.
     fn picture(&mut self, settings: &mut RenderSettings) -> Result<(Rendering, Option<Fit>), RenderError> {
         let Self { options, moments, rest, renderer, progress, .. } = self;
         let scene = moments.scene();

@@ -1,4 +1,4 @@
-//! Messages of a render: contents that were loaded or ignored, and files that were written.
+//! Messages of a render: what was loaded, ignored, chosen, found and written.
 
 use std::path::Path;
 
@@ -18,11 +18,11 @@ use crate::failure::Failure;
 use crate::notices::{self, Uses};
 use crate::progress::duration;
 
-/// Prints loaded contents, ignored contents and options without effect; only ignored contents if `options`
-/// are quiet.
+/// Prints loaded contents, ignored contents and options without effect; ignored contents alone with
+/// `--quiet`.
 ///
 /// # Errors
-/// If anything is ignored and `options` are strict.
+/// If contents are ignored and `--strict` is given.
 pub(super) fn say_loaded(
     options: &RenderOptions,
     settings: &RenderSettings,
@@ -58,7 +58,7 @@ pub(super) fn say_sparse(statistics: &Statistics) {
     }
 }
 
-/// Prints a warning about dazzling tiles that no second card has confirmed.
+/// Prints a warning about tiles far brighter than any surface that no second card has confirmed.
 pub(super) fn say_dazzling(statistics: &Statistics) {
     let Statistics { dazzling_tiles, dazzling_cards, .. } = statistics;
     if *dazzling_tiles > 0 {
@@ -77,7 +77,7 @@ pub(super) fn say_dazzling(statistics: &Statistics) {
     }
 }
 
-/// Prints the contents of a prepared scene, and its view.
+/// Prints the scene of a prepared file, its number of photons, the camera and the picture's size.
 pub(super) fn say_prepared(path: &Path, settings: &RenderSettings, inputs: &NamedSettings, camera: &Camera) {
     let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let scene = inputs.get("scene").and_then(Value::as_str).unwrap_or_default();
@@ -102,13 +102,13 @@ pub(super) fn say_other_finish(path: &Path, prepared: Finish, wanted: Finish) {
     say(format_args!("photoncard: {} {text}", path.display()));
 }
 
-/// Clause that names the quality as the origin of settings.
+/// Text that names the quality that chose settings: `quality good`.
 pub(super) fn by_quality(quality: Quality) -> String {
     format!("quality {}", quality.name())
 }
 
-/// Text about settings that were found for a scene or taken from kept samples. `are_planned` is true if
-/// passes decide the number of samples.
+/// Text about the settings that a pilot has chosen or kept samples have. `are_planned` is true if `--time` or
+/// `--noise` decides the number of samples.
 pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     let RenderSettings { photons, integrator, .. } = settings;
     let (interpolated, of) = match integrator.irradiance_error {
@@ -132,8 +132,8 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     )
 }
 
-/// Messages of a fit about settings that are not stated: the gain of guiding photons to the camera, and
-/// settings that the bounds of the quality have limited.
+/// Messages of a pilot about settings that no option states: the squared error with photons for the camera,
+/// over that without; and photons or gather rays that the quality's bounds have reduced.
 pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Vec<String> {
     let gain = fit.measured.photons_for_camera.map(|ratio| {
         let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };
@@ -179,7 +179,7 @@ fn lights(scene: &Scene) -> String {
     format!("light of {}", kinds.into_iter().flatten().collect::<Vec<_>>().join(" and "))
 }
 
-/// Prints the end of a picture: its files, its time, and its number of samples or the cost of its frame.
+/// Prints the files of a picture, and its time with its samples or, for a frame, with its phases.
 pub(super) fn say_done(outputs: &OutputOptions, rendering: &Rendering, frame: Option<u32>) {
     let statistics = &rendering.statistics;
     if let Some(memory) = &statistics.memory {
@@ -210,7 +210,7 @@ pub(super) fn say_damaged(path: &Path) {
     say(format_args!("photoncard: {} is not as it was written: its frame is rendered again", path.display()));
 }
 
-/// Text about the time of a frame, and of the parts that it does not share with the previous one.
+/// Text about a frame's time: in all, of each preparing phase from 5 ms on, of sending and of tiles.
 fn cost(statistics: &Statistics) -> String {
     let Statistics { time_s, link, .. } = statistics;
     let Times { total, scene, pilot, photons, pack, load, render, denoise, .. } = time_s;
@@ -222,7 +222,7 @@ fn cost(statistics: &Statistics) -> String {
     format!("{total:.2} s: {phases}{sent} bytes sent in {load:.2} s, tiles {render:.2} s{denoised}")
 }
 
-/// Text about time, samples and, if the statistics have it, what limited the render.
+/// Text about the time of a picture, its longest phase, its samples and, from 0.1 % on, its lost paths.
 fn summary(statistics: &Statistics, pixels: usize) -> String {
     let Statistics { samples, rays, lost_paths, time_s, .. } = statistics;
     let total = if time_s.total < 10.0 { format!("{:.1} s", time_s.total) } else { duration(time_s.total) };
@@ -240,7 +240,7 @@ fn summary(statistics: &Statistics, pixels: usize) -> String {
     text
 }
 
-/// Longest phase, with its seconds.
+/// Name of the longest phase, with its seconds.
 fn longest(times: &Times) -> (&'static str, f64) {
     let phases = [
         ("reading the scene", times.scene),
@@ -254,7 +254,7 @@ fn longest(times: &Times) -> (&'static str, f64) {
     phases.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
 }
 
-/// Prints a table of reads from card memory.
+/// Prints reads of card memory: a table of photon map and scene, DRAM bytes for a gather and for a ray.
 fn say_memory(memory: &MemoryStatistics, statistics: &Statistics) {
     let gathers = statistics.gathers;
     let rays = &statistics.rays;

@@ -31,7 +31,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::progress::Progress;
 
-/// Renders a scene, and writes all requested outputs.
+/// Renders a picture, or frames, and writes all requested outputs.
 pub(crate) fn run(options: &mut RenderOptions) -> Result<(), Failure> {
     if let Some(outputs) = files::beside_scene(options)? {
         options.outputs = outputs;
@@ -46,7 +46,7 @@ pub(crate) fn run(options: &mut RenderOptions) -> Result<(), Failure> {
     videos.iter().try_for_each(|video| video.write(options))
 }
 
-/// Renders the scene at rest.
+/// Renders one picture, of the scene at rest.
 fn run_one(options: &RenderOptions) -> Result<(), Failure> {
     let mut settings = options.settings();
     files::check(options, &options.outputs)?;
@@ -84,7 +84,7 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
         end.say(&at_once);
     }
     match end.ending {
-        // The picture that was asked for until then is written.
+        // An interrupt ends passes successfully: the picture of the complete passes is written.
         Ending::Failed(RenderError::Stopped) => Ok(()),
         Ending::Failed(error) => Err(error.into()),
         Ending::Reached | Ending::MaxSamples | Ending::Black => Ok(()),

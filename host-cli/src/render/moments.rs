@@ -8,18 +8,18 @@ use crate::arguments::{FrameOptions, SceneOptions};
 use crate::failure::Failure;
 use crate::input::Input;
 
-/// Scene that is moved from one time of its animations to another.
+/// Scene that is moved from frame to frame.
 pub(super) struct Moments<'a> {
     options: &'a SceneOptions,
     frames: &'a FrameOptions,
     input: Input,
-    /// Scene of the last frame. It starts at rest if only cameras move.
+    /// Scene of the last frame; before the first one at rest if only cameras move, else empty.
     scene: Scene,
     is_still: bool,
 }
 
 impl<'a> Moments<'a> {
-    /// Opens a scene for cards of `dram_bytes` bytes. Also returns it at rest.
+    /// Opens a scene for cards with `dram_bytes` bytes of memory. Also returns the scene at rest.
     pub(super) fn open(
         options: &'a SceneOptions,
         frames: &'a FrameOptions,
@@ -51,7 +51,7 @@ impl<'a> Moments<'a> {
             return Ok(());
         }
         let cameras = self.input.file.cameras_at(&moment).map_err(Failure::input)?;
-        // Without cameras in the file the scene is seen as at rest.
+        // A scene without cameras of its own keeps the camera that it has at rest.
         if !cameras.is_empty() {
             self.scene.set_cameras(cameras);
         }

@@ -9,7 +9,7 @@ use crate::arguments::{PictureFormat, PictureOutput};
 use crate::failure::Failure;
 use crate::shell;
 
-/// Checks that the output is a part file exactly if a part is rendered.
+/// Checks that a render of a part has one output, a part file, and that another render has no part file.
 pub(super) fn check(part: Option<Part>, pictures: &[PictureOutput]) -> Result<(), Failure> {
     let are_parts = pictures.iter().any(|picture| picture.format == PictureFormat::Part);
     match part {
@@ -39,12 +39,12 @@ pub(super) fn arguments() -> Vec<String> {
     std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect()
 }
 
-/// Command that renders another part, derived from the head of an existing one.
+/// Command that renders another part, by the arguments in the head of an existing one.
 pub(crate) fn command(head: &PartHead, part: Part) -> String {
     shell::command(with_part(head, part))
 }
 
-/// Arguments of the head, with another part and its file name, and only the head's frame.
+/// Arguments from a part's head, with another part and its file name, and with the head's frame alone.
 fn with_part(head: &PartHead, part: Part) -> Vec<String> {
     let frame = head.settings.get("frame").map(ToString::to_string);
     let changed = |option: &str, value: &str| match option {
@@ -70,8 +70,8 @@ fn with_part(head: &PartHead, part: Part) -> Vec<String> {
     words
 }
 
-/// Path of another part. The last number in the name that equals the part's is replaced and keeps its leading
-/// zeros. Without such a number, the part's is inserted before the suffix.
+/// Path of another part's file: the last number in the name that equals `part` is replaced, with its leading
+/// zeros. Without such a number, `other` is inserted before the suffix.
 fn name_of(path: &Path, part: Part, other: Part) -> PathBuf {
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
     let mut pieces: Vec<String> = Vec::new();

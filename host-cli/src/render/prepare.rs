@@ -37,7 +37,7 @@ fn prepare_rest(options: &PrepareOptions) -> Result<(), Failure> {
     preparation.write(&prepared, &options.output)
 }
 
-/// Prepares frames. A frame that differs from the previous one only by its cameras shares its file.
+/// Prepares frames. Consecutive frames that differ only by their cameras share a file.
 fn prepare_frames(options: &PrepareOptions, numbers: &[u32]) -> Result<(), Failure> {
     let path = |number: u32| numbered(&options.output, number).unwrap_or_else(|| options.output.clone());
     numbers.iter().try_for_each(|&number| check(options, &path(number)))?;
@@ -81,12 +81,12 @@ fn one_file(output: &Path) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// State that all files of a preparation share.
+/// Options, settings and progress that all files of a preparation share.
 struct Preparation<'a> {
     options: &'a PrepareOptions,
     settings: RenderSettings,
     progress: Progress,
-    /// Text about the settings that the quality has found.
+    /// Message about the settings that the quality has chosen.
     said: OnceLock<String>,
 }
 
@@ -107,7 +107,7 @@ impl<'a> Preparation<'a> {
         Ok(Self { options, settings, progress, said: OnceLock::new() })
     }
 
-    /// Chooses photons and integrator for `scene`, unless they are stated.
+    /// Chooses the settings of photons and integrator that are not stated, by a pilot with `scene`.
     fn choose(&self, scene: &Scene, packed: &PackedScene) -> Chosen {
         let Self { options, settings, progress, said } = self;
         let stated = options.stated();
@@ -156,7 +156,7 @@ impl<'a> Preparation<'a> {
     }
 }
 
-/// Metadata for renders: the quality and the finish, the names of the inputs, and the settings that all frames
+/// Metadata that renders of a prepared scene read: quality, finish, inputs, and settings that all frames
 /// share.
 fn notes(options: &PrepareOptions) -> Map<String, Value> {
     let mut inputs = input::provenance(&options.scene);

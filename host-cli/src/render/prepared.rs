@@ -67,7 +67,7 @@ fn refusal(text: String, help: &str) -> Failure {
     Failure::Input(Report::new(MietteDiagnostic::new(text).with_help(help)))
 }
 
-/// Prepared scene with its renderer.
+/// Open file of a prepared scene, with a renderer.
 struct OpenScene {
     path: PathBuf,
     prepared: PreparedScene,
@@ -75,12 +75,12 @@ struct OpenScene {
     quality: Quality,
     prepared_for: Finish,
     inputs: NamedSettings,
-    /// Time of opening that was not reported yet, seconds.
+    /// Time of opening the file, seconds; 0 once a picture's statistics contain it.
     seconds: f64,
 }
 
 impl OpenScene {
-    /// Opens a prepared scene. `is_rest` is true if no frame is requested.
+    /// Opens a prepared scene. `is_rest` is true if the picture is of no frame.
     fn open(options: &RenderOptions, path: PathBuf, is_rest: bool) -> Result<Self, Failure> {
         let start = Instant::now();
         let prepared = PreparedScene::open(&path).map_err(Failure::input)?;

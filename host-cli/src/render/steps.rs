@@ -1,4 +1,4 @@
-//! Steps that renders of a picture and of a frame have in common.
+//! Steps of a render that a single picture and a frame share.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::{Fit, Quality};
@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::flags::with_flags;
 use crate::progress::Progress;
 
-/// Prints where the finished tiles of a failed render are, and writes its statistics so far.
+/// Prints where a failed render keeps its finished tiles, and writes the statistics it has so far.
 pub(super) fn end_early(error: &RenderError, progress: &Progress, outputs: &OutputOptions) {
     if error.is_input() {
         return;
@@ -27,7 +27,7 @@ pub(super) fn end_early(error: &RenderError, progress: &Progress, outputs: &Outp
     }
     let mut statistics = progress.take_failed().unwrap_or_else(|| json!({}));
     statistics["error"] = json!(with_flags(&error.to_string()));
-    // The error that has ended the render is the one to report.
+    // The render's own error is returned by the caller: a failure to write is only printed.
     if let Err(failure) = files::write_statistics(outputs, serde_json::to_string_pretty(&statistics)) {
         say(format_args!("photoncard: {}", failure.line()));
     }
@@ -38,7 +38,7 @@ pub(super) struct Finished {
     pub(super) rendering: Rendering,
     /// Time of reading the scene, seconds.
     pub(super) scene_seconds: f64,
-    /// Names of the scene's inputs, and the time of the frame if there is one.
+    /// Names of the scene's inputs, with the number and time of a frame.
     pub(super) inputs: NamedSettings,
     pub(super) quality: Quality,
     /// Settings that the quality has found for the scene; `None` without a pilot.
@@ -48,7 +48,7 @@ pub(super) struct Finished {
     pub(super) circumstances: Circumstances,
 }
 
-/// Writes the outputs of a finished picture, and prints the end.
+/// Writes the outputs of a finished picture, and prints messages about them.
 pub(super) fn finish(
     options: &RenderOptions,
     outputs: &OutputOptions,
@@ -77,7 +77,8 @@ pub(super) fn finish(
     Ok(())
 }
 
-/// Photons and integrator of the options. The fit replaces settings that are neither stated nor kept.
+/// Returns photons and integrator: those of a pilot, except where options or kept samples state them. Prints
+/// them.
 pub(super) fn chosen(
     options: &RenderOptions,
     unfitted: Unfitted,
@@ -98,12 +99,12 @@ pub(super) fn chosen(
     (settings.photons, settings.integrator)
 }
 
-/// Memory of the largest card, bytes. Cards whose memory is too small for the scene are not used.
+/// Memory of the card that has most, bytes: a scene may need all of it, and smaller cards are then left out.
 pub(super) fn dram_bytes(settings: &RenderSettings) -> u32 {
     settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX)
 }
 
-/// Applies the options' assignments to a scene, and checks that it has light.
+/// Applies the assignments (`--set`) to a scene, and checks that the scene has light.
 pub(super) fn assigned(options: &SceneOptions, mut scene: Scene) -> Result<Scene, Failure> {
     for assignment in &options.assignments {
         scene.apply(assignment).map_err(Failure::input)?;
@@ -112,7 +113,7 @@ pub(super) fn assigned(options: &SceneOptions, mut scene: Scene) -> Result<Scene
     Ok(scene)
 }
 
-/// Gives the picture the camera's aspect ratio, and prints the loaded contents.
+/// Gives a picture without a stated size the camera's aspect ratio, and prints the loaded contents.
 pub(super) fn view(
     options: &RenderOptions,
     settings: &mut RenderSettings,
@@ -123,7 +124,7 @@ pub(super) fn view(
     messages::say_loaded(options, settings, scene, &camera, misfit)
 }
 
-/// Runs `work` on a pool of `threads` threads.
+/// Runs `work` on a pool of `threads` threads; on rayon's global pool if `None`.
 pub(crate) fn on_threads<T: Send>(
     threads: Option<usize>,
     work: impl FnOnce() -> T + Send,

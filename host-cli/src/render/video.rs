@@ -13,16 +13,17 @@ use crate::shell;
 
 const FFMPEG: &str = "ffmpeg";
 
-/// Video, with the path pattern of its pictures.
+/// Path of a video, and the path pattern of the PNG pictures of its frames.
 pub(super) struct Video {
     path: PathBuf,
     pictures: PathBuf,
 }
 
-/// Replaces the videos among the outputs by the pictures from which they are encoded.
+/// Replaces each video among the outputs by the PNG pictures that it is encoded from, and returns the videos.
 ///
 /// # Errors
-/// If there are no frames, ffmpeg cannot be started, or a video is one of the inputs.
+/// If no frames are stated, a video's name contains `#` or is that of an input, a picture of that name is not
+/// photoncard's, or ffmpeg cannot be started.
 pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     let mut videos = Vec::new();
     for output in options.outputs.pictures.iter_mut().filter(|output| output.format == PictureFormat::Video) {
@@ -53,7 +54,7 @@ pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     Ok(videos)
 }
 
-/// Error of a video whose name has a place for a frame's number.
+/// Error of a video whose name contains a run of `#`, which stands for a frame's number.
 fn of_each_frame(path: &Path) -> Failure {
     let text = format!(
         "{} is one video of all frames, and a run of # in its name stands for the number of each",
@@ -64,7 +65,7 @@ fn of_each_frame(path: &Path) -> Failure {
     refusal(text, &format!("leave the # out: -o {one}; or write the frames alone: -o {frames}"))
 }
 
-/// Name of the video: the pattern without runs of `#` and without the dot before each.
+/// Path of one video: the pattern without runs of `#`, and without the dot before a run.
 fn as_one(pattern: &Path) -> PathBuf {
     let name = pattern.file_name().unwrap_or_default().to_string_lossy();
     let kept: Vec<_> = name.split('.').map(|word| word.replace('#', "")).collect();
@@ -120,7 +121,7 @@ impl Video {
     }
 
     fn words(&self, fps: f64, list: &Path, made: &Path) -> Vec<String> {
-        // Most players take an even number of pixels a side, and two bits of colour for four pixels.
+        // Most players need even sides and 4:2:0 chroma subsampling.
         let even = "pad=ceil(iw/2)*2:ceil(ih/2)*2,format=yuv420p";
         let fps = fps.to_string();
         let [list, made] = [list, made].map(|path| path.to_string_lossy().into_owned());
@@ -129,7 +130,7 @@ impl Video {
     }
 }
 
-/// Error of a video as the output of a command that renders no frames.
+/// Error of a video as the output of a command without frames.
 pub(crate) fn needless() -> Failure {
     refusal(
         "a video is of frames that photoncard render makes".to_owned(),

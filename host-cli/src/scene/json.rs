@@ -7,7 +7,7 @@ use photoncard_driver::scene::{
 };
 use serde_json::{Value, json};
 
-/// Contents of a scene, except vertices and texels.
+/// Contents of a scene, without vertices and texels.
 pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
     let (lower, upper) = scene.bounds();
     json!({

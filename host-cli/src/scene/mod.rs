@@ -44,7 +44,7 @@ pub(crate) fn info(path: &Path, json: bool, lights: &LightOptions) -> Result<(),
     print(&lines)
 }
 
-/// Table rows about triangles, size and texels of a scene.
+/// Table rows about triangles, bounds, attributes and textures of a scene.
 fn geometry(scene: &Scene) -> [String; 5] {
     let (lower, upper) = scene.bounds();
     let size = upper - lower;
@@ -94,7 +94,7 @@ fn camera(camera: &Camera, scene: &Scene) -> String {
 
 fn animation(animation: &Animation) -> String {
     let Animation { name, seconds, moves_only_cameras } = animation;
-    // Times are of single precision in the file.
+    // The file has times in single precision: as `f32` they print without digits of the conversion.
     let [begin, end] = seconds.map(|time| time as f32);
     let moved = if *moves_only_cameras { "moves cameras alone" } else { "moves meshes or lights" };
     format!("{name}: {begin} to {end} s, {moved}")

@@ -24,7 +24,7 @@ use crate::shell;
 /// Message of an interrupted study.
 const STOPPED: &str = "stopped; finished points are kept: run the command again to go on";
 
-/// Writes the reports of built-in studies, or of a sweep.
+/// Runs built-in studies, or a sweep, and writes their reports.
 pub(crate) fn run(arguments: &StudyArguments) -> Result<(), Failure> {
     match arguments {
         StudyArguments { own: Some(StudyCommand::Sweep(sweep)), .. } => {
@@ -76,7 +76,7 @@ fn failure(error: StudyError) -> Failure {
     }
 }
 
-/// Command line as typed. The program's name has no folder.
+/// Command line of this process, quoted; the program is named `photoncard`, without its folder.
 fn command_line() -> String {
     shell::command(std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()))
 }
@@ -90,10 +90,10 @@ struct StudyProgress {
 struct Display {
     study: String,
     bar: ProgressBar,
-    /// Estimate of the remaining time, which the bar shows whenever it is drawn.
+    /// Estimate of the remaining time, which the bar reads each time it is drawn.
     remaining: Arc<Mutex<Remaining>>,
     on_terminal: bool,
-    /// Number of tenths that were printed, without a terminal.
+    /// Tenths of the points that the last printed line states, without a terminal.
     told: usize,
 }
 
@@ -139,7 +139,7 @@ fn lock<T>(value: &Mutex<T>) -> MutexGuard<'_, T> {
     value.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Text of the remaining time, `now` seconds after the start; empty before a point is measured.
+/// Text of the remaining time, `now` seconds after the start; empty before the first point is measured.
 fn left(remaining: &Mutex<Remaining>, now: f64) -> String {
     let seconds = lock(remaining).seconds(now);
     seconds.map_or(String::new(), |seconds| format!(", {} left", duration(seconds)))
@@ -162,7 +162,7 @@ impl Display {
         }
     }
 
-    /// Starts the bar of a study of whose points `done` are stored already.
+    /// Starts the progress bar of a study, at its `done` points stored earlier.
     fn begin(&mut self, study: &str, done: usize, total: usize) {
         self.bar.finish_and_clear();
         study.clone_into(&mut self.study);
@@ -170,10 +170,10 @@ impl Display {
         let target =
             if self.on_terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         self.bar = ProgressBar::with_draw_target(Some(total as u64), target);
-        // Points are measured one after another, each on all threads.
+        // One worker: points are measured one after another, each on all threads.
         self.remaining = Arc::new(Mutex::new(Remaining::new(1, done as u64)));
         let template = "{msg:11} {bar:40} {pos}/{len} points {elapsed}{left}";
-        // The fallback is indicatif's own template.
+        // An invalid template would be replaced by indicatif's default.
         let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
         let remaining = self.remaining.clone();
         self.bar.set_style(style.with_key("left", move |state: &ProgressState, out: &mut dyn Write| {

@@ -1,4 +1,4 @@
-//! Points of `photoncard study sweep`, from the command line with some arguments replaced.
+//! Points of `photoncard study sweep`: each has the command line's arguments with some values replaced.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -19,7 +19,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::notices::{self, Uses};
 
-/// Name of an axis, and a value on it.
+/// Option that is varied, without dashes, and one of its values.
 type Value<'a> = (&'a str, &'a str);
 
 /// Loads the scene of a sweep and creates its points.
@@ -37,7 +37,7 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     if !arguments.output.quiet {
         notices.iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
     }
-    // Assignments are settings of the points.
+    // Assignments (`--set`) belong to the settings of each point, not to the sweep's inputs.
     let inputs = input::provenance(&arguments.scene).into_iter().filter(|(name, _)| name != "set");
     let mut settings: Vec<_> = inputs.map(|(name, value)| (name, value.to_string())).collect();
     settings.push(("scene-checksum".to_owned(), scene.checksum().to_owned()));
@@ -47,7 +47,7 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     Ok(SweepOptions { sweep, name, scene, out, threads, machine, provenance })
 }
 
-/// Point of the sweep with these values. If no size is stated, the picture has the camera's aspect ratio.
+/// Returns the point with these values. If no size is stated, the picture has the camera's aspect ratio.
 fn point(
     arguments: &SweepArguments,
     values: &[Value],
@@ -72,12 +72,12 @@ fn point(
     Ok(point)
 }
 
-/// Arguments of the command line with these values; `None` if there are no values.
+/// Parses this process's arguments with `values` added; `None` if there are no values.
 fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
     if values.is_empty() {
         return Ok(None);
     }
-    // The last one of repeated options counts.
+    // With `args_override_self` the last of repeated options counts.
     let command = Arguments::command().mut_subcommand("study", |study| {
         study.mut_subcommand("sweep", |sweep| sweep.args_override_self(true))
     });
@@ -93,7 +93,7 @@ fn replaced(values: &[Value]) -> Result<Option<SweepArguments>, clap::Error> {
     }
 }
 
-/// Notice about caches that exceed the on-chip memory of the chip.
+/// Notice about caches that are larger than the on-chip memory of `chip`.
 fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
     let sizes = match caches {
         CacheSettings::Split { photon, scene } => [photon.bytes, scene.bytes],
@@ -109,7 +109,7 @@ fn beyond_chip(chip: EmulatedKind, caches: &CacheSettings) -> Option<String> {
     })
 }
 
-/// Parses caches of `--vary cache=`: in the syntax of `--cache`, or the photon cache alone as SIZE/LINE/WAYS
+/// Parses a value of `--vary cache=`: caches in the syntax of `--cache`, or the photon cache's SIZE/LINE/WAYS
 /// or SIZE.
 fn cache(text: &str) -> Result<CacheSettings, String> {
     match (text.contains('='), text.contains('/')) {
@@ -119,7 +119,7 @@ fn cache(text: &str) -> Result<CacheSettings, String> {
     }
 }
 
-/// First paragraph of an error about arguments.
+/// First paragraph of clap's error about an argument, in one line.
 fn reason(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let text = text.strip_prefix("error: ").unwrap_or(&text);

@@ -1,7 +1,7 @@
-//! Tiles for pages, from the newest wish that has any, numbered in the order in which they were finished.
+//! Tiles that pages are sent: those of the newest wish that has a tile, numbered in the order of completion.
 //!
-//! A page remembers only the number of its next tile, because outdated tiles are dropped before it asks. A
-//! slow page therefore receives fewer and newer tiles, and needs no buffer.
+//! A page remembers only the number of its next tile; outdated tiles are dropped before the page is sent
+//! them. A slow page therefore receives fewer and newer tiles, and needs no buffer.
 
 use std::collections::{HashMap, VecDeque};
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use photoncard_driver::layer::{Layer, Layers};
 use photoncard_driver::sink::FinishedTile;
 use photoncard_shared::counters::Counters;
 
-/// Radiance or a layer that a page shows.
+/// What a page shows: radiance or a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     Radiance,
@@ -19,7 +19,7 @@ pub(super) enum Shown {
 }
 
 impl Shown {
-    /// Returns whether chips render this layer only in pictures with layers.
+    /// Returns whether this is a layer that chips render only on request, such as `direct`.
     pub(super) fn is_of_chip(self) -> bool {
         match self {
             Self::Radiance => false,
@@ -28,25 +28,26 @@ impl Shown {
     }
 }
 
-/// Origin of a tile: wish, resolution and number of samples.
+/// Picture that a tile belongs to: wish, pass, resolution and number of samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Origin {
     /// Number of the wish.
     pub(super) version: u32,
-    /// True for a picture with cheap settings.
+    /// True for a tile of [`Pass::Coarse`](super::refinement::Pass::Coarse), whose settings are cheaper than
+    /// the final picture's.
     pub(super) is_coarse: bool,
-    /// Side of the square of pixels that a rendered pixel stands for.
+    /// Side of the square of the full picture's pixels that one rendered pixel covers.
     pub(super) step: u32,
     /// Samples per pixel.
     pub(super) samples: u32,
 }
 
-/// Work on a tile, for all samples of its pixels.
+/// Work that a tile has cost, for all samples of its pixels so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TileWork {
-    /// Number of photon gathers.
+    /// Number of photon gathers, in the photon map and in the caustic map.
     gathers: u64,
-    /// Number of irradiance records gathered.
+    /// Number of irradiance records whose gather rays were cast.
     records: u64,
     /// Number of lines read from DRAM; `None` if memory is not modelled.
     dram_lines: Option<u64>,
@@ -58,7 +59,7 @@ impl TileWork {
         Self { gathers, records: counters.records, dram_lines }
     }
 
-    /// Sum of the work on earlier and on further samples.
+    /// Sum of the work on earlier samples and of that on further ones.
     fn and(self, more: Self) -> Self {
         Self {
             gathers: self.gathers.saturating_add(more.gathers),
@@ -67,7 +68,7 @@ impl TileWork {
         }
     }
 
-    /// Counts for a tile's header; [`UNKNOWN`] replaces unknown ones.
+    /// Gathers, records and DRAM lines in a tile's header; [`UNKNOWN`] for a count that is not known.
     fn words(self) -> [u32; 3] {
         [Some(self.gathers), Some(self.records), self.dram_lines]
             .map(|count| count.map_or(UNKNOWN, |count| count.min(u64::from(UNKNOWN - 1)) as u32))
@@ -78,19 +79,19 @@ impl TileWork {
 #[derive(Debug)]
 pub(super) struct Patch {
     pub(super) origin: Origin,
-    /// Index of the card.
+    /// Index of the card among the view's cards.
     card: u32,
     tile: FinishedTile,
-    /// Denoised radiance of the tile's pixels, which pages see in place of the rendered one.
+    /// Denoised radiance of the tile's pixels, which pages show instead of the rendered radiance.
     denoised: Option<Vec<[f32; 3]>>,
     work: TileWork,
 }
 
-/// Value of an unknown count.
+/// Stands for an unknown count in the header of a tile.
 const UNKNOWN: u32 = u32::MAX;
-/// Size of a tile's header, bytes.
+/// Size of a tile's header in a message to a page, bytes.
 const HEADER: usize = 44;
-/// Size of a pixel, bytes.
+/// Size of a pixel in a message to a page, bytes.
 const PIXEL: usize = 12;
 
 impl Patch {
@@ -98,13 +99,13 @@ impl Patch {
         Self { origin, card, tile, denoised: None, work }
     }
 
-    /// Copy with denoised radiance. `at` is that of a pixel of the picture.
+    /// Copy with denoised radiance; `at(x, y)` is that of a pixel of the picture.
     fn denoised(&self, at: &dyn Fn(u32, u32) -> [f32; 3]) -> Self {
         let denoised = Some(self.tile.pixels().map(|((x, y), _)| at(x, y)).collect());
         Self { tile: self.tile.clone(), denoised, ..*self }
     }
 
-    /// Returns whether this tile adds samples to an earlier one of the same area.
+    /// Returns whether this tile has more samples than an earlier one of the same area, wish and resolution.
     fn goes_on(&self, earlier: &Self) -> bool {
         earlier.origin.samples < self.origin.samples
             && Origin { samples: self.origin.samples, ..earlier.origin } == self.origin
@@ -115,12 +116,12 @@ impl Patch {
         (tile.x, tile.y, tile.pixels())
     }
 
-    /// Size of the message with this tile, bytes.
+    /// Size of the tile's message, bytes.
     pub(super) fn bytes(&self) -> usize {
         HEADER + PIXEL * self.tile.tile().pixels() as usize
     }
 
-    /// Message with this tile, for a page that shows `shown`.
+    /// Message with the tile, little-endian: header, and three `f32` a pixel of what the page shows.
     pub(super) fn message(&self, shown: Shown) -> Vec<u8> {
         let Origin { version, is_coarse: _, step, samples } = self.origin;
         let [gathers, records, lines] = self.work.words();
@@ -137,7 +138,7 @@ impl Patch {
         bytes
     }
 
-    /// Pixel of the tile at `(x, y)` of the full picture; `None` if it is outside.
+    /// Pixel of the tile that covers `(x, y)` of the full picture; `None` if the tile does not.
     fn pixel(&self, [x, y]: [u32; 2]) -> Option<FilmPixel> {
         let [x, y] = [x, y].map(|at| at / self.origin.step);
         let tile = self.tile.tile();
@@ -148,7 +149,7 @@ impl Patch {
     }
 }
 
-/// Channel values of a pixel for a page. A scalar is repeated.
+/// Three channel values of a pixel for a page. A layer of one channel is repeated.
 fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     let Shown::Layer(layer) = shown else { return pixel.pixel.radiance };
     match layer.channels() {
@@ -158,7 +159,7 @@ fn values(pixel: &FilmPixel, shown: Shown) -> [f32; 3] {
     }
 }
 
-/// Corner and number of pixels, which identify a tile of a picture.
+/// Column and row of a tile's corner, and its number of pixels.
 type Area = (u32, u32, u64);
 
 /// Tiles of the newest wish that has any.
@@ -172,7 +173,8 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Adds a tile and drops those of older wishes. The work on its earlier samples is added to its own.
+    /// Adds a tile, with the work on the samples that an earlier tile of its area has. Drops tiles of older
+    /// wishes.
     pub(super) fn put(&mut self, mut patch: Patch) {
         let version = patch.origin.version;
         if self.patches.front().is_some_and(|(_, oldest)| oldest.origin.version < version) {
@@ -192,7 +194,8 @@ impl Canvas {
         self.next += 1;
     }
 
-    /// Replaces the tiles of a complete pass by denoised ones. `at` is the denoised radiance of a pixel.
+    /// Replaces the tiles of a complete pass by denoised ones with new numbers. `at(x, y)` is the denoised
+    /// radiance of a pixel.
     pub(super) fn denoise(&mut self, origin: Origin, at: &dyn Fn(u32, u32) -> [f32; 3]) {
         let of_pass = self.patches.iter().filter(|(_, patch)| patch.origin == origin);
         let denoised: Vec<_> = of_pass.map(|(_, patch)| patch.denoised(at)).collect();
@@ -210,7 +213,7 @@ impl Canvas {
         self.retain(|patch| patch.origin.version == version);
     }
 
-    /// Drops the tiles of other passes, once a pass is complete.
+    /// Drops the tiles of all passes but `origin`, which is complete.
     pub(super) fn keep(&mut self, origin: Origin) {
         self.retain(|patch| patch.origin == origin);
     }
@@ -228,13 +231,13 @@ impl Canvas {
         }
     }
 
-    /// Oldest tile with a number of at least `from`, and its number.
+    /// Oldest tile with a number of `from` or more, and its number.
     pub(super) fn after(&self, from: u64) -> Option<(u64, Arc<Patch>)> {
         let index = self.patches.partition_point(|(number, _)| *number < from);
         self.patches.get(index).cloned()
     }
 
-    /// Depth of the newest pixel of a wish at `at`, metres; `None` where no surface is seen.
+    /// Depth of a wish's newest tile at pixel `at`, metres; `None` where no surface is seen.
     pub(super) fn depth(&self, version: u32, at: [u32; 2]) -> Option<f32> {
         let mut of_wish = self.patches.iter().rev().filter(|(_, patch)| patch.origin.version == version);
         let seen = of_wish.find_map(|(_, patch)| patch.pixel(at))?;
@@ -275,7 +278,7 @@ mod tests {
             canvas.keep(patch(pass, 0, 0).origin);
         }
         assert_eq!(work(&canvas), [70, 73, 76]);
-        // A tile that is taken back is done again from the pass before.
+        // After a revocation, a tile's work is added to that of the pass before.
         canvas.put(patch(8, 1, 80));
         canvas.revoke(patch(8, 0, 0).origin, 1);
         canvas.put(patch(8, 1, 81));

@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 
 /// Pause before the first attempt to reconnect to a lost card. It doubles with each attempt.
 const FIRST_PAUSE: Duration = Duration::from_millis(500);
-/// Maximum pause between attempts.
+/// Maximum pause between two attempts to reconnect.
 const MAX_PAUSE: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Standing {
-    /// The card has not been reached yet.
+    /// No answer or tile of the card has arrived yet.
     Absent,
     Ready,
     Lost,
@@ -42,7 +42,7 @@ impl CardBoard {
         });
         let card = |(name, address): (String, Option<CardAddress>)| Card {
             name,
-            // An emulated card is there as long as the process is.
+            // An emulated card is a thread of this process: it is always ready.
             standing: if address.is_some() { Standing::Absent } else { Standing::Ready },
             address,
             tiles: 0,
@@ -57,7 +57,8 @@ impl CardBoard {
         self.cards.iter_mut().enumerate().find(|(_, card)| card.name == name)
     }
 
-    /// Counts a tile of a card. Returns the card's index, and whether the card was not known to be ready.
+    /// Counts a tile that a card rendered. Returns the card's index, and whether the card becomes ready by
+    /// it.
     pub(super) fn rendered(&mut self, name: &str) -> (u32, bool) {
         let Some((number, card)) = self.of_name(name) else { return (0, false) };
         card.tiles += 1;
@@ -75,7 +76,7 @@ impl CardBoard {
         }
     }
 
-    /// Remote lost card whose pause is over, with its index. The pause doubles with each attempt.
+    /// Returns a lost remote card that is due for an attempt, with its index, and doubles the pause after it.
     pub(super) fn next_to_try(&mut self, now: Duration) -> Option<(usize, CardAddress)> {
         let is_due =
             |card: &Card| card.standing == Standing::Lost && card.address.is_some() && card.try_at <= now;

@@ -1,4 +1,4 @@
-//! Command line that renders a settled picture, with every option on which its pixels or its work depend.
+//! Command line that renders a settled picture, with every option that its pixels or its work depend on.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::{Finish, Quality};
@@ -10,7 +10,7 @@ use crate::arguments::SceneOptions;
 use crate::environment::EnvironmentOption;
 use crate::shell;
 
-/// Words of the command that renders the picture of a wish.
+/// Words of the command that renders the settled picture of a wish.
 pub(super) fn words(scene: &SceneOptions, quality: Quality, finish: Finish, wish: &Wish) -> Vec<String> {
     let mut words = Words(vec!["photoncard".into(), "render".into(), path(&scene.path.to_string_lossy())]);
     words.add("quality", quality.name());
@@ -30,7 +30,7 @@ pub(super) fn quoted(words: &[String]) -> String {
     words.iter().map(|word| shell::quoted(word)).collect::<Vec<_>>().join(" ")
 }
 
-/// Path that cannot be mistaken for an option.
+/// Path that clap does not take for an option: `./` precedes a dash.
 fn path(path: &str) -> String {
     if path.starts_with('-') { format!("./{path}") } else { path.to_owned() }
 }
@@ -41,7 +41,7 @@ impl Words {
     /// Adds an option with its value.
     fn add(&mut self, option: &str, value: &(impl ToString + ?Sized)) {
         let value = value.to_string();
-        // A value that begins like an option is none after an equals sign.
+        // Behind `=`, clap does not take a value with a leading dash for an option.
         if value.starts_with('-') {
             self.0.push(format!("--{option}={value}"));
         } else {
@@ -55,7 +55,7 @@ impl Words {
         }
     }
 
-    /// Adds an option without a value, if it is stated.
+    /// Adds an option without a value, if `is_stated`.
     fn add_switch(&mut self, option: &str, is_stated: bool) {
         self.0.extend(is_stated.then(|| format!("--{option}")));
     }

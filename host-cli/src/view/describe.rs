@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 
 use super::wish::Wish;
 
-/// Facts about a scene for the first message to a page.
+/// Name and bounding box of a scene, for the first message to a page.
 pub(super) struct SceneFacts {
     name: String,
     low: Vec3,
@@ -24,7 +24,7 @@ impl SceneFacts {
         Self { name, low, high }
     }
 
-    /// First message to a page. `scene` has the materials and lights before edits.
+    /// First message to a page. `scene` has the materials and lights that pages have not changed.
     pub(super) fn hello(&self, scene: &Scene, out: Option<&str>, steers: bool) -> Value {
         let layers = ["radiance"].into_iter().chain(Layer::ALL.map(Layer::name));
         let cameras = scene.cameras.iter().map(|camera| {
@@ -49,7 +49,8 @@ impl SceneFacts {
         })
     }
 
-    /// Description of a camera, with a point in its direction at about the distance of the scene's centre.
+    /// Camera with the point that pages turn it around: on its axis, at the depth of the bounding box's
+    /// centre.
     pub(super) fn camera(&self, camera: &Camera, scene: &Scene) -> Value {
         let middle = 0.5 * (self.low + self.high);
         let size = (self.high - self.low).length().max(1e-3);
@@ -81,7 +82,7 @@ fn light(light: &PunctualLight, scene: &Scene) -> Value {
     })
 }
 
-/// Descriptions of the materials, one for each name, with the properties that can be set.
+/// Materials, one for each name, with the properties that a page can set.
 fn materials(scene: &Scene) -> Vec<Value> {
     let is_first = |index: usize, material: &Material| {
         !scene.materials[..index].iter().any(|other| other.name == material.name)
@@ -116,7 +117,7 @@ fn properties(material: &Material) -> Map<String, Value> {
     properties
 }
 
-/// Changes of the scene that pages have made.
+/// Changes of materials and lights that pages have made.
 pub(super) fn changes(wish: &Wish) -> Value {
     let change = |(name, value): &(String, Vec<f64>)| match value[..] {
         [value] => json!({"name": name, "value": value}),
@@ -125,7 +126,7 @@ pub(super) fn changes(wish: &Wish) -> Value {
     wish.edits().iter().map(change).collect()
 }
 
-/// Settings of the settled picture that pages can change, and others that they show.
+/// Settings of the settled picture, which pages show and may change in part.
 pub(super) fn settings(settings: &RenderSettings) -> Value {
     let RenderSettings { photons, integrator, schedule, picture, .. } = settings;
     json!({
@@ -142,11 +143,11 @@ pub(super) fn settings(settings: &RenderSettings) -> Value {
     })
 }
 
-/// Cost of the newest image and of the newest pass, for pages.
+/// Cost of the newest card image and of the newest pass, for pages.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cost {
-    /// Seconds that photons took; the other fields are those of the rest of the image, of its loading and of
-    /// rendering.
+    /// Seconds of tracing photons; `pack`, `load` and `render` are those of building the card image, of
+    /// loading the cards and of rendering.
     photons: f64,
     pack: f64,
     load: f64,
@@ -156,7 +157,7 @@ pub(super) struct Cost {
 }
 
 impl Cost {
-    /// Adds a finished pass. The cost of the image is that of the pass for which it was built.
+    /// Takes the cost of a finished pass; that of the card image only from a pass that traced photons.
     pub(super) fn add(&mut self, statistics: &Statistics) {
         let times = &statistics.time_s;
         if times.photons > 0.0 {

@@ -1,5 +1,5 @@
-//! Pilot renders by which a quality finds its settings. They run on a thread beside the painter, so that a
-//! new wish need not wait for them.
+//! Pilot renders by which a quality chooses settings. They run on a thread of their own: the painter renders
+//! a new wish meanwhile.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +24,7 @@ pub(super) struct Fitting {
 }
 
 impl Fitting {
-    /// Starts pilot renders for the view of `settings`, with at most `threads` threads.
+    /// Starts pilot renders for the camera of `settings`, on `threads` threads, or on all if `None`.
     ///
     /// # Errors
     /// If the thread cannot be started.
@@ -47,7 +47,7 @@ impl Fitting {
         Ok(Self { thread: std::thread::Builder::new().name("pilot".into()).spawn(work)?, stop })
     }
 
-    /// Waits for the result. If `must_stop` becomes true, returns the pilot renders, which continue.
+    /// Waits for the result. If `must_stop` becomes true first, returns the pilot renders, which continue.
     pub(super) fn wait(self, must_stop: &dyn Fn() -> bool) -> Result<Found, Self> {
         while !self.thread.is_finished() {
             if must_stop() {
@@ -58,10 +58,10 @@ impl Fitting {
         Ok(self.thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
     }
 
-    /// Stops the pilot renders. Their result is lost.
+    /// Stops the pilot renders without a result.
     pub(super) fn stop(self) {
         self.stop.store(true, Ordering::Relaxed);
-        // Its panic would be one of a result that nobody wants.
+        // A panic of the thread concerns only its result, which is dropped.
         let _ = self.thread.join();
     }
 }

@@ -11,17 +11,17 @@ use super::page_files::{PageFile, page_file};
 
 /// Path of the page.
 const PAGE: &str = "/";
-/// Path of the page's file, which is also the page.
+/// Path of the page by the name of its file.
 const PAGE_FILE: &str = "/index.html";
 /// Path of the WebSocket.
 const SOCKET: &str = "/socket";
 
-/// Resource that a request may have.
+/// What a request is granted.
 #[derive(Debug, PartialEq)]
 pub(super) enum Resource {
     /// File of the page.
     File(&'static PageFile),
-    /// WebSocket, with the key of the request.
+    /// WebSocket, with the request's `Sec-WebSocket-Key`.
     Socket(String),
 }
 
@@ -32,7 +32,7 @@ pub(super) struct Gate {
 }
 
 impl Gate {
-    /// Creates the access control of a server at `address`, whose port is known.
+    /// Creates the access control of a server that listens at `address`, whose port is not 0.
     pub(super) fn new(address: SocketAddr, token: String) -> Self {
         Self { address, token }
     }
@@ -49,10 +49,11 @@ impl Gate {
         format!("http://{here}{PAGE}?token={token}")
     }
 
-    /// Checks a request and returns its resource.
+    /// Checks a request and returns what it is granted.
     ///
     /// # Errors
-    /// The refusal, if the request may have no resource.
+    /// The refusal of a request for another host, from another site, without the token, or for nothing that
+    /// exists.
     pub(super) fn check(&self, head: &Head) -> Result<Resource, Refusal> {
         if head.method != "GET" {
             return Err(Refusal::new(405, "Method Not Allowed", "only GET is answered"));
@@ -77,14 +78,15 @@ impl Gate {
                 }
                 head.socket_key().map(Resource::Socket)
             }
-            // Files of the page hold nothing of the scene.
+            // Files of the page need no token: they hold nothing of the scene.
             _ => page_file(&path[1.min(path.len())..]).map(Resource::File),
         }
         .ok_or(Refusal::new(404, "Not Found", "there is nothing at this address"))
     }
 
-    /// Returns whether a host name is one of this server: the address at which it listens, or `localhost` for
-    /// this machine. A server that listens at all addresses accepts any address but no name.
+    /// Returns whether a `Host` header names this server: by the address at which it listens, or as
+    /// `localhost` if that includes this machine. A server that listens at all addresses accepts any IP
+    /// address.
     fn is_own(&self, host: &str) -> bool {
         let Self { address, .. } = self;
         let name = match host.strip_suffix(&format!(":{}", address.port())) {
@@ -105,7 +107,7 @@ impl Gate {
     fn check_token(&self, query: &str) -> Result<(), Refusal> {
         let given = query.split('&').find_map(|pair| pair.strip_prefix("token=")).unwrap_or_default();
         let (given, token) = (given.as_bytes(), self.token.as_bytes());
-        // All bytes are compared, so that the time tells nothing of the token.
+        // All bytes are compared, so that the time of the comparison is independent of the token.
         let differing = given.iter().zip(token).fold(0, |differing, (a, b)| differing | (a ^ b));
         if given.len() == token.len() && differing == 0 {
             return Ok(());

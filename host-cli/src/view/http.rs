@@ -1,4 +1,4 @@
-//! Subset of HTTP that a page needs: the head of a request, and answers that close the connection.
+//! Subset of HTTP/1.1 that a page needs: heads of requests, and responses that close the connection.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;
@@ -22,7 +22,7 @@ pub(super) struct Head {
     headers: Vec<(String, String)>,
 }
 
-/// Answer to a request that is refused.
+/// Response to a request that is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Refusal {
     pub(super) status: u16,
@@ -39,7 +39,7 @@ impl Refusal {
         Self::new(403, "Forbidden", text)
     }
 
-    /// Sends the answer.
+    /// Sends the response.
     pub(super) fn send(&self, stream: &mut TcpStream) -> std::io::Result<()> {
         let Self { status, reason, text } = self;
         respond(stream, &format!("{status} {reason}"), "text/plain; charset=utf-8", "", text.as_bytes())
@@ -51,7 +51,7 @@ const TOO_LARGE: Refusal = Refusal::new(431, "Request Header Fields Too Large", 
 const TOO_SLOW: Refusal = Refusal::new(408, "Request Timeout", "the request did not arrive in time");
 
 impl Head {
-    /// Reads a request's head from a connection. Time and memory are bounded.
+    /// Reads a request's head from a connection, in at most [`PATIENCE`] and about [`MAX_HEAD`] bytes.
     pub(super) fn read(stream: &mut TcpStream) -> Result<Self, Refusal> {
         let start = Instant::now();
         let mut bytes = Vec::new();
@@ -109,7 +109,7 @@ impl Head {
         if let [value] = self.all(name)[..] { Some(value) } else { None }
     }
 
-    /// Key of a WebSocket request with the supported version.
+    /// `Sec-WebSocket-Key` of a WebSocket request of version 13; `None` for any other request.
     pub(super) fn socket_key(&self) -> Option<String> {
         let has = |name: &str, word: &str| {
             self.all(name)
@@ -123,9 +123,9 @@ impl Head {
     }
 }
 
-/// Sends a file of the page. `host` is the name by which the page has reached this server.
+/// Sends a file of the page. `host` is the request's `Host`, whose WebSocket the page may open.
 pub(super) fn send_file(stream: &mut TcpStream, file: &PageFile, host: &str) -> std::io::Result<()> {
-    // `'self'` does not name WebSockets in all browsers.
+    // Not all browsers let `'self'` stand for the server's WebSocket.
     let policy = format!(
         "Content-Security-Policy: default-src 'self'; connect-src 'self' ws://{host}; img-src 'self' data: blob:; \
          base-uri 'none'; form-action 'none'; frame-ancestors 'none'\r\n"

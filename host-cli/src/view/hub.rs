@@ -1,4 +1,4 @@
-//! Meeting point of a view's threads: the state under one lock, and a condition variable that is notified of
+//! State of a view under one lock, which all its threads share, with a condition variable that is notified of
 //! each change.
 
 use std::path::{Path, PathBuf};
@@ -19,14 +19,14 @@ use crate::arguments::{PictureFormat, PictureOutput};
 use crate::console::printable_json;
 use crate::render::files::{Form, write_picture};
 
-/// Settled picture, ready to be saved.
+/// Settled picture, which pages can save.
 pub(super) struct Settled {
     pub(super) version: u32,
     pub(super) rendering: Rendering,
     /// Denoised radiance, if the view denoises.
     pub(super) denoised: Option<Vec<[f32; 3]>>,
     pub(super) wish: super::wish::Wish,
-    /// Provenance of its pixels, with the names of the inputs.
+    /// Provenance of the pixels, with the names of the input files.
     pub(super) provenance: NamedSettings,
 }
 
@@ -36,11 +36,11 @@ pub(super) struct Hub {
     /// Notified of each change.
     changed: Condvar,
     must_stop: AtomicBool,
-    /// Set by signals, and when no picture will be rendered any more.
+    /// Set by signals, and by the painter when it ends.
     is_over: Arc<AtomicBool>,
     is_card_back: AtomicBool,
     settled: Mutex<Option<Arc<Settled>>>,
-    /// Folder of saved pictures, locked while one is saved.
+    /// Folder of saved pictures; the lock is held while one is written.
     folder: Mutex<Option<Folder>>,
     start: Instant,
 }
@@ -63,7 +63,7 @@ impl Hub {
         self.view.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the state and notifies all threads.
+    /// Changes the state, at the time since the start, and notifies all threads.
     pub(super) fn change<T>(&self, act: impl FnOnce(&mut View, Duration) -> T) -> T {
         let mut view = self.lock();
         let result = act(&mut view, self.start.elapsed());
@@ -73,7 +73,7 @@ impl Hub {
         result
     }
 
-    /// Returns whether the running work should stop.
+    /// Returns whether the running pass should stop.
     pub(super) fn must_stop(&self) -> bool {
         self.must_stop.load(Ordering::Relaxed) || self.is_over()
     }
@@ -89,9 +89,9 @@ impl Hub {
         self.changed.notify_all();
     }
 
-    /// Waits for the next work; `None` when the view is over.
+    /// Waits for the next pass to render; `None` when the view is over.
     pub(super) fn next_task(&self) -> Option<Task> {
-        /// Interval at which the end of the view is checked, because signals do not notify.
+        /// Interval of checks whether the view is over: a signal does not notify the condition variable.
         const ATTENTION: Duration = Duration::from_millis(100);
         let mut view = self.lock();
         while !self.is_over() {
@@ -129,7 +129,7 @@ impl Hub {
         }
     }
 
-    /// Saves the settled picture.
+    /// Saves the settled picture of the newest wish.
     fn save(&self, saving: &Saving) -> Result<PathBuf, String> {
         let version = self.lock().version();
         let settled = self.settled.lock().unwrap_or_else(PoisonError::into_inner).clone();
@@ -143,12 +143,12 @@ impl Hub {
         folder.save(&saving.name, |path, format| write(path, format, &settled, saving.tone))
     }
 
-    /// Waits until no picture is being saved. Later ones are refused, because the view is over.
+    /// Waits until no picture is being written. Once the view is over, pages can save no other.
     pub(super) fn finish_saving(&self) {
         drop(self.folder.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Waits at most `longest` for the next message to a page; `None` once the page has gone.
+    /// Waits for the next message to a page; `None` after `longest`, or once the page or the view has gone.
     pub(super) fn next_message(
         &self,
         page: PageNumber,
@@ -180,7 +180,7 @@ impl Hub {
     }
 }
 
-/// Writes a picture as `photoncard render` does.
+/// Writes a settled picture as `photoncard render` would.
 fn write(path: &Path, format: PictureFormat, settled: &Settled, tone: ToneMapping) -> Result<(), String> {
     let provenance = serde_json::to_string(&settled.provenance).map_err(|error| error.to_string())?;
     let layers = settled.wish.settings.picture.layers.clone();

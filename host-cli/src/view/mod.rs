@@ -1,15 +1,15 @@
-//! `photoncard view`: a page of the browser that shows a scene while it is rendered.
+//! `photoncard view`: a page in the browser that shows a scene while it is rendered.
 //!
-//! - `refinement`: order of the pictures: a state machine.
-//! - `wish`, `command_line`: the requested picture: its settings, and the command that renders it.
+//! - `wish`, `command_line`: the picture that pages request (settings, camera, changes of the scene), and the
+//!   command that renders it.
+//! - `refinement`: the order of the passes for a wish, as a state machine.
 //! - `canvas`, `pages`, `cards`: tiles of the newest wish; the next message to each page; states of the
 //!   cards.
-//! - `request`, `describe`: messages of a page, and messages to it.
-//! - `state`: all of these as one state, without threads, clock, input or output.
-//! - `hub`, `painter`, `fitting`: the state under a lock, and the threads that render and that run pilot
-//!   renders.
+//! - `request`, `describe`: messages from a page, and messages to it.
+//! - `state`, `painting`: all of these as one state, without threads, clock, input or output.
+//! - `hub`, `painter`, `fitting`: the state under a lock; the thread that renders, and that of pilot renders.
 //! - `http`, `gate`, `page_files`, `socket`, `server`: requests, access control, the page's files,
-//!   web sockets.
+//!   WebSockets.
 //! - `saving`: pictures that a page saves.
 
 mod canvas;
@@ -62,11 +62,11 @@ use crate::progress::stop_on_signals;
 use crate::render::files::denoiser;
 use crate::render::on_threads;
 
-/// Interval at which the end of the view is checked.
+/// Interval of checks whether the view is over.
 const ATTENTION: Duration = Duration::from_millis(50);
-/// Time between two polls of the list of lost cards.
+/// Interval of checks whether a lost card is due for an attempt to reconnect.
 const LOOK: Duration = Duration::from_millis(200);
-/// Time that a card takes to notice that its host has gone, and to accept another one.
+/// Time that a card takes to notice that its host has gone, and to accept another host.
 const CHANGE_OF_HOSTS: Duration = Duration::from_millis(100);
 
 /// Shows a scene until an interrupt.
@@ -97,7 +97,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     let gate = Arc::new(Gate::new(address, token()?));
     announce(options, address, &gate)?;
     let (served, gate) = (hub.clone(), gate.clone());
-    // The threads of pages end with the process.
+    // Threads of connections are not joined: they end with the process.
     std::thread::spawn(move || server::serve(&listener, &gate, &served));
     std::thread::scope(|scope| {
         scope.spawn(|| look_for_cards(&hub));
@@ -113,7 +113,7 @@ pub(crate) fn run(options: &ViewOptions) -> Result<(), Failure> {
     Err(Failure::Stopped("stopped; the view is over"))
 }
 
-/// Checks that a view supports the settings.
+/// Checks the settings, which for a view have neither a crop window nor a trace.
 fn check(settings: &RenderSettings) -> Result<(), Failure> {
     let [option, reason] = if settings.picture.crop.is_some() {
         ["--crop", "a view shows the whole picture"]
@@ -140,7 +140,7 @@ fn check_size(&Picture { width, height, .. }: &Picture) -> Result<(), Failure> {
     )))
 }
 
-/// Loads the scene. Assignments are not applied.
+/// Loads the scene, and gives the picture the camera's aspect ratio. Assignments (`--set`) are not applied.
 fn load(options: &ViewOptions, settings: &mut RenderSettings) -> Result<Scene, Failure> {
     let dram_bytes = settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX);
     let scene = input::load(&options.scene, dram_bytes)?;
@@ -165,7 +165,7 @@ fn listen(address: SocketAddr) -> Result<TcpListener, Failure> {
     })
 }
 
-/// Random token of 128 bits, in text.
+/// Random token of 128 bits, as 32 hexadecimal digits.
 fn token() -> Result<String, Failure> {
     let mut bytes = [0_u8; 16];
     getrandom::fill(&mut bytes).map_err(|error| Failure::work_error(&error))?;
@@ -203,20 +203,20 @@ fn announce(options: &ViewOptions, address: SocketAddr, gate: &Gate) -> Result<(
 fn open_in_browser(url: &str) -> std::io::Result<()> {
     let [program, arguments @ ..] = match std::env::consts::OS {
         "macos" => ["open", "", "", ""],
-        // The empty text is the window's title.
+        // `start` takes its first quoted argument for a window's title.
         "windows" => ["cmd", "/c", "start", "\"\""],
         _ => ["xdg-open", "", "", ""],
     };
     let mut command = Command::new(program);
     command.args(arguments.iter().filter(|argument| !argument.is_empty())).arg(url);
     let mut child = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).spawn()?;
-    // The program ends as soon as it has told the browser; nobody waits for it.
+    // The program ends once the browser has the address; a thread waits for it so that no zombie stays.
     let _ = std::thread::Builder::new().name("browser".into()).spawn(move || child.wait());
     Ok(())
 }
 
-/// Reconnects lost cards until the view is over. Each is greeted after a pause that doubles, until it
-/// answers.
+/// Greets lost cards again until the view is over, each after pauses that double, and reports those that
+/// answer.
 fn look_for_cards(hub: &Hub) {
     while !hub.is_over() {
         std::thread::sleep(LOOK);

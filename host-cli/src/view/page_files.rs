@@ -1,10 +1,10 @@
-//! Files of the page, embedded in the program.
+//! Files of the browser's page, embedded in the program.
 
 /// File of the page.
 #[derive(Debug, PartialEq)]
 pub(super) struct PageFile {
     name: &'static str,
-    /// Media type of the contents.
+    /// Media type, for the header `Content-Type`.
     pub(super) kind: &'static str,
     pub(super) text: &'static str,
 }
@@ -50,7 +50,7 @@ pub(super) fn page_file(name: &str) -> Option<&'static PageFile> {
 mod tests {
     use super::*;
 
-    /// A file that is missing in the table would be noticed by browsers only.
+    /// Without this test only browsers would notice a file that the table lacks.
     #[test]
     fn the_table_has_every_file_of_the_page() {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/page");

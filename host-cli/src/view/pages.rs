@@ -1,11 +1,11 @@
-//! Messages to pages: selects the next one for each page, in bounded memory.
+//! Messages to pages: the next one for each page, in bounded memory.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::canvas::{Canvas, Patch, Shown};
 
-/// Maximum size of unacknowledged tiles, bytes, beyond one tile.
+/// Maximum total size of unacknowledged tiles, bytes. With none on the way, a larger tile is sent too.
 const MAX_ON_THE_WAY: u64 = 4 << 20;
 /// Maximum number of answers that wait for a page. Older ones are dropped.
 const MAX_REPLIES: usize = 64;
@@ -13,17 +13,17 @@ const MAX_REPLIES: usize = 64;
 /// Message to a page.
 #[derive(Debug)]
 pub(super) enum Outgoing {
-    /// Answer to a message.
+    /// Answer to a message of the page, or an error.
     Reply(String),
-    /// Newest state. It may state that the picture is settled only if the flag is true.
+    /// Newest state of the view. True if the page has all tiles, so that the state may say `settled`.
     State(bool),
     /// Newest states of the cards.
     Cards,
-    /// Tile, and the layer that the page shows.
+    /// Tile, and what the page shows of it.
     Tile(Arc<Patch>, Shown),
 }
 
-/// Revision numbers of the state and of the states of cards.
+/// Numbers of changes: of the view's state, and of the cards' states.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Revisions {
     pub(super) state: u64,
@@ -35,11 +35,11 @@ pub(super) struct Revisions {
 pub(super) struct Page {
     replies: VecDeque<String>,
     seen: Revisions,
-    /// Number of the wish in the last state that was sent. A page must know the size of a picture before its
-    /// tiles.
+    /// Number of the wish in the last state that was sent. A wish's state, which has the picture's size,
+    /// precedes its tiles.
     told: u32,
     shown: Shown,
-    /// Number of the next tile.
+    /// Number of the next tile to send, in the [`Canvas`].
     next: u64,
     /// Total size of the tiles sent, bytes.
     sent: u64,
@@ -68,24 +68,24 @@ impl Page {
         self.replies.push_back(text);
     }
 
-    /// Selects another layer. All tiles are sent again.
+    /// Shows radiance or a layer: all tiles are sent again.
     pub(super) fn show(&mut self, shown: Shown) {
         (self.shown, self.next) = (shown, 0);
     }
 
-    /// Returns whether the page shows a layer that chips render only in pictures with layers.
+    /// Returns whether the page shows a layer that chips render only on request, such as `direct`.
     pub(super) fn shows_layer_of_chip(&self) -> bool {
         self.shown.is_of_chip()
     }
 
-    /// Records the total size of tiles that the page has received.
+    /// Records the total size of the tiles that the page has received, bytes.
     pub(super) fn acknowledge(&mut self, bytes: u64) {
         // A page cannot have received what was not sent.
         self.received = self.received.max(bytes.min(self.sent));
     }
 
-    /// Next message to send; `None` if there is none, or if the page is behind. The state of a wish precedes
-    /// its first tile, and the settled state follows the last tile.
+    /// Selects the next message; `None` if there is none, or if tiles have to be acknowledged first. The
+    /// state of a wish precedes its first tile, and the settled state follows the last tile.
     pub(super) fn take(
         &mut self,
         canvas: &Canvas,

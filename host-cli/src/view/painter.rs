@@ -1,4 +1,4 @@
-//! Thread that renders a view's pictures, one after another on the same cards.
+//! Thread that renders a view's pictures, one after another, on the same cards.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,9 +31,9 @@ pub(super) struct Painter<'a> {
     renderer: Renderer,
     threads: Option<usize>,
     scene: Arc<Scene>,
-    /// Running pilot renders of the scene, which continue beside pictures.
+    /// Pilot renders that a new wish has interrupted: they run on beside pictures.
     fitting: Option<Fitting>,
-    /// Assignments that are applied to the scene; `None` before the first picture.
+    /// Assignments that `scene` has; `None` before the first picture, and after one failed.
     assigned: Option<Vec<String>>,
 }
 
@@ -78,7 +78,7 @@ impl<'a> Painter<'a> {
         self.fitting.take().into_iter().for_each(Fitting::stop);
     }
 
-    /// Applies the materials and lights of a task to the scene.
+    /// Gives the scene the materials and lights of a task's wish.
     fn assign(&mut self, task: &Task) -> Result<(), RenderError> {
         let assignments = task.wish.assignments();
         if self.assigned.as_ref() == Some(&assignments) {
@@ -86,7 +86,7 @@ impl<'a> Painter<'a> {
         }
         self.assigned = None;
         self.fitting.take().into_iter().for_each(Fitting::stop);
-        // No pilot renders share the scene any more.
+        // The pilot renders have stopped: this is the only reference, and nothing is cloned.
         let mut scene = Arc::unwrap_or_clone(std::mem::take(&mut self.scene));
         let applied = self.hub.change(|view, _| view.apply(&task.wish, &mut scene));
         self.scene = Arc::new(scene);
@@ -95,8 +95,8 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Waits for the result of pilot renders. Those that a new wish interrupts continue, with the view for
-    /// which they were started.
+    /// Waits for pilot renders. A new wish interrupts the wait; the pilot renders continue, for the camera
+    /// that they were started with.
     fn fit(&mut self, task: &Task) -> Result<(), RenderError> {
         let by = (self.quality, self.finish);
         let begin = || Fitting::start(self.scene.clone(), by, task.settings.clone(), self.threads);
@@ -136,7 +136,7 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Denoised radiance of the settled picture, if it is asked for. Pages show it, or why it failed.
+    /// Denoises the settled picture, if the view denoises. Pages are sent the result, or the error.
     fn denoise(&self, task: &Task, film: &Film) -> Result<Option<Vec<[f32; 3]>>, RenderError> {
         let Some(denoiser) = self.denoiser else { return Ok(None) };
         let denoised = denoiser.radiance(film, self.threads, &|| self.hub.must_stop());
@@ -153,7 +153,7 @@ impl<'a> Painter<'a> {
         Ok(denoised.ok())
     }
 
-    /// Renders a picture by passes, each of which doubles the samples per pixel.
+    /// Renders a picture by passes: after each, a pixel has twice as many samples.
     fn render_by_passes(&mut self, task: &Task) -> Result<Rendering, RenderError> {
         let asked = &task.settings.integrator;
         let with = |samples: u32| {
@@ -206,13 +206,13 @@ impl Drop for EndOnDrop<'_> {
     }
 }
 
-/// Observer of one pass that shows its tiles.
+/// Observer of one pass, which puts its tiles on the view's canvas.
 struct Easel<'a> {
     hub: &'a Hub,
     origin: Origin,
     is_preparing: AtomicBool,
-    /// Card of each tile, and the lines that it read from DRAM, from the tile's report until its pixels
-    /// arrive.
+    /// By a tile's number: card that rendered it, and lines that the card read from DRAM. An entry is removed
+    /// when the tile's pixels arrive.
     cards: Mutex<HashMap<u32, (String, Option<u64>)>>,
 }
 

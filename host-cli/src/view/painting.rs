@@ -1,5 +1,5 @@
-//! Interface of a view's state for the painter: the next task with the settings of its pass, finished tiles,
-//! and ends of passes.
+//! Interface between a view's state and the painter: the next pass with its settings, finished tiles, and
+//! ends of passes.
 
 use std::time::Duration;
 
@@ -12,16 +12,16 @@ use super::pages::Revisions;
 use super::refinement::{Next, Outcome, Pass};
 use super::state::{Task, View};
 
-/// Maximum number of pixels of a coarse picture that gathers at each pixel. Above it, interpolation of
-/// irradiance is faster.
+/// Maximum number of pixels of a coarse picture without the irradiance cache; for more pixels, the cache is
+/// faster.
 const FEW_PIXELS: u64 = 1 << 12;
-/// Gather rays per pixel and per irradiance record, in coarse pictures.
+/// Gather rays in coarse pictures: per pixel without the irradiance cache, per irradiance record with it.
 const RAYS: [u32; 2] = [6, 16];
-/// Maximum relative error of interpolated irradiance in coarse pictures.
+/// Minimum of `--ic-error` in coarse pictures.
 const IRRADIANCE_ERROR: f32 = 1.0;
 
 impl View {
-    /// Next task, or the time until which to wait for one.
+    /// Returns the next pass to render, or the time until which to wait for one.
     pub(super) fn next(&mut self, now: Duration) -> Result<Task, Option<Duration>> {
         let work = match self.refinement.next(now) {
             Next::Work(work) => work,
@@ -37,18 +37,17 @@ impl View {
         Ok(Task { work, wish: self.wish.clone(), settings, origin })
     }
 
-    /// Returns whether the running work should stop.
+    /// Returns whether the running pass should stop.
     pub(super) fn must_stop(&self) -> bool {
         self.refinement.must_stop()
     }
 
-    /// Records that the running work starts or ends the preparation: tracing photons and building the card
-    /// image.
+    /// Records whether the running pass is preparing: tracing photons and building the card image.
     pub(super) fn prepares(&mut self, is_preparing: bool, now: Duration) {
         self.refinement.prepares(is_preparing, now);
     }
 
-    /// Adds a tile of the running work. `card` has rendered it and read `dram_lines` lines from DRAM.
+    /// Adds a tile of the running pass. `card` rendered it and read `dram_lines` lines from DRAM.
     pub(super) fn put(&mut self, origin: Origin, card: &str, dram_lines: Option<u64>, tile: &FinishedTile) {
         let (number, is_new) = self.cards.rendered(card);
         if is_new {
@@ -69,7 +68,7 @@ impl View {
         self.canvas.revoke(origin, id);
     }
 
-    /// Records the end of the running work. `statistics` are those of its picture.
+    /// Records the end of the running pass. `statistics` are those of a complete picture.
     pub(super) fn finish(
         &mut self,
         task: &Task,
@@ -90,8 +89,8 @@ impl View {
         self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
     }
 
-    /// Records that the requested work is impossible. The newest wish takes the settings of the last settled
-    /// picture, if they differ.
+    /// Records that a task's wish cannot be rendered. If it is the newest, it takes the settings of the last
+    /// settled picture, unless it has them already.
     pub(super) fn refuse(&mut self, task: &Task, reason: &str, now: Duration) {
         self.tell_error(reason);
         self.finish(task, Outcome::Refused, None, now);
@@ -105,14 +104,14 @@ impl View {
         }
     }
 
-    /// Records a complete pass with fewer samples than the picture will have.
+    /// Records that a picture is complete with fewer samples than it will have.
     pub(super) fn refine(&mut self, origin: Origin, statistics: &Statistics) {
         self.cost.add(statistics);
         self.keep(origin);
         self.revisions.state += 1;
     }
 
-    /// Drops all tiles but those of a complete pass of the newest wish.
+    /// If `origin`, a complete pass, is of the newest wish, drops all other tiles.
     fn keep(&mut self, origin: Origin) {
         if origin.version == self.refinement.version() {
             self.done = Some(origin);
@@ -141,9 +140,9 @@ impl View {
     }
 }
 
-/// Settings of a coarse picture with one pixel for each square of `step` x `step`. The photon maps are those
-/// of the settled picture, so that none is traced again. Rays follow the reflection alone, which for few rays
-/// is faster than to search photons for a table of directions.
+/// Settings of a coarse picture with one pixel for each square of `step` x `step`. Photon maps stay those of
+/// the settled picture: no photon is traced again. Directions of gather rays follow the reflection alone,
+/// which is faster for few rays than gathering photons for direction tables.
 fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
     settings.clone().with(|settings| {
         let picture = &mut settings.picture;
@@ -166,7 +165,7 @@ fn coarse(settings: &RenderSettings, step: u32) -> RenderSettings {
     })
 }
 
-/// Settings of the settled picture. Tiles near `focus` come first.
+/// Settings of the settled picture. Tiles near the pixel `focus` are rendered first.
 fn full(settings: &RenderSettings, focus: Option<[u32; 2]>) -> RenderSettings {
     settings.clone().with(|settings| {
         let middle = [settings.picture.width / 2, settings.picture.height / 2];

@@ -1,9 +1,9 @@
-//! Order of a view's pictures, from the coarsest picture of a new camera to the picture of `photoncard
-//! render`. It is a state machine without threads, clock or pictures.
+//! Order of a view's passes, from the coarsest picture of a new camera to the picture of `photoncard render`:
+//! a state machine without threads, clock or pixels.
 //!
-//! The newest wish stops the work for an older one. The first pass of a wish is not stopped if that of the
-//! previous wish was, so that there is always a picture, however fast wishes follow each other. Photons that
-//! the newest wish can use are also traced to their end.
+//! A newer wish stops the running pass of an older one, with two exceptions. If the first pass of a wish was
+//! stopped, the next first pass runs to its end: pages are shown pictures however fast wishes follow each
+//! other. Photons that the newest wish can use are traced to their end.
 
 use std::time::Duration;
 
@@ -15,25 +15,25 @@ const FIRST_PAUSE: Duration = Duration::from_millis(500);
 /// Maximum pause after a failure.
 const MAX_PAUSE: Duration = Duration::from_secs(8);
 
-/// Side of the squares of the first pass, pixels.
+/// Side of the squares of pixels that the first pass has one pixel for.
 pub(super) const COARSEST: u32 = 8;
-/// Duration of a pass with every pixel up to which it directly follows the first pass. Pictures in between
-/// would hardly be seen.
+/// If the pass with every pixel is expected to take at most this time, it directly follows the first pass:
+/// pictures in between would hardly be seen.
 const SEEN: Duration = Duration::from_millis(800);
-/// Duration of a pass with every pixel up to which the pass with every second one, a quarter of the work, is
-/// left out.
+/// If the pass with every pixel is expected to take at most this time, the pass with every second column and
+/// row, a quarter of the work, is left out.
 const AWAITED: Duration = Duration::from_secs(4);
-/// Side of the squares before the pass with every second pixel.
+/// Side of the squares in the pass before that with every second column and row.
 const FINE: u32 = 4;
 
 /// Pass on the way to the settled picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pass {
-    /// Picture with one pixel for each square of this side, by cheap settings.
+    /// Picture by cheap settings, with one pixel for each square of this side.
     Coarse(u32),
-    /// Pilot renders, by which a quality finds its settings.
+    /// Pilot renders, by which a quality chooses the settings.
     Fit,
-    /// Picture of `photoncard render`.
+    /// Picture of `photoncard render`, at all its samples.
     Full,
 }
 
@@ -42,7 +42,7 @@ impl Pass {
     pub(super) const FIRST: Self = Self::Coarse(COARSEST);
 }
 
-/// Pass after one that took `time`; `None` after the last.
+/// Pass that follows `pass`, which took `time`; `None` after the last.
 fn next_pass(pass: Pass, time: Duration, is_fitted: bool) -> Option<Pass> {
     match pass {
         Pass::Coarse(step) if step > 1 => Some(Pass::Coarse(next_step(step, time))),
@@ -52,19 +52,19 @@ fn next_pass(pass: Pass, time: Duration, is_fitted: bool) -> Option<Pass> {
     }
 }
 
-/// Side of the squares after a pass with side `step` that took `time`. It is half of `step`, or 1 if the pass
-/// with every pixel is expected to be short at the same time per pixel.
+/// Side of the squares after a pass of side `step` that took `time`: 1 if the pass with every pixel, at the
+/// same time per pixel, is within the limit; otherwise half of `step`.
 fn next_step(step: u32, time: Duration) -> u32 {
     let limit = if step > FINE { SEEN } else { AWAITED };
     if time * (step * step) <= limit { 1 } else { step / 2 }
 }
 
-/// Pass of a wish.
+/// Pass of the picture that one [`Wish`](super::wish::Wish) requests.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Work {
     /// Number of the wish.
     pub(super) version: u32,
-    /// Number of the wish's scene and photons.
+    /// Number of the wish's edition: wishes with the same scene and photons have the same number.
     pub(super) edition: u32,
     pub(super) pass: Pass,
 }
@@ -76,14 +76,14 @@ pub(super) enum Outcome {
     Done,
     /// Pilot renders have found settings.
     Fitted {
-        /// True if the number of photons has changed.
+        /// True if pilot renders have changed the number of photons.
         has_other_photons: bool,
     },
     /// A newer wish has stopped the pass.
     Stopped,
     /// No card is left.
     NoCard,
-    /// The wish is impossible.
+    /// The wish cannot be rendered.
     Refused,
 }
 
@@ -100,16 +100,16 @@ pub(super) enum Next {
 pub(super) struct Refinement {
     version: u32,
     edition: u32,
-    /// Next pass of the wish; `None` once its picture is settled.
+    /// Next pass of the newest wish; `None` once its picture is settled.
     pass: Option<Pass>,
     is_fitted: bool,
     is_refused: bool,
     running: Option<Work>,
-    /// Time at which the running work started, or last ended its preparation.
+    /// Time at which the running pass started, or last began or ended its preparation.
     begun: Duration,
-    /// True while the running work traces photons and builds the card image.
+    /// True while the running pass traces photons and builds the card image.
     is_preparing: bool,
-    /// False if the last first pass was stopped, so that the next one must complete.
+    /// False after a first pass was stopped, until another one is complete.
     may_stop_first: bool,
     moving_until: Duration,
     retry_at: Duration,
@@ -117,7 +117,7 @@ pub(super) struct Refinement {
 }
 
 impl Refinement {
-    /// Creates the state for a first wish. `is_fitted` is true if pilot renders would find nothing.
+    /// Creates the state for the first wish. `is_fitted` is true if no setting is left to pilot renders.
     pub(super) fn new(is_fitted: bool) -> Self {
         Self {
             version: 1,
@@ -140,7 +140,7 @@ impl Refinement {
         self.version
     }
 
-    /// Returns whether the picture is that of `photoncard render`.
+    /// Returns whether the newest wish has its last picture, that of `photoncard render`.
     pub(super) fn is_settled(&self) -> bool {
         self.pass.is_none()
     }
@@ -151,7 +151,7 @@ impl Refinement {
         self.is_fitted
     }
 
-    /// Starts a new wish. `is_edit` is true if its scene or photons differ.
+    /// Starts a new wish. `is_edit` is true if its scene or photons differ from those of the wish before.
     pub(super) fn wish(&mut self, is_edit: bool) {
         self.version += 1;
         self.edition += u32::from(is_edit);
@@ -164,8 +164,7 @@ impl Refinement {
         self.moving_until = if is_moving { now + REST } else { Duration::ZERO };
     }
 
-    /// Records that the running work starts or ends the preparation: tracing photons and building the card
-    /// image.
+    /// Records whether the running pass is preparing: tracing photons and building the card image.
     pub(super) fn prepares(&mut self, is_preparing: bool, now: Duration) {
         (self.is_preparing, self.begun) = (is_preparing, now);
     }
@@ -175,7 +174,7 @@ impl Refinement {
         (self.retry_at, self.pause) = (Duration::ZERO, FIRST_PAUSE);
     }
 
-    /// Returns whether the running work should stop.
+    /// Returns whether the running pass should stop.
     pub(super) fn must_stop(&self) -> bool {
         let Some(work) = self.running.filter(|work| work.version != self.version) else { return false };
         if work.edition == self.edition && self.is_preparing {
@@ -184,8 +183,8 @@ impl Refinement {
         work.pass != Pass::FIRST || self.may_stop_first
     }
 
-    /// Number of the wish whose running work need not stop: the newest wish, or an older one whose first pass
-    /// must complete.
+    /// Number of the running pass's wish, unless the pass must stop: the newest wish, or an older one whose
+    /// first pass or photons must be completed.
     pub(super) fn spares(&self) -> Option<u32> {
         self.running.filter(|_| !self.must_stop()).map(|work| work.version)
     }
@@ -205,7 +204,7 @@ impl Refinement {
         Next::Work(work)
     }
 
-    /// Records the result of the running work.
+    /// Records the end of the running pass.
     pub(super) fn finish(&mut self, outcome: Outcome, now: Duration) {
         let Some(work) = self.running.take() else { return };
         let is_newest = work.version == self.version;
@@ -248,7 +247,8 @@ mod tests {
         }
     }
 
-    /// Runs all passes until the picture settles. A pass takes `time` per 4096 pixels. Returns the passes.
+    /// Runs all passes until the picture is settled, and returns them. A coarse pass of side 8 takes `time`,
+    /// others in proportion to their pixels.
     fn settle(refinement: &mut Refinement, time: Duration) -> Vec<Pass> {
         let mut passes = Vec::new();
         let mut now = NOW;
@@ -312,7 +312,7 @@ mod tests {
         refinement.wish(false);
         assert!(refinement.must_stop());
         refinement.finish(Outcome::Stopped, NOW);
-        // The second first pass is spared.
+        // Another first pass runs to its end: the one before was stopped.
         assert_eq!(work(&mut refinement, NOW), Work { version: first.version + 1, ..first });
         refinement.wish(true);
         assert!(!refinement.must_stop());

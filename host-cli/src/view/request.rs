@@ -11,13 +11,13 @@ use super::canvas::Shown;
 
 /// Maximum side of a picture, pixels.
 pub(super) const MAX_SIDE: u64 = 4096;
-/// Maximum number of pixels of a picture. A view holds the tiles of at most two pictures.
+/// Maximum number of pixels of a picture. A view holds tiles of at most two pictures.
 pub(super) const MAX_PIXELS: u64 = 1 << 22;
-/// Maximum coordinate of a position, metres.
+/// Maximum absolute coordinate of a position, metres.
 const MAX_PLACE: f64 = 1e15;
-/// Maximum absolute exposure, stops.
+/// Maximum absolute exposure, stops (powers of two).
 const MAX_STOPS: f64 = 120.0;
-/// Maximum length of a name, bytes.
+/// Maximum length of a text, bytes.
 const MAX_NAME: usize = 1024;
 
 /// Message from a page.
@@ -60,18 +60,18 @@ pub(super) enum Setting {
     Samples(u32),
     GatherRays(u32),
     Order(GatherOrder),
-    /// Side of the tiles, pixels; 0 for the widest that all cards can hold.
+    /// Side of the tiles, pixels; 0 for the greatest that all cards can hold.
     Tile(u32),
     Cache(bool),
     Sampling(Sampling),
 }
 
-/// Fault of a message.
+/// Reason why a message is not accepted.
 #[derive(Debug, PartialEq)]
 pub(super) enum Fault {
-    /// The message violates the protocol, and the connection must be closed.
+    /// The message is no JSON object: the connection is closed.
     Foreign,
-    /// The message is refused. The text tells the page why.
+    /// The message has an invalid type or field; the text says which.
     Refused(String),
 }
 
@@ -81,7 +81,7 @@ impl From<String> for Fault {
     }
 }
 
-/// Parses a message. Its number is returned separately, because refused messages may have one too.
+/// Parses a message. Also returns its `id`, which the answer to a refused message contains.
 pub(super) fn parse(text: &str) -> (Result<Request, Fault>, Option<u64>) {
     let Ok(Value::Object(message)) = serde_json::from_str(text) else { return (Err(Fault::Foreign), None) };
     (request(&Fields(&message)), message.get("id").and_then(Value::as_u64))
@@ -163,7 +163,7 @@ impl Fields<'_> {
         number.ok_or_else(|| format!("{name:?} is a whole number from 0 to {most}"))
     }
 
-    /// Numbers of a field within the range of single precision: one number, or a list.
+    /// One number or three of a field, each finite as `f32`.
     fn values(&self, name: &str) -> Result<Vec<f64>, String> {
         let number = |value: &Value| value.as_f64().filter(|number| (*number as f32).is_finite());
         let values = match self.field(name)? {
@@ -173,7 +173,7 @@ impl Fields<'_> {
         values.ok_or_else(|| format!("{name:?} is a number, or a list of three"))
     }
 
-    /// Tone mapping. Missing fields have their default.
+    /// Tone mapping. A missing or null field has its default.
     fn tone(&self) -> Result<ToneMapping, String> {
         let is_stated = |name: &str| self.0.get(name).is_some_and(|value| !value.is_null());
         let stops = || self.number("exposure", -MAX_STOPS, MAX_STOPS);

@@ -1,4 +1,5 @@
-//! Pictures that pages save: plain names in one folder. A file that the view did not write is never replaced.
+//! Pictures that pages save, under plain names in one folder. A file that is not of this view is never
+//! replaced.
 
 use std::collections::BTreeMap;
 use std::fs::{self, Metadata};
@@ -9,23 +10,22 @@ use crate::arguments::PictureFormat;
 
 /// Maximum length of a name, bytes.
 const MAX_NAME: usize = 100;
-/// Names that Windows reserves for devices, with any suffix.
+/// Names of devices on Windows, reserved with any suffix.
 const DEVICES: [&str; 6] = ["aux", "con", "nul", "prn", "conin$", "conout$"];
 
 /// Folder of saved pictures.
 pub(super) struct Folder {
     path: PathBuf,
-    /// Identities of the saved pictures, by name.
+    /// Identities of the pictures that this view has saved, by name.
     saved: BTreeMap<String, Identity>,
 }
 
-/// Identity of a file and its content. It differs for another file in the same place, and after writes of
-/// other programs.
+/// Identity of a file with its contents: it changes when the file is replaced or written by another program.
 #[derive(PartialEq)]
 struct Identity {
     length: u64,
     modified: Option<SystemTime>,
-    /// Device and inode number of the file; `None` on file systems without them.
+    /// Device and inode number of the file; `None` on systems other than Unix.
     number: Option<[u64; 2]>,
 }
 
@@ -60,10 +60,11 @@ impl Folder {
         &self.path
     }
 
-    /// Saves a picture and returns its path. `write` must write it completely or not at all.
+    /// Saves a picture and returns its path. `write` writes it completely or not at all.
     ///
     /// # Errors
-    /// If the name is not plain, another file of the name exists, or the picture cannot be written.
+    /// If the name is not plain or has another suffix than `.exr` and `.png`, if a file of this name is not
+    /// of this view, or if the picture cannot be written.
     pub(super) fn save(
         &mut self,
         name: &str,
@@ -83,7 +84,7 @@ impl Folder {
     }
 }
 
-/// Format of a picture by its name, which must be plain.
+/// Format by a picture's suffix. The name must be plain.
 fn format_of(name: &str) -> Result<PictureFormat, String> {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-. ".contains(&byte);
     let begins_plainly =
@@ -169,7 +170,7 @@ mod tests {
         assert!(!room.path().join("elsewhere").exists());
     }
 
-    /// Both names denote one file on case-insensitive file systems.
+    /// On case-insensitive file systems both names denote one file.
     #[test]
     fn a_file_whose_name_differs_in_case_stays() {
         let room = tempfile::tempdir().unwrap();

@@ -1,9 +1,9 @@
-//! Serves the page: its files, and WebSocket connections. Each connection has a thread of its own. Their
-//! number is bounded.
+//! Serves the page: its files and WebSockets, with a thread for each connection. The number of connections is
+//! bounded.
 //!
-//! A connection is a stranger until the gate accepts it. Strangers have their own limit, and the oldest is
-//! closed for a new one. Silent strangers therefore cannot keep pages out, and pages cannot keep strangers
-//! out.
+//! A connection is a stranger until its request's head is read. There is a maximum number of strangers:
+//! beyond it a new one closes the oldest. Silent strangers therefore cannot keep pages out, nor pages
+//! strangers.
 
 use std::collections::VecDeque;
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -18,9 +18,9 @@ use super::socket;
 
 /// Maximum number of connections that the gate has accepted.
 const MAX_CONNECTIONS: usize = 16;
-/// Maximum number of connections that the gate has not accepted yet.
+/// Maximum number of strangers: connections whose request's head is not read yet.
 const MAX_STRANGERS: usize = 16;
-/// Pause after an error of accepting a connection, such as too many open files.
+/// Pause after a connection could not be accepted, such as for too many open files.
 const PAUSE: Duration = Duration::from_millis(100);
 
 /// Serves connections until the process ends.
@@ -34,14 +34,14 @@ pub(super) fn serve(listener: &TcpListener, gate: &Arc<Gate>, hub: &Arc<Hub>) {
         };
         let (connections, gate, hub) = (connections.clone(), gate.clone(), hub.clone());
         let work = move || {
-            // A connection that fails is closed, and no concern of others.
+            // An error closes this connection alone.
             let _ = answer(stream, stranger, &connections, &gate, &hub);
         };
         let _ = std::thread::Builder::new().name("page".into()).spawn(work);
     }
 }
 
-/// Connections that the gate has not accepted yet, the oldest first.
+/// Connections whose request's head is not read yet, the oldest first.
 #[derive(Clone, Default)]
 struct Strangers(Arc<Mutex<Waiting>>);
 
@@ -52,7 +52,7 @@ struct Waiting {
 }
 
 impl Strangers {
-    /// Adds a connection, and closes the oldest one if there are too many.
+    /// Adds a connection. If there are more than [`MAX_STRANGERS`], closes the oldest.
     fn admit(&self, stream: &TcpStream) -> std::io::Result<Stranger> {
         let stream = stream.try_clone()?;
         let mut waiting = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -62,14 +62,14 @@ impl Strangers {
         if waiting.streams.len() > MAX_STRANGERS
             && let Some((_, oldest)) = waiting.streams.pop_front()
         {
-            // Its thread reads the end of it.
+            // The thread of the connection then reads its end, and ends.
             let _ = oldest.shutdown(Shutdown::Both);
         }
         Ok(Stranger { number, of: self.clone() })
     }
 }
 
-/// Membership of a connection among the strangers, until it is dropped.
+/// Entry of a connection among the strangers, removed when this is dropped.
 struct Stranger {
     number: u64,
     of: Strangers,
@@ -82,7 +82,7 @@ impl Drop for Stranger {
     }
 }
 
-/// Counted place of an accepted connection, until it is dropped.
+/// Unit of the count of accepted connections, given back when this is dropped.
 struct Place(Arc<AtomicUsize>);
 
 impl Place {

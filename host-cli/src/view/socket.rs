@@ -1,4 +1,4 @@
-//! WebSocket of a page, with a reading thread and a writing thread. A lock keeps frames of both whole.
+//! WebSocket of a page, with a reading and a writing thread. Both write whole frames, under a lock.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};
@@ -15,11 +15,11 @@ use super::state::PageNumber;
 
 /// Maximum size of a page's message, bytes.
 const MAX_MESSAGE: usize = 64 << 10;
-/// Time without a message after which a page is pinged.
+/// Time without a message to a page after which the page is pinged.
 const PING: Duration = Duration::from_secs(10);
-/// Time without a byte after which a page is considered gone, because pages answer pings.
+/// Time without a byte from a page after which it counts as gone: pages answer pings.
 const SILENCE: Duration = Duration::from_secs(40);
-/// Time without progress of a write after which a page is considered gone.
+/// Time without progress of a write after which the page counts as gone.
 const STALLED: Duration = Duration::from_secs(20);
 
 /// Serves a page until its connection ends.
@@ -32,7 +32,7 @@ pub(super) fn attend(stream: TcpStream, hub: &Arc<Hub>) -> std::io::Result<()> {
     let is_open = AtomicBool::new(true);
     std::thread::scope(|scope| {
         let writer = || {
-            // A page that is gone ends both threads.
+            // Any error ends the writer; the shutdown ends the reader.
             let _ = write(writing, page, hub, &is_open);
             let _ = pipe.stream.shutdown(Shutdown::Both);
         };
@@ -81,7 +81,7 @@ fn write(pipe: Pipe, page: PageNumber, hub: &Hub, is_open: &AtomicBool) -> Resul
     Ok(())
 }
 
-/// End of a connection that two threads share. Each write is done as a whole.
+/// Stream that two threads share. A lock keeps the bytes of each write together.
 #[derive(Clone)]
 struct Pipe {
     stream: Arc<TcpStream>,
@@ -95,7 +95,7 @@ impl Read for Pipe {
 }
 
 impl Write for Pipe {
-    /// Writes all bytes, which are whole frames.
+    /// Writes all bytes: tungstenite passes whole frames.
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         let _whole = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
         (&*self.stream).write_all(bytes)?;

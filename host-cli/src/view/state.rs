@@ -38,7 +38,7 @@ pub(super) struct Start {
     pub(super) out: Option<String>,
 }
 
-/// Pass to render, with all that it needs.
+/// Pass to render, with its wish and settings.
 pub(super) struct Task {
     pub(super) work: Work,
     pub(super) wish: Wish,
@@ -47,7 +47,7 @@ pub(super) struct Task {
     pub(super) origin: Origin,
 }
 
-/// Action that a message from a page requires of the caller.
+/// What the caller must do after a message from a page.
 #[derive(Debug, PartialEq)]
 pub(super) enum Effect {
     Nothing,
@@ -61,12 +61,12 @@ pub(super) enum Effect {
 pub(super) struct View {
     pub(super) start: Start,
     pub(super) wish: Wish,
-    /// Scene with the file's cameras, and the materials and lights of the newest wish.
+    /// Sketch with the file's cameras, and with the materials and lights of the newest wish.
     scene: Scene,
-    /// Scene with the materials and lights of the first wish, to which `reset` returns.
+    /// Sketch with the materials and lights of the first wish, to which `reset` returns.
     first: Scene,
     pub(super) refinement: Refinement,
-    /// Wish of the last settled picture.
+    /// Wish of the last picture that settled.
     pub(super) settled: Option<Wish>,
     /// Reason why the newest wish cannot be rendered.
     pub(super) refused: Option<String>,
@@ -74,7 +74,7 @@ pub(super) struct View {
     /// Last complete pass of the newest wish.
     pub(super) done: Option<Origin>,
     pub(super) cost: Cost,
-    /// Number of the first wish with the present size of the picture.
+    /// Number of the first wish that has the present size of the picture.
     of_size: u32,
     /// Pixel near which tiles are rendered first.
     pub(super) cursor: Option<[u32; 2]>,
@@ -82,7 +82,7 @@ pub(super) struct View {
     pages: BTreeMap<PageNumber, Page>,
     next_page: PageNumber,
     steering: Option<PageNumber>,
-    /// Number of the last message from the page that steers.
+    /// Number of the last message that was accepted from the page that steers.
     message: u64,
     pub(super) revisions: Revisions,
 }
@@ -91,7 +91,7 @@ impl View {
     /// Creates a view without pages.
     ///
     /// # Errors
-    /// If the first wish is impossible.
+    /// If the first wish cannot be rendered.
     pub(super) fn new(start: Start) -> Result<Self, RenderError> {
         let wish = start.wish.clone();
         wish.check_cards()?;
@@ -118,7 +118,7 @@ impl View {
         })
     }
 
-    /// Adds a page. It steers if no other page does.
+    /// Adds a page, which steers if no other does.
     pub(super) fn connect(&mut self) -> PageNumber {
         let number = self.next_page;
         self.next_page += 1;
@@ -137,7 +137,7 @@ impl View {
         self.pages.contains_key(&number)
     }
 
-    /// Removes a page. If it steered, the page that has been connected for the longest time steers.
+    /// Removes a page. If it steered, the page that has been connected longest steers next.
     pub(super) fn disconnect(&mut self, number: PageNumber) {
         self.pages.remove(&number);
         if self.steering == Some(number) {
@@ -155,14 +155,14 @@ impl View {
         }
     }
 
-    /// Sends an answer to a page, if it is still connected.
+    /// Queues an answer to a page, if it is still connected.
     pub(super) fn reply(&mut self, number: PageNumber, message: &Value) {
         if let Some(page) = self.pages.get_mut(&number) {
             page.reply(message.to_string());
         }
     }
 
-    /// Sends an error to all pages.
+    /// Queues an error for all pages.
     pub(super) fn tell_error(&mut self, text: &str) {
         let message = json!({"type": "error", "text": with_flags(text)}).to_string();
         self.pages.values_mut().for_each(|page| page.reply(message.clone()));
@@ -184,7 +184,7 @@ impl View {
         }
     }
 
-    /// Records the number of a message from the page that steers, which the state contains.
+    /// If the page steers, records the number of its message; the next state repeats it.
     fn note(&mut self, number: PageNumber, id: Option<u64>) {
         if let Some(id) = id.filter(|_| self.steering == Some(number)) {
             self.message = id;
@@ -214,7 +214,7 @@ impl View {
         Ok(Effect::Nothing)
     }
 
-    /// Processes a request from the page that steers.
+    /// Processes a request that only the page that steers may make.
     fn turn(&mut self, request: Request, now: Duration) -> Result<(), String> {
         let mut wish = self.wish.clone();
         let mut moves = None;
@@ -252,10 +252,10 @@ impl View {
         Ok(())
     }
 
-    /// Makes `wish` the newest wish, if it differs.
+    /// Makes `wish` the newest wish, if it differs from that.
     pub(super) fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
         if wish == self.wish {
-            // The page is told that its message was heard.
+            // A new state tells the page that its message was received.
             self.revisions.state += 1;
             return Ok(());
         }
@@ -271,8 +271,8 @@ impl View {
         Ok(())
     }
 
-    /// Drops tiles that no page should show any more. Tiles of an older first pass that must complete are
-    /// shown until the newest wish has a tile.
+    /// Drops tiles that pages must not show any more. Tiles of an older wish whose first pass must be
+    /// completed stay until the newest wish has a tile.
     pub(super) fn begin_picture(&mut self) {
         match self.spared() {
             Some(version) => self.canvas.keep_version(version),
@@ -282,7 +282,8 @@ impl View {
         self.revisions.state += 1;
     }
 
-    /// Number of the wish whose tiles are shown as they arrive.
+    /// Number of the wish whose running pass is shown: it must not stop, and its picture has the present
+    /// size.
     pub(super) fn spared(&self) -> Option<u32> {
         self.refinement.spares().filter(|version| *version >= self.of_size)
     }
@@ -293,7 +294,8 @@ impl View {
         }
     }
 
-    /// Selects the layer that a page shows. Layers of the chips require a picture with layers.
+    /// Selects what a page shows. A layer that chips render on request makes a new wish, if it is not
+    /// rendered yet.
     fn show(&mut self, number: PageNumber, shown: Shown) -> Result<(), String> {
         let mut wish = self.wish.clone();
         if shown.is_of_chip() && wish.add_layers() {
@@ -307,7 +309,7 @@ impl View {
         Ok(())
     }
 
-    /// Sends a page the position that a pixel shows.
+    /// Answers a page with the point that pixel `at` shows, in the file's coordinates, and its depth.
     fn pick(&mut self, number: PageNumber, at: [u32; 2]) -> Result<(), String> {
         let camera = self.wish.settings.camera(&self.scene).map_err(|error| with_remedy(&error))?;
         let message = match self.canvas.depth(self.refinement.version(), at) {
@@ -334,7 +336,7 @@ impl View {
         self.revisions.cards += 1;
     }
 
-    /// Next message to a page: text or a tile.
+    /// Next message to a page: text, or a tile as `Err`.
     pub(super) fn take(&mut self, number: PageNumber) -> Option<Result<String, Outgoing>> {
         let is_settled = self.refinement.is_settled();
         let version = self.refinement.version();
@@ -348,7 +350,7 @@ impl View {
         })
     }
 
-    /// Applies the materials and lights of a wish to a scene.
+    /// Gives a scene the materials and lights of a wish.
     ///
     /// # Errors
     /// If an assignment is not possible, or no light is left.
@@ -356,16 +358,17 @@ impl View {
         self.start.sketch.apply(wish, scene)
     }
 
-    /// Command line that renders the settled picture.
+    /// Words of the command that renders the settled picture.
     pub(super) fn command(&self) -> Vec<String> {
         let Start { options, quality, finish, .. } = &self.start;
         command_line::words(options, *quality, *finish, &self.wish)
     }
 
-    /// State for a page. It says that the picture is settled only if the page has all tiles.
+    /// State as a message to a page. `has_all` is true if the page has all tiles: only then `settled` may be
+    /// true.
     fn describe(&self, has_all: bool) -> Value {
         let settings = &self.wish.settings;
-        // The camera was checked when it was wished for.
+        // The camera is valid: it was checked when the wish was made.
         let camera = settings.camera(&self.scene).map(|camera| {
             let mut described = self.start.facts.camera(&camera, &self.scene);
             if let Some(look_at) = settings.picture.look_at {
@@ -416,7 +419,7 @@ impl View {
     }
 }
 
-/// Text of an error, with its remedy and with flags in place of fields.
+/// Text of an error and its remedy, with flags in place of settings' names.
 pub(super) fn with_remedy(error: &RenderError) -> String {
     let remedy = miette::Diagnostic::help(error).map_or(String::new(), |help| format!("; {help}"));
     with_flags(&format!("{error}{remedy}"))

@@ -1,4 +1,4 @@
-//! Wish: the settings, the camera and the changes of the scene that pages request.
+//! Wish: settings, camera and changes of the scene of the picture that pages request.
 
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use photoncard_driver::scene::{Environment, Scene, SceneContents};
 
 use super::request::Setting;
 
-/// Default error of interpolated irradiance, for a quality that states none.
+/// `--ic-error` when a page switches on the irradiance cache and the quality states no error.
 const IRRADIANCE_ERROR: f32 = 0.1;
 
 /// Settings, camera and changes of the scene that pages request.
@@ -17,11 +17,11 @@ const IRRADIANCE_ERROR: f32 = 0.1;
 pub(super) struct Wish {
     /// Settings of the settled picture.
     pub(super) settings: RenderSettings,
-    /// Flags of the settings that a quality must not change.
+    /// Which settings an option or a page has stated: a quality does not change them.
     stated: Stated,
-    /// Assignments from the command line.
+    /// Assignments (`--set`) of the command line.
     given: Vec<String>,
-    /// Changes by pages: names of properties with their values.
+    /// Assignments by pages: property, such as `wall.diffuse`, and values.
     edits: Vec<(String, Vec<f64>)>,
 }
 
@@ -30,18 +30,18 @@ impl Wish {
         Self { settings, stated, given, edits: Vec::new() }
     }
 
-    /// Returns whether a quality may change no setting.
+    /// Returns whether no setting is left to a quality's pilot.
     pub(super) fn states_all(&self) -> bool {
         !self.stated.needs_fit()
     }
 
-    /// All assignments, in the order in which they are applied.
+    /// Assignments of the command line, then those of pages: the order in which they are applied.
     pub(super) fn assignments(&self) -> Vec<String> {
         let edits = self.edits.iter().map(|(name, value)| format!("{name}={}", numbers(value)));
         self.given.iter().cloned().chain(edits).collect()
     }
 
-    /// Changes by pages.
+    /// Assignments by pages.
     pub(super) fn edits(&self) -> &[(String, Vec<f64>)] {
         &self.edits
     }
@@ -52,7 +52,7 @@ impl Wish {
         (picture.camera_at, picture.look_at, picture.fov) = (Some(position), Some(look_at), Some(fov));
     }
 
-    /// Sets a property. A new value takes the place of an earlier one, so that later changes stay valid.
+    /// Sets a property. Its new value takes the place of an earlier one, in the order of assignments.
     pub(super) fn set(&mut self, name: String, value: Vec<f64>) {
         match self.edits.iter_mut().find(|(edited, _)| *edited == name) {
             Some((_, earlier)) => *earlier = value,
@@ -77,17 +77,17 @@ impl Wish {
             }
             Setting::Sampling(sampling) => integrator.sampling = sampling,
         }
-        // Without gather rays nothing is interpolated: the command line knows no such settings.
+        // Without gather rays there is no irradiance to interpolate: `photoncard render` has no cache then,
+        // either.
         if integrator.gather_rays == 0 {
             integrator.irradiance_error = None;
         }
     }
 
-    /// Checks the settings against the capacities of emulated cards. Those of other cards are unknown until
-    /// they are greeted.
+    /// Checks the settings against the budgets of emulated cards. Those of remote cards are not known here.
     ///
     /// # Errors
-    /// The first setting that exceeds the capacity of a card.
+    /// The first setting that exceeds the budget of a card.
     pub(super) fn check_cards(&self) -> Result<(), RenderError> {
         self.settings.cards.addresses.iter().try_for_each(|address| match address {
             CardAddress::Emulated { kind, .. } => self.settings.check_budget(&kind.budget()),
@@ -95,15 +95,15 @@ impl Wish {
         })
     }
 
-    /// Copy of this wish with the settings of another one. Camera, size, layers and changes of the scene are
-    /// kept.
+    /// Copy of this wish with the settings of another. It keeps its own picture (camera, size, layers) and
+    /// assignments.
     pub(super) fn by_settings_of(&self, other: &Self) -> Self {
         let picture = self.settings.picture.clone();
         let settings = RenderSettings { picture, ..other.settings.clone() };
         Self { settings, stated: other.stated, ..self.clone() }
     }
 
-    /// Requests all layers that chips can render. Returns whether any was missing.
+    /// Requests all layers, unless the picture has layers of the chips already. Returns whether it did.
     pub(super) fn add_layers(&mut self) -> bool {
         let layers = &mut self.settings.picture.layers;
         !layers.are_of_chip() && {
@@ -112,30 +112,29 @@ impl Wish {
         }
     }
 
-    /// Applies the settings that pilot renders have found, except those stated on the command line or by a
-    /// page.
+    /// Applies the settings that pilot renders have chosen, except those that an option or a page has stated.
     pub(super) fn fit(&mut self, fit: &Fit) {
         fit.apply(&mut self.settings, self.stated);
     }
 
-    /// Returns whether photons or scene differ from those of another wish.
+    /// Returns whether another wish has another scene or other photons.
     pub(super) fn is_other_edition(&self, other: &Self) -> bool {
         let photons = |wish: &Self| (wish.settings.photons.clone(), wish.settings.integrator.seed);
         self.given != other.given || self.edits != other.edits || photons(self) != photons(other)
     }
 }
 
-/// Formats numbers for an option. They parse to the same bits.
+/// Numbers with commas between them, which parse to the same bits.
 pub(super) fn numbers<T: ToString>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
 }
 
-/// Scene with one triangle per material, against which wishes are checked quickly.
+/// Scene with one triangle for each material in use, on which wishes are checked quickly.
 pub(super) struct Sketch(Scene);
 
 impl Sketch {
-    /// Creates the sketch of a scene without assignments. It has a triangle of each material in use, and the
-    /// brightest texel of the environment.
+    /// Creates the sketch of a scene without assignments. Its environment is one texel, with the brightest
+    /// channel value of the scene's.
     pub(super) fn new(scene: &Scene) -> Self {
         let mut materials = BTreeSet::new();
         let triangles = scene.triangles.iter().filter(|triangle| materials.insert(triangle.material));
@@ -155,10 +154,10 @@ impl Sketch {
         }))
     }
 
-    /// Sketch with the assignments of a wish applied.
+    /// Scene of the sketch with the assignments of a wish.
     ///
     /// # Errors
-    /// If an assignment, a setting or the camera is not possible, or no light is left.
+    /// If an assignment, a setting or the camera is invalid, or no light is left.
     pub(super) fn with(&self, wish: &Wish) -> Result<Scene, RenderError> {
         let mut scene = self.0.clone();
         self.apply(wish, &mut scene)?;
@@ -167,10 +166,10 @@ impl Sketch {
         Ok(scene)
     }
 
-    /// Replaces the materials and lights of a scene by those of a wish.
+    /// Gives a scene the sketch's materials, lights and environment strength, with the assignments of a wish.
     ///
     /// # Errors
-    /// If an assignment is not possible, or no light is left.
+    /// If an assignment is invalid, or no light is left.
     pub(super) fn apply(&self, wish: &Wish, scene: &mut Scene) -> Result<(), RenderError> {
         scene.materials.clone_from(&self.0.materials);
         scene.lights.clone_from(&self.0.lights);

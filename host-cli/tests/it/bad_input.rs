@@ -1,12 +1,12 @@
-//! Invalid arguments and unreadable input give status 2, an error with location and remedy, and unchanged
-//! files.
+//! Invalid arguments and unreadable input: the exit status is 2, the error has location and remedy, and no
+//! file changes.
 
 use std::fs;
 
 use crate::support::{Outcome, Room, scene, scene_bytes, scene_of, shipped};
 use serde_json::{Value, json};
 
-/// Checks that a command is refused with these words in its message, and with an empty standard output.
+/// Checks that a command was refused: status 2, these words in its message, and nothing on standard output.
 fn check_refused(outcome: &Outcome, words: &[&str], case: &str) {
     let Outcome { status, stdout, stderr } = outcome;
     assert_eq!(*status, Some(2), "{case}: {stderr}");
@@ -16,8 +16,8 @@ fn check_refused(outcome: &Outcome, words: &[&str], case: &str) {
     }
 }
 
-/// Checks that a render is refused with these words, that an old picture is unchanged, and that no other file
-/// appears.
+/// Checks that a render is refused with these words, that it leaves an old picture unchanged, and that it
+/// writes no other file.
 fn refused(room: &Room, scene: &str, options: &[&str], words: &[&str]) {
     let case = format!("{scene} {options:?}");
     room.write("out.exr", "old picture");
@@ -101,7 +101,7 @@ fn scenes_without_geometry_or_light_are_refused() {
     let room = Room::new();
     room.write_scene("dark.gltf", &dark);
     refused(&room, "dark.gltf", &[], &["no light", "emissiveFactor", "help:"]);
-    // The lamp shines on a floor that reflects no light.
+    // A floor that absorbs all of the lamp's light.
     let black = json!([0.0, 0.0, 0.0, 1.0]);
     room.write_scene(
         "lost.gltf",
@@ -232,7 +232,7 @@ fn settings_beyond_every_card_are_refused_before_one_is_reached() {
         ("--max-distance", "-1"),
         ("--verify", "2"),
     ] {
-        // No card is at this address, which is what the error would say.
+        // No card listens at this address: an error about the card would mean that the value was accepted.
         let options = [option, value, "--card", "tcp:127.0.0.1:1", "--irradiance-cache", "on"];
         refused(&room, "scene.gltf", &options, &[option]);
     }
@@ -316,7 +316,7 @@ fn outputs_that_cannot_be_written_are_refused() {
     }
 }
 
-/// The suffix states the format. It is checked before a card is reached or a file is read.
+/// The suffix of `-o` is checked before a card is reached or the scene is read.
 #[test]
 fn outputs_of_an_unknown_format_are_refused() {
     let room = Room::new();
@@ -340,8 +340,7 @@ fn outputs_of_an_unknown_format_are_refused() {
     assert!(room.names().is_empty());
 }
 
-/// Outputs to names that are no regular files are refused: a pipe would block, and a device or a link would
-/// be replaced.
+/// An output must be a regular file: a pipe would block, and a device or a link would be replaced.
 #[cfg(unix)]
 #[test]
 fn outputs_that_are_no_regular_files_are_refused() {

@@ -1,16 +1,16 @@
-//! Small files with costly contents are rejected with a remedy or take little, within 4 GB of address space
+//! Small files that stand for large contents are refused with a remedy, or rendered in 4 GB of address space
 //! and some seconds (docs/architecture.md, "What a file may cost").
 #![cfg(unix)]
 
 use crate::support::{Outcome, Room, glb, scene};
 use serde_json::{Value, json};
 
-/// Limit of processor time, seconds. None of these files takes nearly as long.
+/// Limit of processor time, seconds, far above what any of these files takes.
 const SECONDS: u32 = 100;
 const KILOBYTES: u32 = 4_000_000;
 
-/// Runs the command with limited memory and time. When the time is over a signal ends it, so that it has no
-/// exit status.
+/// Runs the command with limited address space and processor time. At the end of the time a signal ends it,
+/// and it has no exit status.
 fn limited(room: &Room, arguments: &[&str]) -> Outcome {
     let mut shell = std::process::Command::new("sh");
     let script = format!("ulimit -v {KILOBYTES} && ulimit -t {SECONDS} && exec \"$0\" \"$@\"");
@@ -19,7 +19,7 @@ fn limited(room: &Room, arguments: &[&str]) -> Outcome {
     Outcome::of(&shell.output().unwrap())
 }
 
-/// Checks that a render of the scene is refused with these words.
+/// Checks that a render of `scene.glb` is refused with these words.
 fn refused(room: &Room, words: &[&str]) {
     let outcome =
         limited(room, &["render", "scene.glb", "-o", "out.exr", "--size", "8x8", "--photons", "100"]);
@@ -36,7 +36,7 @@ fn refused_scene(json: &Value, bytes: &[u8], words: &[&str]) {
     refused(&room, words);
 }
 
-/// Checks that a scene is refused whose `list` has `count` nearly empty elements.
+/// Checks that a scene is refused whose JSON array `list` has `count` nearly empty elements.
 fn refused_list(list: &str, element: &str, count: usize) {
     let room = Room::new();
     let mut elements = vec![element; count - 1].join(",");
@@ -45,8 +45,7 @@ fn refused_list(list: &str, element: &str, count: usize) {
     refused(&room, &["of JSON would take more than", "leave out what is empty"]);
 }
 
-/// Emissive mesh whose primitives each have one accessor of positions, and one of indices if `indices` is
-/// given.
+/// Emissive mesh of equal primitives: all have accessor 0 for positions, and accessor `indices` for indices.
 fn meshes(primitives: usize, indices: Option<usize>) -> Value {
     let mut primitive = json!({"attributes": {"POSITION": 0}, "material": 0});
     if let Some(indices) = indices {
@@ -61,7 +60,7 @@ fn meshes(primitives: usize, indices: Option<usize>) -> Value {
     })
 }
 
-/// Bytes of vertices at pairwise different positions.
+/// Bytes of `count` vertices, each at another position.
 fn places(count: u32) -> Vec<u8> {
     let scattered = |i: u32| (i.wrapping_mul(2_654_435_761) >> 8) as f32 / 16_777_216.0;
     (0..3 * count).flat_map(|i| scattered(i).to_le_bytes()).collect()

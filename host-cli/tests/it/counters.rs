@@ -1,4 +1,5 @@
-//! Modelled memory: counters add up, the trace contains the counted reads, and the picture does not change.
+//! Modelled memory: counters add up, the trace has the reads that are counted, and the picture stays the
+//! same.
 
 use std::collections::BTreeMap;
 use std::io;
@@ -13,13 +14,13 @@ fn statistics(room: &Room, name: &str) -> Value {
     serde_json::from_slice(&room.read(name)).unwrap()
 }
 
-/// Value of a counter below `memory` in the statistics.
+/// Counter `key` at `/memory/POINTER` in the statistics.
 fn count(statistics: &Value, pointer: &str, key: &str) -> u64 {
     let count = statistics.pointer(&format!("/memory/{pointer}/{key}")).and_then(Value::as_u64);
     count.unwrap_or_else(|| panic!("no memory/{pointer}/{key} in {statistics:#}"))
 }
 
-/// Sum of a counter over several parts.
+/// Sum of a counter over the parts `names` of `part`.
 fn sum(statistics: &Value, part: &str, names: &[&str], key: &str) -> u64 {
     names.iter().map(|name| count(statistics, &format!("{part}/{name}"), key)).sum()
 }
@@ -91,7 +92,7 @@ fn counters_add_up_and_change_no_picture() {
     }
 }
 
-/// Renders the picture of the first row of `docs/memory.csv`, which takes a second.
+/// Renders the picture of the first row of `docs/memory.csv` again, which takes a second.
 #[test]
 fn the_figures_of_the_document_on_memory_are_of_this_program() {
     let csv = include_str!("../../../docs/memory.csv");
@@ -140,7 +141,7 @@ fn a_trace_has_a_line_for_every_request_and_every_tile() {
     }
 }
 
-/// Requests and bytes, summed by the label in column `column` of a trace's lines.
+/// Numbers of requests and of bytes in a trace for Dinero, by the label in column `column`.
 fn sums_by_label(text: &str, column: usize) -> BTreeMap<&str, [u64; 2]> {
     let mut sums: BTreeMap<_, [u64; 2]> = BTreeMap::new();
     for line in text.lines().filter(|line| line.starts_with("0 ")) {
@@ -255,7 +256,7 @@ fn invalid_caches_are_refused_with_the_valid_form() {
     }
 }
 
-/// A shell limits the size of files, which the trace exceeds first.
+/// The shell's limit of file sizes is reached by the trace first.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_trace_that_cannot_be_written_ends_the_render() {

@@ -1,4 +1,4 @@
-//! Denoised pictures, by Open Image Denoise where the machine has it.
+//! Denoised pictures, on machines that have Open Image Denoise.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde_json::Value;
 
 use crate::support::{Room, shipped, skip};
 
-/// A Cornell box with much noise: one sample, and few gather rays without interpolation.
+/// Options of a picture with much noise: one sample a pixel, four gather rays, no irradiance cache.
 const NOISY: [&str; 8] = [
     "--size=64x64",
     "--photons=5000",
@@ -20,7 +20,8 @@ const NOISY: [&str; 8] = [
     "--quiet",
 ];
 
-/// Renders the noisy picture with further options; `None`, and a notice, without the library.
+/// Renders the Cornell box with [`NOISY`] and `options`. `None`, with a notice, if Open Image Denoise is
+/// missing.
 fn rendered(room: &Room, options: &[&str]) -> Option<()> {
     rendered_of("cornell.gltf", room, options)
 }
@@ -36,12 +37,12 @@ fn rendered_of(scene: &str, room: &Room, options: &[&str]) -> Option<()> {
     Some(())
 }
 
-/// Returns whether the machine has the library. A notice says that it has not.
+/// Returns whether the machine has Open Image Denoise. Prints a notice if not.
 pub(crate) fn is_there(room: &Room) -> bool {
     rendered(room, &["-o", "there.png", "--denoise"]).is_some()
 }
 
-/// Seconds of the denoiser in a statistics file.
+/// Time of the denoiser in a statistics file, seconds.
 fn seconds(room: &Room, name: &str) -> Option<f64> {
     let statistics: Value = serde_json::from_slice(&room.read(name)).unwrap();
     statistics["time_s"]["denoise"].as_f64()
@@ -99,7 +100,7 @@ fn parts_are_denoised_when_they_are_merged() {
     }
 }
 
-/// The quality chooses other settings for a picture that is denoised.
+/// By `--denoise`, a quality chooses other settings for the prepared scene.
 #[test]
 fn a_scene_is_prepared_for_pictures_that_are_denoised() {
     let room = Room::new();

@@ -1,4 +1,4 @@
-//! Display server: a viewer receives the picture.
+//! Picture that a display server receives during a render.
 
 use std::io::Read;
 use std::net::{SocketAddr, TcpListener};
@@ -7,7 +7,7 @@ use std::thread::{self, JoinHandle};
 use crate::support::{Room, scene};
 use photoncard_driver::exr::{Shown, read};
 
-/// Image of a viewer, built from received packets.
+/// Picture that a viewer builds from the packets it receives.
 #[derive(Default)]
 struct Viewed {
     name: String,
@@ -16,11 +16,11 @@ struct Viewed {
     channels: Vec<String>,
     /// Values of each channel, row by row.
     values: Vec<Vec<f32>>,
-    /// Number of packets that updated the image.
+    /// Number of packets with pixels.
     updates: usize,
 }
 
-/// Parser of the fields of a packet.
+/// Bytes of a packet that are not parsed yet.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
@@ -96,7 +96,7 @@ impl Viewed {
     }
 }
 
-/// Starts a viewer that serves one connection. Its thread returns the final image.
+/// Starts a viewer for one connection. Returns its address, and the thread that returns the picture.
 fn viewer() -> (SocketAddr, JoinHandle<Viewed>) {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();

@@ -2,7 +2,7 @@
 
 use crate::support::Room;
 
-/// Options at the beginnings of the lines of `text`.
+/// Long options with which lines of `text` begin, behind their short forms.
 fn options(text: &str) -> Vec<&str> {
     let lines = text.lines().map(str::trim_start).filter(|line| line.starts_with('-'));
     lines.filter_map(|line| line.split([' ', ',', '[']).find(|word| word.starts_with("--"))).collect()

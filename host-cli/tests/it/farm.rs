@@ -1,4 +1,4 @@
-//! Farm jobs run, and their picture equals that of one render, byte for byte.
+//! Farm jobs are run, without their engines if need be; the picture has the bytes of a single render's.
 #![cfg(unix)]
 
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::support::{Outcome, Room, shipped, skip};
 use serde_json::Value;
 
-/// Folder name that shells and engines misread unless it is quoted.
+/// Folder name that shells and farm engines misread unless it is quoted.
 const FOLDER: &str = "it's a {{Param.x}} $HOME";
 const SCENE: &str = "a {1} \"b\" {}.gltf";
 const PICTURE: &str = "o{{}}ut `id`.exr";
@@ -30,7 +30,7 @@ const OPTIONS: [&str; 15] = [
     "--irradiance-cache=on",
 ];
 
-/// Room with a scene in a folder. Returns it with the scene's picture by one render.
+/// Room with the scene in [`FOLDER`], and the bytes of the scene's EXR by a single render.
 fn room() -> (Room, Vec<u8>) {
     let room = Room::new();
     std::fs::create_dir(room.path(FOLDER)).unwrap();
@@ -41,12 +41,12 @@ fn room() -> (Room, Vec<u8>) {
     (room, std::fs::read(whole).unwrap())
 }
 
-/// Runs the command in the folder of the scene.
+/// Runs the command in [`FOLDER`].
 fn run(room: &Room, arguments: &[&str]) -> Outcome {
     Outcome::of(&room.command().current_dir(room.path(FOLDER)).args(arguments).output().unwrap())
 }
 
-/// Text of the scene's job for an engine.
+/// Text that `photoncard farm` prints for an engine, for a picture with half-precision samples.
 fn job(room: &Room, engine: &str) -> String {
     job_with(room, engine, &["--sample-type", "half"])
 }
@@ -58,7 +58,7 @@ fn job_with(room: &Room, engine: &str, options: &[&str]) -> String {
     outcome.stdout
 }
 
-/// Command whose path contains the program.
+/// Command `program`, in whose `PATH` `photoncard` is found.
 fn in_path(program: &str) -> Command {
     let own = std::path::Path::new(env!("CARGO_BIN_EXE_photoncard")).parent().unwrap();
     let path = format!("{}:{}", own.display(), std::env::var("PATH").unwrap());
@@ -79,8 +79,7 @@ fn run_script(room: &Room, script: &str, arguments: &[&str]) {
     assert_eq!(outcome.status, Some(0), "{script}\n{}\n{}", outcome.stdout, outcome.stderr);
 }
 
-/// Checks the pictures of a finished job. The one with half-precision samples contains the rounded pixels of
-/// the other.
+/// Checks that a finished job's EXR and PNG have the bytes of a single render's.
 fn check_pictures(room: &Room) {
     let own = ["render", SCENE, "-o", "half.exr", "-o", "whole.png", "--sample-type", "half"];
     let outcome = run(room, &[&own[..], &OPTIONS].concat());
@@ -128,7 +127,7 @@ fn the_last_step_of_a_job_denoises_the_picture() {
     assert!(read(PICTURE) == read("whole.exr") && read("out.png") == read("whole.png"));
 }
 
-/// Tasks are killed, run twice, or run after the scene has changed.
+/// Parts may be missing or begun, and the scene may have changed, when a job is run again.
 #[test]
 fn a_repeated_job_continues_or_starts_again() {
     let (room, whole) = room();
@@ -139,13 +138,13 @@ fn a_repeated_job_continues_or_starts_again() {
     assert!(picture() == whole);
     let farm = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
     let farm = farm.into_iter().find(|path| path.extension().is_some_and(|ending| ending == "farm")).unwrap();
-    // A part that is missing, and one that was begun.
+    // One part is missing, and only its partial file is left.
     std::fs::remove_file(farm.join("2of3.part")).unwrap();
     std::fs::write(farm.join("2of3.part.partial"), b"photoncard partial ren").unwrap();
     std::fs::remove_file(folder.join(PICTURE)).unwrap();
     by_hand(&room, &script);
     assert!(picture() == whole);
-    // Another scene under the same name: no part of the old one is merged.
+    // Parts of another scene with the same file name are not merged.
     std::fs::copy(shipped("cornell-uplight.gltf"), folder.join(SCENE)).unwrap();
     by_hand(&room, &script);
     let outcome = run(&room, &[&["render", SCENE, "-o", "other.exr"], &OPTIONS[..]].concat());
@@ -153,12 +152,12 @@ fn a_repeated_job_continues_or_starts_again() {
     assert!(picture() == std::fs::read(folder.join("other.exr")).unwrap() && picture() != whole);
 }
 
-/// Runs the steps in the order of Slurm, each by the command that Slurm would run.
+/// Runs the steps of the job in order, by the command that Slurm would run for each.
 #[test]
 fn the_script_of_slurm_submits_steps_that_render_the_picture() {
     let (room, _) = room();
     let script = job(&room, "slurm");
-    // A stand-in notes what is submitted.
+    // In place of `sbatch`, a function writes down what is submitted.
     let stand_in = "sbatch() { printf '%s\\n' \"$*\" >>submitted; wc -l <submitted | tr -d ' '; }\n";
     run_script(
         &room,
@@ -183,7 +182,7 @@ fn the_script_of_slurm_submits_steps_that_render_the_picture() {
     check_pictures(&room);
 }
 
-/// Runs the template by the engine's own command, which `tests/ci.sh` installs.
+/// Runs the template by the command `openjd`, which `tests/ci.sh` installs.
 #[test]
 fn the_template_of_open_job_description_renders_the_picture() {
     let (room, _) = room();
@@ -208,8 +207,8 @@ fn the_template_of_open_job_description_renders_the_picture() {
     check_pictures(&room);
 }
 
-/// Compiles the job type with a stand-in for Flamenco's manager, and runs the commands of the tasks in an
-/// order of their dependencies.
+/// Compiles the job type without Flamenco's manager, and runs the tasks' commands in an order that their
+/// dependencies allow.
 #[test]
 fn the_job_type_of_flamenco_renders_the_picture() {
     let (room, _) = room();
@@ -283,7 +282,7 @@ fn frames_of_a_job_equal_those_of_one_render() {
     }
 }
 
-/// Tasks name their frames, whose pictures are merged one by one.
+/// A task renders a part of one frame; each frame's parts are merged by a command of their own.
 #[test]
 fn each_frame_is_a_task() {
     let room = Room::new();

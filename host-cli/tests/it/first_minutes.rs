@@ -1,5 +1,4 @@
-//! First commands of a new user: a scene without options, default outputs, pipes, and options of other
-//! renderers.
+//! First commands of a new user: no options, default outputs, pipes, and options of other renderers.
 
 use std::fs;
 use std::process::Stdio;
@@ -78,12 +77,12 @@ fn options_of_other_renderers_and_other_files_get_a_remedy() {
     }
 }
 
-/// A map with one bright column in the middle lights surfaces that face it.
+/// An environment map is black in the red channel but for one column.
 #[test]
 fn environments_are_turned_by_the_option_and_by_blenders_convention() {
     let room = Room::new();
     let mut scene = scene();
-    // Nothing but the sky is seen, to -z.
+    // The camera looks up towards -z, and sees nothing but the sky.
     scene["nodes"][1]["rotation"] = json!([0.382_683_4, 0, 0, 0.923_879_5]);
     room.write_scene("other.gltf", &scene);
     scene["asset"]["generator"] = json!("Khronos glTF Blender I/O v5.0.21");
@@ -103,7 +102,7 @@ fn environments_are_turned_by_the_option_and_by_blenders_convention() {
     assert_eq!(red("blender.gltf", &["--environment-rotation", "90"]), ahead);
 }
 
-/// A stand-in for ffmpeg joins the files of the list that it receives, or fails.
+/// In place of ffmpeg, a script joins the files of the list that it is given, or fails.
 #[cfg(unix)]
 #[test]
 fn ffmpeg_makes_a_video_of_frames() {

@@ -1,4 +1,4 @@
-//! Foreign text: names in scenes, cards, paths and files do not reach the terminal as control characters.
+//! Foreign text: control characters in names of scenes, cards, paths and files do not reach the terminal.
 
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -15,14 +15,14 @@ use serde_json::{Value, json};
 
 /// Text that clears the screen, ends a line, starts a forged one, and reverses the direction of the rest.
 const HOSTILE: &str = "x\u{1b}[2J\0\u{9b}31m\r\nforged\u{202e}\u{2066}\u{7f}";
-/// [`HOSTILE`] as it must be printed.
+/// [`HOSTILE`] as the command must print it.
 const SHOWN: &str = "x\\u{1b}[2J\\0\\u{9b}31m\\r\\nforged\\u{202e}\\u{2066}\\u{7f}";
 /// [`HOSTILE`] as a path or an argument, which cannot contain a zero byte.
 const HOSTILE_PATH: &str = "x\u{1b}[2J\u{9b}31m\r\nforged\u{202e}";
 const SHOWN_PATH: &str = "x\\u{1b}[2J\\u{9b}31m\\r\\nforged\\u{202e}";
 
-/// Checks the status of a command, that its output contains `shown` at least `times` times, and that it
-/// contains no unprintable character.
+/// Checks that a command has this status, prints `shown` at least `times` times, and prints no unprintable
+/// character.
 fn check_shown(outcome: &Outcome, status: i32, shown: &str, times: usize) {
     let Outcome { status: found, stdout, stderr } = outcome;
     assert_eq!(*found, Some(status), "{stderr}");
@@ -54,7 +54,7 @@ fn hostile_scene(mut scene: Value) -> Value {
 fn names_of_a_scene_are_shown_escaped() {
     let room = Room::new();
     room.write_scene("scene.gltf", &hostile_scene(scene()));
-    // The exporter, a camera, two materials, a light, and a notice of it.
+    // Generator, camera, two materials, light, and the notice about the light's `range`.
     check_shown(&room.run(&["scene", "info", "scene.gltf"]), 0, SHOWN, 6);
     check_shown(&room.render("scene.gltf", &["-o", "a.exr"]), 0, SHOWN, 1);
     for options in [["--camera", "absent"], ["--set", "absent.diffuse=0"]] {
@@ -78,7 +78,7 @@ fn errors_about_a_scene_are_escaped() {
     let mut absent = scene();
     absent["buffers"][0]["uri"] = json!(HOSTILE_PATH);
     refused(&absent, SHOWN_PATH);
-    // An excerpt of the file is printed, with a mark below the location.
+    // The error has an excerpt of the file, with a mark below the position.
     room.write("scene.gltf", "{\"\u{9b}31m\u{202e}\u{7f}\": \u{202e}}");
     let outcome = room.run(&["scene", "info", "scene.gltf"]);
     check_shown(&outcome, 2, "{\"\\u{9b}31m\\u{202e}\\u{7f}\": \\u{202e}}", 1);
@@ -96,7 +96,7 @@ fn paths_and_arguments_are_shown_escaped() {
     let folder = format!("{HOSTILE_PATH}/a.exr");
     check_shown(&room.render("scene.gltf", &["-o", &folder]), 2, SHOWN_PATH, 1);
     check_shown(&room.run(&["diff", HOSTILE_PATH, HOSTILE_PATH]), 2, SHOWN_PATH, 1);
-    // Arguments that the parser itself rejects.
+    // Arguments that clap rejects.
     for arguments in
         [&[HOSTILE_PATH][..], &["diff", "a", "b", HOSTILE_PATH], &["card", "info", "--card", HOSTILE_PATH]]
     {
@@ -119,7 +119,7 @@ fn settings_of_a_kept_file_are_shown_escaped() {
     let head = format!("photoncard partial render 4\n{settings}\n");
     let sum = checksum(head.as_bytes()).to_le_bytes();
     room.write("a.exr.partial", [head.as_bytes(), &sum].concat());
-    // Within JSON a part of the text is escaped before.
+    // JSON itself escapes a part of the text.
     check_shown(&room.render("scene.gltf", &["-o", "a.exr", "--resume"]), 2, SHOWN, 1);
 }
 
@@ -140,7 +140,7 @@ fn the_name_of_a_picture_is_shown_escaped_by_a_viewer() {
     assert!(bytes[6..].starts_with(b"a\\u{1b}[2J.exr\0"), "{:?}", &bytes[..40]);
 }
 
-/// Answers the hello of a host with a hostile `build`, until the host disconnects.
+/// Answers a host's hello with the hostile `build`, until the host disconnects.
 fn serve_hello(mut host: TcpStream, build: &str) {
     let mut transport = Transport::card();
     host.set_read_timeout(Some(Duration::from_millis(5))).unwrap();
@@ -191,7 +191,7 @@ fn the_build_of_a_card_is_shown_escaped() {
     server.join().unwrap();
 }
 
-/// Uses the options of a small render.
+/// Sets a material whose name begins with a direction mark.
 #[test]
 fn a_material_with_a_hostile_name_can_be_set() {
     let room = Room::new();

@@ -1,10 +1,10 @@
-//! Frames: each equals the picture of its own command, and a camera that moves alone only renders tiles
-//! again.
+//! Frames of animations: each equals the picture of its own command, and no lines are sent again if only the
+//! camera moves.
 
 use crate::support::{Outcome, Room, scene_bytes, scene_of, shipped};
 use serde_json::{Value, json};
 
-/// Renders frames of the Cornell box in which everything moves.
+/// Renders frames of the Cornell box whose camera, meshes and lights move.
 fn moving(room: &Room, options: &[&str]) -> Outcome {
     room.rendered(&shipped("cornell-moving.glb"), options)
 }
@@ -13,13 +13,13 @@ fn statistics(room: &Room, name: &str) -> Value {
     serde_json::from_slice(&room.read(name)).expect("JSON")
 }
 
-/// Bytes of the image that each card received.
+/// Bytes of the card image that each card received for a frame.
 fn sent(statistics: &Value) -> Vec<u64> {
     let bytes = statistics["link"]["image_bytes"].as_array().expect("a list");
     bytes.iter().map(|bytes| bytes.as_u64().expect("a number")).collect()
 }
 
-/// Scene of the tests with an animation of its camera's position, after which the file ends.
+/// Small scene with an animation of its camera's position from 0 to 1 s.
 fn walk() -> Value {
     let mut bytes = scene_bytes();
     let keys: [[f32; 4]; 2] = [[0.0, 1.0, 0.0, 0.5], [3.0, 0.5, 1.0, 2.0]];
@@ -59,7 +59,7 @@ fn a_moving_camera_takes_one_photon_pass_and_one_load() {
     }
 }
 
-/// A card may be loaded in a later frame only if the others have rendered the first one before it had the
+/// A card may be loaded only in a later frame: the others had rendered the frames before it had the card
 /// image.
 #[test]
 fn no_card_is_loaded_twice_for_cameras_that_move() {
@@ -70,14 +70,13 @@ fn no_card_is_loaded_twice_for_cameras_that_move() {
     let image = frames[0]["image_bytes"].as_u64().expect("a number");
     for card in 0..3 {
         let loaded: u64 = frames.iter().map(|frame| sent(frame)[card]).sum();
-        // A load that the end of a frame interrupts goes on in the next one, with the last chunk of lines
-        // again.
+        // If a frame ends during a load, the load continues in the next frame and repeats its last chunk of
+        // lines.
         assert!(loaded < 2 * image, "card {card}: {loaded} bytes of an image of {image}");
     }
 }
 
-/// The settings of a quality are chosen once, for the scene at rest, so that frames from different machines
-/// match.
+/// A quality's settings are chosen for the scene at rest, so that frames of different machines match.
 #[test]
 fn a_frame_is_the_same_after_others_and_alone_on_other_cards() {
     let room = Room::new();
@@ -123,7 +122,7 @@ fn unchanged_lines_are_not_sent_again() {
     let room = Room::new();
     let names = ["-o", "a.#.png", "--stats", "a.#.json", "--card", "emulated:1"];
     moving(&room, &[&["--animation", "play", "--frames", "47,60,61"][..], &names].concat());
-    // The animation ends at frame 48.
+    // The animation ends at frame 48: frames 60 and 61 are equal.
     let bytes = ["a.47.json", "a.60.json", "a.61.json"].map(|name| sent(&statistics(&room, name)));
     assert!(bytes[..2].iter().flatten().all(|&bytes| bytes > 0), "{bytes:?}");
     assert!(bytes[2].iter().all(|&bytes| bytes == 0), "{bytes:?}");
@@ -170,12 +169,12 @@ fn statistics_and_provenance_name_the_frame() {
     );
 }
 
-/// Finished frames are not written again; their modification time stays. Those with other settings or
-/// formats, and damaged ones, are rendered again.
+/// A finished frame is not written again: its modification time stays. A frame with other settings or
+/// formats, or with a damaged file, is rendered again.
 #[test]
 fn a_resumed_sequence_renders_unfinished_frames() {
     let scene = shipped("cornell-moving.glb");
-    // Without a pilot, which would take four fifths of the time.
+    // The quality `paper` has no pilot, which would take four fifths of the time.
     let small = [
         ["--quality", "paper"],
         ["--size", "8x8"],
@@ -200,7 +199,7 @@ fn a_resumed_sequence_renders_unfinished_frames() {
         let whole = read();
         let again = |options: &[&str]| of(&[&["--frames", "1-3", "--resume"], options].concat());
         assert_eq!(again(&[]), [true; 3]);
-        // One file of each frame is not what it was.
+        // A file of frame 1 is cut off, and one of frame 2 is missing.
         room.write("a.1.exr", &whole[0][0][..100]);
         std::fs::remove_file(room.path("a.2.png")).unwrap();
         assert_eq!(again(&[]), [false, false, true]);
@@ -208,7 +207,7 @@ fn a_resumed_sequence_renders_unfinished_frames() {
         std::fs::copy(room.path("a.2.exr"), room.path("a.1.exr")).unwrap();
         assert_eq!(again(&[]), [false, true, true]);
         assert!(read() == whole, "{animation}");
-        // Damage behind the heads, which say what the files are of.
+        // Bytes behind the provenance are damaged.
         let mut flipped = whole[0][1].clone();
         let place = flipped.len() * 3 / 4;
         flipped[place] ^= 4;
@@ -241,8 +240,7 @@ fn a_resumed_sequence_renders_unfinished_frames() {
     }
 }
 
-/// Kept samples of frames continue with the settings that a pilot has chosen for them, whichever frames are
-/// finished.
+/// Samples are added with the settings that a pilot chose for the kept ones, whichever frames are finished.
 #[test]
 fn samples_of_frames_are_added_with_the_settings_of_the_kept_ones() {
     let room = Room::new();

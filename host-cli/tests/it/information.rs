@@ -1,4 +1,4 @@
-//! Output of informative commands, also to closed streams.
+//! Commands that print information, also to closed streams.
 
 use std::f64::consts::PI;
 use std::process::Stdio;
@@ -24,7 +24,7 @@ fn scene_info_prints_the_contents_of_a_scene() {
     assert!(outcome.stdout.ends_with('\n'));
 }
 
-/// Used features are printed with their numbers, others are named as ignored.
+/// Features that are used are printed with their values, others are named as ignored.
 #[test]
 fn scene_info_prints_textures_lights_and_ignored_features() {
     let outcome = Room::new().run(&[
@@ -46,7 +46,8 @@ fn scene_info_prints_textures_lights_and_ignored_features() {
     }
 }
 
-/// Blender's 60 W are 60 / (4 pi) W/sr, unless `--light-units` says that its numbers are taken unchanged.
+/// A point light of 60 W in Blender has 60 / (4 pi) W/sr, unless `--light-units` states another unit of the
+/// file.
 #[test]
 fn scene_info_prints_lights_in_the_units_of_their_exporter() {
     let lights = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/fixtures/blender/lights.glb");
@@ -88,7 +89,7 @@ fn scene_info_is_json_for_programs() {
     assert_eq!(value["bounds"], json!([[-1.0, 0.0, -1.0], [1.0, 1.0, 1.0]]));
 }
 
-/// Lists the machine's own ports. Each line contains the address of one.
+/// Lists the ports of this machine, each with its address.
 #[test]
 fn card_list_gives_an_address_for_every_serial_port() {
     let outcome = Room::new().run(&["card", "list"]);

@@ -1,4 +1,5 @@
-//! An interrupt soon ends a render or a self-test, with status 130 and without files left behind.
+//! An interrupt ends a render or a self-test within a short time, with status 130 and without files left
+//! behind.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader};
@@ -6,7 +7,7 @@ use std::process::{Command, Stdio};
 
 use crate::support::{Emulator, Room, shipped, small_render};
 
-/// Interrupts a render once it has printed `phase`, and checks how it ends.
+/// Interrupts a render once it has printed a line of `phase`, and checks status, message and files.
 fn interrupt(phase: &str, options: &[&str]) {
     let room = Room::new();
     room.write("out.exr", "old picture");
@@ -17,7 +18,7 @@ fn interrupt(phase: &str, options: &[&str]) {
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     let told = lines.find(|line| line.starts_with(&format!("photoncard: {phase} ")));
     assert!(told.is_some(), "the render ended before its phase {phase}");
-    // Twice, as `timeout` signals a process and its group.
+    // Two signals at once, as from `timeout`, which signals the process and its group.
     let process = child.id().to_string();
     let kill = Command::new("kill").args(["-INT", &process, &process]).status().unwrap();
     assert!(kill.success());
@@ -28,7 +29,7 @@ fn interrupt(phase: &str, options: &[&str]) {
     assert_eq!(room.read("out.exr"), b"old picture");
 }
 
-/// The card continues with its test, and serves the next host.
+/// The host ends; the card continues with the test, and then serves the next host.
 #[test]
 fn an_interrupt_ends_a_self_test() {
     let room = Room::new();
@@ -56,6 +57,6 @@ fn an_interrupt_ends_photon_tracing() {
 
 #[test]
 fn an_interrupt_ends_a_render() {
-    // The image is loaded, and a single tile would take hours.
+    // The card is loaded when the signal comes, and its first tile would take hours.
     interrupt("load", &["--size", "256x256", "--spp", "4096", "--gather-rays", "4096", "--tile", "32"]);
 }

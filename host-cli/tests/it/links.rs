@@ -1,4 +1,5 @@
-//! Cards of other processes give equal pictures over every link, and clear errors if they cannot be reached.
+//! Cards in other processes render equal pictures over every link, and errors name cards that cannot be
+//! reached.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Write};
@@ -9,7 +10,7 @@ use crate::support::{Emulator, Outcome, Room, shipped, small_render};
 
 const LISTEN: [&str; 3] = ["tcp:", "unix:card", "pty"];
 
-/// Checks that a command failed at its work with these words, and left no files but `names`.
+/// Checks that a command failed with status 1 and these words, and left no files but `names`.
 fn check_failed(room: &Room, outcome: &Outcome, words: &[&str], names: &[&str]) {
     let Outcome { status, stdout, stderr } = outcome;
     assert_eq!((*status, stdout.as_str()), (Some(1), ""), "{stderr}");
@@ -33,7 +34,7 @@ fn pictures_are_equal_over_every_link() {
     let emulators = LISTEN.map(|listen| Emulator::start(&room, listen, &[]));
     let micro = Emulator::start(&room, "tcp:127.0.0.1:0", &["--card", "emulated-micro"]);
     for Emulator { address, .. } in emulators.iter().chain([&micro]) {
-        // The second host connects to the same card as the first.
+        // The second host finds the card as the first one has left it.
         for _ in 0..2 {
             assert!(render("a.exr", &[address]) == expected, "{address}");
         }
@@ -52,7 +53,7 @@ fn a_card_serves_the_next_host_after_a_killed_one() {
     let expected = room.read("a.exr");
     for listen in LISTEN {
         let emulator = Emulator::start(&room, listen, &[]);
-        // A single tile would take minutes.
+        // One tile of this picture would take minutes.
         let endless = ["--size", "64x64", "--spp", "4096", "--gather-rays", "64", "--tile", "32"];
         let options = [&endless[..], &["-o", "b.exr", "--card", &emulator.address]].concat();
         let mut command = room.command();
@@ -117,8 +118,8 @@ fn connections_that_are_no_host_do_not_occupy_a_card() {
     });
 }
 
-/// A card that cannot hold the scene or the settings is not used if another can. If it is the only one, the
-/// setting is refused.
+/// A card that cannot hold the scene or the settings is left out if there is another; alone, it makes the
+/// render fail.
 #[test]
 fn a_card_that_is_too_small_is_not_used() {
     let room = Room::new();
@@ -160,7 +161,7 @@ fn missing_cards_are_reported() {
         let options = ["-o", "a.exr", "--stats", "a.json", "--card", card];
         check_failed(&room, &room.render(&cornell, &options), &words, &["a.json", "file"]);
         assert!(room.read("a.json").starts_with(b"{\n  \"error\": \"card 0"));
-        // Beside another card it counts as lost.
+        // Beside a second card the failing one is lost, and the picture is rendered.
         let options = [&options[..], &["--card", "emulated:1"]].concat();
         let outcome = room.render(&cornell, &options);
         assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
@@ -194,7 +195,7 @@ fn an_emulator_ends_on_a_signal() {
         assert_eq!(emulator.end(signal), (Some(130), "photoncard: stopped; the card is gone\n".into()));
         assert!(room.names().is_empty(), "{listen}");
     }
-    // The socket file of a killed process is no obstacle.
+    // A killed process leaves its socket file behind, which the next one replaces.
     Emulator::start(&room, "unix:card", &[]).end("-KILL");
     assert_eq!(room.names(), ["card"]);
     assert_eq!(Emulator::start(&room, "unix:card", &[]).end("-INT").0, Some(130));

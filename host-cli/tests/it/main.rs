@@ -1,4 +1,4 @@
-//! Tests that run the command.
+//! Tests that run the command `photoncard`.
 
 mod bad_input;
 #[cfg(feature = "study")]

@@ -1,11 +1,11 @@
-//! Notices on scenes: ignored or missing contents are reported even if the command is quiet, and are errors
-//! with `--strict`.
+//! Notices about scenes: ignored or missing contents are reported even with `--quiet`, and are errors with
+//! `--strict`.
 
 use crate::support::{Room, scene};
 use photoncard_driver::exr::{Shown, read};
 use serde_json::{Value, json};
 
-/// Scene with a texture whose image is missing.
+/// Small scene whose texture has a missing image file.
 fn without_texture() -> Value {
     let mut scene = scene();
     scene["images"] = json!([{"uri": "absent.png"}]);
@@ -47,7 +47,7 @@ fn a_missing_texture_is_reported_and_refused_with_strict() {
     assert_eq!(room.rendered("whole.gltf", &["-o", "a.exr", "--quiet", "--strict"]).stderr, "");
 }
 
-/// No surface receives light: the sky is seen, and the back of a plane is black.
+/// No surface is lit: the camera sees the black sky, and a one-sided floor lit from behind.
 #[test]
 fn a_scene_without_photons_has_a_picture() {
     let room = Room::new();
@@ -56,7 +56,7 @@ fn a_scene_without_photons_has_a_picture() {
     let point = json!({"lights": [{"type": "directional", "intensity": 1}]});
     scene["extensions"] = json!({"KHR_lights_punctual": point});
     scene["extensionsUsed"] = json!(["KHR_materials_specular", "KHR_lights_punctual"]);
-    // Light from below the floor, whose back is one-sided.
+    // Directional light from below the one-sided floor.
     let below = json!({"rotation": [1, 0, 0, 1], "extensions": {"KHR_lights_punctual": {"light": 0}}});
     scene["nodes"].as_array_mut().unwrap().push(below);
     scene["scenes"][0]["nodes"] = json!([0, 1, 2]);
@@ -66,7 +66,7 @@ fn a_scene_without_photons_has_a_picture() {
         assert!(said.contains("only 0 photons were stored of 10"), "{said}");
         assert!(said.contains("the picture is black: no light reaches what is seen"), "{said}");
     }
-    // Direct light of a bright sky on what is seen stays.
+    // On a black floor no photons are stored, and the sky is still seen.
     let options = ["-o", "a.exr", "--set", "floor.diffuse=0,0,0", "--environment", "1,1,1"];
     let said = room.rendered("scene.gltf", &options).stderr;
     let picture = read(&room.path("a.exr"), Shown::Rendered).unwrap();
@@ -92,7 +92,7 @@ fn an_orthographic_camera_is_refused_unless_another_view_is_stated() {
     );
 }
 
-/// One file has no camera, another has an orthographic camera before a perspective one.
+/// One file has no camera; in the other an orthographic camera precedes a perspective one.
 #[test]
 fn strict_renders_accept_contents_that_the_command_line_replaces() {
     let room = Room::new();

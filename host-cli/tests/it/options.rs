@@ -1,4 +1,4 @@
-//! Options that require others have no effect without them, which is reported.
+//! Options without effect for want of another option: a notice reports them.
 
 use crate::support::{Room, scene, shipped};
 
@@ -44,7 +44,7 @@ fn options_without_effect_are_reported() {
         let quiet = room.rendered("scene.gltf", &[&["-o", "plain.exr", "--quiet"], options].concat());
         assert_eq!(quiet.stderr, "", "{options:?}");
     }
-    // The units are in the picture's provenance.
+    // The picture differs from the plain one by the units in its provenance.
     let outcome = room.rendered("scene.gltf", &["-o", "units.exr", "--light-units=watts"]);
     let said = "--light-units has no effect without point, spot or directional lights in the file";
     assert!(outcome.stderr.contains(said), "{}", outcome.stderr);

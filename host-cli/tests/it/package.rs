@@ -1,11 +1,11 @@
-//! Archive that `package.sh` makes of the program.
+//! Archive of the program that `package.sh` writes.
 #![cfg(target_os = "linux")]
 
 use std::process::Command;
 
 use crate::support::{Outcome, Room, shipped};
 
-/// Runs the script, which packs the program of this build.
+/// Runs `package.sh` in the room.
 fn package(room: &Room, arguments: &[&str]) -> Outcome {
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/package.sh");
     let mut command = Command::new("timeout");
@@ -14,7 +14,7 @@ fn package(room: &Room, arguments: &[&str]) -> Outcome {
     Outcome::of(&command.output().unwrap())
 }
 
-/// Output of a program, which must succeed.
+/// Standard output of a program, which must succeed.
 fn said(room: &Room, program: &str, arguments: &[&str]) -> String {
     let outcome =
         Outcome::of(&Command::new(program).args(arguments).current_dir(room.path("")).output().unwrap());

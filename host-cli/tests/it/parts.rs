@@ -35,7 +35,7 @@ fn the_merged_picture_equals_the_file_of_one_render() {
         let room = Room::new();
         let whole = [&PICTURE, options, &["-o", "whole.exr", "-o", "whole.png"]].concat();
         room.rendered(&shipped("cornell-glossy.gltf"), &whole);
-        // Each on other cards, in another order, with other tiles.
+        // Parts are rendered on different cards, in different orders, with different tiles.
         for (number, own) in [
             ("1/3", &["--card", "emulated:1", "--order", "naive"][..]),
             ("2/3", &["--card", "emulated-micro:2", "--tile", "5"]),
@@ -49,7 +49,7 @@ fn the_merged_picture_equals_the_file_of_one_render() {
         merged(&room, &[&parts[..], &["-o", "merged.exr", "-o", "merged.png"]].concat());
         assert!(room.read("merged.exr") == room.read("whole.exr"), "{options:?}");
         assert!(room.read("merged.png") == room.read("whole.png"), "{options:?}");
-        // Neither tiles nor the name of a file is left behind.
+        // No partial and no temporary file is left behind.
         assert_eq!(room.names().len(), 7, "{:?}", room.names());
     }
 }

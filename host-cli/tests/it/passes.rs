@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use crate::support::{Outcome, Room, shipped};
 use serde_json::Value;
 
-/// Options that a pilot would choose otherwise.
+/// Size of the picture, and settings that otherwise a pilot would choose.
 const STATED: [&str; 12] = [
     "--size",
     "24x20",
@@ -33,7 +33,7 @@ fn render_or_panic(room: &Room, picture: &str, options: &[&str]) -> Outcome {
     outcome
 }
 
-/// Number of samples per pixel that a render reports.
+/// Number of samples per pixel that a render prints at its end.
 fn samples(outcome: &Outcome) -> String {
     let (before, _) = outcome.stderr.rsplit_once(" a pixel, ").expect("the number of samples");
     let mut words = before.rsplit(' ');
@@ -63,7 +63,7 @@ fn a_picture_with_added_samples_equals_that_of_one_render() {
     assert_eq!(room.names(), ["a.exr"]);
     render_or_panic(&room, "once.exr", &["--spp", "5"]);
     assert!(room.read("a.exr") == room.read("once.exr"));
-    // Fewer samples than are kept, and other settings.
+    // Fewer samples than are kept, or another setting, are refused.
     room.write("a.exr.partial", &kept);
     for (options, word) in [(["--spp", "2"], "spp was 3"), (["--seed", "9"], "seed was 0 and is 9")] {
         let outcome = render(&room, "a.exr", &[&["--resume"], &options[..]].concat());
@@ -107,7 +107,7 @@ fn samples_are_added_with_the_settings_that_a_pilot_chose() {
     let first = chosen(&room, "a.exr", &["--spp", "3", "--keep-samples"]);
     assert_eq!(first.status, Some(0), "{}", first.stderr);
     let kept = room.read("a.exr.partial");
-    // A stated setting that differs is refused, and named alone.
+    // A stated setting that differs from the kept samples' is refused; the message names this setting alone.
     for (options, difference) in [
         (["--planned-spp", "5"], "planned-spp was 3 and is 5"),
         (["--shadow-rays", "15"], "shadow-rays was "),
@@ -151,7 +151,7 @@ fn a_missed_aim_is_reported() {
         "{}",
         outcome.stderr
     );
-    // A black picture.
+    // In a picture that is black everywhere, noise is undefined.
     let away = ["--noise", "0.1", "--look-at", "0,1,100"];
     let outcome = render_or_panic(&room, "black.exr", &away);
     assert!(
@@ -170,7 +170,7 @@ fn an_interrupt_writes_the_picture_of_the_complete_passes() {
     command.args(["render", &cornell, "-o", "a.exr", "--noise", "0.000001"]).args(STATED);
     let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
-    // The first pass is over.
+    // A line about tiles follows: the first pass has begun.
     assert!(lines.any(|line| line.starts_with("photoncard: tiles ")));
     std::thread::sleep(std::time::Duration::from_millis(300));
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());

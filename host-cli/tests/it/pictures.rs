@@ -26,7 +26,7 @@ fn layers_are_requested_by_name_and_do_not_change_the_picture() {
             sizes.push(other.len());
         }
     }
-    // The file has the requested channels, and no others.
+    // By their sizes, files have the requested channels and no others.
     let [default, all, again, none, _, some, _] = sizes[..] else { panic!("{sizes:?}") };
     assert!(all == again && all > default && none < some && none < default, "{sizes:?}");
 
@@ -42,7 +42,7 @@ fn layers_are_requested_by_name_and_do_not_change_the_picture() {
 fn a_render_writes_pictures_and_statistics() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
-    // One card: bytes in transit to another at the end count as payload, but not yet as sent.
+    // With one card the sums are exact. Of several, one may still have bytes under way at the end.
     let files = ["-o", "a.exr", "-o", "a.png", "--stats", "a.json", "--card", "emulated:1"];
     let outcome = room.rendered(&cornell, &files);
     assert_eq!(room.names(), ["a.exr", "a.json", "a.png"]);
@@ -71,7 +71,7 @@ fn a_render_writes_pictures_and_statistics() {
     }
 }
 
-/// The first line describes what was loaded, the last what was written, with remaining times in between.
+/// The first line describes the scene, the last the picture's files; between them are remaining times.
 #[test]
 fn a_render_reports_what_it_loads_and_what_it_writes() {
     let room = Room::new();
@@ -159,7 +159,7 @@ fn a_crop_is_a_part_of_the_whole() {
 fn a_setting_of_a_material_changes_the_picture() {
     let room = Room::new();
     let glossy = shipped("cornell-glossy.gltf");
-    // The glossy lobe reflects the light of final gather rays: with few of them the difference is visible.
+    // The floor's exponent changes the light that final gather rays bring to the lobe.
     let common = ["--size", "16x16", "--gather-rays", "16", "--quiet"];
     room.rendered(&glossy, &[&common[..], &["-o", "a.exr"]].concat());
     room.rendered(&glossy, &[&common[..], &["-o", "b.exr", "--set", "floor.exponent=2"]].concat());
@@ -177,7 +177,7 @@ fn an_environment_lights_the_picture() {
     let plain = pixels(&[]);
     assert!(plain == pixels(&["--environment", "0,0,0"]));
     assert!(plain != pixels(&["--environment", "1, 2, 3"]));
-    // A picture of the scene serves as the map.
+    // The environment map is a picture of the scene.
     room.rendered("scene.gltf", &["-o", "map.exr"]);
     assert!(plain != pixels(&["--environment", "map.exr"]));
 }
@@ -186,7 +186,7 @@ fn an_environment_lights_the_picture() {
 fn triangles_of_no_area_are_counted_and_left_out() {
     let room = Room::new();
     let mut bytes = scene_bytes();
-    // The floor's second triangle becomes a line.
+    // An index of the floor's second triangle is repeated, so that the triangle has no area.
     bytes[92..94].copy_from_slice(&0u16.to_le_bytes());
     room.write_scene("scene.gltf", &scene_of(&bytes));
     let outcome = room.rendered("scene.gltf", &["-o", "a.exr"]);
@@ -207,7 +207,7 @@ fn triangles_of_no_area_are_counted_and_left_out() {
 fn ignored_contents_are_reported_once() {
     let room = Room::new();
     let mut scene = scene();
-    // An image of an unused texture is not read.
+    // Occlusion textures are ignored: the missing image file is not read.
     scene["images"] = json!([{"uri": "absent.png"}]);
     scene["textures"] = json!([{"source": 0}]);
     scene["materials"][0]["occlusionTexture"] = json!({"index": 0});
@@ -243,7 +243,7 @@ fn the_camera_gives_the_picture_its_aspect_ratio() {
     let found = picture(&room, "a.exr");
     assert_eq!((found.width, found.height), (512, 8));
 
-    // Another size is rendered as it is given, with the same field of view from top to bottom.
+    // A stated size of another aspect ratio keeps the vertical field of view.
     let said = room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x8"]).stderr;
     assert!(said.contains("'eye' has an aspect ratio of 64") && said.contains("--size 128x2 "), "{said}");
     let narrow = picture(&room, "a.exr");
@@ -251,7 +251,7 @@ fn the_camera_gives_the_picture_its_aspect_ratio() {
     assert!(!room.rendered("scene.gltf", &["-o", "a.exr", "--size", "128x2"]).stderr.contains("aspect"));
 }
 
-/// A view by options equals that of a camera in the file.
+/// `--camera-at`, `--look-at` and `--fov` give the picture of a camera in the file with these values.
 #[test]
 fn a_view_by_options_equals_that_of_a_camera_there() {
     let room = Room::new();
@@ -273,12 +273,12 @@ fn a_view_by_options_equals_that_of_a_camera_there() {
         assert!(pixels(name, &view) == expected, "{name}");
     }
     assert!(pixels("without.gltf", &[]) != expected);
-    // Options that are not given leave the camera's own values.
+    // Options that are not stated leave the values of the file's camera.
     assert!(pixels("other.gltf", &[&place[..], &["--fov=45"]].concat()) == expected);
     assert!(pixels("other.gltf", &place) != expected);
 }
 
-/// The memory of both tiles in flight is the file's.
+/// The chip is that of `docs/chip.json`.
 #[test]
 fn chips_of_a_file_render_the_picture_of_the_reference_chip() {
     let room = Room::new();

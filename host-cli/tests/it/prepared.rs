@@ -23,8 +23,8 @@ fn prepare(room: &Room) {
 #[test]
 fn a_picture_of_a_prepared_scene_equals_that_of_the_scene() {
     let cornell = shipped("cornell-spheres.glb");
-    // The pilot of a quality looks at the picture. Options of the scene, of photons and of rays are prepared,
-    // those of the picture are stated again.
+    // `photoncard prepare` takes the options of scene, photons, rays and quality; those of the picture are
+    // also needed by the quality's pilot, and stated again to `photoncard render`.
     for (prepared, picture) in [
         (
             &["--quality", "draft", "--photons", "900", "--environment", "0.1,0.2,0.3"][..],
@@ -77,10 +77,10 @@ const FRAMES: [&str; 8] = ["--quality", "paper", "--photons", "300", "--gather-r
 fn frames_of_a_prepared_scene_equal_those_of_the_scene() {
     let moving = shipped("cornell-moving.glb");
     for (animation, frames, card, files) in [
-        // Cameras move: all frames are in one file, whether it has a number or not.
+        // Only cameras move: all frames share one file.
         ("pan", "3-5,20", "one.card", &["one.card"][..]),
         ("pan", "3-5,20", "s.##.card", &["s.03.card"]),
-        // Meshes and lights move until frame 24.
+        // Meshes and lights move until frame 24: each frame up to it has a file.
         ("play", "22-26", "s.###.card", &["s.022.card", "s.023.card", "s.024.card"]),
     ] {
         let room = Room::new();

@@ -1,12 +1,12 @@
-//! Provenance of pictures contains all on which pixels depend; that of statistics contains all on which the
-//! work depends.
+//! The provenance in a picture has every setting that pixels depend on; that in the statistics also what the
+//! work depends on.
 
 use std::collections::BTreeSet;
 
 use crate::support::{Room, scene, shipped};
 use serde_json::{Value, json};
 
-/// Options on which pixels depend: one with a value that is not the default, its key in the provenance, and
+/// Options that pixels depend on: each with a value other than the default, its key in the provenance, and
 /// its value there.
 fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
     vec![
@@ -42,10 +42,10 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
     ]
 }
 
-/// Example of a file with the capacities of a chip.
+/// Example of a file for `--chip`.
 const CHIP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/chip.json");
 
-/// Options on which no pixel depends.
+/// Options that no pixel depends on.
 const OTHERS: [&[&str]; 24] = [
     &["--strict"],
     &["--photon-map", "jensen"],
@@ -60,7 +60,7 @@ const OTHERS: [&[&str]; 24] = [
     &["--faults", "flips=1e-6"],
     &["--resume"],
     &["--keep-samples"],
-    // Without the irradiance cache.
+    // Planned samples change no pixel if the irradiance cache is off, as in this render.
     &["--planned-spp", "7"],
     &["--counters"],
     &["--cache", "unified=8K/128/2"],
@@ -74,22 +74,22 @@ const OTHERS: [&[&str]; 24] = [
     &["--stats", "a.json"],
 ];
 
-/// Options about the storage of samples, which the file states itself, and about messages.
+/// Options of storage, which the file itself states, of denoising, which adds a layer, and of messages.
 const OF_THE_FILE: [&str; 6] = ["--output", "--sample-type", "--denoise", "--quiet", "--progress", "--help"];
 
-/// Option on which pixels depend, but which applies to no shipped scene.
+/// Option that pixels depend on, for scenes with variants, of which none ships.
 const OF_SCENES_WITH_VARIANTS: &str = "--variant";
 
-/// Options of frames, which have their own test.
+/// Options of frames, which another test checks.
 const OF_FRAMES: [&str; 3] = ["--frames", "--animation", "--fps"];
 
-/// Options of prepared scenes and parts, which have their own tests.
+/// Options of prepared scenes and parts, which other tests check.
 const OF_FARMS: [&str; 2] = ["--part", "--prepared"];
 
-/// Options that state the number of samples by an aim.
+/// Options that determine the number of samples by an aim.
 const OF_SAMPLES: [&str; 2] = ["--noise", "--time"];
 
-/// Provenance in an EXR file, which is the text of the attribute `photoncard`.
+/// Provenance in an EXR file: the text of its attribute `photoncard`.
 fn provenance(file: &[u8]) -> Value {
     let head = b"photoncard\0string\0";
     let start = file.windows(head.len()).position(|bytes| bytes == head).expect("the attribute") + head.len();
@@ -100,7 +100,7 @@ fn provenance(file: &[u8]) -> Value {
 /// Provenance of a rendered scene with mirrors and glass.
 fn rendered(room: &Room, options: &[&str]) -> Value {
     let small = if options.contains(&"--caustic-photons") { &[][..] } else { &["--caustic-photons", "99"] };
-    // Samples that an earlier render has kept are not written over.
+    // A render without `--resume` does not overwrite the samples that an earlier one has kept.
     let _ = std::fs::remove_file(room.path("a.exr.partial"));
     room.rendered(&shipped("cornell-spheres.glb"), &[&["-o", "a.exr"], small, options].concat());
     provenance(&room.read("a.exr"))
@@ -125,7 +125,7 @@ fn the_provenance_has_exactly_the_options_that_pixels_depend_on() {
     }
 }
 
-/// JSON in a text chunk of a PNG file; `None` without a chunk of this keyword.
+/// JSON of the text chunk `keyword` in a PNG file; `None` without this chunk.
 fn text_of_png(file: &[u8], keyword: &str) -> Option<Value> {
     let reader = png::Decoder::new(std::io::Cursor::new(file)).read_info().expect("a PNG");
     let chunk = reader.info().uncompressed_latin1_text.iter().find(|chunk| chunk.keyword == keyword);

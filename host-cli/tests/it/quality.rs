@@ -1,12 +1,12 @@
-//! Option `--quality`: settings that are found for a scene are printed and stored.
+//! Option `--quality`: the settings that it chooses for a scene are printed and stored.
 
 use crate::support::{Outcome, Room, shipped};
 use serde_json::Value;
 
-/// Names in the provenance of the settings that a quality finds.
+/// Keys in the provenance of settings that a quality chooses.
 const FOUND: [&str; 5] = ["spp", "photons", "gather-rays", "shadow-rays", "ic-error"];
 
-/// Renders the Cornell box small with the quality `draft`. Returns the outcome and the statistics.
+/// Renders the Cornell box at 12x12 pixels with the quality `draft`. Returns the outcome and the statistics.
 fn drafted(room: &Room, picture: &str, options: &[&str]) -> (Outcome, Value) {
     let (cornell, stats) = (shipped("cornell.gltf"), format!("{picture}.json"));
     let fixed =
@@ -51,8 +51,8 @@ fn a_stated_option_is_not_changed() {
         let (_, stated) = drafted(&room, "b.exr", &[option]);
         let of = |statistics: &Value, name: &str| statistics["provenance"]["pixels"][name].as_f64();
         assert_eq!(of(&stated, name), Some(value), "{option}");
-        // Samples of a stated number share the shadow rays of a pixel, and the error decides how many records
-        // share the gather rays.
+        // The number of shadow rays depends on that of samples, and the number of gather rays on the error of
+        // interpolated irradiance, which determines how many records there are.
         let pairs = [("spp", "shadow-rays"), ("ic-error", "gather-rays")];
         let follows = |other: &str| other == name || pairs.contains(&(name, other));
         for other in FOUND.into_iter().filter(|other| !follows(other)) {

@@ -1,4 +1,5 @@
-//! Interrupted renders: if a card, its link or the host ends, finished tiles are kept.
+//! Renders that end early, by the loss of the card or its link or by the end of the host: finished tiles are
+//! kept.
 #![cfg(unix)]
 
 #[cfg(target_os = "linux")]
@@ -13,7 +14,7 @@ use serde_json::Value;
 
 /// Options of a picture with 64 tiles that takes a second or two.
 const PICTURE: [&str; 6] = ["--size", "128x128", "--photons", "2000", "--gather-rays", "50"];
-/// Size of a tile in the file of finished tiles, bytes.
+/// Size of a finished tile of 16x16 pixels in the partial file, bytes.
 const TILE_BYTES: u64 = 8 + 24 + 60 * 256 + 4;
 
 fn arguments<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a str> {
@@ -24,7 +25,7 @@ fn partial_bytes(room: &Room) -> u64 {
     fs::metadata(room.path("a.exr.partial")).map_or(0, |found| found.len())
 }
 
-/// Starts a render, and waits until it has finished `tiles` tiles.
+/// Starts a render, and waits until its partial file has `tiles` tiles.
 fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     let cornell = shipped("cornell.gltf");
     let mut command = room.command();
@@ -36,8 +37,8 @@ fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     host
 }
 
-/// Signal of a closed terminal; that of a stop if the tests run without a terminal, because programs then
-/// ignore hang-ups.
+/// Signal of a closed terminal. If the tests run without one, hang-ups are ignored, and the signal is
+/// SIGTERM.
 fn hang_up() -> &'static str {
     #[cfg(target_os = "linux")]
     if hang_up::is_ignored() == Some(false) {
@@ -46,7 +47,7 @@ fn hang_up() -> &'static str {
     "-TERM"
 }
 
-/// Picture of an undisturbed render.
+/// Bytes of the picture of a render that is not interrupted.
 fn expected() -> Vec<u8> {
     let room = Room::new();
     let outcome = room.run(&arguments(&shipped("cornell.gltf"), &["--quiet"]));
@@ -55,7 +56,7 @@ fn expected() -> Vec<u8> {
     room.read("a.exr")
 }
 
-/// Resumes a render, and checks that it had finished some tiles and gives the expected picture.
+/// Resumes a render, and checks that it takes over tiles and gives the expected bytes.
 fn resumes(room: &Room, options: &[&str], expected: &[u8]) {
     let options = [options, &["--resume"]].concat();
     let outcome = room.run(&arguments(&shipped("cornell.gltf"), &options));
@@ -73,18 +74,18 @@ fn a_killed_host_loses_only_tiles_in_flight() {
     host.kill().unwrap();
     host.wait().unwrap();
     assert_eq!(room.names(), ["a.exr.partial"]);
-    // An incomplete tile.
+    // The last tile in the partial file is incomplete.
     let mut bytes = room.read("a.exr.partial");
     bytes.truncate(bytes.len() - 100);
     room.write("a.exr.partial", &bytes);
-    // Tiles and order may differ.
+    // Side and order of the tiles, and the kind of card, may differ.
     resumes(&room, &["--tile", "16", "--order", "hash", "--card", "emulated-micro:2"], &expected);
 }
 
 #[test]
 fn only_a_render_with_equal_settings_is_resumed() {
     let room = Room::new();
-    // A terminal that is closed ends a render as an interrupt does.
+    // A closed terminal ends a render as an interrupt does.
     let host = begun(&room, &["--stats", "a.json"], 1);
     assert!(Command::new("kill").args([hang_up(), &host.id().to_string()]).status().unwrap().success());
     let outcome = host.wait_with_output().unwrap();
@@ -107,7 +108,7 @@ fn only_a_render_with_equal_settings_is_resumed() {
     refused(&["--radiance", "precomputed"], &["radiance was", "precomputed"]);
     refused(&["--set", "white.diffuse=0.1,0.1,0.1"], &["scene-checksum was"]);
     assert!(room.read("a.exr.partial") == kept);
-    // Without --resume no tile is lost, of this picture or another.
+    // A render without `--resume` is refused while there are finished tiles, of this picture or another.
     for options in [&[][..], &["--seed", "7"], &["--quiet", "--order", "naive"]] {
         let outcome = room.run(&arguments(&cornell, options));
         assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
@@ -116,7 +117,7 @@ fn only_a_render_with_equal_settings_is_resumed() {
         }
         assert!(room.names() == ["a.exr.partial"] && room.read("a.exr.partial") == kept);
     }
-    // A file without tiles is written over. This render keeps none, and has none to resume from.
+    // A partial file without tiles is replaced. This render fails before it has any tile to keep.
     let head = kept.iter().position(|&byte| byte == 0x89).unwrap();
     room.write("a.exr.partial", &kept[..head]);
     let outcome = room.run(&arguments(&cornell, &["--seed", "7", "--card", "unix:absent"]));

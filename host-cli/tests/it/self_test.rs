@@ -1,5 +1,5 @@
-//! Command `photoncard card selftest` on a card with bad memory: it names the fault and its address, with
-//! status 1.
+//! Command `photoncard card selftest` on a card with bad memory: it prints addresses and bits of the errors,
+//! and has status 1.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,7 +13,7 @@ use photoncard_firmware::serve::serve;
 use photoncard_shared::address::{LINE_BYTES, Line, LineAddress, Structure};
 use photoncard_shared::message::Fault;
 
-/// Memory with one data line stuck at 1.
+/// Card memory with one data line stuck at 1.
 struct StuckLine(Vec<Line>);
 
 impl MemoryPort for StuckLine {
@@ -40,7 +40,7 @@ impl CardMemory for StuckLine {
     }
 }
 
-/// Output of the self-test of a card with `lines` lines of bad memory.
+/// Output of the self-test of a card with `lines` lines of such memory.
 fn tested(lines: usize) -> crate::support::Outcome {
     let listener = Listener::new(&"tcp:0".parse().unwrap()).unwrap();
     let address = listener.card_address().to_owned();
@@ -53,7 +53,7 @@ fn tested(lines: usize) -> crate::support::Outcome {
     });
     let outcome = Room::new().run(&["card", "selftest", "--quiet", "--card", &address]);
     stop.store(true, Ordering::Relaxed);
-    // The port is closed.
+    // `serve` ends with an error, as its port was stopped.
     assert!(card.unwrap().join().unwrap().is_err());
     outcome
 }
@@ -66,7 +66,7 @@ fn a_bad_card_is_reported_with_addresses_and_bits() {
     assert!(lines[0].starts_with("arithmetic      0 of"), "{lines:?}");
     let [ones, zeros] = ["walking one", "walking zero"]
         .map(|name| lines.iter().position(|line| line.trim_start().starts_with(name)).unwrap());
-    // One word of 32 has the bit set, or clear.
+    // Of 32 words in a row, one has the stuck bit set ("walking one") or clear ("walking zero").
     assert!(lines[ones].ends_with(": 4063232 wrong words"), "{lines:?}");
     assert_eq!(
         lines[ones + 1..ones + 3],

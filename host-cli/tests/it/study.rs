@@ -43,7 +43,7 @@ fn an_interrupt_ends_a_study_and_keeps_its_points() {
     let finished = |line: &String| -> Option<usize> {
         line.strip_prefix("photoncard: reordering ")?.split(' ').next()?.parse().ok()
     };
-    // Progress is printed in tenths: several points may be finished at the first line.
+    // A line follows each tenth of the points: the first may count several.
     let finished = lines.find_map(|line| finished(&line).filter(|&count| count > 0)).unwrap();
     let kill = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
     assert!(kill.success());
@@ -54,7 +54,7 @@ fn an_interrupt_ends_a_study_and_keeps_its_points() {
     assert!(!room.path("out/index.html").exists());
 }
 
-/// Options of a minimal sweep of the scene `my scene.gltf`.
+/// Options of a sweep of `my scene.gltf` with few points.
 const SWEEP: [&str; 15] = [
     "sweep",
     "my scene.gltf",
@@ -102,7 +102,7 @@ fn a_sweep_measures_every_combination_of_values() {
     }
     let points = || std::fs::read_dir(room.path("out/points")).unwrap().count();
     assert_eq!(points(), 4);
-    // Two orders and materials of four are finished.
+    // One of the two points of this sweep is measured already.
     let more = ["--cache", "photon=1K/128/4", "--cache", "unified=2K/128/4", "--vary", "order=sort"];
     let set = ["--vary", "set=floor.diffuse=0.2"];
     let machine = ["--bandwidth", "12.5", "--flops", "80"];

@@ -1,4 +1,4 @@
-//! Tone-mapped pictures of a render, and of `photoncard tonemap` on an EXR, follow one formula.
+//! Tone-mapped PNGs: those of a render equal those of `photoncard tonemap` for its EXR.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ fn tonemap(room: &Room, options: &[&str]) -> Outcome {
     room.run(&[&["tonemap"], options].concat())
 }
 
-/// One render writes both files in any order. The PNG equals that of its EXR at any exposure.
+/// One render writes both files. The PNG equals that of the EXR, for every tone mapping.
 #[test]
 fn the_png_of_a_render_equals_that_of_its_exr() {
     let room = room_with_a_scene();
@@ -56,13 +56,13 @@ fn finished_tiles_of_a_png_alone_are_kept_beside_it() {
     let outcome = room.render("scene.gltf", &["-o", "a.png", "--resume"]);
     assert_eq!(outcome.status, Some(2));
     assert!(outcome.stderr.contains("a.png.partial"), "{}", outcome.stderr);
-    // Beside an EXR, whatever the order.
+    // With an EXR, the partial file has the EXR's name, whatever the order of outputs.
     let outcome = room.rendered("scene.gltf", &["-o", "a.png", "-o", "a.exr"]);
     assert_eq!(outcome.status, Some(0));
     assert_eq!(room.names(), ["a.exr", "a.png", "a.png.partial", "scene.gltf"]);
 }
 
-/// Writes an EXR as another program would, with 16-bit samples given by `pixel`.
+/// Writes an EXR of half-precision samples from `pixel`, as another program would.
 fn foreign(path: &Path, pixel: impl Fn(usize, usize) -> f32 + Sync) {
     let half = |x, y| f16::from_f32(pixel(x, y));
     write_rgb_file(path, 5, 4, |x, y| (half(x, y), half(y, x), f16::ONE)).unwrap();
@@ -134,7 +134,7 @@ fn files_that_are_no_picture_are_refused_and_the_old_one_is_kept() {
     }
 }
 
-/// Writes a picture without colour channels.
+/// Writes an EXR whose only channel is `Z`.
 fn depth_alone(path: &Path) {
     use exr::prelude::{AnyChannel, AnyChannels, FlatSamples, Image, SmallVec, WritableImage};
     let mut channels = SmallVec::new();
@@ -142,7 +142,7 @@ fn depth_alone(path: &Path) {
     Image::from_channels((3, 2), AnyChannels::sort(channels)).write().to_file(path).unwrap();
 }
 
-/// An EXR with the name of a PNG is not replaced by its own tone-mapped picture.
+/// The input is an EXR with the name of a PNG, which is also the output.
 #[test]
 fn the_input_picture_is_not_replaced() {
     let room = room_with_a_scene();

@@ -1,4 +1,4 @@
-//! Verification: two cards render a tile, and the results are compared.
+//! Verification: two cards render a tile, and their pixels are compared.
 
 use crate::support::{Room, scene, shipped};
 use serde_json::json;
@@ -56,7 +56,7 @@ fn impossible_verification_is_refused_with_a_remedy() {
     }
 }
 
-/// The lamp is a hundredth of a millimetre above the floor.
+/// A point light is a hundredth of a millimetre above the floor.
 #[test]
 fn dazzling_light_of_a_single_card_is_reported() {
     let room = Room::new();
@@ -79,7 +79,7 @@ fn dazzling_light_of_a_single_card_is_reported() {
         );
         assert_eq!(statistics(&room)["dazzling_tiles"].as_u64().unwrap() > 0, is_told);
     }
-    // Samples of a card alone are kept, and others added by two.
+    // Samples of a single card are kept; two cards add others.
     let kept = [&["-o", "k.exr", "--quiet", "--keep-samples"][..], &view].concat();
     room.rendered("scene.gltf", &[&kept[..], &["--spp", "2", "--card", "emulated:1"]].concat());
     let added = [&kept[..], &["--spp", "4", "--card", "emulated:2", "--resume"]].concat();
@@ -88,7 +88,7 @@ fn dazzling_light_of_a_single_card_is_reported() {
         said.contains("an earlier render with light far beyond") && said.contains("without --resume"),
         "{said}"
     );
-    // Parts do not state which cards have rendered them.
+    // The file of a part does not name the cards that rendered it.
     for number in ["1", "2"] {
         let part = [&format!("--part={number}/2"), "-o", &format!("{number}.part"), "--quiet"];
         room.rendered("scene.gltf", &[&part[..], &view[..6]].concat());

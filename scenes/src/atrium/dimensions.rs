@@ -9,7 +9,7 @@ use glam::Vec2;
 /// Half the size of the rectangle of the arcades' centre lines, x and z.
 pub(super) const HALF: Vec2 = Vec2::new(12.0, 4.5);
 
-/// Distance between columns of an arch on the ground floor. The upper arches are half as wide.
+/// Distance between the columns of the ground floor's arches. The upper arches are half as wide.
 pub(super) const BAY: f32 = 3.0;
 
 /// Offsets of the inner and the outer border of the corridor's clear space.

@@ -1,9 +1,9 @@
 //! Sky over the court, and the sun in it.
 //!
 //! The space beyond the scene is black. The sky is therefore an emissive wedge on the roof that closes the
-//! opening, low in the north and high in the south. Its shape is invisible, because its radiance is uniform.
-//! It is small, because light from one part of it to another is lost. The sun is in its high corner, so that
-//! sunlight passes the southern eaves obliquely and reaches the northern side.
+//! opening, low in the north and high in the south. The wedge's shape is invisible, because its radiance is
+//! uniform. The wedge is small, because light from one part of it to another is lost. The sun is in its high
+//! corner, so that sunlight passes the southern eaves obliquely and reaches the northern side.
 
 use glam::Vec3;
 

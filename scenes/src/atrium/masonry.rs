@@ -133,7 +133,7 @@ pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh 
 /// `profile` is a closed polygon of offset and height, counter-clockwise if offsets point to the right.
 pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
     const STEPS: [usize; 2] = [16, 6];
-    // From corner to corner, along +x on the side of +z and on around.
+    // Corners around the court, the first two along +x on the side of +z.
     let corners = [Vec2::new(-1.0, 1.0), Vec2::ONE, Vec2::new(1.0, -1.0), Vec2::NEG_ONE];
     let stations: Vec<Vec2> = (0..4)
         .flat_map(|side| {
@@ -192,7 +192,7 @@ mod tests {
         for (a, b) in outline.iter().zip(outline.iter().rev()) {
             assert_eq!(a[1], Vec2::new(-b[1].x, b[1].y));
         }
-        // Front and back alone, as pyramids over the origin: area x distance / 3, twice.
+        // Sum of the areas of front and back, positive for triangles that face outwards.
         let mesh = panel.mesh();
         let flat = |corners: &&[u32; 3]| {
             let z = corners.map(|index| mesh.positions[index as usize].z);

@@ -111,7 +111,7 @@ fn add_reed(scene: &mut SceneBuilder) -> [usize; 2] {
     let upper = scene.node(joint("upper", middle, Vec::new()));
     let lower = scene.root(joint("lower", FOOT, vec![upper]));
     let skin = Some(scene.skin(&[(lower, FOOT), (upper, FOOT + middle)]));
-    // The upper joint takes over within the middle half.
+    // The weight of the upper joint rises from 0 to 1 over the middle half of the height.
     let share = |place: &Vec3| ((place.y - FOOT.y) / HEIGHT * 2.0 - 0.5).clamp(0.0, 1.0);
     let shares: Vec<f32> = shape.positions.iter().map(share).collect();
     let geometry = scene.geometry(&shape);

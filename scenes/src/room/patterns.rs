@@ -1,4 +1,4 @@
-//! Patterns of the room's textures. None equals its mirror image, so that wrong mappings are visible.
+//! Patterns of the room's textures. No pattern equals its mirror image, so that wrong mappings are visible.
 
 use core::f32::consts::TAU;
 
@@ -58,7 +58,8 @@ pub(super) fn wallpaper() -> Picture {
     })
 }
 
-/// Crossing slats with a leaf in every other gap. Alpha falls off smoothly, and is a half at their edges.
+/// Crossing slats with a leaf in every other gap. Alpha falls off smoothly across the edges, where it is a
+/// half.
 pub(super) fn lattice() -> Picture {
     const SIDE: u32 = 128;
     Picture::new([SIDE, SIDE], |column, row| {

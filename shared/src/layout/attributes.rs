@@ -12,11 +12,11 @@ const COORDINATES: usize = 12;
 const COLOURS: usize = 36;
 const EMITTER: usize = 60;
 
-/// Position of the attributes of a leaf's triangles. They are consecutive records, in the order of the
-/// triangles' slots.
+/// Position of the [`Attributes`] of a leaf's triangles: consecutive records, in the order of the triangles'
+/// slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LeafAttributes {
-    /// Index of the first record.
+    /// Index of the leaf's first [`Attributes`] record.
     pub first: u32,
     /// True if each slot has two records, the second for a second set of texture coordinates.
     pub two_sets: bool,
@@ -37,8 +37,8 @@ impl LeafAttributes {
         self.first | if self.two_sets { TWO_SETS } else { 0 }
     }
 
-    /// Index of the record with texture coordinate set 0 or 1 of a slot. The record of set 0 also holds the
-    /// other attributes.
+    /// Index of the [`Attributes`] record with texture coordinate set `set`, 0 or 1, of the triangle in slot
+    /// `slot`. The record of set 0 also holds the triangle's other attributes.
     #[inline(always)]
     pub fn record(self, slot: u32, set: u32) -> u32 {
         let index = if self.two_sets { 2 * slot + (set & 1) } else { slot };
@@ -56,7 +56,8 @@ impl LeafAttributes {
 /// | 60..64 | index of its emitter |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attributes {
-    /// Shading normals at the corners, on the front side; `None` for the geometric normal.
+    /// Shading normals at the corners, on the front side; `None` if the triangle is shaded with its geometric
+    /// normal.
     pub normals: Option<[[f32; 3]; 3]>,
     /// Texture coordinates of the corners.
     pub coordinates: [[f32; 2]; 3],

@@ -30,7 +30,7 @@ pub const MAX_MATERIALS: u32 = 1 << (8 * MATERIAL_BYTES - 2);
 const CUT_OUT: u32 = 2 * MAX_MATERIALS;
 /// Flag in a leaf's material index: triangles with this material are flat glass.
 const FLAT_GLASS: u32 = MAX_MATERIALS;
-/// Highest of the material index's bytes in `flag`.
+/// Returns the bits of `flag` in the last of a material index's three bytes.
 const fn in_last_byte(flag: u32) -> u8 {
     (flag >> (8 * (MATERIAL_BYTES - 1))) as u8
 }
@@ -63,8 +63,8 @@ pub struct Triangle {
 }
 
 impl BvhLeaf<'_> {
-    /// Range of the bytes needed to read one triangle of a known slot. It excludes the last byte, the numbers
-    /// of triangles and vertices.
+    /// Bytes of the line that a reader of one triangle needs if its slot is known: all but the last byte,
+    /// which holds the numbers of triangles and vertices.
     pub const OF_TRIANGLE: Range<u32> = 0..LINE_BYTES as u32 - 1;
 
     /// Number of triangles, at most [`LEAF_TRIANGLES`].
@@ -79,7 +79,7 @@ impl BvhLeaf<'_> {
         u32::from(self.byte(COUNTS) >> 4).min(LEAF_VERTICES as u32)
     }
 
-    /// Coordinate on one axis of every vertex, metres. Lanes past the last vertex are meaningless.
+    /// Coordinates of all vertices on one axis, metres. Lanes past the last vertex are meaningless.
     #[inline(always)]
     pub fn coordinates(&self, axis: usize) -> [f32; VERTEX_LANES] {
         let bytes: Option<&[u8; 4 * VERTEX_LANES]> =
@@ -93,14 +93,14 @@ impl BvhLeaf<'_> {
         [self.corners(0), self.corners(1), self.corners(2)]
     }
 
-    /// Vertex index of one corner of every triangle. The indices are below nine even in a damaged image.
+    /// Vertex index of one corner of every triangle. The indices are below nine even in a damaged card image.
     #[inline(always)]
     fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
         let vertices = read_u32(self.0, CORNERS + 4 * corner);
         let mut corners = [0; LEAF_TRIANGLES];
         // A loop: compilers leave `from_fn` without the vector instructions of the caller.
         for (slot, corner) in (0_u32..).zip(&mut corners) {
-            // Above the maximum in unsound images only.
+            // An index above the maximum occurs in unsound card images only.
             *corner = (vertices >> (4 * slot) & 15).min(LEAF_VERTICES as u32 - 1);
         }
         corners
@@ -115,7 +115,7 @@ impl BvhLeaf<'_> {
     #[inline(always)]
     fn vertex_of(&self, slot: usize, corner: usize) -> usize {
         let vertex = read_u32(self.0, CORNERS + 4 * corner) >> (4 * (slot % LEAF_TRIANGLES)) & 15;
-        // Above the maximum in unsound images only.
+        // An index above the maximum occurs in unsound card images only.
         (vertex as usize).min(LEAF_VERTICES - 1)
     }
 
@@ -186,8 +186,8 @@ impl BvhLeaf<'_> {
         let mut materials = Distinct::<u32, LEAF_MATERIALS>::new();
         for (slot, triangle) in triangles.iter().enumerate() {
             for (corner, vertex) in triangle.vertices.iter().enumerate() {
-                // Compared as bits: of 0 and -0 the first to come would replace the other, and hits would
-                // depend on the order.
+                // Compared as bits: a vertex with -0 must not replace an equal one with 0, or hits would
+                // depend on the order of triangles.
                 let vertex = vertices.index(vertex.map(f32::to_bits))?;
                 let at = CORNERS + 4 * corner;
                 let before = read_u32(&line, at);
@@ -227,7 +227,7 @@ impl<T: Copy + PartialEq, const MOST: usize> Distinct<T, MOST> {
         Self { items: [None; MOST], count: 0 }
     }
 
-    /// Index of an item, which is added if it is new; `None` if the item is new and the set is full.
+    /// Returns the index of an item, after adding a new one; `None` if the item is new and the set is full.
     fn index(&mut self, item: T) -> Option<usize> {
         let index = self.items().position(|other| other == item).unwrap_or(self.count);
         *self.items.get_mut(index)? = Some(item);

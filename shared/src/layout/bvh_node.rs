@@ -40,7 +40,7 @@ pub struct NodeBox {
 /// upper[i]`.
 #[derive(Clone, Copy)]
 pub struct BvhAxis<'a> {
-    /// Minimum corner of the node's 8-bit grid, metres.
+    /// Coordinate of the minimum corner of the node's 8-bit grid, metres.
     pub corner: f32,
     /// Unit of the node's 8-bit grid, metres: a power of two.
     pub unit: f32,
@@ -92,14 +92,16 @@ impl<'a> BvhNode<'a> {
     }
 }
 
-/// Grid of a node on one axis.
+/// Positions on one axis of a node's 8-bit grid: `corner + i unit`, where the unit has the biased exponent
+/// `exponent`.
 struct Grid {
     corner: f32,
     exponent: u8,
 }
 
 impl Grid {
-    /// Returns the finest grid that covers an interval, metres.
+    /// Returns the finest grid that covers an interval, metres; `None` if an end is not finite or no grid
+    /// covers it.
     fn around(lower: f32, upper: f32) -> Option<Self> {
         if !lower.is_finite() || !upper.is_finite() {
             return None;
@@ -124,14 +126,16 @@ impl Grid {
         (f64::from(place) - f64::from(self.corner)) / self.unit()
     }
 
-    /// Returns the greatest grid line that is at least [`MARGIN`] units below a coordinate.
+    /// Returns the greatest grid line that is at least [`MARGIN`] units below a coordinate; `None` if there
+    /// is none.
     fn below(&self, place: f32) -> Option<u8> {
         let units = self.units(place) - MARGIN;
         // The conversion rounds down.
         (0.0..=255.0).contains(&units).then_some(units as u8)
     }
 
-    /// Returns the least grid line that is at least [`MARGIN`] units above a coordinate.
+    /// Returns the least grid line that is at least [`MARGIN`] units above a coordinate; `None` if there is
+    /// none.
     fn above(&self, place: f32) -> Option<u8> {
         let units = self.units(place) + MARGIN;
         let line = units as u64;

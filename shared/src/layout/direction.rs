@@ -38,7 +38,8 @@ pub const fn decode_normal(byte: u8) -> [f32; 3] {
     fold((high as f32 - NORMAL_STEPS) / NORMAL_STEPS, (low as f32 - NORMAL_STEPS) / NORMAL_STEPS)
 }
 
-/// Class of a normal's code, 0 to 15: four by four adjacent codes of the octahedral map are of one class.
+/// Class, 0 to 15, of a normal's octahedral code: the two upper bits of each coordinate, so that 4x4 adjacent
+/// codes share a class.
 #[inline(always)]
 pub const fn normal_class(byte: u8) -> u32 {
     (byte as u32 >> 6) << 2 | (byte as u32 >> 2) & 3

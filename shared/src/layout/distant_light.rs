@@ -9,7 +9,8 @@ pub struct DistantLight {
     pub direction: [f32; 3],
     /// Irradiance of a surface perpendicular to the light, W/m^2.
     pub irradiance: [f32; 3],
-    /// Cumulative probability of the distant lights up to this one, in units of 2^-32; 2^32 - 1 at the last.
+    /// Sum of the probabilities of the distant lights up to and including this one, in units of 2^-32; 2^32 -
+    /// 1 for the last.
     pub threshold: u32,
 }
 

@@ -24,11 +24,12 @@ pub enum EmitterKind {
         vertices: [[f32; 3]; 3],
         /// True if the back emits like the front.
         double_sided: bool,
-        /// Index of the triangle in the image.
+        /// Index of the triangle in the card image, `LEAF_TRIANGLES * leaf + slot`.
         triangle: u32,
         /// Index of the triangle's material.
         material: u32,
-        /// True if the radiance varies over the triangle, because of an emissive texture or alpha cut-outs.
+        /// True if the radiance varies over the triangle, because of an emissive texture, cut-outs (`MASK`)
+        /// or partial coverage (`BLEND`).
         varies: bool,
     },
     /// An isotropic point light.

@@ -26,7 +26,7 @@ const MANTISSA_BITS: u32 = 16;
 const MAX_MANTISSA: u32 = (1 << MANTISSA_BITS) - 1;
 const NORMAL_SHIFT: u32 = 3 * MANTISSA_BITS;
 const EXPONENT_SHIFT: u32 = NORMAL_SHIFT + 8;
-/// Bias of the exponent of a mantissa's unit.
+/// Bias of the stored exponent `e`: a step of a mantissa is `2^(e - 143)`.
 const EXPONENT_BIAS: i32 = 143;
 
 impl IrradiancePoint {
@@ -70,7 +70,7 @@ impl IrradiancePoint {
 /// `value * 2^exponent`, at most `f32::MAX`, for exponents of -252 to 254.
 #[inline(always)]
 fn scaled(value: f32, exponent: i32) -> f32 {
-    // In two factors, as 2^exponent may be out of the range of `f32` where the product is not.
+    // Multiplied in two factors, as 2^exponent may be out of the range of `f32` where the product is not.
     let half = exponent / 2;
     let product = value * power_of_two(half) * power_of_two(exponent - half);
     if product < f32::MAX { product } else { f32::MAX }

@@ -3,15 +3,16 @@
 
 use super::{NO_TEXTURE, Record, read_f32, read_u32, read_vector, write_f32, write_u32, write_vector};
 
-/// Layers of a material that has more than its base. Every texture multiplies the factor with its name.
+/// Layers of a material that has more than its base. Each texture, except normal maps, multiplies the glTF
+/// factor that it is named after.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Layers {
-    /// F0 of the dielectric: F0 of the index of refraction times `specularColorFactor`. It may exceed 1, and
-    /// excludes `specularFactor`.
+    /// F0 of the dielectric without `specularFactor`: `((ior - 1) / (ior + 1))^2` times
+    /// `specularColorFactor`. It may exceed 1.
     pub specular: [f32; 3],
     /// Scale of x and y of the normal map (glTF `normalTexture.scale`).
     pub normal_scale: f32,
-    /// Factor of the coat, 0 to 1 (`KHR_materials_clearcoat`).
+    /// Factor of the coat's reflectance, 0 to 1 (`clearcoatFactor` of `KHR_materials_clearcoat`).
     pub coat: f32,
     /// Roughness of the coat, 0 to 1.
     pub coat_roughness: f32,
@@ -44,7 +45,7 @@ pub enum LayerTexture {
     Coat,
     /// `clearcoatRoughnessFactor`: the green channel.
     CoatRoughness,
-    /// Tangent-space normal of the coat.
+    /// Tangent-space normal of the coat, in the encoding of [`Self::Normal`].
     CoatNormal,
     /// Colour of the sheen: red, green and blue, sRGB.
     Sheen,

@@ -10,17 +10,17 @@ pub const THIN_WALLED: u32 = 2;
 /// Flag of [`Material::flags`]: some triangles of the material have [`super::Attributes`].
 pub const HAS_ATTRIBUTES: u32 = 4;
 
-/// Flag of [`Material::flags`]: the GGX lobe is narrow at some texel. It is followed by rays instead of being
-/// estimated from photons.
+/// Flag of [`Material::flags`]: the GGX lobe is narrow at some texel, and is followed by rays instead of
+/// being estimated from photons.
 pub const NARROW_LOBE: u32 = 8;
 
-/// Value of `a = roughness^2` below which a GGX lobe is narrow: half of its light is then within 28 degrees,
-/// an eighth of the hemisphere. A material whose lobe is narrow at some texel has [`NARROW_LOBE`] at all
-/// texels, because photons are stored for the lobe everywhere on a surface or nowhere.
+/// Value of `a = roughness^2` below which a GGX lobe is narrow: half of the lobe's light is then within 28
+/// degrees, an eighth of the hemisphere. A material whose lobe is narrow at some texel has [`NARROW_LOBE`] at
+/// all texels, because photons are stored for the lobe everywhere on a surface or nowhere.
 pub const NARROW_ALPHA: f32 = 0.25;
 
-/// Flag of [`Material::flags`]: glTF's `alphaMode` is `BLEND`. [`Material::cutoff`] is then a factor of
-/// alpha, the fraction of the surface that is present.
+/// Flag of [`Material::flags`]: glTF's `alphaMode` is `BLEND`. Coverage, the fraction of the surface that is
+/// present, is then alpha times [`Material::cutoff`].
 pub const BLENDS: u32 = 64;
 
 /// Flag of [`Material::flags`]: the GGX lobe includes multiple scattering between microfacets (energy
@@ -36,13 +36,13 @@ const FLAGS: u32 = DOUBLE_SIDED | THIN_WALLED | HAS_ATTRIBUTES | NARROW_LOBE | B
 
 const KIND_SHIFT: u32 = 4;
 const KIND_BITS: u32 = 2;
-/// Shift in the flags word of the index of [`super::Layers`] plus 1.
+/// Lowest bit, in the flags word, of the index of [`super::Layers`] plus 1.
 const LAYERS_SHIFT: u32 = 9;
 const METALLIC_ROUGHNESS: u32 = 1;
 const GLASS: u32 = 2;
 
-/// Maximum exponent `n` of a Phong lobe. At this exponent `cos^n alpha` is 1/2 at 0.7 degrees, a mirror as
-/// far as photons can tell.
+/// Maximum exponent `n` of a Phong lobe. At this exponent `cos^n alpha` falls to 1/2 at 0.7 degrees: the lobe
+/// is narrower than the rounding error of photon directions, 1 degree.
 pub const MAX_PHONG_EXPONENT: f32 = 10_000.0;
 
 /// Index that marks an absent texture.
@@ -59,7 +59,7 @@ pub struct Material {
     /// [`COMPENSATED`] and [`PANE`].
     pub flags: u32,
     /// glTF's `alphaCutoff`: a triangle with cut-outs is absent where alpha, the product of base texture and
-    /// vertex alpha, is below it. With [`BLENDS`], coverage is the cutoff times alpha.
+    /// vertex alpha, is below it. With [`BLENDS`], coverage is `cutoff` times alpha.
     pub cutoff: f32,
     /// Indices of three textures: base colour or diffuse albedo; metallic-roughness, with roughness in green
     /// and metalness in blue; emission. [`NO_TEXTURE`] if absent.
@@ -100,7 +100,7 @@ pub enum Reflectance {
         /// Absorption coefficient inside, 1/m. For a [`PANE`] it is the optical depth, the coefficient times
         /// the thickness.
         absorption: [f32; 3],
-        /// Fraction, 0 to 1, of the light that passes the interface and is transmitted. A Lambertian surface
+        /// Fraction, 0 to 1, of the light past the Fresnel reflection that is transmitted. A Lambertian base
         /// of the base colour reflects the rest.
         transmission: f32,
         /// Index of refraction.

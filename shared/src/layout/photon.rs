@@ -10,7 +10,7 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | position, metres |
-/// | 12..16 | power, [`Rgbe`], in units of the image's photon power unit |
+/// | 12..16 | power, [`Rgbe`], in units of the card image's photon power unit |
 /// | 16..18 | incoming direction, from the surface towards the origin of the photon, [`super::encode_direction`] |
 /// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
 ///
@@ -48,11 +48,11 @@ pub struct Photon {
 
 /// Number of codes of the disc fraction.
 pub const DISC_CODES: usize = 1 << 5;
-/// Code of the disc fraction 1 of a disc that is visible as a whole.
+/// Code of the disc fraction 1 where no wall hides a part of the disc.
 pub const FULL_DISC: u8 = 13;
-/// First code of the disc fractions of a visible region.
+/// First code of the disc fractions that are relative to a visible region, the unhidden part of the disc.
 const FIRST_REGION: u8 = 20;
-/// Code of the disc fraction 1 of a visible region.
+/// Code of the disc fraction 1 relative to a visible region.
 const FULL_REGION: u8 = 25;
 
 const DISC_MASK: u8 = DISC_CODES as u8 - 1;
@@ -67,8 +67,8 @@ const SMALL_STEP: f64 = 1.4;
 const FINE_STEPS: u8 = 6;
 const DISC_FRACTIONS: [f32; DISC_CODES] = disc_fractions();
 
-/// Disc fractions of all codes. They are geometric series, from 0.038 to 4 for a whole disc and from 0.31 to
-/// 4 for a visible region, so that the relative rounding error hardly varies.
+/// Disc fractions of all codes: geometric series from 0.038 to 4 relative to the disc, and from 0.31 to 4
+/// relative to a visible region, so that the relative rounding error hardly varies.
 #[expect(clippy::indexing_slicing, reason = "computed when it is compiled")]
 const fn disc_fractions() -> [f32; DISC_CODES] {
     let mut fractions = [1.0; DISC_CODES];
@@ -105,13 +105,14 @@ pub fn disc_fraction(code: u8) -> f32 {
     DISC_FRACTIONS.get((code & DISC_MASK) as usize).copied().unwrap_or(1.0)
 }
 
-/// Returns true if the code's fraction is of a visible region: walls hide parts of the disc from the photon.
+/// Returns true if the code's disc fraction is relative to a visible region, because walls hide a part of the
+/// disc from the photon.
 #[inline(always)]
 pub fn is_of_region(code: u8) -> bool {
     code & DISC_MASK >= FIRST_REGION
 }
 
-/// Code of a disc fraction, dithered; with `of_region`, of the fraction of a visible region.
+/// Code of a disc fraction, dithered. With `of_region` the fraction is relative to a visible region.
 ///
 /// `dither`, in [0, 1), chooses between the two neighbouring codes such that the mean of
 /// `1 / disc_fraction(code)`, the factor in a gather, is `1 / fraction`. Fractions out of range take the

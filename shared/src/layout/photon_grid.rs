@@ -6,9 +6,9 @@ pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
 /// Maximum magnitude of `origin + q`. Integers up to 2^24 are exact in `f32`.
 const MAX_COORDINATE: f64 = (1 << 24) as f64;
 
-/// Grid of the photons' positions: grid coordinates `q` below 2^20 stand for the position
-/// `(origin + q) * cell`, exact in `f32`. The longest side of the box that it covers takes at least
-/// half of the 2^20 cells. Far from the origin, where `f32` is coarser, it takes fewer.
+/// Grid of the photons' positions: grid coordinates `q` below 2^20 stand for the position `(origin + q) *
+/// cell`, exact in `f32`. The longest side of the covered box takes at least half of the 2^20 cells, or fewer
+/// far from the origin, where `f32` is coarser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
     /// Minimum corner of the grid, in cells.
@@ -72,7 +72,7 @@ impl PhotonGrid {
 
     #[inline(always)]
     fn metres(&self, origin: i32, point: u32) -> f32 {
-        // Wraps in unsound images only.
+        // The sum wraps in unsound card images only.
         origin.wrapping_add(point as i32) as f32 * self.cell
     }
 }
@@ -84,7 +84,7 @@ fn floor(value: f64) -> i32 {
 
 /// Returns the smallest power of two that is at least `value`, clamped to the normal numbers of `f32`.
 pub fn power_of_two_above(value: f64) -> f32 {
-    // From the exponent bits: the last digit of a logarithm differs between platforms.
+    // Computed from the exponent bits, because the last digit of a logarithm differs between platforms.
     let bits = value.max(f64::MIN_POSITIVE).to_bits();
     let is_power = bits & ((1 << 52) - 1) == 0;
     let exponent = (bits >> 52) as i32 - 1023 + i32::from(!is_power);

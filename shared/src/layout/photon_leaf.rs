@@ -72,7 +72,7 @@ impl<'a> PhotonLeaf<'a> {
     #[inline(always)]
     pub fn read(line: &'a [u8; LINE_BYTES]) -> Self {
         let header = line.first_chunk().map_or(0, |&bytes| u64::from_le_bytes(bytes));
-        // Above the maximum in unsound images only.
+        // A number above the maximum occurs in unsound card images only.
         let photons = ((header >> AXES_BITS) as u32 & ((1 << COUNT_BITS) - 1)).min(LEAF_PHOTONS as u32);
         let mut bit = AXES_BITS + COUNT_BITS;
         let mut first = HEADER_BYTES as u32;
@@ -133,7 +133,8 @@ impl<'a> PhotonLeaf<'a> {
         self.contents().iter().nth_back(index as usize).copied().unwrap_or_default()
     }
 
-    /// Marks the axes on which photons in this bounding box vary; at least one is marked.
+    /// Returns for each axis whether the coordinates of photons in a bounding box vary; true for at least one
+    /// axis.
     fn varying(bounds: &GridBox) -> [bool; 3] {
         let ([a, b, c], [x, y, z]) = (bounds.lower, bounds.upper);
         let varies = [a != x, b != y, c != z];

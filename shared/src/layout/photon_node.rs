@@ -20,7 +20,7 @@ use crate::address::LINE_BYTES;
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
-/// Offset of the photon share or the classes of normals in the line, bytes.
+/// Offset in the line, bytes, of the photon share or, in the caustic map, of the classes of normals.
 const SHARE: usize = 22;
 /// Maximum of [`NodeCoordinates::exponent`], for a box as large as the grid.
 const MAX_EXPONENT: u32 = 13;
@@ -49,23 +49,23 @@ pub struct NodeCoordinates<'a> {
 }
 
 impl<'a> PhotonNode<'a> {
-    /// Squared distance of the k-th nearest photon divided by k, m^2: an upper estimate for most query points
-    /// among the node's photons, so that most searches that begin at this node need not go farther. 0 in a
-    /// node without leaves, and where the host has no estimate.
+    /// Squared radius, m^2, divided by k, to which a search for the k nearest photons is narrowed if this is
+    /// the first node with leaves that it visits. The host chooses the radius such that most of these
+    /// searches find k photons. 0 in a node without leaves, and where the host has no estimate.
     #[inline(always)]
     pub fn photon_share(&self) -> f32 {
         let [low, high] = [SHARE, SHARE + 1].map(|at| u32::from(WideNode(self.0).byte(at)));
         f32::from_bits(low << 16 | high << 24)
     }
 
-    /// Sets the photon share in the line of a node, rounded up to a mantissa of 7 bits.
+    /// Stores [`Self::photon_share`] in a node's line, rounded up to a mantissa of 7 bits.
     pub fn set_photon_share(line: &mut [u8; LINE_BYTES], share: f32) {
         let [_, _, low, high] = share.to_bits().saturating_add(0xffff).to_le_bytes();
         [line[SHARE], line[SHARE + 1]] = [low, high];
     }
 
-    /// Classes of the normals of the node's photons ([`normal_class`]), one bit each; 0 where the host has
-    /// not stated them.
+    /// Bit mask of the classes ([`normal_class`]) of the normals of all photons below the node; 0 if the host
+    /// has not stored them.
     ///
     /// [`normal_class`]: super::normal_class
     #[inline(always)]
@@ -73,7 +73,8 @@ impl<'a> PhotonNode<'a> {
         u16::from_le_bytes([WideNode(self.0).byte(SHARE), WideNode(self.0).byte(SHARE + 1)])
     }
 
-    /// Sets the classes of normals in the line of a node.
+    /// Stores the bit mask of the classes ([`normal_class`](super::normal_class)) of a node's photon normals
+    /// in its line.
     pub fn set_normals(line: &mut [u8; LINE_BYTES], classes: u16) {
         [line[SHARE], line[SHARE + 1]] = classes.to_le_bytes();
     }

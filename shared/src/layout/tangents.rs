@@ -25,7 +25,7 @@ impl Tangents {
     /// Bytes of one triangle's tangents.
     const BYTES: usize = 16;
 
-    /// Number of triangles per record, which is as large as [`Attributes`].
+    /// Number of triangles whose tangents one record holds. A record has the size of [`Attributes`].
     const PER_RECORD: usize = Attributes::BYTES / Self::BYTES;
 
     /// Number of records with tangents before the first [`Attributes`] of a leaf.
@@ -34,8 +34,8 @@ impl Tangents {
     /// Tangents of a triangle that has none.
     pub const NONE: Self = Self { directions: [[0.0; 3]; 3], signs: [1.0; 3] };
 
-    /// Index of the record with the tangents of triangle `slot` of a leaf. Such records exist only in leaves
-    /// with a material that needs them.
+    /// Index of the record with the tangents of triangle `slot` of a leaf. Only leaves with a normal-mapped
+    /// material have these records.
     #[inline(always)]
     pub fn locate(leaf: LeafAttributes, slot: u32) -> u32 {
         leaf.first.wrapping_sub(Self::RECORDS as u32).wrapping_add(Self::record(slot))

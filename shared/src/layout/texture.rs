@@ -1,22 +1,23 @@
-//! Textures: an image, a sampler and a coordinate transform (glTF `KHR_texture_transform`).
+//! Textures: texels, a sampler and a coordinate transform (glTF `KHR_texture_transform`).
 
 use super::{Record, read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// Number of texels per line. A line is a tile of the image, row-major, so that neighbours share a line.
+/// Number of texels per line. A line holds a texel tile, 8x4 texels in row-major order, so that neighbouring
+/// texels share a line.
 pub const TEXELS_PER_LINE: u32 = (LINE_BYTES / 4) as u32;
-/// Number of columns of a tile.
+/// Number of columns of a texel tile, the part of a texture in one line.
 pub const TILE_WIDTH: u32 = 8;
-/// Number of rows of a tile.
+/// Number of rows of a texel tile, the part of a texture in one line.
 pub const TILE_HEIGHT: u32 = TEXELS_PER_LINE / TILE_WIDTH;
 
-/// A texture. The tiles of its image are row-major; tiles at the right and lower border are padded to full
-/// size.
+/// A texture. Its texel tiles of 8x4 texels are in row-major order, one a line; tiles at the right and lower
+/// border are padded to full size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {
     /// First line of the texels, counted from the start of [`crate::image::SectionKind::Texels`].
     pub first_line: u32,
-    /// Width and height of the image, texels: 1 to 65535.
+    /// Width and height, texels: 1 to 65535.
     pub size: [u16; 2],
     /// Wrap modes of u and v.
     pub wrap: [Wrap; 2],
@@ -84,7 +85,7 @@ impl Texture {
         let number = |index: usize| read_f32(bytes, 12 + 4 * index);
         Self {
             first_line: read_u32(bytes, 0),
-            // 0 in unsound images only.
+            // A size of 0 occurs in unsound card images only.
             size: [(size as u16).max(1), ((size >> 16) as u16).max(1)],
             wrap: [wrap(0), wrap(1)],
             nearest: flags & NEAREST != 0,
@@ -127,8 +128,8 @@ impl Texture {
         width.div_ceil(TILE_WIDTH) * height.div_ceil(TILE_HEIGHT)
     }
 
-    /// Returns the line of a texel, counted from the start of the section, and the texel's index in that
-    /// line.
+    /// Returns the line of a texel, counted from the start of [`crate::image::SectionKind::Texels`], and the
+    /// texel's index in that line.
     #[inline(always)]
     pub fn locate(&self, column: u32, row: u32) -> (u32, usize) {
         let tiles_across = u32::from(self.size[0]).div_ceil(TILE_WIDTH);

@@ -10,7 +10,7 @@ const FIRST_LEAF: usize = 12;
 const FIRST_NODE: usize = 16;
 const LEAVES: usize = 20;
 const CHILDREN: usize = 21;
-/// Offset of the children's boxes: sixteen bytes each of lower x, y, z, upper x, y, z.
+/// Offset of the children's boxes in the line, bytes: sixteen bytes each of lower x, y, z, upper x, y, z.
 const SIDES: usize = 32;
 const _: () = assert!(SIDES + 6 * NODE_CHILDREN == LINE_BYTES);
 
@@ -38,7 +38,7 @@ pub struct WideNode<'a>(pub &'a [u8; LINE_BYTES]);
 /// Indices of the children of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Links {
-    /// Number of children that are leaves. They come before the others.
+    /// Number of children that are leaves. Leaves come before inner nodes.
     pub leaves: u32,
     /// Index of the first child that is a leaf.
     pub first_leaf: u32,
@@ -63,7 +63,7 @@ impl<'a> WideNode<'a> {
         }
     }
 
-    /// Lower and upper sides of all children's boxes on one axis, in the node's units.
+    /// Lower and upper sides of all children's boxes on one axis, in units of the node's 8-bit grid.
     #[inline(always)]
     pub(super) fn sides(&self, axis: usize) -> [&'a [u8; NODE_CHILDREN]; 2] {
         const NONE: &[u8; NODE_CHILDREN] = &[0; NODE_CHILDREN];
@@ -84,7 +84,7 @@ impl Links {
     /// Kind and index of child number `index`.
     #[inline(always)]
     pub fn child(&self, index: u32) -> Child {
-        // Wraps in unsound images only.
+        // The sum wraps in unsound card images only.
         if index < self.leaves {
             Child::Leaf(self.first_leaf.wrapping_add(index))
         } else {
@@ -105,7 +105,7 @@ pub(super) fn write_links(line: &mut [u8; LINE_BYTES], children: usize, links: L
     Some(())
 }
 
-/// Writes the sides of a child's box on one axis, in the node's units.
+/// Writes the sides of a child's box on one axis, in units of the node's 8-bit grid; `None` out of range.
 pub(super) fn write_sides(
     line: &mut [u8; LINE_BYTES],
     axis: usize,

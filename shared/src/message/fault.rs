@@ -16,33 +16,34 @@ pub struct Fault {
 /// Numbered faults; the numbers are part of the protocol.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum FaultCode {
-    /// A payload is not a command; detail: its bytes.
+    /// A payload is not a command; detail: the length of the payload, bytes.
     Message,
     /// The command is not allowed in this state of the session; detail: 0.
     Order,
-    /// The image does not fit in the card's memory; detail: the number of lines of the memory.
+    /// The card image does not fit in the card's memory; detail: the number of lines of the memory.
     ImageTooLarge,
-    /// The data of a write is not whole lines, exceeds the image, or has too many lines; detail: number of
-    /// the first line.
+    /// The data of a write is not whole lines, exceeds the card image, or has too many lines; detail: number
+    /// of the first line.
     Lines,
     /// Chunks were requested that are not written, or too many; detail: number of the first chunk.
     Chunks,
-    /// The image's checksum differs; detail: the lower half of the checksum found.
+    /// The card image's checksum differs; detail: the lower half of the checksum found.
     ImageChecksum,
-    /// The image's header is invalid; detail: the image's layout version if that is wrong, else 0.
+    /// The card image's header is invalid; detail: the card image's layout version if that is wrong, else 0.
     ImageHeader,
-    /// A frame parameter is outside the budget, is not a number, or needs something that the image does not
-    /// have; detail: number of the [`Parameter`].
+    /// A frame parameter is outside the budget, is not a number, or needs something that the card image does
+    /// not have; detail: number of the [`Parameter`].
     Parameter,
     /// A tile is empty, outside the picture or larger than the budget allows; detail: the tile's number.
     Tile,
     /// More tiles were sent than the budget allows; detail: the tile's number.
     TooManyTiles,
-    /// A line outside the card's memory was requested; detail: the line.
+    /// A line outside the card's memory was requested; detail: index of the line.
     LineRange,
     /// A record outside its section was requested; detail: the record's index.
     Record,
-    /// The bounding volume hierarchy is deeper than the stack, or not a tree; detail: the node.
+    /// A bounding volume hierarchy, photon map or light tree is deeper than a chip's stack allows, or is not
+    /// a tree; detail: index of a node.
     Depth,
     /// The operands are not whole triples, none, or too many; detail: their length, bytes.
     Operands,
@@ -50,33 +51,32 @@ pub enum FaultCode {
     Internal,
 }
 
-/// Invariants of a correct chip, numbered as in [`FaultCode::Internal`]. If one is violated, the card sends a
-/// fault instead of losing light.
+/// Conditions that hold in a correct chip, numbered as in [`FaultCode::Internal`]. If one is violated, the
+/// card sends a fault instead of losing light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Invariant {
-    /// Each pass, completion and gather belongs to a tile in flight.
+    /// A pass, a completion or a gather must belong to a tile in flight.
     Flight,
-    /// A tile in flight that begins a block has one left.
+    /// A tile in flight that begins a block must have a block left.
     Block,
-    /// A block of several pixels can be halved, and the records of a block of one pixel fit into the
-    /// irradiance cache.
+    /// A block whose irradiance records exceed the cache must have several pixels, so that it can be halved.
     Halves,
-    /// The buffers of a tile hold all pixels of a block.
+    /// The buffers of a tile must have room for all pixels of a block.
     Pixels,
-    /// Each pixel with gather rays has sums.
+    /// A pixel with gather rays must have a place in the buffer of sums.
     Sums,
-    /// The buffer has room for each gather point, and each gather point has rays.
+    /// The buffer of gather points must have room for each point of a pass, and each point must have rays.
     Points,
-    /// The irradiance record that a gather belongs to is being gathered.
+    /// An irradiance record must be in the state that a step of its survey or gather expects.
     Record,
-    /// A gather that ends is counted among the gathers that its tile waits for.
+    /// A gather that ends must be one of those that its tile in flight counts as waiting.
     Waiting,
-    /// A surface that was seen once is seen again by the same ray.
+    /// An eye path that ended at a surface must end at a surface when it is traced again.
     Surface,
-    /// A bundle has room for each of its rays.
+    /// A bundle must have room for each of its rays.
     Bundle,
-    /// A reply has room for each of its parts.
+    /// A reply must have room for each pixel, checksum or result that is added to it.
     Reply,
 }
 
@@ -101,13 +101,13 @@ pub enum Parameter {
     Seed,
     /// Number of the first sample of a pixel.
     FirstSample,
-    /// Samples per pixel.
+    /// Number of samples per pixel in the frame.
     Samples,
-    /// Planned samples per pixel of the whole picture.
+    /// Planned number of samples per pixel in all frames of the picture.
     PlannedSamples,
-    /// Final gather rays per sample.
+    /// Number of final gather rays.
     GatherRays,
-    /// Shadow rays per sample.
+    /// Number of shadow rays of a sample.
     ShadowRays,
     /// Number of photons of a gather.
     Neighbors,
@@ -125,7 +125,7 @@ pub enum Parameter {
     Queue,
     /// Source of the radiance at the ends of gather rays.
     Radiance,
-    /// Gathers in the caustic map.
+    /// Parameters of gathers in the caustic map.
     Caustics,
     /// Presence of pixel layers.
     Layers,

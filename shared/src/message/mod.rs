@@ -13,8 +13,8 @@
 //! Flush           -> (nothing)                   no tile follows for now: waiting gathers are done
 //! ```
 //!
-//! A self-test takes the place of the image: `Compute -> Computed`, any number, then
-//! `TestMemory -> MemoryTested ...`.
+//! A self-test takes the place of the card image: `Compute -> Computed`, any number, then `TestMemory ->
+//! MemoryTested ...`.
 //!
 //! A command that the card cannot execute is answered with [`Reply::Fault`]; the card stays ready for the
 //! next one.
@@ -44,7 +44,7 @@ pub const PROTOCOL_VERSION: u16 = 17;
 /// Maximum number of lines in one [`Command::WriteLines`].
 pub const LINES_PER_WRITE: usize = 8;
 
-/// Number of lines of a chunk, the unit of which [`Reply::Checksums`] reports checksums.
+/// Number of lines of a chunk. [`Reply::Checksums`] has one checksum per chunk.
 pub const CHUNK_LINES: u32 = 64;
 
 /// On-chip memory that a firmware uses, measured by its board.
@@ -86,15 +86,16 @@ pub struct FrameParameters {
     pub camera: Camera,
     /// Seed of all random numbers.
     pub seed: u32,
-    /// Number of the first sample of each pixel. It is above 0 if other frames of the picture have the
-    /// samples before it.
+    /// Number of the first sample of each pixel. The number is above 0 if other frames of the picture have
+    /// the earlier samples.
     pub first_sample: u32,
     /// Number of samples per pixel in this frame.
     pub samples: u32,
-    /// Planned number of samples per pixel of the whole picture. The irradiance cache divides gather rays
-    /// among them.
+    /// Planned number of samples per pixel in all frames of the picture. With the irradiance cache, a pixel's
+    /// gather rays are divided among these samples.
     pub planned_samples: u32,
-    /// Final gather rays per sample.
+    /// Number of final gather rays of a sample; with the irradiance cache, of an irradiance record, and of
+    /// all planned samples of a pixel together.
     pub gather_rays: u32,
     /// Shadow rays per sample.
     pub shadow_rays: u32,
@@ -118,21 +119,21 @@ pub struct FrameParameters {
     /// Source of the reflected radiance at the end of a gather ray.
     pub radiance: Radiance,
     /// Parameters of gathers in the caustic map. With `None`, a gather ray that reaches an emitter through
-    /// specular surfaces counts its emission.
+    /// specular surfaces counts the emitter's emission.
     pub caustics: Option<CausticGather>,
-    /// True if pixels have [`LayerSums`]. Their radiance does not change; tiles have fewer pixels
-    /// ([`Budget::pixels_of_tile`]).
+    /// True if the card sends [`LayerSums`] with each pixel. The radiance of pixels is the same without;
+    /// tiles have fewer pixels ([`Budget::pixels_of_tile`]).
     pub layers: bool,
     /// Pixel filter.
     pub filter: Filter,
     /// Maximum number of tiles in flight, at least 1. A chip limits it to [`Budget::in_flight`].
     pub in_flight: u32,
-    /// True if the picture has several frames. Irradiance records of a tile are then kept in card memory
-    /// beyond the image, as far as there is room, and reused by frames with other samples.
+    /// True if the picture has several frames. Irradiance records of a tile are then kept in the lines after
+    /// the card image, as far as there is room, and reused by frames with other samples.
     pub keep_records: bool,
     /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m), finite and above 0; `None` for one path per
-    /// sample. Samples after the first [`PROBES`] are means of several paths if the standard deviation of the
-    /// pixel's samples over the square root of their mean exceeds it.
+    /// sample. A sample after the first [`PROBES`] is the mean of `s / (threshold sqrt(L))` paths, rounded, 1
+    /// to [`MAX_PATHS`]; `L` and `s` are the mean and the standard deviation of the probes' light.
     pub adaptive_threshold: Option<f32>,
 }
 
@@ -165,14 +166,16 @@ pub enum Filter {
 /// Parameters of photon gathers in the caustic map.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CausticGather {
-    /// Number k of photons, at least 2. The k-th photon only determines the radius.
+    /// Number of neighbours from which the host has chosen the photons' kernel radii, at least 2. A card only
+    /// checks it against [`Budget::neighbors`].
     pub neighbors: u32,
-    /// Maximum radius of a gather, metres.
+    /// Maximum kernel radius of a photon, metres: that of the last code of
+    /// [`kernel_share`](crate::layout::kernel_share).
     pub max_distance: f32,
 }
 
-/// Importance sampling of final gather rays. It does not change the expectation of the picture. Points with
-/// fewer than eight rays use [`Self::Reflection`].
+/// Importance sampling of final gather rays. It does not change the expectation of the picture. Gather points
+/// with fewer than eight rays use [`Self::Reflection`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sampling {
     /// In proportion to the BRDF times the cosine.
@@ -193,12 +196,12 @@ pub enum Radiance {
     #[default]
     Density,
     /// Irradiance of the nearest irradiance point (Christensen 1999, *Faster photon map global illumination*)
-    /// for Lambertian surfaces, density estimate for surfaces with a lobe. The image must have irradiance
-    /// points.
+    /// for Lambertian surfaces, density estimate for surfaces with a lobe. The card image must have
+    /// irradiance points.
     Precomputed,
 }
 
-/// Time and order of photon gathers. The picture does not depend on it.
+/// Time and order of photon gathers. The picture depends on neither.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Drain {
     /// A gather is done at the end of its ray, without a queue.
@@ -237,8 +240,8 @@ impl Tile {
 /// Message from the host to a card.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command<'a> {
-    /// Begins a session, at any time. The card forgets its frame, its tiles and whether it has an image, but
-    /// keeps the written lines. The encoding is equal in all versions of the protocol.
+    /// Begins a session, at any time. The card forgets its frame, its tiles and whether it has a card image,
+    /// but keeps the written lines. The encoding is equal in all versions of the protocol.
     Hello {
         /// The host's [`PROTOCOL_VERSION`].
         protocol: u16,
@@ -252,15 +255,15 @@ pub enum Command<'a> {
         /// Number of chunks.
         count: u32,
     },
-    /// Announces an image. Lines written earlier are kept, so that only lines that differ from the previous
-    /// image need be written.
+    /// Announces a card image. Lines written earlier are kept, so that only lines that differ from the
+    /// previous card image need be written.
     BeginImage {
-        /// Number of lines of the image.
+        /// Number of lines of the card image.
         lines: u32,
         /// [`crate::checksum::image_checksum`] of all lines.
         checksum: u64,
     },
-    /// Writes lines of the image.
+    /// Writes lines of the card image.
     WriteLines {
         /// Number of the first line.
         first: u32,
@@ -268,10 +271,10 @@ pub enum Command<'a> {
         #[serde(borrow)]
         data: &'a [u8],
     },
-    /// Ends the image. The card then checks it.
+    /// Ends the card image. The card then checks it.
     EndImage,
-    /// Sets the parameters of the tiles that follow. Tiles of an earlier frame are dropped, but messages
-    /// about them may arrive before the answer.
+    /// Sets the parameters of the tiles that follow. Tiles of an earlier frame are dropped; replies about
+    /// them may arrive before the answer to this command.
     BeginFrame(FrameParameters),
     /// Renders a tile.
     RenderTile(Tile),
@@ -285,7 +288,7 @@ pub enum Command<'a> {
     /// written lines.
     TestMemory,
     /// Announces that no tile follows for now: waiting gathers are done once no other work is left. The next
-    /// [`Command::RenderTile`] revokes it.
+    /// [`Command::RenderTile`] revokes the announcement.
     Flush,
 }
 

@@ -3,13 +3,13 @@
 //! Sums are integers. If a pixel is rendered several times with different samples, the sums of these renders
 //! add up exactly to the sums of all samples.
 
-/// Number of steps of a sum of light per radiance unit: 2^40.
+/// Fixed-point scale of sums of light: one radiance unit is stored as 2^40.
 const LIGHT_STEPS: f64 = (1_u64 << 40) as f64;
-/// Number of steps of a sum of albedos per 1.
+/// Fixed-point scale of sums of albedos: an albedo of 1 is stored as 2^19.
 pub const ALBEDO_STEPS: u32 = 1 << 19;
-/// Number of steps of a sum of normals per 1.
+/// Fixed-point scale of sums of normals: a component 1 is stored as 2^18.
 pub const NORMAL_STEPS: u32 = 1 << 18;
-/// Number of steps of a sum of depths per depth unit.
+/// Fixed-point scale of sums of depths: one depth unit ([`SumScale::depth`]) is stored as 2^16.
 pub const DEPTH_STEPS: u32 = 1 << 16;
 /// Number of probes: a pixel's first samples in a frame with adaptive sampling. Their variance determines the
 /// number of paths of each later sample.
@@ -18,7 +18,7 @@ pub const PROBES: u32 = 4;
 /// paths adds no bias.
 pub const WEIGHT_OF_PROBE: f32 = 0.5;
 
-/// Number of samples in a sum.
+/// Numbers of samples and of probes in the sums of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleCount {
     /// Number of all samples.
@@ -34,8 +34,8 @@ impl SampleCount {
         Self { samples, probes: if is_adaptive { probes } else { 0 } }
     }
 
-    /// Sum of the weights of all samples' light. A sample that is not a probe has weight 1. Without samples
-    /// it is 1/2.
+    /// Sum of the weights of all samples' light: [`WEIGHT_OF_PROBE`] for a probe, 1 for another sample; at
+    /// least 1/2.
     pub fn weight_of_light(self) -> f64 {
         (f64::from(self.samples) - f64::from(1.0 - WEIGHT_OF_PROBE) * f64::from(self.probes)).max(0.5)
     }
@@ -46,12 +46,13 @@ impl SampleCount {
 pub struct Pixel {
     /// Radiance towards the eye, W/(sr m^2).
     pub radiance: [f32; 3],
-    /// Mean albedo of the visible surfaces, 0 to 1 per channel; 0 if no sample sees a surface.
+    /// Mean over all samples of the albedo that a sample shows, 0 to 1 per channel. A sample without a
+    /// surface counts as 0.
     pub albedo: [f32; 3],
-    /// Mean of the visible surfaces' unit normals, in world space, on the side of the eye; 0 if no sample
-    /// sees a surface.
+    /// Mean over all samples of the unit normal that a sample shows, in world space, on the side of the eye.
+    /// A sample without a surface counts as 0.
     pub normal: [f32; 3],
-    /// Mean depth of the visible surfaces, metres along the view axis; infinite if no sample sees a surface.
+    /// Mean depth, metres along the view axis, over the samples that see a surface; infinite if none does.
     pub depth: f32,
 }
 
@@ -62,7 +63,7 @@ pub struct PixelLayers {
     /// pixel's own gather rays.
     pub direct: [f32; 3],
     /// Indirect light, W/(sr m^2): radiance estimates at the ends of gather rays, and interpolated
-    /// irradiance. The latter includes emission that rays of the irradiance records hit.
+    /// irradiance. Interpolated irradiance includes emission that gather rays of irradiance records hit.
     pub indirect: [f32; 3],
     /// Caustics, W/(sr m^2): radiance estimates in the caustic map.
     pub caustic: [f32; 3],
@@ -70,7 +71,8 @@ pub struct PixelLayers {
     pub gathers: f32,
 }
 
-/// Units of the sums in an image's pixels ([`Header::sum_scale`](crate::image::Header::sum_scale)).
+/// Units of a pixel's sums, which the card image states
+/// ([`Header::sum_scale`](crate::image::Header::sum_scale)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SumScale {
     /// Unit of light, W/(sr m^2), a power of two.
@@ -107,7 +109,7 @@ pub struct LayerSums {
     pub indirect: [i64; 3],
     /// Sum of [`PixelLayers::caustic`].
     pub caustic: [i64; 3],
-    /// [`PixelLayers::gathers`].
+    /// Number of samples with a final gather, as in [`PixelLayers::gathers`].
     pub gathers: u32,
 }
 
@@ -236,7 +238,7 @@ impl PixelSums {
         }
     }
 
-    /// Sums without layers whose values are nearest to those of a pixel.
+    /// Sums, without layers, for which [`Self::pixel`] returns the values nearest to `pixel`.
     pub fn nearest(pixel: &Pixel, count: SampleCount, scale: &SumScale) -> Self {
         let Pixel { radiance, albedo, normal, depth } = *pixel;
         let sees = depth.is_finite();
@@ -253,7 +255,8 @@ impl PixelSums {
         }
     }
 
-    /// Adds layers whose values are nearest to `layers`. The light becomes their sum.
+    /// Adds the layer sums for which [`Self::pixel_layers`] returns the values nearest to `layers`. The light
+    /// becomes their sum.
     #[must_use]
     pub fn with_nearest_layers(self, layers: &PixelLayers, count: SampleCount, scale: &SumScale) -> Self {
         let [direct, indirect, caustic] =

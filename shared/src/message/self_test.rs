@@ -64,7 +64,7 @@ pub struct WrongWord {
 pub struct WrongWords {
     /// Number of wrong words, at most `u32::MAX`.
     pub count: u32,
-    /// Union of the bits that differ in any wrong word.
+    /// Bitwise OR of `expected ^ found` over all wrong words.
     pub bits: u32,
     /// The wrong word with the lowest index.
     pub first: Option<WrongWord>,

@@ -12,10 +12,10 @@
 //! - Every frame carries the number of messages of the other direction that were taken (`acknowledged`), and
 //!   which of the next ones have arrived (`held`). A link keeps the order of its bytes: a message is lost if
 //!   one that was sent after it has arrived. Only lost messages are repeated.
-//! - Only a clock reveals that the last messages were lost. The host has one: after some silence it sends
-//!   a [`FrameKind::Probe`] with the number of its transmission. The card's [`FrameKind::Answer`] returns
-//!   that number: host messages sent before the probe that have not arrived are lost. The answer also carries
-//!   the number of messages that the card has sent; missing ones are lost, as the host's next probe states.
+//! - Only a clock reveals that the last messages were lost. The host has one: after some silence it sends a
+//!   [`FrameKind::Probe`] with the number of this transmission. The card's [`FrameKind::Answer`] returns that
+//!   number: host messages sent before the probe that have not arrived are lost. The answer also carries the
+//!   number of messages that the card has sent; missing ones are lost, as the host's next probe states.
 
 mod session;
 
@@ -68,7 +68,7 @@ impl Transport {
     }
 
     /// Number of messages delivered, modulo 2^16: messages taken at this end plus messages acknowledged by
-    /// the other end. It changes with every progress.
+    /// the other end. It changes whenever a message is delivered in either direction.
     pub fn passed(&self) -> u16 {
         self.session.passed()
     }
@@ -133,7 +133,7 @@ impl Transport {
         self.session.lose(|_, _| true);
     }
 
-    /// Number of damaged and repeated frames so far.
+    /// Numbers of damaged and repeated frames and of probes so far.
     pub fn statistics(&self) -> LineStatistics {
         self.session.statistics()
     }

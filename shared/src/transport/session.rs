@@ -7,7 +7,8 @@ use crate::frame::{Frame, FrameHeader, FrameKind, MAX_FRAME, MAX_PAYLOAD, write_
 /// Maximum number of messages in flight in one direction.
 pub const WINDOW: usize = 4;
 
-/// Number of taken messages after which an acknowledgement is sent without a request.
+/// Number of taken messages after which an acknowledgement is sent without a call of
+/// `Transport::acknowledge`.
 const MAX_UNACKNOWLEDGED: u16 = WINDOW as u16 / 2;
 
 /// Statistics of damage and repetition on a link, as one end observes them.
@@ -50,13 +51,13 @@ struct Outgoing {
     passage: Passage,
 }
 
-/// A received message that is not taken. It is empty unless `has_come`.
+/// Slot for a message that was received and is not taken. `payload` is meaningless unless `has_come`.
 struct Incoming {
     payload: Vec<u8, MAX_PAYLOAD>,
     has_come: bool,
 }
 
-/// Frame without a message that is to be sent.
+/// Kind of frame without a message, to be sent next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Control {
     Acknowledge,
@@ -73,7 +74,6 @@ pub(super) enum End {
     Card,
 }
 
-/// The state of one session.
 pub(super) struct LinkSession {
     end: End,
     /// Number of the session; `None` before the first.
@@ -88,8 +88,8 @@ pub(super) struct LinkSession {
     next: u16,
     /// Number of transmissions so far: frames with messages, and probes.
     transmissions: u16,
-    /// Number of messages that the other end had sent by its last answer; missing ones with lower numbers are
-    /// lost. The next probe reports it.
+    /// Number of messages that the other end had sent when it sent its last answer, if some of them are
+    /// missing. These are lost, as the next probe states.
     lost_below: Option<u16>,
     /// Payload of the other end's last probe, which the answer returns.
     asked: [u8; 2],
@@ -178,7 +178,6 @@ impl LinkSession {
         self.unacknowledged > 0
     }
 
-    /// Counts a damaged frame.
     pub(super) fn count_damaged(&mut self) {
         self.statistics.damaged += 1;
     }
@@ -212,7 +211,8 @@ impl LinkSession {
         });
     }
 
-    /// Writes the next frame. Messages come before answers and probes.
+    /// Writes the next frame: the reply to an unknown session, else a message, else an acknowledgement, an
+    /// answer or a probe.
     pub(super) fn write_next(&mut self, wire: &mut Vec<u8, MAX_FRAME>) {
         if let Some(Control::Unknown(number)) = self.control {
             self.control = None;
@@ -301,11 +301,12 @@ impl LinkSession {
         Some(Event::Heard)
     }
 
-    /// Processes the acknowledgements of a header, and marks messages as lost that they prove lost.
+    /// Processes the acknowledgements of a header. Marks as lost the messages that were sent before one that
+    /// has arrived, and have not arrived.
     fn learn(&mut self, header: &FrameHeader) {
         let taken = header.acknowledged.wrapping_sub(self.oldest);
         if taken > self.on_their_way() {
-            // An acknowledgement that is older than a known one, or of messages never sent.
+            // The acknowledgement is older than a known one, or of messages never sent.
             return;
         }
         let mut latest: Option<u16> = None;
@@ -345,7 +346,7 @@ impl LinkSession {
     fn keep(&mut self, number: u16, payload: &[u8]) {
         let offset = number.wrapping_sub(self.expected);
         if offset >= WINDOW as u16 || self.has_come(number) {
-            // A repetition: the acknowledgement was lost, and is repeated.
+            // A repetition: the acknowledgement of the message was lost, and is sent again.
             self.statistics.duplicates += 1;
             return self.ask_for(Control::Acknowledge);
         }

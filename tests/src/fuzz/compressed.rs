@@ -1,4 +1,4 @@
-//! Fuzzing of compressed buffer views and primitives: damaged streams in valid scenes.
+//! Fuzzing of compressed buffer views and primitives: damaged streams in otherwise valid scenes.
 
 use std::path::PathBuf;
 
@@ -10,22 +10,22 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound, write_anew};
 
-/// Scenes with buffer views of every mode and filter, in both versions of meshopt.
+/// Scenes with buffer views of every mode and filter, in both versions of meshopt's format.
 const MESHOPT: [&[u8]; 2] = [
     include_bytes!("../../../driver/scene/tests/it/compressed/meshopt-0.glb"),
     include_bytes!("../../../driver/scene/tests/it/compressed/meshopt-1.glb"),
 ];
 
-/// Scenes with a primitive that has every attribute, compressed by both encoders of Draco.
+/// Scenes with a primitive that has every attribute, encoded by either method of Draco.
 const DRACO: [&[u8]; 2] = [
     include_bytes!("../../../driver/scene/tests/it/compressed/draco-edgebreaker.glb"),
     include_bytes!("../../../driver/scene/tests/it/compressed/draco-sequential.glb"),
 ];
 
-/// Target for compressed contents. An input is a scene.
+/// Target for compressed streams. An input is a scene in GLB.
 pub(super) struct Streams {
     name: &'static str,
-    /// Maximum number of decoded bytes per byte of a stream.
+    /// Maximum number of bytes that are allocated per byte of a stream.
     expansion: usize,
     /// JSON and binary chunk of each scene.
     scenes: Vec<(Vec<u8>, Vec<u8>)>,
@@ -39,7 +39,7 @@ impl Streams {
     }
 
     pub(super) fn draco() -> Self {
-        // Its scenes have accessors of a few elements, which bound what a stream stands for.
+        // The scenes' accessors have few elements, which bounds what a stream decodes to.
         Self::new("draco", DRACO, 0)
     }
 
@@ -68,7 +68,7 @@ impl Target for Streams {
         let (text, streams) = random.pick(&self.scenes);
         let mut edited = streams.clone();
         mutation::edit(&mut edited, &self.streams, random);
-        // The JSON states the places of all streams: bytes that an edit removed are missing at the end.
+        // The JSON states the ranges of the streams: the binary chunk keeps its length.
         edited.resize(streams.len(), 0);
         glb(text, &edited)
     }

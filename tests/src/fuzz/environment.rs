@@ -1,4 +1,4 @@
-//! Fuzzing of environment maps in Radiance format. Those in `OpenEXR` are covered by `picture`.
+//! Fuzzing of environment maps in Radiance format; `picture` covers those in `OpenEXR`.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ pub(super) struct Environments {
 /// Width of the run-length encoded picture, pixels.
 const WIDTH: u8 = 12;
 
-/// Pictures with plain and with run-length encoded rows.
+/// Radiance pictures, one with plain and one with run-length encoded scanlines.
 pub(crate) fn pictures() -> Vec<Vec<u8>> {
     let header = b"#?RADIANCE\nSOFTWARE=any\nEXPOSURE=2.0\nFORMAT=32-bit_rle_rgbe\n\n";
     let mut flat = [&header[..], b"-Y 2 +X 3\n"].concat();
@@ -27,7 +27,7 @@ pub(crate) fn pictures() -> Vec<Vec<u8>> {
     for row in 0..3 {
         encoded.extend([2, 2, 0, WIDTH]);
         for channel in 0..4 {
-            // A run, and literals.
+            // A scanline of a channel is a run of 8 bytes, and 4 literal bytes.
             encoded.extend([128 + WIDTH - 4, 120 + channel, 4, row, 2 * row, 3, 128]);
         }
     }

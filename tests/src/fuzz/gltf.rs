@@ -1,4 +1,4 @@
-//! Fuzzing of scenes: glTF as text and as GLB, loaded and packed.
+//! Fuzzing of scenes: glTF as text and as GLB, which are loaded and packed.
 
 use std::path::{Path, PathBuf};
 
@@ -12,15 +12,15 @@ use super::mutation;
 use super::random::Random;
 use super::target::{Target, bound, write_anew};
 
-/// Maximum number of triangles of a scene that is packed. Larger ones are only loaded.
+/// Maximum number of triangles of a scene that is packed; a larger one is only loaded.
 const MAX_PACKED: usize = 2000;
 
 /// Target for scenes.
 pub(super) struct Scenes {
     texts: Vec<Vec<u8>>,
-    /// JSON and binary chunk of each scene in GLB.
+    /// JSON and binary chunk of each scene in GLB form.
     binaries: Vec<(Vec<u8>, Vec<u8>)>,
-    /// All scenes as files.
+    /// All scenes as whole files.
     files: Vec<Vec<u8>>,
     folder: TempDir,
 }
@@ -35,12 +35,12 @@ const SHIPPED: [&[u8]; 3] = [
     include_bytes!("../../../scenes/cornell-glossy.gltf"),
 ];
 
-/// Image files. They follow the triangle's data in the buffer, aligned to four bytes.
+/// Image files, which follow the triangle's data in the buffer, aligned to four bytes.
 const PNG: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/texel.png");
 const JPEG: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/grey.jpg");
 
-/// Buffer of a triangle: vertices, indices, an index and a position of a sparse accessor, coordinates,
-/// colours, joints, weights, a matrix, images, and times, rotations and weights of keyframes.
+/// Buffer of a triangle: vertices; indices; index and position of a sparse accessor; texture coordinates;
+/// colours; joints; weights; a matrix; images; times, rotations and weights of keyframes.
 fn triangle_bytes() -> Vec<u8> {
     let vertices = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let indices = [0_u16, 1, 2, 1].map(u16::to_le_bytes);
@@ -74,7 +74,7 @@ fn triangle_bytes() -> Vec<u8> {
     bytes
 }
 
-/// Scene as text whose buffer is a data URI.
+/// glTF text with its buffer as a data URI.
 fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let data: String = bytes.iter().map(|byte| format!("%{byte:02x}")).collect();
     let text = String::from_utf8_lossy(text);
@@ -83,7 +83,7 @@ fn with_data(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     text.replace(&stated, &format!("{stated}, \"uri\": \"data:,{data}\"")).into_bytes()
 }
 
-/// GLB with correct lengths in its headers.
+/// GLB of a JSON and a binary chunk, with correct lengths.
 pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let mut text = text.to_vec();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -99,7 +99,7 @@ pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     file
 }
 
-/// Splits a GLB of two chunks into JSON and bytes.
+/// Splits a GLB of two chunks into its JSON and its binary chunk.
 pub(crate) fn split_glb(file: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     let chunk = |at: usize| {
         let length = u32::from_le_bytes(*file.get(at..)?.first_chunk()?) as usize;
@@ -109,7 +109,7 @@ pub(crate) fn split_glb(file: &[u8]) -> Option<(Vec<u8>, Vec<u8>)> {
     Some((text.to_vec(), chunk(12 + 8 + text.len())?.to_vec()))
 }
 
-/// Scene with every feature that the loader reads, as text.
+/// Scene [`RICH`] as text.
 pub(crate) fn rich() -> Vec<u8> {
     with_data(RICH, &triangle_bytes())
 }
@@ -130,14 +130,14 @@ impl Scenes {
     }
 }
 
-/// Makes few edits, because most single ones already make a scene invalid.
+/// Makes few edits: most single ones already make a scene invalid.
 fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     for _ in 0..1 + random.edits() / 3 {
         mutation::edit_json(text, random);
     }
 }
 
-/// Loads a scene, evaluates it at a time of its animations, and returns it at rest.
+/// Loads a scene at rest and at 1 s of its animations. Returns it at rest.
 pub(crate) fn load(path: &Path) -> Result<Scene, SceneError> {
     let file = SceneFile::open(path, &LoadSettings::default())?;
     let scene = file.at_rest()?;
@@ -154,7 +154,7 @@ impl Target for Scenes {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // A node takes a few bytes of JSON, and some hundred in memory.
+        // A node takes a few bytes of JSON, and some hundreds in memory.
         bound(input, 1024)
     }
 

@@ -1,5 +1,5 @@
-//! Fuzzing of files with a head: parts of pictures and prepared scenes. In half of the inputs the checksums
-//! are recomputed, as an attacker would.
+//! Fuzzing of files that begin with a head: parts of pictures, and prepared scenes. Half of the inputs have
+//! correct checksums, as from an attacker.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,15 +17,15 @@ use super::random::Random;
 use super::target::{Target, write_anew};
 use crate::everything::everything;
 
-/// Maximum number of bytes that a file may allocate: the patches of the largest picture, although the file
-/// contains almost none of them.
+/// Maximum number of bytes in use for a file: its head may state the largest picture, whose patches take
+/// memory although the file lacks them.
 const BOUND: usize = 256 << 20;
-/// Alignment of the lines in a prepared scene, bytes.
+/// Alignment of a prepared scene's lines in its file, bytes.
 const PAGE: usize = 4096;
-/// First bytes of a tile's record in a part.
+/// First bytes of a tile's record in the file of a part.
 const TILE: &[u8] = b"\x89TILE";
 
-/// Target for one kind of files.
+/// Target for the files of one kind.
 pub(super) struct Files {
     name: &'static str,
     seeds: Vec<Vec<u8>>,
@@ -34,7 +34,7 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Creates the target for parts: one that is the whole picture, and one of three.
+    /// Creates the target for parts. The seeds are a part that is the whole picture, and one of three.
     pub(super) fn parts() -> Self {
         let folder = tempfile::tempdir().expect("there is room for a folder");
         let settings = settings();
@@ -55,7 +55,7 @@ impl Files {
         Self { name: "parts", seeds, folder, read: read_part }
     }
 
-    /// Creates the target for a prepared scene with every kind of section.
+    /// Creates the target for prepared scenes. The seed has every kind of section.
     pub(super) fn prepared() -> Self {
         let folder = tempfile::tempdir().expect("there is room for a folder");
         let RenderSettings { photons, integrator, .. } = settings();
@@ -82,7 +82,7 @@ fn settings() -> RenderSettings {
     })
 }
 
-/// Reads a part, and merges it if the picture has no other.
+/// Reads a part, and merges the picture if this is its only part.
 fn read_part(path: &Path) -> bool {
     match Parts::open(&[path.to_owned()]).and_then(|parts| parts.merge()) {
         Ok(merged) => {
@@ -104,12 +104,12 @@ fn read_prepared(path: &Path) -> bool {
             return false;
         }
     };
-    // Which settings are possible is a render's to say.
+    // Settings may be invalid: a render would refuse them.
     let _ = settings.check();
     true
 }
 
-/// File with an edited head and a recomputed checksum, to which its tiles are bound.
+/// File with an edited head, and with correct checksums of the head and of tiles.
 fn resigned(file: &[u8], page: usize, random: &mut Random) -> Vec<u8> {
     let mut lines = file.splitn(3, |&byte| byte == b'\n');
     let [title, head, rest] = [(); 3].map(|()| lines.next().unwrap_or_default().to_vec());
@@ -126,7 +126,7 @@ fn resigned(file: &[u8], page: usize, random: &mut Random) -> Vec<u8> {
     [bytes, body].concat()
 }
 
-/// Recomputes the checksums of tiles, which include that of the head.
+/// Recomputes the checksums of all tile records, which cover the head's checksum too.
 fn bind_tiles(body: &mut [u8], head: [u8; 4]) {
     let starts: Vec<usize> = (0..body.len()).filter(|&place| body[place..].starts_with(TILE)).collect();
     let ends: Vec<usize> = starts.iter().skip(1).copied().chain([body.len()]).collect();

@@ -1,4 +1,4 @@
-//! Fuzzing of card images. A card that loads one must render a tile or answer with a fault.
+//! Fuzzing of card images. A card that accepts an image must render a tile or report a fault.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -21,16 +21,16 @@ use crate::{camera, lambertian, room, scene};
 
 /// Number of lines of the card's memory.
 const DRAM_LINES: usize = 1024;
-/// Tile in the middle of the picture that sees several walls.
+/// Tile in the middle of the picture, in which several walls are seen.
 const TILE: Tile = Tile { id: 7, x: 2, y: 2, width: 4, height: 4 };
 
-/// Target for card images. An input is a byte that selects the techniques, followed by an image.
+/// Target for card images. An input is a byte that selects techniques, and an image.
 pub(super) struct Image {
     seeds: Vec<Vec<u8>>,
 }
 
-/// Card images of two scenes. The lit room has a few photons in both layouts of the photon map, with
-/// irradiance points. The scene with every feature has a caustic map.
+/// Card images of a lit room with a few photons and irradiance points, in both layouts of the photon map, and
+/// of the scene with every feature, with a caustic map.
 fn images() -> [CardImage; 3] {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;
@@ -54,7 +54,7 @@ fn images() -> [CardImage; 3] {
     [tree, leaves, mapped.image]
 }
 
-/// Frame with the techniques that a byte selects.
+/// Frame with the techniques that the bits of `choice` select.
 fn frame(choice: u8) -> FrameParameters {
     let settings = RenderSettings {
         picture: Picture { width: 8, height: 8, ..Picture::default() },
@@ -87,13 +87,13 @@ impl Image {
     }
 }
 
-/// Makes one edit of an image. Most edits keep the positions of lines.
+/// Makes one edit of an image. Most edits keep all lines in their places.
 fn edit(image: &mut Vec<u8>, seeds: &[Vec<u8>], random: &mut Random) {
     let lines = image.len() / LINE_BYTES;
     if lines == 0 {
         return;
     }
-    // A word of a line, sometimes of the header: all but the first are numbers.
+    // A word of the header behind its first three, any byte of a line, or a word of a line.
     let place = match random.below(4) {
         0 => 12 + 4 * random.below(HEADER_LINES * LINE_BYTES / 4 - 3),
         1 => LINE_BYTES * random.below(lines) + random.below(LINE_BYTES),
@@ -130,7 +130,7 @@ impl Target for Image {
         for _ in 0..random.edits() {
             edit(&mut image, &self.seeds, random);
         }
-        // An image with more or fewer lines than its header states is rejected: rarely worth a try.
+        // Most inputs state their true number of lines in the header: others are refused at once.
         if !random.once_in(16) && image.len() >= LINE_BYTES {
             let lines = (image.len() / LINE_BYTES) as u32;
             image[12..16].copy_from_slice(&lines.to_le_bytes());
@@ -145,7 +145,7 @@ impl Target for Image {
         let mut memory = vec![Line::ZERO; DRAM_LINES];
         let mut wire = Wire::new(&mut memory);
         wire.hello();
-        // If there is no room for the image, each of its commands is a fault.
+        // If the memory is too small for the image, each command of the load is answered by a fault.
         match wire.load(&lines).last() {
             Some(Answer::ImageAccepted) => {}
             Some(Answer::Fault(_)) => return false,
@@ -153,7 +153,7 @@ impl Target for Image {
         }
         match wire.say(&Command::BeginFrame(frame(choice)))[..] {
             [Answer::FrameAccepted] => {}
-            // The edited image may have lost its irradiance points.
+            // An edit may have removed the irradiance points from the header.
             [Answer::Fault(FaultCode::Parameter)] if frame(choice).radiance == Radiance::Precomputed => {
                 return false;
             }
@@ -171,7 +171,7 @@ impl Target for Image {
     }
 }
 
-/// Number of pixels in the answers.
+/// Number of pixels in all answers.
 fn pixels(answers: &[Answer]) -> usize {
     let count = |answer: &Answer| if let Answer::Pixels(count) = answer { *count } else { 0 };
     answers.iter().map(count).sum()

@@ -1,4 +1,4 @@
-//! Fuzzing of messages: payloads of frames that may be commands, replies, or neither.
+//! Fuzzing of messages: payloads that may be commands, replies, or neither.
 
 use photoncard_firmware::kind::{MICRO, REFERENCE};
 use photoncard_shared::counters::Counters;
@@ -17,7 +17,7 @@ pub(super) struct Messages {
     seeds: Vec<Vec<u8>>,
 }
 
-/// Frame that every chip can render.
+/// Parameters of a frame that every kind of chip can render.
 pub(super) fn frame() -> FrameParameters {
     let camera = Camera {
         origin: [0.0, 1.0, 5.0],
@@ -120,13 +120,13 @@ impl Messages {
     }
 }
 
-/// Decodes and re-encodes a command. The result must not be longer.
+/// Decodes a command and encodes it again, which must not make it longer. `None` if the input is no command.
 fn rewritten_command(input: &[u8]) -> Option<Vec<u8>> {
     let command = message::decode::<Command>(input)?;
     Some(written(input.len(), |bytes| message::encode(&command, bytes)))
 }
 
-/// Decodes and re-encodes a reply. The result must not be longer.
+/// Decodes a reply and encodes it again, which must not make it longer. `None` if the input is no reply.
 fn rewritten_reply(input: &[u8]) -> Option<Vec<u8>> {
     let reply = message::decode::<Reply>(input)?;
     Some(written(input.len(), |bytes| message::encode(&reply, bytes)))

@@ -1,9 +1,8 @@
-//! Fuzzing of all readers of foreign bytes. Inputs are mutated; each is a function of its target, a seed and
-//! a number.
+//! Fuzzing of all readers of foreign bytes, by mutated inputs. An input is a function of target, seed and
+//! number, by which it can be repeated.
 //!
 //! No input may panic, take longer than some seconds, or allocate more than a bound. A coverage-guided fuzzer
-//! would do more, but needs a build of its own, of instrumented code. A failing input is repeated by its
-//! number.
+//! would find more, but needs another build, of instrumented code.
 
 mod compressed;
 pub(crate) mod environment;

@@ -1,15 +1,15 @@
-//! Mutations of bytes and of JSON tokens.
+//! Random edits of bytes and of JSON tokens.
 
 use std::ops::Range;
 
 use super::random::Random;
 
-/// Maximum length of a mutated input.
+/// Maximum length of an input after an edit, bytes.
 const MAX_BYTES: usize = 1 << 17;
-/// Maximum length of a chunk that is inserted, deleted, repeated or taken from another input.
+/// Maximum length of the range that an edit inserts, deletes, repeats or takes from another input, bytes.
 const CHUNK: usize = 256;
 
-/// Words at the limits of integer fields.
+/// Integers at the limits of fields of 8 to 64 bits.
 const WORDS: [u64; 24] = [
     0,
     1,
@@ -55,20 +55,20 @@ const FLOATS: [f32; 14] = [
     16_777_216.0,
 ];
 
-/// Random range of `bytes`.
+/// Random range within `bytes` bytes, of at most [`CHUNK`].
 fn chunk(bytes: usize, random: &mut Random) -> Range<usize> {
     let start = random.below(bytes);
     let most = CHUNK.min(bytes - start);
     start..start + random.below(most + 1)
 }
 
-/// Overwrites the bytes at `place` with a word of [`WORDS`], of 1, 2, 4 or 8 bytes.
+/// Overwrites 1, 2, 4 or 8 bytes from `place` on by a number of [`WORDS`] or [`FLOATS`].
 pub(crate) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
     let word = if random.once_in(3) {
         u64::from(random.pick(&FLOATS).to_bits())
     } else {
         let word = *random.pick(&WORDS);
-        // Sometimes a neighbour of the word.
+        // One of four is up to 63 less than the listed number.
         if random.once_in(4) { word.wrapping_sub(random.below(64) as u64) } else { word }
     };
     let mut word = word.to_le_bytes();
@@ -81,7 +81,7 @@ pub(crate) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
     }
 }
 
-/// Makes one edit of arbitrary bytes. Inserted chunks come from the bytes themselves and from `others`.
+/// Makes one edit of arbitrary bytes. Inserted ranges come from the bytes themselves and from `others`.
 pub(crate) fn edit_bytes(bytes: &mut Vec<u8>, others: &[Vec<u8>], random: &mut Random) {
     if bytes.is_empty() {
         bytes.push(random.next() as u8);
@@ -175,7 +175,7 @@ const STRINGS: [&str; 14] = [
     "0",
 ];
 
-/// Ranges of the numbers in a text or, if `strings`, of its strings with their quotes.
+/// Ranges of the numbers in JSON text or, if `strings`, of its strings with their quotes.
 fn tokens(text: &[u8], strings: bool) -> Vec<Range<usize>> {
     let mut found = Vec::new();
     let mut at = 0;
@@ -203,7 +203,7 @@ fn tokens(text: &[u8], strings: bool) -> Vec<Range<usize>> {
     found
 }
 
-/// End of the value that begins at `start`: the position of the comma or bracket after it.
+/// End of the JSON value that begins at `start`: position of the comma or bracket behind it.
 fn value_end(text: &[u8], start: usize) -> usize {
     let (mut depth, mut is_string) = (0, false);
     for (offset, &byte) in text[start..].iter().enumerate() {
@@ -218,7 +218,7 @@ fn value_end(text: &[u8], start: usize) -> usize {
     text.len()
 }
 
-/// Makes one edit of JSON text that keeps most of its structure.
+/// Makes one edit of JSON text, most often of a single token.
 pub(crate) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     let is_string = random.once_in(3);
     let found = tokens(text, is_string);
@@ -229,7 +229,7 @@ pub(crate) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     let other = text[random.pick(&found).clone()].to_vec();
     match random.below(16) {
         0 => drop(text.splice(place, other)),
-        // A small change keeps indices and factors in range.
+        // One digit changes, so that most indices and factors stay in range.
         1..=5 if !is_string => {
             let digit = place.start + random.below(place.len());
             if text[digit].is_ascii_digit() {
@@ -246,19 +246,19 @@ pub(crate) fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
             drop(text.splice(place, new.into_bytes()));
         }
         12 => {
-            // Repeats a value as the next of its array or object.
+            // A value is repeated, as the next element of its array or object.
             let end = value_end(text, place.start);
             let mut copy = text[place.start..end].to_vec();
             copy.push(b',');
             drop(text.splice(place.start..place.start, copy));
         }
         13 => {
-            // Deletes a value with its comma.
+            // A value is deleted, with its comma.
             let end = (value_end(text, place.start) + 1).min(text.len());
             drop(text.drain(place.start..end));
         }
         _ => {
-            // Nests a value, sometimes deeper than a reader may follow.
+            // A value is nested in arrays, at times deeper than a reader may follow.
             let depth = if random.once_in(4) { 200 + random.below(4000) } else { random.below(4) };
             let nested = [vec![b'['; depth], other, vec![b']'; depth]].concat();
             drop(text.splice(place, nested));

@@ -1,4 +1,4 @@
-//! Fuzzing of pictures: `OpenEXR` files of every compression, read and compared.
+//! Fuzzing of `OpenEXR` pictures of every compression, which are read and compared.
 
 use std::io::Cursor;
 use std::path::PathBuf;
@@ -18,7 +18,7 @@ use super::target::{Target, bound, write_anew};
 
 /// Width and height of the pictures, pixels.
 const SIZE: [usize; 2] = [20, 36];
-/// Maximum number of pixels of a picture that is compared. Larger ones are only read.
+/// Maximum number of pixels of a picture that is compared; a larger one is only read.
 const MAX_COMPARED: usize = 1 << 16;
 
 /// Target for pictures.
@@ -46,7 +46,7 @@ fn picture(compression: Compression, blocks: Blocks, is_half: bool) -> Option<Ve
     Some(bytes.into_inner())
 }
 
-/// Pictures with each compression that the encoder supports, in scanlines and in tiles.
+/// Pictures with each compression that the encoder has, in scanlines and in tiles.
 pub(crate) fn pictures() -> Vec<Vec<u8>> {
     let compressions = [
         Compression::Uncompressed,
@@ -87,14 +87,14 @@ impl Target for Pictures {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Deflate expands a byte to at most 1100: halves of three channels, which are read as floats of twice
-        // the size, and three blocks.
+        // Deflate expands a byte to at most 1032. Halves of three channels are read as floats, of twice the
+        // size, and three blocks are decoded at once.
         bound(input, 8192)
     }
 
     fn input(&self, random: &mut Random) -> Vec<u8> {
         let mut file = random.pick(&self.seeds).clone();
-        // The header is a small part of a file, but its most meaningful one.
+        // Half of the edits are in the header: it is short, but all else depends on it.
         let header = 400.min(file.len());
         for _ in 0..random.edits() {
             let place = random.below(header);

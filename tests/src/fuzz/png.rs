@@ -1,19 +1,19 @@
-//! Mutations of PNG chunks with correct lengths and checksums, so that decoders read their contents.
+//! Edits of PNG chunks with correct lengths and checksums, so that decoders read the chunks.
 
 use super::{Random, mutation};
 
 /// Signature of PNG.
 pub(crate) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
-/// Type and data of a chunk.
+/// Type and data of a PNG chunk.
 type Chunk = ([u8; 4], Vec<u8>);
 
-/// Types of chunks that a decoder interprets.
+/// Types of chunks that decoders interpret.
 const TYPES: [&[u8; 4]; 9] =
     [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"gAMA", b"iCCP", b"acTL", b"fcTL"];
 
-/// Makes one edit of a file's chunks: of the data of one chunk, or of the list of chunks. Bytes after the
-/// last chunk are lost.
+/// Makes one edit of a PNG: of the data of a chunk, or of the list of chunks. Bytes behind the last chunk are
+/// lost.
 pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     let mut chunks = split(file);
     if chunks.is_empty() {
@@ -39,7 +39,7 @@ pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     *file = join(&chunks);
 }
 
-/// Corrects the checksums of chunks without other changes.
+/// Corrects the checksums of all chunks, and nothing else.
 pub(crate) fn mend_checksums(file: &mut [u8]) {
     let mut at = MAGIC.len();
     while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk::<4>()) {
@@ -100,8 +100,7 @@ mod tests {
         assert_eq!(damaged, FILE);
     }
 
-    /// Checks that edits include palettes whose length is no multiple of three, for which a decoder has
-    /// panicked.
+    /// Edits must include palettes whose length is no multiple of three: a decoder has panicked on one.
     #[test]
     fn palettes_of_odd_lengths_are_reached() {
         let odd = |number| {

@@ -7,7 +7,7 @@ pub struct Random(u64);
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
 
 impl Random {
-    /// Creates the sequence for input `number` of a target.
+    /// Creates the sequence of input `number` of a target.
     pub fn new(target: &str, seed: u64, number: u64) -> Self {
         let mut random = Self(0);
         for part in target.bytes().map(u64::from).chain([seed, number]) {
@@ -42,8 +42,7 @@ impl Random {
         &items[self.below(items.len())]
     }
 
-    /// Number of edits with a geometric distribution: 1 with probability 1/2, each further one half as
-    /// likely.
+    /// Number of edits of an input, 1 to 8: n has the probability `2^-n`, and 8 the rest.
     pub fn edits(&mut self) -> u32 {
         1 + self.next().trailing_zeros().min(7)
     }

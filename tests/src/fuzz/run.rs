@@ -1,4 +1,4 @@
-//! Runs inputs on a separate thread, and detects panics, hangs and excessive allocations.
+//! Runs inputs of a target on a thread of their own, and detects panics, hangs and excessive allocations.
 
 use std::cell::RefCell;
 use std::fmt::Write as _;
@@ -17,11 +17,11 @@ use peak_alloc::PeakAlloc;
 use super::random::Random;
 use super::target::Target;
 
-/// Name of the worker thread, in which panics are findings.
+/// Name of the thread whose panics are findings.
 const WORKER: &str = "fuzz";
-/// Stack size, bytes. It is large because a card's buffers are built on the stack.
+/// Stack of the thread, bytes: a card's buffers are built on it.
 const STACK: usize = 16 << 20;
-/// Interval at which the watchdog polls.
+/// Interval at which the time of the present input is checked.
 const GLANCE: Duration = Duration::from_millis(100);
 /// Number of failures after which a run ends.
 const MAX_FAILURES: usize = 20;
@@ -35,11 +35,11 @@ pub struct Settings {
     pub first: u64,
     /// Number of inputs.
     pub inputs: u64,
-    /// Time after which the run ends even if inputs are left.
+    /// Time after which the run ends, with inputs left; `None` for no limit.
     pub time: Option<Duration>,
     /// Time limit of one input.
     pub patience: Duration,
-    /// Folder for failing inputs, and for the number of the current one.
+    /// Folder for the bytes of failing inputs, and for the number of the present one.
     pub folder: PathBuf,
 }
 
@@ -59,7 +59,7 @@ pub struct Report {
     pub inputs: u64,
     /// Number of valid inputs.
     pub sound: u64,
-    /// Maximum number of bytes allocated at once by one input, with the input's number; 0 if [`PeakAlloc`] is
+    /// Maximum number of bytes in use at once for one input, with the input's number; 0 if [`PeakAlloc`] is
     /// not the allocator.
     pub peak: (usize, u64),
     /// Maximum time of an input, with the input's number.
@@ -74,8 +74,8 @@ thread_local! {
     static LAST_PANIC: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Installs a panic hook that stores the message of a worker's panic instead of printing it, because the
-/// tested code catches some panics.
+/// Installs a panic hook that stores the message of a panic on the worker thread. Code under test catches
+/// some panics, which must not be printed.
 fn keep_panics() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -90,7 +90,7 @@ fn keep_panics() {
     });
 }
 
-/// Runs inputs of a target and reports failures.
+/// Runs inputs of a target, and returns the failures among them.
 ///
 /// # Panics
 /// If the system cannot start a thread.
@@ -117,8 +117,8 @@ pub fn fuzz(target: &Arc<dyn Target>, settings: &Settings) -> Report {
     report
 }
 
-/// Waits for the worker's report, or until an input exceeds `patience`. The thread of such an input
-/// continues, because it cannot be killed.
+/// Waits for the worker's report, or until an input exceeds `patience`. A thread cannot be killed: that of
+/// such an input runs on.
 fn watch(reports: &Receiver<Report>, at: &AtomicU64, patience: Duration) -> Report {
     let (mut last, mut since) = (at.load(Ordering::Relaxed), Instant::now());
     loop {
@@ -144,7 +144,7 @@ fn watch(reports: &Receiver<Report>, at: &AtomicU64, patience: Duration) -> Repo
 fn run(target: &dyn Target, settings: &Settings, at: &AtomicU64) -> Report {
     let mut report = Report::default();
     let begin = Instant::now();
-    // A failure that ends the process, such as a stack overflow, leaves this number behind.
+    // If a failure ends the process, such as a stack overflow, the file still has the input's number.
     let trace =
         settings.folder.join(format!("{}-{}-from-{}.at", target.name(), settings.seed, settings.first));
     let file = std::fs::create_dir_all(&settings.folder).and_then(|()| File::create(&trace)).ok();

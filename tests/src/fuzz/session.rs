@@ -1,4 +1,4 @@
-//! Fuzzing of a host's session by a hostile card: mutated replies in any order, unrequested replies, and
+//! Fuzzing of a host's session by a hostile card: mutated replies in any order, replies to no command, and
 //! resets.
 
 use std::sync::{Arc, Mutex};
@@ -24,25 +24,25 @@ use super::random::Random;
 use super::target::{Target, bound};
 use super::{messages, mutation};
 
-/// Number of lines of the image: several chunks and a partial one.
+/// Number of lines of the card image: several chunks, of which the last is not full.
 const LINES: u32 = 200;
 /// Side of a tile, pixels. The picture has two tiles.
 const SIDE: u32 = 6;
 /// Simulated time per step.
 const STEP: Duration = Duration::from_millis(50);
-/// Maximum number of frames exchanged per step.
+/// Maximum number of frames that the two ends exchange in a step.
 const MAX_FRAMES: usize = 64;
-/// Number of steps after which a session with a silent card must have failed.
+/// Maximum number of steps until a session with a silent card has failed.
 const MAX_STEPS: usize = 400;
 
-/// First byte of a record in an input: an action of the card. Other values send the reply that follows. The
-/// first byte of the input states whether the frame has layers.
+/// Action in the first byte of a record of an input. Actions other than this and [`WAIT`] send the reply in
+/// the record. The first byte of an input says whether the frame has layers.
 const RESET: u8 = 0xff;
 const WAIT: u8 = 0xfe;
 
 /// Target for sessions.
 pub(super) struct Sessions {
-    /// Replies of a valid session in order, without and with layers.
+    /// Replies of a valid session in order: without layers, and with them.
     replies: [Vec<Vec<u8>>; 2],
     others: Vec<Vec<u8>>,
     upload: Arc<Upload>,
@@ -94,7 +94,7 @@ impl Sessions {
         }
     }
 
-    /// Mutated or valid reply of a hostile card.
+    /// Reply of a hostile card: in most cases the valid one, at times mutated or another.
     fn reply(&self, replies: &[Vec<u8>], sound: &[u8], random: &mut Random) -> Vec<u8> {
         let mut bytes = match random.below(16) {
             0 => random.pick(&self.others).clone(),
@@ -109,14 +109,14 @@ impl Sessions {
     }
 }
 
-/// Appends a record to an input.
+/// Appends a record to an input: action, length, reply.
 fn put(input: &mut Vec<u8>, what: u8, reply: &[u8]) {
     input.push(what);
     input.extend((reply.len() as u16).to_le_bytes());
     input.extend(reply);
 }
 
-/// Next record of an input: the card's action, and its reply.
+/// Takes the next record of an input: the card's action, and a reply.
 fn next_record<'a>(input: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
     let (&[what, low, high], rest) = input.split_first_chunk()?;
     let length = usize::from(u16::from_le_bytes([low, high])).min(rest.len()).min(MAX_PAYLOAD);
@@ -125,7 +125,7 @@ fn next_record<'a>(input: &mut &'a [u8]) -> Option<(u8, &'a [u8])> {
     Some((what, reply))
 }
 
-/// Both ends of the link.
+/// Both ends of the link, with the dispatcher that deals tiles.
 struct Ends<'a> {
     session: Session,
     card: Transport,
@@ -134,7 +134,7 @@ struct Ends<'a> {
 }
 
 impl Ends<'_> {
-    /// Exchanges all pending frames, and advances the time by a step.
+    /// Exchanges all pending frames, and advances the time by [`STEP`].
     fn step(&mut self, is_silent: bool) -> Result<(), SessionError> {
         for _ in 0..MAX_FRAMES {
             self.dispatcher.supply(0, &mut self.session, self.now);
@@ -161,7 +161,7 @@ impl Ends<'_> {
         self.session.tick(self.dispatcher.scheduler().slowest(0), self.now)
     }
 
-    /// Handles an error as a render does. Returns whether the session continues.
+    /// Handles the result of a step as a render does. Returns whether the session continues.
     fn goes_on(&mut self, result: &Result<(), SessionError>) -> bool {
         let may_pass = result.as_ref().err().is_some_and(SessionError::may_pass);
         if may_pass {
@@ -221,7 +221,7 @@ impl Target for Sessions {
                 RESET => ends.card = Transport::card(),
                 WAIT => ends.now += 40 * STEP,
                 _ => {
-                    // The host's command comes first.
+                    // Before the reply, the host sends its command.
                     let result = ends.step(false);
                     if !ends.goes_on(&result) {
                         return was_loaded;

@@ -1,4 +1,4 @@
-//! Fuzzing of textures: PNG, JPEG, WebP and KTX2 files in a valid scene.
+//! Fuzzing of textures: PNG, JPEG, WebP and KTX2 files in an otherwise valid scene.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ pub(super) struct Textures {
     folder: TempDir,
 }
 
-/// Images of all colour types of PNG, because no edit of a byte adds a palette.
+/// Images, of PNG one of each colour type: no edit of a byte would add a palette.
 const SEEDS: [&[u8]; 14] = [
     include_bytes!("../../../driver/scene/tests/it/images/texel.png"),
     include_bytes!("../../../driver/scene/tests/it/images/palette.png"),
@@ -34,11 +34,11 @@ const SEEDS: [&[u8]; 14] = [
     include_bytes!("../../../driver/scene/tests/it/images/uastc-zstd.ktx2"),
 ];
 
-/// Memory of the card, bytes. It bounds the texels of WebP and of ETC1S in KTX2, which may take no bytes of
-/// the file.
+/// Memory of the card, bytes. It limits the number of texels, which in WebP and in KTX2 with ETC1S may take
+/// no bytes of the file.
 const DRAM_BYTES: u32 = 2 << 20;
 
-/// Scene with one triangle. Its base colour is the second buffer view, of `image_bytes` bytes.
+/// glTF of a triangle whose base colour is the image in the second buffer view, of `image_bytes` bytes.
 fn scene(image_bytes: usize) -> String {
     let length = TRIANGLE_BYTES + image_bytes;
     format!(
@@ -56,7 +56,7 @@ fn scene(image_bytes: usize) -> String {
 
 const TRIANGLE_BYTES: usize = 36;
 
-/// Scene of a triangle whose base colour is an image file.
+/// GLB of a triangle whose base colour is an image file.
 pub(crate) fn textured(image: &[u8]) -> Vec<u8> {
     let triangle = [0_f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_le_bytes);
     let bytes = [triangle.as_flattened(), image].concat();
@@ -80,8 +80,8 @@ impl Target for Textures {
     }
 
     fn allocation_bound(&self, input: usize) -> usize {
-        // Deflate expands a byte to at most 1032, each of eight texels if they have one bit; decoding
-        // requests 16 bytes per texel.
+        // Deflate expands a byte to at most 1032, each of them up to eight texels of one bit. Decoding
+        // allocates at most 17 bytes a texel.
         bound(input, 1032 * 8 * 17)
     }
 

@@ -1,4 +1,4 @@
-//! Fuzzing of frames and of the transport: bytes received by either end.
+//! Fuzzing of frames and of the transport: arbitrary bytes reach either end of a link.
 
 use photoncard_shared::frame::{
     Frame, FrameHeader, FrameKind, FrameReader, MAX_FRAME, MAX_PAYLOAD, write_frame,
@@ -9,16 +9,17 @@ use super::random::Random;
 use super::target::{Target, bound};
 use super::{messages, mutation};
 
-/// Number of the session, for both ends.
+/// Number of the session at both ends.
 const SESSION: u32 = 7;
 /// Message that both ends send.
 const MESSAGE: &[u8] = b"message";
-/// Maximum number of frames that an end sends without receiving any: its messages, and control frames.
+/// Maximum number of frames that an end sends without receiving any: a window of messages, and control
+/// frames.
 const MAX_FRAMES: usize = WINDOW + 4;
 
 /// Target for frames.
 pub(super) struct Frames {
-    /// Frames of all kinds in a valid order.
+    /// Frames of every kind, in an order that is valid.
     seeds: Vec<(FrameHeader, Vec<u8>)>,
     wires: Vec<Vec<u8>>,
 }
@@ -46,7 +47,7 @@ impl Frames {
         Self { seeds, wires }
     }
 
-    /// Frame with an arbitrary header and a correct checksum.
+    /// Encoded frame with an edited header and a correct checksum.
     fn frame(&self, random: &mut Random) -> Vec<u8> {
         let (mut header, mut payload) = random.pick(&self.seeds).clone();
         if random.once_in(2) {
@@ -75,7 +76,8 @@ fn wire(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {
     wire.to_vec()
 }
 
-/// Reads all frames, of which each valid one must re-encode to equal bytes. Returns whether there was one.
+/// Reads all frames; a valid one must encode to the bytes that were read. Returns whether there was a valid
+/// one.
 fn read_frames(input: &[u8], step: usize) -> bool {
     let mut reader = FrameReader::new();
     let mut is_whole = false;
@@ -96,7 +98,7 @@ fn read_frames(input: &[u8], step: usize) -> bool {
     is_whole
 }
 
-/// Drains an end, which may send only a bounded number of valid frames.
+/// Takes all that an end sends: at most [`MAX_FRAMES`] frames, all valid.
 fn drain(end: &mut Transport) {
     for _ in 0..MAX_FRAMES {
         let wire = end.outgoing();
@@ -118,7 +120,7 @@ fn send(end: &mut Transport) -> bool {
     })
 }
 
-/// Feeds bytes to an end, which answers each message with another.
+/// Feeds an end bytes, `step` at a time. The end answers each message by another.
 fn feed(end: &mut Transport, input: &[u8], step: usize) {
     for chunk in input.chunks(step) {
         let mut rest = chunk;
@@ -136,7 +138,7 @@ fn feed(end: &mut Transport, input: &[u8], step: usize) {
     }
 }
 
-/// Checks that the card accepts a new session of the host, whatever it has received before.
+/// Checks that the card accepts a new session of the host, whatever the card has received before.
 fn is_heard(card: &mut Transport) -> bool {
     card.receive(&[0]);
     (SESSION + 1000..).take(2).any(|session| {

@@ -1,4 +1,4 @@
-//! Generates inputs: damaged copies of real files.
+//! Inputs: damaged copies of real files.
 
 use std::fs;
 use std::path::Path;
@@ -6,16 +6,16 @@ use std::path::Path;
 use super::Kind;
 use crate::fuzz::{Random, environment, gltf, mutation, picture, png, texture};
 
-/// Maximum length of the part of a file that one edit changes, bytes.
+/// Maximum length of the range that one edit changes, bytes.
 const WINDOW: usize = 1 << 12;
 
-/// Undamaged file.
+/// Undamaged file, by suffix and bytes.
 struct Seed {
     extension: String,
     bytes: Vec<u8>,
 }
 
-/// Files of one kind, from which inputs are made.
+/// Undamaged files of one kind, from which inputs are made.
 pub struct Inputs {
     kind: Kind,
     seeds: Vec<Seed>,
@@ -60,7 +60,7 @@ const IMAGES: [&str; 18] = [
 ];
 
 impl Inputs {
-    /// Reads the files of a kind that ship with the project, and generates pictures. Kept files have none.
+    /// Reads files of the repository, and generates pictures. Of [kept](Kind::Kept) files there are none.
     ///
     /// # Panics
     /// If a file is missing.
@@ -88,7 +88,7 @@ impl Inputs {
         Self { kind, seeds }
     }
 
-    /// Input `number`: the suffix of its file, and its bytes.
+    /// Makes input `number`: the suffix of its file, and its bytes.
     pub fn make(&self, seed: u64, number: u64) -> (&str, Vec<u8>) {
         let mut random = Random::new(self.kind.name(), seed, number);
         let chosen = random.pick(&self.seeds);
@@ -99,7 +99,7 @@ impl Inputs {
         (&chosen.extension, bytes)
     }
 
-    /// Makes one edit. Half of the edits respect the format.
+    /// Makes one edit. Half of the edits keep to the structure of the format, such as chunks of PNG.
     fn edit(&self, bytes: &mut Vec<u8>, extension: &str, random: &mut Random) {
         match (random.below(8), extension) {
             (0..=3, "png") => png::edit_chunks(bytes, random),
@@ -116,7 +116,7 @@ impl Inputs {
         }
     }
 
-    /// Replaces a part of the file by a part of another file of its format.
+    /// Replaces a range of the file by a range of another file of its format.
     fn splice(&self, bytes: &mut Vec<u8>, extension: &str, random: &mut Random) {
         let others: Vec<_> = self.seeds.iter().filter(|seed| seed.extension == extension).collect();
         let other = &random.pick(&others).bytes;
@@ -127,7 +127,7 @@ impl Inputs {
     }
 }
 
-/// File to read for an input, with its suffix. A texture is embedded in a scene.
+/// File that is read for an input, with its suffix: a texture is embedded in a scene.
 pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
     match extension {
         "png" | "jpg" | "webp" | "ktx2" => ("glb", texture::textured(&bytes)),
@@ -135,7 +135,7 @@ pub(super) fn as_file(extension: &str, bytes: Vec<u8>) -> (&str, Vec<u8>) {
     }
 }
 
-/// Edits a part of a file, whose length may change.
+/// Edits a range of a file; the length may change.
 pub(super) fn edit_window(bytes: &mut Vec<u8>, random: &mut Random) {
     let start = random.below(bytes.len());
     let end = (start + WINDOW).min(bytes.len());
@@ -144,7 +144,7 @@ pub(super) fn edit_window(bytes: &mut Vec<u8>, random: &mut Random) {
     bytes.splice(start..end, window);
 }
 
-/// Changes a number near the start, where sizes and counts are.
+/// Edits a word, a bit or a byte in the first 600 bytes, where sizes and counts are.
 fn edit_header(bytes: &mut [u8], random: &mut Random) {
     let place = random.below(bytes.len().min(600));
     match random.below(3) {
@@ -155,7 +155,7 @@ fn edit_header(bytes: &mut [u8], random: &mut Random) {
     }
 }
 
-/// Edits the JSON or the binary chunk of a GLB, and corrects its lengths.
+/// Edits the JSON or the binary chunk of a GLB, and states the new lengths in its headers.
 fn edit_glb(bytes: &mut Vec<u8>, random: &mut Random) {
     let Some((mut text, mut data)) = gltf::split_glb(bytes) else { return };
     if random.below(4) < 3 {

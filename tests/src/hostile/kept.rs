@@ -1,8 +1,8 @@
-//! Files that the command keeps and reads again, damaged before it starts or while it runs.
+//! Files that the command writes and reads again, damaged before it starts or while it runs.
 //!
-//! Scenes are small, so that an input takes some hundredths of a second. The command must end with the
-//! picture of undamaged files, or with an error message and without a picture. Damage that forges checksums
-//! would make another valid file, and is not tested here.
+//! Scenes are so small that an input takes some hundredths of a second. The command must end with the picture
+//! of undamaged files, or with an error message and without a picture. Damage with matching checksums would
+//! make another valid file, and is not tested here.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -19,32 +19,32 @@ use super::supervisor::{ended, limited};
 use super::{Finding, Kept, Kind, Report, Settings};
 use crate::fuzz::{Random, mutation};
 
-/// First bytes of a tile's record, in parts and partial renders.
+/// First bytes of a tile's record, in parts and in partial files.
 const RECORD: &[u8] = b"\x89TILE";
-/// Settings of photons and rays that take some milliseconds.
+/// Options of photons and rays with which a picture takes some milliseconds.
 const LIGHT: &str = "--photons 200 --neighbors 10 --caustic-photons 0 --gather-rays 2 --shadow-rays 1 --spp 1 --adaptive off \
                      --irradiance-cache off";
-/// Settings of a picture with four tiles.
+/// Options of a picture with four tiles.
 const PICTURE: &str = "--size 8x8 --tile 4 --card emulated:1 --threads 1 --quiet";
 
-/// Contents of a folder by file name.
+/// Bytes of each file in a folder, by name.
 type Files = BTreeMap<String, Vec<u8>>;
 
-/// Command line that reads kept files.
+/// Command line that reads kept files, and these files.
 struct Work {
     arguments: String,
     kept: Files,
-    /// Duration without damage.
+    /// Duration of the command on undamaged files.
     usual: Duration,
 }
 
-/// Command lines for one kind of files, and the folder in which they run.
+/// Command lines that read files of one kind, and the folder in which they run.
 struct Bench<'s> {
     settings: &'s Settings,
     program: &'s Path,
     folder: PathBuf,
     works: Vec<Work>,
-    /// Pictures that each command line renders from undamaged files, and without the files.
+    /// Right results: what each command line renders from the undamaged files of either, and without any.
     right: Vec<Files>,
 }
 
@@ -59,7 +59,7 @@ impl Kept {
         }
     }
 
-    /// Command lines. The last one reads the files that the others have written.
+    /// Command lines, of which the last reads the files that the others write.
     fn commands(self, seed: u32) -> Vec<String> {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes");
         let scene = format!("{root}/furnace.gltf");
@@ -76,7 +76,7 @@ impl Kept {
                 [1, 2, 3].map(part).into_iter().chain([merge]).collect()
             }
             Self::Partials => {
-                // Photons and rays of the second are those of the file.
+                // The second takes photons and rays from the partial file.
                 let render = format!("render {scene} -o a.exr --quality draft --neighbors 10 {PICTURE}");
                 let (photons, samples) = (200 + 100 * seed, 4 >> seed);
                 vec![
@@ -96,10 +96,10 @@ impl Kept {
     }
 }
 
-/// Runs the command on damaged files.
+/// Runs the command on inputs: damaged files.
 ///
 /// # Errors
-/// If the settings name no command, it cannot be started, it fails without damage, or a file cannot be
+/// If no command is stated or it cannot be started, if it fails on undamaged files, or if a file cannot be
 /// written.
 pub fn supervise(settings: &Settings, kind: Kept, tell: &dyn Fn(&Report)) -> io::Result<Report> {
     fs::create_dir_all(&settings.folder)?;
@@ -132,7 +132,7 @@ impl<'s> Bench<'s> {
         for seed in [0, 1] {
             this.add(kind, seed)?;
         }
-        // A damaged file may be that of the other work, whole.
+        // Damage may replace a file by the undamaged one of the other command line.
         let none = Files::new();
         for work in &this.works {
             for kept in this.works.iter().map(|work| &work.kept).chain([&none]) {
@@ -146,7 +146,7 @@ impl<'s> Bench<'s> {
         Ok(this)
     }
 
-    /// Creates the files for a command line.
+    /// Adds a command line, and writes the files that it reads.
     fn add(&mut self, kind: Kept, seed: u32) -> io::Result<()> {
         self.fill(&Files::new())?;
         let mut commands = kind.commands(seed);
@@ -180,13 +180,13 @@ impl<'s> Bench<'s> {
         ended(&mut child, self.settings.patience)
     }
 
-    /// Messages of the last command.
+    /// Messages of the last command that ran.
     fn said(&self) -> String {
         fs::read(self.settings.folder.join("said"))
             .map_or(String::new(), |text| String::from_utf8_lossy(&text).into_owned())
     }
 
-    /// Replaces the contents of the folder by these files.
+    /// Replaces all files of the folder by these.
     fn fill(&self, files: &Files) -> io::Result<()> {
         self.files()?.keys().try_for_each(|name| fs::remove_file(self.folder.join(name)))?;
         files.iter().try_for_each(|(name, bytes)| fs::write(self.folder.join(name), bytes))
@@ -206,7 +206,7 @@ impl<'s> Bench<'s> {
         Ok(files)
     }
 
-    /// Runs the command on an input. Returns its exit status, or a description of the failure.
+    /// Runs the command on input `number`. Returns the exit status, or a description of the finding.
     fn run(&self, number: u64) -> io::Result<Result<usize, String>> {
         let mut random = Random::new(self.settings.kind.name(), self.settings.seed, number);
         let work = random.pick(&self.works);
@@ -229,7 +229,7 @@ impl<'s> Bench<'s> {
         }
         let status = self.finish(child)?;
         let mut judged = self.judge(work, status)?;
-        // A frame that was damaged after it was read, or written, is found by the next command.
+        // A frame's file that is damaged after this run has read or written it must be found by another run.
         let is_late = !is_before && self.settings.kind == Kind::Kept(Kept::Frames);
         if is_late && judged.is_err() && status.is_some_and(|status| status.success()) {
             let again = self.finish(self.start(&work.arguments)?)?;
@@ -242,7 +242,7 @@ impl<'s> Bench<'s> {
         Ok(judged.map_err(|what| format!("{:?} damaged {when} {}: {what}", damaged.keys(), work.arguments)))
     }
 
-    /// One or two damaged files for a command line.
+    /// One or two damaged files that a command line reads.
     fn damaged(&self, work: &Work, random: &mut Random) -> Files {
         let names: Vec<&String> = work.kept.keys().collect();
         let chosen = (0..=random.below(2)).map(|_| *random.pick(&names)).collect::<Vec<_>>();
@@ -268,7 +268,7 @@ impl<'s> Bench<'s> {
         for (name, bytes) in files {
             let is_cut = random.once_in(2);
             match File::options().write(true).truncate(is_cut).open(self.folder.join(name)) {
-                // The command has removed it.
+                // The command has removed the file.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => {}
                 Err(error) => return Err(error),
                 Ok(mut file) => {
@@ -296,7 +296,7 @@ impl<'s> Bench<'s> {
         })
     }
 
-    /// Keeps the damaged files of a finding.
+    /// Stores the damaged files of a finding.
     fn keep(&self, number: u64, damaged: &Files) -> io::Result<()> {
         let name = format!("{}-{}-{number}", self.settings.kind.name(), self.settings.seed);
         let folder = self.settings.folder.join(name);
@@ -305,7 +305,7 @@ impl<'s> Bench<'s> {
     }
 }
 
-/// Damages a file as copies, disks and memory do. Parts of `donors` may overwrite a part of it.
+/// Damages a file as faulty copies, disks and memory do. Ranges of `donors` may replace ranges of the file.
 fn damage(bytes: &mut Vec<u8>, donors: &[&[u8]], random: &mut Random) {
     let length = bytes.len();
     match random.below(12) {
@@ -332,7 +332,7 @@ fn damage(bytes: &mut Vec<u8>, donors: &[&[u8]], random: &mut Random) {
     }
 }
 
-/// Edits a number or a string in the first two lines, where heads are.
+/// Edits a JSON token in the first two lines, which are the file's head.
 fn edit_head(bytes: &mut Vec<u8>, random: &mut Random) {
     let ends = bytes.iter().enumerate().filter(|(_, byte)| **byte == b'\n').map(|(place, _)| place);
     let end = ends.take(2).last().unwrap_or(bytes.len());
@@ -341,14 +341,14 @@ fn edit_head(bytes: &mut Vec<u8>, random: &mut Random) {
     bytes.splice(..end, head);
 }
 
-/// Random block of a file: of the size of a disk's block, or smaller.
+/// Random aligned block of a file, of 16, 512 or 4096 bytes.
 fn block(length: usize, random: &mut Random) -> Range<usize> {
     let size = *random.pick(&[16, 512, 4096]);
     let start = random.below(length.div_ceil(size)) * size;
     start.min(length)..(start + size).min(length)
 }
 
-/// Random boundary of a block or of a record, at which one file may end and another continue.
+/// Random start of a block or of a record, at which a file may continue as another.
 fn boundary(bytes: &[u8], random: &mut Random) -> usize {
     let records: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place..].starts_with(RECORD)).collect();
     if records.is_empty() || random.once_in(2) {

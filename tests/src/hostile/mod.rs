@@ -1,11 +1,11 @@
 //! Reads damaged copies of shipped scenes and images in processes of limited memory.
 //!
-//! Files that the command keeps, such as parts of pictures, are also damaged while it runs, and its pictures
-//! are compared.
+//! Files that the command writes and reads again, such as parts of pictures, are also damaged while it runs,
+//! and the pictures are compared.
 //!
 //! Fuzz targets catch panics in their own process, and start from small generated files. Here a process reads
-//! a batch of inputs, and the way it ends is the result: an exit status, a signal, or a time-out. Every input
-//! is a function of its kind, a seed and a number.
+//! a batch of inputs, and the result is how it ends: by an exit status, a signal, or a time-out. An input is
+//! a function of kind, seed and number.
 
 mod inputs;
 mod kept;
@@ -23,25 +23,25 @@ pub use self::supervisor::{Finding, Report, supervise};
 /// Kind of files to damage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// PNG, JPEG, WebP and KTX2 as textures, and Radiance and `OpenEXR` pictures as environments. `OpenEXR`
-    /// pictures are also compared.
+    /// PNG, JPEG, WebP and KTX2 as textures; Radiance and `OpenEXR` as environments. `OpenEXR` pictures are
+    /// also compared, as by `photoncard diff`.
     Images,
-    /// glTF as text and as GLB, which is loaded, packed, and rendered with few photons and rays.
+    /// glTF as text and as GLB: loaded, packed, and rendered with few photons and rays.
     Scenes,
-    /// Files that the command keeps and reads again. Only the command reads them.
+    /// Files that the command writes and reads again. Only the command reads them here.
     Kept(Kept),
 }
 
-/// Kind of files that are damaged before the command starts or while it runs.
+/// Kind of files that the command writes and reads again, damaged before it starts or while it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kept {
     /// Prepared scenes.
     Cards,
-    /// Parts of a picture that is merged.
+    /// Parts of a picture, which are merged.
     Parts,
-    /// Finished tiles of a render that is resumed.
+    /// Partial file with finished tiles, from which a render resumes.
     Partials,
-    /// `OpenEXR` and PNG pictures of frames that are resumed.
+    /// `OpenEXR` and PNG pictures of finished frames, which a render recognises.
     Frames,
 }
 
@@ -91,7 +91,7 @@ pub struct Settings {
     pub patience: Duration,
     /// Size of a process's address space, kilobytes.
     pub kilobytes: u64,
-    /// Program `photoncard`. It reads every [`Settings::every`]th image or scene as well, and all kept files.
+    /// Program `photoncard`, which also reads every [`Settings::every`]th image or scene, and all kept files.
     pub command: Option<PathBuf>,
     /// Interval of the inputs that [`Settings::command`] reads.
     pub every: u64,

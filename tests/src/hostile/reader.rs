@@ -1,4 +1,4 @@
-//! Process that reads inputs, one after another.
+//! Process that reads inputs one after another.
 
 use std::fs;
 use std::io::{Write as _, stdout};
@@ -14,17 +14,17 @@ use super::inputs::as_file;
 use super::{Inputs, Settings};
 use crate::fuzz::gltf::load;
 
-/// Maximum number of triangles of a scene that is always rendered. Larger ones are rendered rarely, but
-/// loaded and packed.
+/// Maximum number of triangles of a scene that is always rendered. Larger ones are loaded, and one in fifty
+/// is packed.
 const MAX_RENDERED: usize = 3000;
 
-/// Maximum number of pixels of a picture that is compared. Larger ones are only read.
+/// Maximum number of pixels of a picture that is compared; a larger one is only read.
 const MAX_COMPARED: usize = 1 << 18;
 
-/// Reads inputs. Prints the number of each before it is read, and afterwards whether it was valid.
+/// Reads inputs. Prints the number of each before it is read, and then whether the input is valid.
 ///
 /// # Panics
-/// If the tested reader panics, which is a finding.
+/// If a reader under test panics, which is a finding.
 pub fn read_batch(settings: &Settings) {
     let inputs = Inputs::new(settings.kind);
     for number in settings.first..settings.first + settings.inputs {
@@ -35,7 +35,7 @@ pub fn read_batch(settings: &Settings) {
     }
 }
 
-/// Prints a line. Errors are ignored, because the supervisor may have ended.
+/// Prints a line. Errors are ignored: the supervisor may have ended.
 fn say(line: std::fmt::Arguments) {
     let mut out = stdout().lock();
     let _ = writeln!(out, "{line}").and_then(|()| out.flush());
@@ -63,7 +63,7 @@ fn read(folder: &Path, extension: &str, bytes: Vec<u8>, number: u64) -> bool {
     }
 }
 
-/// Value of a result. An error is formatted as well, because that must not panic either.
+/// Value of a result. Errors are formatted too, which must not panic.
 fn told<T, E: std::fmt::Display>(result: Result<T, E>) -> Option<T> {
     result.inspect_err(|error| drop(error.to_string())).ok()
 }

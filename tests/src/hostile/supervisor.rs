@@ -1,4 +1,4 @@
-//! Process that starts readers and observes how they end.
+//! Process that starts readers and records how they end.
 
 use std::fs;
 use std::io::{self, BufRead, BufReader};
@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use super::inputs::as_file;
 use super::{Inputs, Kind, Settings};
 
-/// Interval at which a running command is polled.
+/// Interval of checks whether a command has ended.
 const GLANCE: Duration = Duration::from_millis(2);
 
 /// Input on which a reader or the command failed.
@@ -24,24 +24,24 @@ pub struct Finding {
     pub what: String,
 }
 
-/// Result of some inputs.
+/// Result of the inputs so far.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     /// Number of inputs that were read.
     pub inputs: u64,
-    /// Number of valid inputs; of kept files, of those that gave the undamaged picture.
+    /// Number of valid inputs; with kept files, of inputs whose picture was that of undamaged files.
     pub sound: u64,
     /// Number of exits of the command with status 0, 1 and 2.
     pub statuses: [u64; 3],
     /// Maximum time of an input, with the input's number.
     pub slowest: (Duration, u64),
-    /// Inputs that ended a process or exceeded the time limit.
+    /// Inputs that a process ended on by a panic, an abort or a signal, or that exceeded the time limit.
     pub findings: Vec<Finding>,
 }
 
 /// Reads inputs in processes of limited memory. `reader` is a program that calls
-/// [`read_batch`](super::read_batch) for the arguments `read KIND SEED FIRST INPUTS FOLDER`. It does not read
-/// [kept](super::supervise_kept) files.
+/// [`read_batch`](super::read_batch) when its arguments are `read KIND SEED FIRST INPUTS FOLDER`.
+/// [Kept](super::supervise_kept) files are not among the inputs.
 ///
 /// # Errors
 /// If a process cannot be started or a file cannot be written.
@@ -69,7 +69,7 @@ pub fn supervise(reader: &Path, settings: &Settings, tell: &dyn Fn(&Report)) -> 
     Ok(report)
 }
 
-/// Command with a limited address space.
+/// Command that starts a program with a limited address space.
 pub(super) fn limited(settings: &Settings, program: &Path) -> Command {
     let mut command = Command::new("sh");
     let script = format!("ulimit -v {} && exec \"$0\" \"$@\"", settings.kilobytes);
@@ -77,8 +77,8 @@ pub(super) fn limited(settings: &Settings, program: &Path) -> Command {
     command
 }
 
-/// Starts a process that reads inputs until the last one, or until it ends. Returns the number of finished
-/// inputs.
+/// Starts a process that reads `count` inputs, and waits until it ends. Returns the number of inputs that are
+/// done.
 fn read_some(
     reader: &Path,
     settings: &Settings,
@@ -122,7 +122,7 @@ fn read_some(
     Ok(number + 1 - first)
 }
 
-/// Receives the lines of a process's output.
+/// Lines of a process's standard output, received by a thread.
 fn lines(child: &mut Child) -> Receiver<String> {
     let (sender, receiver) = channel();
     if let Some(output) = child.stdout.take() {
@@ -134,7 +134,7 @@ fn lines(child: &mut Child) -> Receiver<String> {
     receiver
 }
 
-/// Runs the command on an input as a user would.
+/// Runs the command on an input, as a user would.
 fn run_command(settings: &Settings, inputs: &Inputs, number: u64, report: &mut Report) -> io::Result<()> {
     let Some(program) = &settings.command else { return Ok(()) };
     let (extension, bytes) = inputs.make(settings.seed, number);
@@ -169,13 +169,13 @@ fn run_command(settings: &Settings, inputs: &Inputs, number: u64, report: &mut R
     Ok(())
 }
 
-/// Minimal render.
+/// Adds the arguments of a minimal render.
 fn render<'c>(command: &'c mut Command, scene: &Path, folder: &Path) -> &'c mut Command {
     let options = "--size 4x4 --photons 200 --neighbors 10 --caustic-photons 50 --gather-rays 8 --shadow-rays 1 --spp 1 --quiet";
     command.arg("render").arg(scene).arg("-o").arg(folder.join("out.exr")).args(options.split(' '))
 }
 
-/// Exit status of a process; `None` if it exceeds `patience`, after which it is killed.
+/// Exit status of a process. `None` if the process exceeds `patience`; it is killed then.
 pub(super) fn ended(child: &mut Child, patience: Duration) -> io::Result<Option<ExitStatus>> {
     let begun = Instant::now();
     while begun.elapsed() < patience {

@@ -1,5 +1,5 @@
-//! Counts floating-point operations of rendered tiles. The firmware in `tests/operations` is compiled so that
-//! every operation is a call, which is counted by its kind and its position in the code.
+//! Counts the floating-point operations of rendered tiles. The program in `tests/operations` compiles the
+//! firmware so that each operation is a call, which it counts by kind and by position in the code.
 
 pub mod run;
 mod steps;
@@ -19,12 +19,12 @@ use photoncard_shared::message::{self, FrameParameters, Tile};
 
 use self::steps::{Place, step_of};
 
-/// Compilation target without floating-point instructions.
+/// Compilation target without floating-point instructions, on which operations are calls.
 pub const TARGET: &str = "x86_64-unknown-none";
-/// Number of steps.
+/// Number of the cost model's steps.
 pub const STEPS: usize = Step::ALL.len();
 
-/// Counted operations of some tiles.
+/// Operations that were counted in some tiles.
 pub struct Counted {
     /// Counters of each tile, which are equal on every processor.
     pub counters: Vec<Counters>,
@@ -33,7 +33,7 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// Sum of the operations of all steps.
+    /// Operations of all steps.
     pub fn total(&self) -> Operations {
         let mut total = Operations::default();
         self.steps.iter().for_each(|operations| total.add(operations));
@@ -65,7 +65,7 @@ impl Instrument {
             return Err(format!("the target {TARGET} is missing; run: rustup target add {TARGET}"));
         }
         let target = tests.join("../target/operations");
-        // The flags of this build are not for that one.
+        // This build's compiler flags must not apply to the program.
         let status = Command::new("cargo")
             .args(["build", "--release", "--locked", "--quiet"])
             .current_dir(tests.join("operations"))
@@ -94,7 +94,7 @@ impl Instrument {
         Counted { counters: counters.collect(), steps: self.by_step(places) }
     }
 
-    /// Sums the counts of all positions in the code by step.
+    /// Operations of each step, from the counts of each position in the code.
     fn by_step(&self, places: &[u8]) -> [Operations; STEPS] {
         let symbols = addr2line::Loader::new(&self.program).expect("the program has its symbols");
         let mut steps = [Operations::default(); STEPS];
@@ -108,7 +108,8 @@ impl Instrument {
         let conversions: HashSet<_> =
             records.iter().filter(|(kind, ..)| *kind == CONVERT).map(|(_, place, _)| place).collect();
         for &(kind, ref place, count) in &records {
-            // A conversion that saturates is one instruction; here it comes with comparisons.
+            // A saturating conversion is one instruction of a processor; on this target it includes
+            // comparisons.
             if kind == COMPARE && conversions.contains(place) {
                 continue;
             }
@@ -122,7 +123,7 @@ impl Instrument {
 const COMPARE: u64 = 4;
 const CONVERT: u64 = 5;
 
-/// One operation of a kind, whose number is that of the program's tables.
+/// One operation of a kind, by the kind's number in the program's output.
 fn operation(kind: u64) -> Operations {
     let none = Operations::default();
     match kind {
@@ -132,13 +133,13 @@ fn operation(kind: u64) -> Operations {
         3 => Operations { square_root: 1.0, ..none },
         COMPARE => Operations { compare: 1.0, ..none },
         CONVERT | 6 => Operations { convert: 1.0, ..none },
-        // A call of a function; what it does is counted by itself.
+        // A call of a function of `libm`; the operations in it are counted at the call's position.
         7 => none,
         _ => panic!("there is no operation {kind}"),
     }
 }
 
-/// Input of the program: image, frame and tiles, in lines.
+/// Standard input of the program: card image, frame and tiles, in lines.
 fn input(image: &CardImage, frame: &FrameParameters, tiles: &[Tile]) -> std::io::Result<File> {
     let mut bytes: Vec<u8> = image.lines().iter().flat_map(|line| line.0).collect();
     bytes.extend(line(frame));
@@ -149,7 +150,7 @@ fn input(image: &CardImage, frame: &FrameParameters, tiles: &[Tile]) -> std::io:
     Ok(file)
 }
 
-/// Message in a line, after its length.
+/// Line with the length of an encoded message and the message.
 fn line<T: serde::Serialize>(message: &T) -> [u8; LINE_BYTES] {
     let mut line = [0; LINE_BYTES];
     let (length, bytes) = line.split_first_mut().expect("a line has bytes");

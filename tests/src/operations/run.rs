@@ -1,4 +1,4 @@
-//! Operations of a scene's tiles, both counted and computed by the cost model.
+//! Operations of a scene's tiles, as counted and by the cost model.
 
 use std::path::Path;
 
@@ -18,22 +18,22 @@ use photoncard_shared::counters::Counters;
 
 use super::{Instrument, STEPS};
 
-/// Operations of some tiles of a scene, with their work.
+/// Counted operations of some tiles of a scene, with the work that the cost model needs.
 pub struct Run {
     /// Counters of all tiles.
     pub counters: Counters,
-    /// Work of all tiles.
+    /// Work of all tiles, as the cost model's numbers of steps.
     pub work: Work,
     /// Counted operations of each step, in the order of [`Step::ALL`].
     pub steps: [Operations; STEPS],
 }
 
 impl Run {
-    /// Renders `count` tiles of a shipped scene, spread over the picture, with the program that counts
+    /// Renders `count` tiles of a shipped scene, spread over the picture, both with the program that counts
     /// operations and on an emulated chip.
     ///
     /// # Panics
-    /// If the scene cannot be rendered, or the two do not count equal work.
+    /// If the scene cannot be rendered, or the counters of the two differ.
     pub fn new(instrument: &Instrument, scene: &str, settings: &RenderSettings, count: usize) -> Self {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes").join(scene);
         let scene = gltf::load(&path).expect("a scene that ships loads");
@@ -57,13 +57,13 @@ impl Run {
         }
         let mut steps = counted.steps;
         let work = Work::new(&counters, &contents, f64::from(frame.gather_rays));
-        // Comparisons of bits are no calls: chip and memory model count them.
+        // Comparisons of bits are no calls of the program: the chip and its memory model count them.
         let compared = Step::ALL.iter().position(|&step| step == Step::Compared).expect("it is one of all");
         steps[compared].compare = Step::Compared.count(&work);
         Self { counters, work, steps }
     }
 
-    /// Counted operations of a unit.
+    /// Counted operations of a unit's steps.
     pub fn counted(&self, unit: Unit) -> Operations {
         let mut sum = Operations::default();
         let of_unit = Step::ALL.iter().zip(&self.steps).filter(|(step, _)| step.unit() == unit);
@@ -71,13 +71,14 @@ impl Run {
         sum
     }
 
-    /// Operations of all units according to the cost model.
+    /// Operations of each unit by the cost model.
     pub fn modelled(&self) -> Arithmetic {
         Arithmetic::of(&self.work)
     }
 }
 
-/// Mean operations of each step over some runs. Steps that occur in no run have the values of [`OPERATIONS`].
+/// Mean operations of one step of each kind in some runs. Steps that none has keep the values of
+/// [`OPERATIONS`].
 pub fn means(runs: &[Run]) -> [Operations; STEPS] {
     let mut means = OPERATIONS;
     for (index, (step, mean)) in Step::ALL.iter().zip(&mut means).enumerate() {

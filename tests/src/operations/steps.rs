@@ -1,9 +1,8 @@
-//! Assigns positions in the code to steps, by the firmware's functions into which an operation was compiled.
+//! Assigns operations to the cost model's steps, by the functions of the firmware that their code is of.
 
 use photoncard_driver::cost_model::arithmetic::Step;
 
-/// Position of an operation: the functions that contain it, the innermost first, with the line and column in
-/// each.
+/// Position of an operation: the functions that are inlined there, the innermost first, with line and column.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Place(Vec<Frame>);
 
@@ -39,7 +38,7 @@ impl Place {
         place
     }
 
-    /// Returns whether one of the functions is in a file, or in a folder.
+    /// Returns whether one of the functions is in a file or folder below `firmware/src`.
     fn is_in(&self, path: &str) -> bool {
         self.0.iter().any(|frame| frame.file.starts_with(path))
     }
@@ -50,8 +49,8 @@ impl Place {
     }
 }
 
-/// Step to which an operation belongs, decided by the innermost function that belongs to one. Other
-/// operations, such as codes of directions, belong to the gathers, which need them most.
+/// Step of an operation, by the first rule below that fits one of its functions. Operations without a rule,
+/// such as those on codes of directions, count for gathers, which need them most.
 pub(super) fn step_of(place: &Place) -> Step {
     ray_caster(place)
         .or_else(|| photons(place))
@@ -61,7 +60,7 @@ pub(super) fn step_of(place: &Place) -> Step {
         .unwrap_or(Step::Gather)
 }
 
-/// Steps of the ray caster.
+/// Step of the ray caster; `None` for other operations.
 fn ray_caster(place: &Place) -> Option<Step> {
     Some(if place.is_of("scene/triangle.rs", "leaf") {
         if place.is_of("scene/triangle.rs", "shear") { Step::Vertex } else { Step::Triangle }
@@ -80,7 +79,7 @@ fn ray_caster(place: &Place) -> Option<Step> {
     })
 }
 
-/// Steps of photon searches and of the density estimate.
+/// Step of a photon search or of the density estimate; `None` for other operations.
 fn photons(place: &Place) -> Option<Step> {
     Some(if place.is_in("photon/select.rs") {
         Step::Selected
@@ -112,7 +111,7 @@ fn photons(place: &Place) -> Option<Step> {
     })
 }
 
-/// Steps of direction tables and of the irradiance cache.
+/// Step of direction tables or of the irradiance cache; `None` for other operations.
 fn directions(place: &Place) -> Option<Step> {
     Some(if place.is_in("irradiance_cache/survey.rs") {
         Step::SurveyRay
@@ -131,14 +130,14 @@ fn directions(place: &Place) -> Option<Step> {
     })
 }
 
-/// Steps of evaluated surfaces, for any kind of ray.
+/// Step of evaluating a surface, by the innermost function that is no helper; `None` for other operations.
 fn surfaces(place: &Place) -> Option<Step> {
     let inner = &place.0.iter().find(|frame| !HELPERS.contains(&frame.file.as_str()))?.file;
     let is_surface = inner.strip_prefix("scene/").is_some_and(|file| SURFACES.contains(&file));
     (is_surface && !place.is_in("scene/light/")).then_some(Step::Surface)
 }
 
-/// Files about surfaces, below `scene`.
+/// Files that evaluate surfaces, below `firmware/src/scene`.
 const SURFACES: [&str; 7] = [
     "surface.rs",
     "shading_normal.rs",
@@ -152,7 +151,7 @@ const SURFACES: [&str; 7] = [
 /// Files whose functions are used everywhere.
 const HELPERS: [&str; 2] = ["vector.rs", "fixed_point.rs"];
 
-/// Steps of lights and pixels.
+/// Step of lights, eye rays or pixels; `None` for other operations.
 fn lights_and_pixels(place: &Place) -> Option<Step> {
     Some(if place.is_in("scene/light/tree.rs") {
         Step::LightRecord

@@ -1,5 +1,4 @@
-//! Fuzzes all readers of foreign bytes with some thousands of mutated inputs. The example `fuzz` runs any
-//! number.
+//! Fuzzes all readers of foreign bytes with thousands of mutated inputs; the example `fuzz` runs any number.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -26,12 +25,11 @@ fn check(name: &str, inputs: u64) {
     println!("{report:?}");
     assert!(report.failures.is_empty(), "{:#?}", report.failures);
     assert_eq!(report.inputs, inputs);
-    // Inputs that are all rejected at once would test nothing.
+    // At least one input in twenty must be valid: inputs that are all rejected at once would test nothing.
     assert!(report.sound * 20 > inputs && report.sound < inputs, "{report:?}");
 }
 
-/// Defines a test for each target, with the number of inputs that takes some seconds, so that a busy machine
-/// has time for every test.
+/// Defines a test for each target, with a number of inputs that takes some seconds.
 macro_rules! tests_of_targets {
     ($($name:ident: $inputs:literal,)*) => {
         $(#[test]
@@ -63,7 +61,7 @@ mod no_input_panics_hangs_or_takes_much_memory {
     }
 }
 
-/// Target that fails in every way. The number in its input selects the way.
+/// Target that fails in every way, as the number in its input says.
 struct Faulty;
 
 impl Target for Faulty {

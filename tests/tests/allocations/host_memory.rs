@@ -1,4 +1,4 @@
-//! Memory of the host for a photon map under construction, and for an image that emulated cards share.
+//! Memory of the host: for a photon map under construction, and for a card image that emulated cards share.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -12,7 +12,7 @@ use photoncard_driver::scene::{Scene, gltf};
 use crate::{ALONE, MEMORY};
 
 const PHOTONS: usize = 600_000;
-/// Maximum number of bytes per photon, card image included.
+/// Maximum number of bytes per photon, with its share of the card image.
 const BYTES_A_PHOTON: usize = 40;
 
 fn cornell() -> Scene {
@@ -34,7 +34,7 @@ fn settings(chips: usize) -> RenderSettings {
     }
 }
 
-/// Observer that records the maximum memory in use while tiles are rendered.
+/// Observer that records the greatest memory in use while tiles are rendered.
 #[derive(Default)]
 struct WhileRendering(AtomicUsize);
 
@@ -50,7 +50,8 @@ impl Observer for WhileRendering {
     }
 }
 
-/// Maximum number of bytes in use while `chips` chips render a picture, and the size of the image, bytes.
+/// Maximum number of bytes in use while `chips` chips render a picture, and number of bytes of the card
+/// image.
 fn rendering(scene: &Scene, chips: usize) -> (usize, usize) {
     let observer = WhileRendering::default();
     let before = MEMORY.current_usage();
@@ -58,7 +59,7 @@ fn rendering(scene: &Scene, chips: usize) -> (usize, usize) {
     (observer.0.into_inner() - before, rendering.statistics.image_bytes as usize)
 }
 
-// A single test: allocations of another at the same time would count.
+// One test for both: allocations of another test at the same time would count.
 #[test]
 fn a_photon_takes_at_most_forty_bytes_and_cards_share_the_image() {
     let _alone = ALONE.lock();
@@ -76,7 +77,7 @@ fn a_photon_takes_at_most_forty_bytes_and_cards_share_the_image() {
     let (with_four, _) = rendering(&scene, 4);
     println!("{with_one} bytes with one chip, {with_four} with four, an image of {image}");
     assert!(with_one >= image);
-    // Three further chips have everything that the first has, except a copy of the image.
+    // Each chip has all that the first has, without a copy of the card image.
     let chip = with_one - image;
     assert!(
         with_four < image + 4 * chip + image / 2,

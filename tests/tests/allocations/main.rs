@@ -1,4 +1,4 @@
-//! Limits of memory allocations.
+//! Limits of the memory that the host allocates.
 
 use std::sync::Mutex;
 
@@ -11,5 +11,5 @@ mod tangent_memory;
 #[global_allocator]
 static MEMORY: PeakAlloc = PeakAlloc;
 
-/// Lock that runs one test at a time, so that only its own allocations are counted.
+/// Lock by which tests run one at a time, so that no other test's allocations are counted.
 static ALONE: Mutex<()> = Mutex::new(());

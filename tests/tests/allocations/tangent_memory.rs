@@ -1,4 +1,4 @@
-//! Memory for computing tangents does not exceed what is reserved before.
+//! Computing tangents takes at most the memory that was reserved for it.
 
 use std::fs;
 
@@ -13,7 +13,7 @@ const TRIANGLES: usize = (2 * SIDE * SIDE) as usize;
 const BYTES_A_TRIANGLE: usize = 1600;
 const TEXEL: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/texel.png");
 
-/// Buffer of a hilly square of triangles without shared vertices, and its number of vertices.
+/// Buffer of a hilly square of triangles that share no vertices, and its number of vertices.
 fn mesh() -> (Vec<u8>, usize) {
     let corners = (0..SIDE * SIDE).flat_map(|cell| {
         let (x, y) = (cell % SIDE, cell / SIDE);

@@ -1,10 +1,10 @@
-//! Adaptive sampling reduces the noise where samples differ, and keeps the expected picture.
+//! Adaptive sampling lowers the noise where samples differ, and keeps the picture's expected value.
 
 use photoncard_driver::render::{Filter, Integrator, PhotonMaps, Picture, RenderSettings, Rendering};
 use photoncard_driver::scene::{Scene, gltf};
 use photoncard_tests::render_or_panic;
 
-/// Samples per pixel: the four probes, and one whose number of paths they determine.
+/// Samples per pixel: four probes, and one sample whose number of paths the probes choose.
 const SAMPLES: u32 = 5;
 
 fn room() -> Scene {
@@ -28,7 +28,8 @@ fn settings(seed: u32, adaptive_threshold: Option<f32>, gather_rays: u32) -> Ren
     }
 }
 
-/// Mean over `seeds` of the picture's mean, its standard error, and the mean variance of a pixel.
+/// Over `seeds` renders: mean of the pictures' means, its standard error, and mean over pixels of their
+/// variance.
 fn moments(threshold: Option<f32>, gather_rays: u32, seeds: u32) -> [f64; 3] {
     let scene = room();
     let radiances = |seed| -> Vec<f64> {
@@ -57,7 +58,7 @@ fn mean_and_variance(values: &[f64]) -> [f64; 3] {
     [number, mean, values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (number - 1.0)]
 }
 
-/// Checks that two means are equal within four standard errors, and that these are small.
+/// Checks that two means differ by less than four standard errors, and that these are small enough to tell.
 fn check_means([even, even_error, _]: [f64; 3], [adaptive, error, _]: [f64; 3]) {
     let allowed = 4.0 * even_error.hypot(error);
     assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");
@@ -65,7 +66,7 @@ fn check_means([even, even_error, _]: [f64; 3], [adaptive, error, _]: [f64; 3]) 
 }
 
 /// Most pixels see an edge of the lamp, of a box or of a shadow. A plain mean over all paths would be too
-/// dark, because the probes determine their number: bright probes add more paths, and so count less.
+/// dark: bright probes add more paths, and so would weigh less in it.
 #[test]
 fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
     let [even, adaptive] = [None, Some(0.02)].map(|threshold| moments(threshold, 0, 120));
@@ -74,15 +75,15 @@ fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
     assert!(variance < 0.75 * even_variance, "{variance} of {even_variance}");
 }
 
-/// The paths of a sample share its gather rays on a Lambertian surface. Of sixteen rays each path has one; of
-/// one ray each has it.
+/// On a Lambertian surface, the paths of a sample share the sample's sixteen gather rays; each path has at
+/// least one.
 #[test]
 fn paths_that_share_gather_rays_have_the_mean_of_samples_with_rays_of_their_own() {
     check_means(moments(None, 16, 54), moments(Some(0.005), 16, 54));
 }
 
-/// The number of gather rays on Lambertian surfaces does not grow with the paths per sample, except that each
-/// path has at least one.
+/// More paths per sample do not cast more gather rays on Lambertian surfaces, except that each path has at
+/// least one.
 #[test]
 fn paths_divide_the_gather_rays_of_their_sample() {
     let scene = room();
@@ -92,7 +93,7 @@ fn paths_divide_the_gather_rays_of_their_sample() {
     assert!(adaptive.gather < even.gather * 5 / 4, "{adaptive:?} {even:?}");
 }
 
-/// A sample has one path if all samples have equal light.
+/// In a furnace all probes have equal light, so that further samples have one path.
 #[test]
 fn pixels_without_noise_have_one_path_a_sample() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/furnace.gltf");

@@ -1,4 +1,4 @@
-//! Lights of a file from Blender's exporter are as bright as Cycles renders them.
+//! Lights in a file of Blender's exporter are as bright as Cycles renders them.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ fn fixture(name: &str) -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/blender").join(name)
 }
 
-/// Mean radiance seen by the file's camera.
+/// Mean radiance of the picture by the file's camera, per channel.
 fn seen(scene: &Scene) -> [f64; 3] {
     let settings = RenderSettings {
         picture: Picture { width: 64, height: 64, filter: Filter::Box, ..Picture::default() },
@@ -24,7 +24,7 @@ fn seen(scene: &Scene) -> [f64; 3] {
     [0, 1, 2].map(|channel| mean(channel) / pixels.len() as f64)
 }
 
-/// Scene with one of its lights only.
+/// Scene with the light `name` alone.
 fn lit_by(scene: &Scene, name: &str) -> Scene {
     let mut scene = scene.clone();
     scene.lights.retain(|light| light.name == name);

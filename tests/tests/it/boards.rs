@@ -1,5 +1,5 @@
-//! Processor-independent parts of boards: the ring between a UART's interrupt and the port, and the sizes in
-//! the document on boards.
+//! Parts of boards that need no hardware: the ring buffer between a UART's interrupt and the port, and the
+//! sizes in docs/bring-up.md.
 
 #[path = "../../../firmware/boards/common/ring.rs"]
 mod ring;
@@ -8,7 +8,7 @@ use photoncard_firmware::kind::MICRO;
 
 use self::ring::Ring;
 
-/// The document on boards states the sizes of the budget.
+/// docs/bring-up.md states the sizes of the micro chip's budget.
 #[test]
 fn the_page_states_the_budget() {
     let page = include_str!("../../../docs/bring-up.md");

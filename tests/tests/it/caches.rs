@@ -1,4 +1,4 @@
-//! Line caches hit and miss like an LRU oracle, and return the contents of memory.
+//! Line caches hit and miss as an LRU oracle does, and return what the memory holds.
 
 use std::ops::Range;
 
@@ -10,7 +10,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 use photoncard_tests::lru::LruOracle;
 use proptest::prelude::*;
 
-/// Lines with pairwise different contents.
+/// Lines that all have different contents.
 fn numbered(count: u32) -> Vec<Line> {
     (0..count)
         .map(|number| {
@@ -27,14 +27,14 @@ fn cache(shape: CacheShape) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
     LineCache::new(shape, entries, vec![Line::ZERO; shape.lines()]).expect("buffers of its size")
 }
 
-/// Cache shapes: number of sets and ways, lines of card memory per cache line, and set index.
+/// Shapes of caches: number of sets, number of ways, lines of card memory in a cache line, index of sets.
 fn shapes() -> impl Strategy<Value = (u32, u32, u32, SetIndex)> {
     let sets = prop_oneof![Just(1), Just(4), 1_u32..14];
     let ways = prop_oneof![Just(1), Just(4), 1_u32..10];
     (sets, ways, 1_u32..=8, prop_oneof![Just(SetIndex::Modulo), Just(SetIndex::Hashed)])
 }
 
-/// Addresses below `end`: random, repeated and consecutive ones.
+/// Addresses below `end`: runs of random start, stride and length.
 fn addresses(end: u32) -> impl Strategy<Value = Vec<u32>> {
     let run = (0..end, 1_u32..5, 1_usize..40);
     let runs = proptest::collection::vec(run, 1..60);
@@ -81,7 +81,7 @@ proptest! {
         }
     }
 
-    /// Reads in any order return the right line inside the memory, and a fault outside.
+    /// A read inside the memory returns its line, a read outside a fault, in any order.
     #[test]
     fn a_cache_returns_only_lines_of_its_memory(
         (sets, ways, lines, index) in shapes(),
@@ -148,7 +148,7 @@ fn a_write_and_a_kept_record_take_the_place_of_no_other_line() {
     assert_eq!(fetched(&memory), 10);
 }
 
-/// Memory of the lines that were written.
+/// Memory that ends with the last line written.
 struct Growing(Vec<Line>);
 
 impl MemoryPort for Growing {

@@ -1,4 +1,4 @@
-//! A card answers any command with a fault or with pixels, and afterwards renders a valid tile.
+//! A card answers any command with pixels or a fault, and renders a valid tile afterwards.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -43,7 +43,7 @@ fn frame() -> FrameParameters {
 
 const TILE: Tile = Tile { id: 7, x: 0, y: 0, width: 8, height: 8 };
 
-/// Answers to a tile of 64 pixels. A reply holds 16.
+/// Answers of the micro chip to a tile of 64 pixels without layers, 16 pixels a reply.
 fn tile_of_64_pixels(id: u32) -> [Answer; 5] {
     let pixels = || Answer::Pixels(16);
     [pixels(), pixels(), pixels(), pixels(), Answer::TileDone(id)]
@@ -85,7 +85,7 @@ fn commands_out_of_order_are_faults_and_the_card_continues() {
     });
 }
 
-/// Gathers of a tile wait for those of the next tile or for a flush.
+/// A tile's gathers wait in the queue until another tile or a flush arrives.
 #[test]
 fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
     with_room_for_a_card(|| {
@@ -104,16 +104,16 @@ fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
         assert!(!wire.card.is_busy());
         assert_eq!(wire.say(&Command::Flush), done(2));
         assert_eq!(wire.say(&Command::Flush), []);
-        // Another frame drops what is in flight.
+        // Another frame drops the tile in flight.
         assert_eq!(wire.say(&tile(2)), []);
         assert_eq!(wire.say(&begin(2)), [Answer::FrameAccepted]);
         assert_eq!(wire.say(&Command::Flush), []);
         assert!(!wire.card.is_busy());
-        // A second tile fills the chip, a third waits for a place.
+        // With the second tile all places are taken: both are completed before a third could come.
         assert_eq!(wire.say(&tile(3)), []);
         assert_eq!(wire.say(&tile(4)), [done(3), done(4)].concat());
         assert_eq!(wire.say(&tile(5)), []);
-        // A hello drops what is in flight, and the next command is carried out without a wait.
+        // A hello drops the tile in flight: the next command need not wait for it.
         wire.hello();
         assert!(!wire.card.is_busy());
         let checksums = wire.say(&Command::ReadChecksums { first: 0, count: 1 });
@@ -126,8 +126,8 @@ fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
     });
 }
 
-/// A pixel with layers takes four sums in the buffer. The micro chip has room for 64 such pixels, and a reply
-/// for 8.
+/// A pixel with layers takes four sums of the chip's buffer. The micro chip has room for 64 such pixels; a
+/// reply has room for 8.
 #[test]
 fn a_tile_with_layers_has_a_fourth_of_the_pixels() {
     with_room_for_a_card(|| {
@@ -166,14 +166,14 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
             FrameParameters { gather_rays: MICRO.gather_rays + 1, ..frame() },
             FrameParameters { neighbors: MICRO.neighbors + 1, ..frame() },
             FrameParameters { max_distance: f32::NAN, ..frame() },
-            // The image has photons, but no irradiance points.
+            // The card image has photons, but no irradiance points.
             FrameParameters { radiance: Radiance::Precomputed, ..frame() },
         ];
         for bad in bad_frames {
             assert_eq!(wire.say(&Command::BeginFrame(bad)), [Answer::Fault(FaultCode::Parameter)], "{bad:?}");
         }
         assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::FrameAccepted]);
-        // The end of an image without a beginning does not disturb the image in use.
+        // An `EndImage` without a `BeginImage` leaves the loaded image in use.
         assert_eq!(wire.say(&Command::EndImage), [Answer::Fault(FaultCode::Order)]);
         assert_eq!(wire.say(&Command::RenderTile(TILE)).last(), Some(&Answer::TileDone(7)));
         let bad_tiles = [
@@ -189,7 +189,7 @@ fn frames_and_tiles_outside_the_budget_are_faults() {
     });
 }
 
-/// Copy of the image whose root node has `children` children with unbounded boxes.
+/// Lines of the image with another root node: `children` children, whose boxes contain the scene.
 fn with_root(image: &CardImage, children: usize, links: Links) -> Vec<Line> {
     let mut lines = image.lines().to_vec();
     let root =
@@ -242,7 +242,7 @@ fn a_card_reports_the_lines_of_an_image_and_keeps_them_over_sessions() {
             let answers = wire.say(&Command::ReadChecksums { first, count });
             assert_eq!(answers, [Answer::Fault(FaultCode::Chunks)], "{first} {count}");
         }
-        // All lines are there already.
+        // All lines of the image are in the memory already.
         let checksum = image_checksum(image.lines());
         assert_eq!(wire.say(&Command::BeginImage { lines: written, checksum }), []);
         assert_eq!(wire.say(&Command::EndImage), [Answer::ImageAccepted]);
@@ -265,7 +265,7 @@ fn a_card_reports_the_memory_use_that_its_board_measures() {
     });
 }
 
-/// A memory test overwrites the scene at any time, and the next image is loaded completely.
+/// A memory test overwrites the scene, even during a tile; the next image is loaded from its first line.
 #[test]
 fn a_memory_test_drops_the_scene_and_the_next_load_works() {
     with_room_for_a_card(|| {
@@ -276,7 +276,8 @@ fn a_memory_test_drops_the_scene_and_the_next_load_works() {
         let answers = wire.say_all(&[Command::RenderTile(TILE), Command::TestMemory]);
         let sound = |answer: &Answer| matches!(answer, Answer::MemoryTested(test) if test.wrong.count == 0);
         assert!(answers.iter().all(sound), "{answers:?}");
-        // A small memory has a report at the end of each pattern's writing, and of its reading.
+        // In so small a memory each of the five patterns has two reports: at the end of writing and of
+        // reading.
         assert_eq!(answers.len(), 10);
         assert_eq!(wire.say(&Command::RenderTile(TILE)), [Answer::Fault(FaultCode::Order)]);
         assert_eq!(wire.say(&Command::BeginFrame(frame())), [Answer::Fault(FaultCode::Order)]);
@@ -284,7 +285,7 @@ fn a_memory_test_drops_the_scene_and_the_next_load_works() {
         assert_eq!(wire.say(&read), [Answer::Fault(FaultCode::Chunks)]);
         assert_eq!(wire.hello(), 0, "no line holds what was written");
         renders_a_tile(&mut wire, &image);
-        // Another command ends a test.
+        // Another command ends the memory test.
         let begin = Command::BeginImage { lines: 2, checksum: 0 };
         assert_eq!(wire.say_all(&[Command::TestMemory, begin, Command::EndImage]).len(), 1);
         renders_a_tile(&mut wire, &image);
@@ -306,7 +307,7 @@ fn a_card_computes_only_without_other_work() {
             let answers = wire.say(&Command::Compute { operands: &bytes });
             assert_eq!(answers, [Answer::Fault(FaultCode::Operands)], "{} bytes", bytes.len());
         }
-        // Results and pixels share a buffer.
+        // Results are computed in the buffer of pixels, and are refused while a tile is rendered.
         let answers = wire.say_all(&[Command::RenderTile(TILE), Command::Compute { operands: &cases(1) }]);
         assert_eq!(answers.first(), Some(&Answer::Fault(FaultCode::Order)));
         assert_eq!(answers.last(), Some(&Answer::TileDone(7)), "the scene is still there");
@@ -316,7 +317,7 @@ fn a_card_computes_only_without_other_work() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
-    /// Sends complete messages of arbitrary content.
+    /// Messages of arbitrary bytes arrive in valid frames.
     #[test]
     fn no_messages_stop_a_card(
         messages in proptest::collection::vec(proptest::collection::vec(any::<u8>(), 0..200), 0..40),
@@ -342,7 +343,8 @@ proptest! {
         });
     }
 
-    /// A card with a damaged line in its image renders or reports a fault. It never panics or hangs.
+    /// With a damaged line in its image a card renders or reports a fault, without a panic or an endless
+    /// loop.
     #[test]
     fn no_damaged_image_stops_a_card(
         line in any::<prop::sample::Index>(),

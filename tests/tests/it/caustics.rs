@@ -1,4 +1,4 @@
-//! Caustics of few photons: sparse light beside a dense patch.
+//! Caustics of few photons: dense light next to sparse light.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -28,8 +28,8 @@ fn smooth(name: &str, metallic: f32, transmission: Option<Transmission>) -> Mate
     Material::new(name, reflection)
 }
 
-/// Room with a light above two balls. A glass one focuses it on the floor, and a metal one scatters it over
-/// the walls. The camera sees a part of the ceiling.
+/// Room with a light above two balls: a glass ball that focuses the light on the floor, and a metal ball that
+/// scatters it over walls and ceiling. The camera sees a part of the ceiling.
 fn two_balls() -> Scene {
     let glass = Transmission { factor: 1.0, ior: 1.5, is_volume: true, absorption: Vec3::ZERO };
     let materials =
@@ -44,7 +44,7 @@ fn two_balls() -> Scene {
     scene
 }
 
-/// Radiance of each pixel of a picture with caustics only.
+/// Radiance of each pixel, by caustics alone.
 fn caustics(scene: &Scene, photons: usize, seed: u32) -> Vec<[f32; 3]> {
     let settings = RenderSettings {
         picture: Picture { width: 24, height: 24, ..Picture::default() },
@@ -73,8 +73,8 @@ fn sparse_light_beside_a_focus_is_smooth_with_the_mean_of_many_photons() {
     assert!(deviation < 0.25, "a deviation of {deviation}");
 }
 
-/// Room with a lamp above a mirror that lies at the foot of a wall, in the gap behind a board or without the
-/// board. The camera sees the board, or the wall behind it.
+/// Room with a light above a mirror at the foot of a wall. If `has_board`, a board stands before wall and
+/// mirror. The camera sees the board or, without it, the wall.
 fn mirror_behind_a_board(has_board: bool) -> Scene {
     let materials = vec![lambertian("wall", 0.5), smooth("metal", 1.0, None)];
     let mut triangles = room([0; 6]);
@@ -116,7 +116,7 @@ fn caustic_map() -> (CardImage, f32) {
     (image, caustics.expect("there are caustics").max_distance)
 }
 
-/// Caustics on a white surface, and the number of lines that the search reads.
+/// Caustics on a white surface at `position`, and the number of lines that the search has read.
 fn searched(image: &CardImage, max_radius: f32, position: Vec3, normal: Vec3) -> (Caustics, u64) {
     let (scene, memory) = image.view();
     let mut memory = Counted::new(memory);
@@ -137,7 +137,7 @@ fn searched(image: &CardImage, max_radius: f32, position: Vec3, normal: Vec3) ->
     (caustics.expect("the image is valid"), reads.requests)
 }
 
-/// Number of photons on a wall whose discs contain a position, from all leaves.
+/// Number of photons with `normal` whose discs contain `position`, found in all leaves.
 fn within_discs(image: &CardImage, max_radius: f32, position: Vec3, normal: Vec3) -> u32 {
     let grid = image.view().0.header.photon_grid;
     let mut count = 0;

@@ -1,4 +1,4 @@
-//! The boundary-corrected density estimate is unbiased at edges, in corners and on thin walls.
+//! The density estimate is unbiased at edges, in corners and on thin walls.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -17,11 +17,11 @@ use photoncard_tests::{camera, lambertian, quad, room, scene};
 const NEIGHBORS: u32 = 100;
 const ALBEDO: f32 = 0.5;
 
-/// Photon map from which radiance is gathered.
+/// Card image with a photon map, in which radiance is gathered.
 struct Map {
     image: CardImage,
     max_distance: f32,
-    /// Radius of a gather on the floor, metres.
+    /// Distance of the [`NEIGHBORS`]-th nearest photon from a point of the floor, metres.
     radius: f32,
 }
 
@@ -48,12 +48,13 @@ impl Map {
         Self { image, max_distance, radius }
     }
 
-    /// Radiance that a Lambertian surface reflects at a point, W/(sr m^2). All instruction sets must agree.
+    /// Radiance that a Lambertian surface at `position` reflects, W/(sr m^2). All instruction sets must
+    /// agree.
     fn radiance(&self, position: Vec3, normal: Vec3) -> f64 {
         self.radiance_after(f32::INFINITY, position, normal)
     }
 
-    /// [`Self::radiance`] at the end of a gather ray of length `length`, metres.
+    /// [`Self::radiance`] at the end of a gather ray of `length` metres.
     fn radiance_after(&self, length: f32, position: Vec3, normal: Vec3) -> f64 {
         let (scene, mut memory) = self.image.view();
         let mut buffer = CandidateBuffer::<512>::new();
@@ -88,8 +89,8 @@ impl Map {
         f64::from(radiance.x)
     }
 
-    /// Mean radiance of a horizontal surface along the four sides of a square. `distance` is that of the
-    /// sides from its centre, `half` is half their length.
+    /// Mean radiance of a horizontal surface at height `y` along four segments of length `2 half`, each at
+    /// `distance` from the y axis.
     fn mean_around(&self, y: f32, distance: f32, half: f32) -> f64 {
         let sides = [-distance, distance].map(|side| {
             let along_z = [-half, half].map(|z| Vec3::new(side, y, z));
@@ -99,14 +100,14 @@ impl Map {
         sides.as_flattened().iter().sum::<f64>() / 4.0
     }
 
-    /// Mean radiance at a hundred points along a line.
+    /// Mean radiance at a hundred points of a segment.
     fn mean_along(&self, from: Vec3, to: Vec3, normal: Vec3) -> f64 {
         let places = (0..100).map(|i| from.lerp(to, (i as f32 + 0.5) / 100.0));
         places.map(|place| self.radiance(place, normal)).sum::<f64>() / 100.0
     }
 }
 
-/// Furnace whose walls emit 1, so that every point reflects rho / (1 - rho) = 1.
+/// Closed room whose walls emit 1: every point reflects rho / (1 - rho) = 1, with rho = [`ALBEDO`].
 fn furnace() -> Scene {
     cluttered_furnace(Vec::new(), glowing())
 }
@@ -115,18 +116,18 @@ fn glowing() -> Material {
     Material { emission: Vec3::ONE, ..lambertian("wall", ALBEDO) }
 }
 
-/// Furnace with other objects of one material in it.
+/// Furnace with objects `things` of the material `finish` in it.
 fn cluttered_furnace(things: Vec<Triangle>, finish: Material) -> Scene {
     let mut triangles = room([0; 6]);
     triangles.extend(things.into_iter().map(|triangle| Triangle { material: 1, ..triangle }));
     scene(triangles, vec![glowing(), finish], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// Closed box of size `size` whose lower corner is `lower`.
+/// Closed box that faces outwards, from `lower` to `lower + size`.
 fn closed_box(lower: Vec3, size: Vec3) -> impl Iterator<Item = Triangle> {
     room([0; 6]).into_iter().map(move |mut triangle| {
         triangle.vertices = triangle.vertices.map(|corner| lower + size * (0.5 + 0.5 * corner));
-        // The walls of a room face inwards.
+        // The walls of a room face inwards: their orientation is reversed.
         triangle.vertices.reverse();
         triangle
     })
@@ -138,8 +139,8 @@ fn the_radiance_of_a_wall_is_the_same_up_to_its_edges() {
     for distance in [0.0, 0.1, 0.25, 0.5, 0.75, 1.0, 2.0] {
         let x = 1.0 - distance * map.radius;
         let mean = map.mean_along(Vec3::new(x, -1.0, -0.8), Vec3::new(x, -1.0, 0.8), Vec3::Y);
-        // At the edge itself the nearest photon is always a little inside, where the fraction of the disc is
-        // larger.
+        // On the edge itself the nearest photon is always a little inside, where the disc fraction is
+        // greater.
         let tolerance = if distance == 0.0 { 0.08 } else { 0.05 };
         assert!((mean - 1.0).abs() < tolerance, "at {distance} radii from the edge it is {mean}");
     }
@@ -162,8 +163,8 @@ fn the_mean_radiance_around_a_corner_equals_that_of_the_wall() {
     assert!((mean - 1.0).abs() < 0.05, "around the corners it is {mean}");
 }
 
-/// The shelves are closer than the radius of a gather, so that a search finds photons of several. Boards
-/// reflect on one side, sheets on both.
+/// The distance between shelves is less than the radius of a gather: a search finds photons of several
+/// shelves. Boards reflect on their outsides, sheets on both sides.
 #[test]
 fn the_radiance_of_stacked_shelves_equals_that_of_the_wall() {
     let top = |shelf: u32| -0.5 + 0.02 * shelf as f32;
@@ -189,7 +190,7 @@ fn the_radiance_of_stacked_shelves_equals_that_of_the_wall() {
     }
 }
 
-/// The holes of the textured lattice are narrower than the radius of a gather.
+/// The holes of the lattice, cut out by alpha, are narrower than the radius of a gather.
 #[test]
 fn the_radiance_of_a_lattice_equals_that_of_the_wall() {
     let lattice =
@@ -213,16 +214,16 @@ fn the_radiance_of_a_lattice_equals_that_of_the_wall() {
     assert!((mean - 1.0).abs() < 0.04, "{mean}");
 }
 
-/// The bars and the gaps between them are narrower than the radius of a gather. They are close above the
-/// floor, so that a search on the floor finds photons on their tops, and vice versa. Double-sided end faces
-/// do not matter, because it is dark inside the bars.
+/// Bars and gaps are narrower than the radius of a gather, and the tops of the bars are close above the
+/// floor: a search on either finds photons of the other. Double-sided bars are dark inside, and their ends
+/// change nothing.
 #[test]
 fn the_radiance_of_bars_and_of_the_floor_between_them_equals_that_of_the_wall() {
     let bars = (0..40).flat_map(|bar| {
         closed_box(Vec3::new(-0.4 + 0.02 * bar as f32, -0.998, -0.4), Vec3::new(0.01, 0.015, 0.8))
     });
     let bars: Vec<Triangle> = bars.collect();
-    // An albedo of 1 is as bright as the furnace.
+    // Under equal light, an albedo of 1 without emission is as bright as the furnace's walls.
     let white = Material { double_sided: true, ..lambertian("white", 1.0) };
     for finish in [glowing(), white] {
         let map = Map::new(&cluttered_furnace(bars.clone(), finish), 300_000);
@@ -242,7 +243,7 @@ fn the_radiance_of_bars_and_of_the_floor_between_them_equals_that_of_the_wall() 
 
 #[test]
 fn light_on_one_side_of_a_thin_wall_does_not_show_on_the_other() {
-    // A wall of a millimetre across the room, lit on its upper side alone.
+    // A wall of a millimetre divides the room; light falls on its upper side alone.
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
     let mut triangles = room([0, 0, 0, 1, 0, 0]);
     let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
@@ -262,7 +263,7 @@ fn light_on_one_side_of_a_thin_wall_does_not_show_on_the_other() {
     assert_eq!(lower, 0.0);
 }
 
-/// The back of the board faces in the direction of the wall's lit side, and the wall is between them.
+/// The back of the board faces as the lit side of the wall does; the wall is between them.
 #[test]
 fn light_on_a_wall_does_not_show_on_the_back_of_furniture_behind_it() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
@@ -284,8 +285,8 @@ fn light_on_a_wall_does_not_show_on_the_back_of_furniture_behind_it() {
     }
 }
 
-/// Five boxes around the cube from -1 to 1, without a ceiling. They touch along its edges, or the floor
-/// continues below the walls.
+/// Walls and floor around the cube from -1 to 1, each a box. They touch along the edges of the cube; if
+/// `overlap`, the floor extends below the walls.
 fn walls_of_boxes(thickness: f32, overlap: bool) -> Vec<Triangle> {
     let wall = |side: usize| {
         let axis = side / 2;
@@ -298,7 +299,7 @@ fn walls_of_boxes(thickness: f32, overlap: bool) -> Vec<Triangle> {
     [0, 1, 2, 4, 5].into_iter().flat_map(wall).collect()
 }
 
-/// Furnace with a glowing ceiling above white objects.
+/// Furnace of white objects below a glowing ceiling.
 fn white_furnace(white: Vec<Triangle>, double_sided: bool) -> Scene {
     let corner = |x: f32, z: f32| Vec3::new(x, 1.0, z);
     let ceiling = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 0);
@@ -308,7 +309,7 @@ fn white_furnace(white: Vec<Triangle>, double_sided: bool) -> Scene {
     scene(triangles, vec![glowing(), white], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// Meshes that touch share edges. The space that one of them encloses must stay dark.
+/// Boxes that touch share edges, and the space inside a box must stay dark.
 #[test]
 fn a_room_of_boxes_that_touch_is_as_bright_as_one_of_sheets() {
     for (thickness, double_sided, overlap) in [
@@ -331,7 +332,7 @@ fn a_room_of_boxes_that_touch_is_as_bright_as_one_of_sheets() {
     }
 }
 
-/// A floor continues from a furnace into a room without light.
+/// Two rooms stand side by side: a furnace, and a dark room whose floor continues the furnace's.
 #[test]
 fn no_photon_counts_through_a_wall_on_the_floor() {
     for thickness in [0.001_f32, 0.02, 0.1] {
@@ -356,8 +357,8 @@ fn no_photon_counts_through_a_wall_on_the_floor() {
     }
 }
 
-/// A frame on a wall or a carpet on a floor covers an area, which has no light although the sheet is an open
-/// mesh.
+/// A tray without a bottom, such as a picture frame or a carpet, covers an area of the floor, where no light
+/// falls.
 #[test]
 fn a_sheet_close_before_a_wall_is_as_bright_as_the_wall() {
     for gap in [0.0005, 0.005, 0.02, 0.05] {
@@ -375,7 +376,7 @@ fn a_sheet_close_before_a_wall_is_as_bright_as_the_wall() {
     }
 }
 
-/// A path between two white sheets hits them hundreds of times, so that its photons alone give no density.
+/// Between two white sheets a path has hundreds of hits close together: its photons alone give no density.
 #[test]
 fn sheets_that_nearly_touch_have_no_bright_spot() {
     const GAP: f32 = 0.001;
@@ -389,7 +390,7 @@ fn sheets_that_nearly_touch_have_no_bright_spot() {
     let map = Map::new(&white_furnace(white.collect(), true), 300_000);
     let mut radiances = Vec::new();
     for i in 0..2000 {
-        // Along the four edges, at most 3 cm from them.
+        // Points along the four edges of the sheet, at most 3 cm from them.
         let (along, inward) = (-0.4 + 0.8 * (i / 4) as f32 / 500.0, 0.03 * ((7 * i) % 40) as f32 / 40.0);
         let (x, z) = if i % 2 == 0 { (along, 0.399 - inward) } else { (0.399 - inward, along) };
         let side = if i % 4 < 2 { 1.0 } else { -1.0 };

@@ -1,4 +1,4 @@
-//! Energy of the photon pass: stored power equals the power that every kind of light emits towards surfaces.
+//! Energy of the photon pass: photons store the power that each kind of light emits towards surfaces.
 
 use std::f64::consts::PI;
 
@@ -13,10 +13,10 @@ use photoncard_firmware::scene::light::{environment_direction, environment_radia
 use photoncard_tests::{camera, lambertian, quad, room, scene};
 
 const PHOTONS: usize = 200_000;
-/// Albedo of nearly black surfaces, which still store photons.
+/// Albedo of surfaces that are nearly black, and store photons all the same.
 const BLACK: f32 = 0.001;
 
-/// Stored power per channel, watts.
+/// Power of all stored photons per channel, W.
 fn stored(scene: &Scene) -> [f64; 3] {
     let packed = PackedScene::new(scene).unwrap();
     let photons = trace(&packed, 11, PHOTONS, &|_| true).unwrap().photons;
@@ -33,12 +33,12 @@ fn check(scene: &Scene, expected: [f64; 3], what: &str) {
     }
 }
 
-/// Closed black room.
+/// Closed room whose walls are nearly black.
 fn inside() -> Scene {
     scene(room([0; 6]), vec![lambertian("wall", BLACK)], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// Black cube of side 2, seen from outside.
+/// Nearly black cube of side 2 that faces outwards.
 fn outside() -> Scene {
     let mut cube = inside();
     for Triangle { vertices: [_, b, c], .. } in &mut cube.triangles {
@@ -72,7 +72,7 @@ fn point_and_spot_lights_emit_their_intensity_over_their_directions() {
             outer_cosine: outer as f32,
         };
         room.lights = vec![light(kind, COLOUR)];
-        // Numerical integral of the falloff of `KHR_lights_punctual`.
+        // Mean over the cone of the falloff of `KHR_lights_punctual`, integrated numerically.
         let width = (f64::from(inner as f32) - f64::from(outer as f32)).max(0.001);
         let steps = 10_000;
         let share = |i: i32| {
@@ -109,7 +109,7 @@ fn an_environment_gives_its_radiance_to_all_sides() {
     check(&cube, received(&cube), "map");
 }
 
-/// Power that the cube receives from its environment: the integral over directions of radiance times
+/// Power that the cube receives from its environment, W: the integral over directions of radiance times
 /// projected area.
 fn received(cube: &Scene) -> [f64; 3] {
     let packed = PackedScene::new(cube).unwrap();
@@ -130,7 +130,7 @@ fn received(cube: &Scene) -> [f64; 3] {
 
 #[test]
 fn a_panel_with_a_texture_emits_its_mean_and_all_lights_together_their_sum() {
-    // A panel with one glowing corner, beside a point light.
+    // A panel of whose emissive texture one corner glows, at first without a point light.
     let mut texels = vec![[0, 0, 0, 255]; 16 * 16];
     for row in 2..6 {
         texels[row * 16 + 3..][..5].fill([255; 4]);
@@ -152,19 +152,19 @@ fn a_panel_with_a_texture_emits_its_mean_and_all_lights_together_their_sum() {
         emissive_texture: Some(0),
         ..lambertian("panel", BLACK)
     });
-    // The interpolated texture has the mean of its texels, as it is dark at the borders.
+    // Interpolation keeps the mean of the texels, as those at the borders are black.
     let panel = 2.0 * PI * 20.0 / 256.0;
     check(&all, times(COLOUR, panel), "panel");
     all.lights = vec![light(PunctualKind::Point { position: Vec3::new(0.0, 0.5, 0.0) }, COLOUR)];
     check(&all, times(COLOUR, panel + 4.0 * PI), "panel and point");
 }
 
-/// Distance of two small cubes from the point midway between them, metres.
+/// Distance of each of two small cubes from the origin, metres.
 const AFAR: f32 = 5.0;
-/// Half the side of a small cube, metres.
+/// Half side of a small cube, metres.
 const HALF: f32 = 0.05;
 
-/// Two small black cubes, far from each other.
+/// Two small cubes, nearly black and far from each other.
 fn far_cubes() -> Scene {
     let mut cubes = outside();
     let of = |x: f32| {
@@ -179,8 +179,8 @@ fn far_cubes() -> Scene {
     cubes
 }
 
-/// Irradiance by a light at the point `from`, integrated over the surfaces of both cubes. `toward(way)` is
-/// the radiant intensity along the vector to the surface, W/sr.
+/// Power that both cubes receive from a light at `from`, W. `toward(way)` is the radiant intensity along the
+/// vector `way` from the light to a surface, W/sr.
 fn received_from(from: Vec3, toward: impl Fn(Vec3) -> f32) -> f64 {
     const STEPS: i32 = 8;
     let middle = |i: i32| ((i as f32 + 0.5) / STEPS as f32 * 2.0 - 1.0) * HALF;
@@ -228,7 +228,7 @@ fn photons_of_panels_are_aimed() {
         let mut lamp = lambertian("lamp", 0.0);
         (lamp.emission, lamp.double_sided) = (COLOUR.into(), double_sided);
         cubes.materials.push(lamp);
-        // It faces one of the cubes, its back the other.
+        // The front of the lamp faces one of the cubes, its back the other.
         let normal = Vec3::new(1.0, -0.4, 0.0).normalize();
         let (along, across) = normal.any_orthonormal_pair();
         let corner = |x: f32, y: f32| middle + along * (0.2 * x) + across * (0.2 * y);
@@ -250,9 +250,8 @@ fn photons_of_panels_are_aimed() {
     }
 }
 
-/// Mirror of 10 m on the ground under a slanting sun, with a black plate of 1 m above it. One in hundreds of
-/// paths that hit the mirror hits the plate. A spot light illuminates the plate with `lamp` times the sun's
-/// intensity.
+/// Mirror of 10 m on the ground under a slanting sun, with a plate of 1 m above it: of hundreds of paths that
+/// hit the mirror, one hits the plate. A spot light gives the plate `lamp` times the light of the sun.
 fn sun_over_a_mirror(lamp: f32) -> Scene {
     let smooth = Reflection::MetallicRoughness {
         base_colour: Vec3::ONE,
@@ -268,7 +267,7 @@ fn sun_over_a_mirror(lamp: f32) -> Scene {
         quad([corner(-1.0, -1.0), corner(-1.0, 1.0), corner(1.0, 1.0), corner(1.0, -1.0)], material)
     };
     let mut triangles = [square(0.0, 10.0, 1), square(3.0, 1.0, 0)].concat();
-    // The plate faces the mirror.
+    // The plate faces the mirror, downwards.
     triangles[2..].iter_mut().for_each(|triangle| triangle.vertices.reverse());
     let sun = light(PunctualKind::Directional { direction: Vec3::new(1.0, -1.0, 0.0).normalize() }, COLOUR);
     let spot = PunctualKind::Spot {
@@ -281,8 +280,8 @@ fn sun_over_a_mirror(lamp: f32) -> Scene {
     scene(triangles, materials, camera(Vec3::Y, Vec3::Y)).with(|scene| scene.lights = vec![sun, spot])
 }
 
-/// Few paths are traced for caustics that contribute almost no light. The stored photons still have the power
-/// of the caustics.
+/// If caustics contribute almost no light, few paths are traced for them. The stored photons have the full
+/// power of the caustics all the same.
 #[test]
 fn rare_caustics_have_few_paths_and_their_full_power() {
     const SEEDS: u32 = 16;

@@ -1,4 +1,4 @@
-//! Energy balance of the photon pass: stored power is the emitted power plus that of every reflection.
+//! Energy balance of the photon pass: photons store the emitted power, and that of every reflection.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -13,7 +13,7 @@ fn pass(scene: &Scene, seed: u32) -> PhotonPass {
     trace(&packed, seed, PHOTONS, &|_| true).unwrap()
 }
 
-/// Stored power per channel, watts.
+/// Power of all stored photons per channel, W.
 fn stored_power(pass: &PhotonPass) -> [f64; 3] {
     let unit = f64::from(pass.photons.power_unit());
     std::array::from_fn(|channel| {
@@ -21,7 +21,7 @@ fn stored_power(pass: &PhotonPass) -> [f64; 3] {
     })
 }
 
-/// Closed room with a lamp in its middle that emits upwards and downwards.
+/// Closed room around a square lamp that emits upwards and downwards.
 fn lit_room(walls: Material, emission: Vec3) -> Scene {
     let lamp = Material { emission, double_sided: true, ..walls.clone() };
     let mut triangles = room([0; 6]);
@@ -30,13 +30,13 @@ fn lit_room(walls: Material, emission: Vec3) -> Scene {
     scene(triangles, vec![walls, lamp], camera(Vec3::ZERO, Vec3::NEG_Z))
 }
 
-/// Power of the lamp per unit of radiance, W: pi times the area of both sides.
+/// Power of the lamp for a radiance of 1, W: pi times the area of both sides.
 const LAMP: f64 = std::f64::consts::PI * 0.64 * 2.0;
 
 #[test]
 fn a_closed_room_stores_the_emitted_power_over_one_minus_the_albedo() {
     let emission = Vec3::new(3.0, 2.0, 0.5);
-    // Black surfaces store no photons: an albedo of 0.001 stands for black.
+    // An albedo of 0.001 stands for black: surfaces without reflection store no photons.
     for albedo in [[0.001; 3], [0.2; 3], [0.5; 3], [0.8; 3], [0.7, 0.3, 0.1]] {
         let walls = Material::lambertian("wall", albedo.into());
         let stored = stored_power(&pass(&lit_room(walls, emission), 3));
@@ -50,7 +50,7 @@ fn a_closed_room_stores_the_emitted_power_over_one_minus_the_albedo() {
 
 #[test]
 fn a_room_with_one_reflecting_wall_stores_its_share() {
-    // The lamp in a form factor: a parallel square of side 2 at distance 0.7, seen from a square of side 0.8.
+    // Form factor of the lamp, a square of side 0.8, and the ceiling, a square of side 2 at distance 0.7.
     let mut scene = lit_room(lambertian("black", 0.0), Vec3::ONE);
     scene.materials.push(lambertian("floor", 0.001));
     for triangle in &mut scene.triangles {
@@ -65,7 +65,7 @@ fn a_room_with_one_reflecting_wall_stores_its_share() {
 }
 
 /// Form factor from a square of half side `a` to a parallel, centred square of half side `b` at `distance`,
-/// by the double area integral.
+/// by the integral over both areas.
 fn form_factor(a: f64, b: f64, distance: f64) -> f64 {
     let steps = 40;
     let at = |i: usize, half: f64| ((i as f64 + 0.5) / steps as f64 * 2.0 - 1.0) * half;

@@ -1,4 +1,4 @@
-//! Environments with a sun of one texel have its irradiance, with little noise.
+//! An environment map with a sun of one texel gives the sun's irradiance, with little noise.
 
 use std::f64::consts::PI;
 
@@ -24,7 +24,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Floor below a sky with a sun of one texel.
+/// Floor under a uniform sky with a sun at one texel.
 fn floor_under(column: u32, row: u32, sun: f32) -> Scene {
     let corner = |x: f32, z: f32| Vec3::new(x, 0.0, -z);
     let floor = quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], 0);
@@ -38,8 +38,8 @@ fn floor_under(column: u32, row: u32, sun: f32) -> Scene {
     scene
 }
 
-/// Expected radiance of the floor. The sun's texel is interpolated towards its neighbours, and has the power
-/// of its own solid angle.
+/// Expected radiance of the floor. Interpolation spreads the sun's texel over its neighbours; its power is
+/// that of the texel's own solid angle.
 fn expected(row: u32, sun: f32) -> f64 {
     let angle = PI * (f64::from(row) + 0.5) / f64::from(WIDTH / 2);
     let solid_angle = (2.0 * PI / f64::from(WIDTH)).powi(2) * angle.sin();

@@ -1,4 +1,4 @@
-//! Renders that differ only in ordering, tile size, chips or threads have identical pixels.
+//! Renders that differ only in gather order, tile size, chips or threads have identical pixels.
 
 use std::sync::Mutex;
 
@@ -39,12 +39,12 @@ fn card(text: &str) -> CardAddress {
     text.parse().unwrap()
 }
 
-/// Pixel sums of a film without those of its layers.
+/// Sums of all pixels of a film, without those of layers.
 fn sums(film: &Film) -> Vec<PixelSums> {
     film.sums().map(|sums| PixelSums { layers: None, ..sums }).collect()
 }
 
-/// Settings on which no pixel may depend.
+/// Settings that no pixel may depend on.
 fn variants() -> Vec<RenderSettings> {
     use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
     let tile = 16;
@@ -99,18 +99,18 @@ fn variants() -> Vec<RenderSettings> {
     scheduled.into_iter().chain(dealt).chain(in_kd_tree).collect()
 }
 
-/// Checks all variants with a sampling, with and without irradiance records.
+/// Checks all variants with a sampling of gather rays, with and without irradiance records.
 fn check_variants(sampling: Sampling) {
     check_variants_of(&glossy(), &few_pixels().with(|s| s.integrator.sampling = sampling));
 }
 
-/// Settings of a picture that is rendered dozens of times. It has several tiles of 16x16 pixels, and more
-/// gathers than the longest queue.
+/// Settings of a picture of several tiles of 16x16 pixels, with more gathers than the longest queue holds. It
+/// is so small that dozens of renders take little time.
 fn few_pixels() -> RenderSettings {
     settings().with(|s| (s.picture.width, s.picture.height) = (27, 19))
 }
 
-/// Checks that pixels of all variants equal those with `settings_of`.
+/// Checks that the pixels of all variants are those of a render with `settings_of`.
 fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
     let PhotonMaps { radiance, caustic_photons, .. } = settings_of.photons;
     let Picture { width, height, .. } = settings_of.picture;
@@ -135,18 +135,18 @@ fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
     }
 }
 
-/// Layer sums of a film; zero in a film without layers.
+/// Sums of the layers of all pixels of a film; zero in a film without layers.
 fn layer_sums(film: &Film) -> Vec<LayerSums> {
     film.sums().map(|sums| sums.layers.unwrap_or_default()).collect()
 }
 
-/// Gather orders of chips.
+/// Gather orders that chips have.
 const CHIPS_ORDERS: [GatherOrder; 5] = {
     use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
     [Naive, Tiled, DirectionBins, Hash, Sort]
 };
 
-/// A tile of 64x64 pixels has more gather points than a chip keeps, so that its rays are cast in two stripes.
+/// A tile of 64x64 pixels has more gather points than a chip holds: its gather rays are cast in two stripes.
 #[test]
 fn tiles_with_more_pixels_than_gather_points_are_exact() {
     const { assert!(64 * 64 > <Reference as ChipKind>::Points::ENTRIES, "one stripe") };
@@ -175,7 +175,8 @@ fn tiles_with_more_pixels_than_gather_points_are_exact() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 32, ..ProptestConfig::default() })]
 
-    /// Gathers wait across tiles, for any number of tiles in flight, kind of chip, order and size of queue.
+    /// Gathers wait across tiles, with any number of tiles in flight, kind of chip, order and length of
+    /// queue.
     #[test]
     fn pixels_do_not_depend_on_tiles_in_flight(
         tile in 2_u32..9,
@@ -255,7 +256,8 @@ fn adaptive_sampling_is_exact() {
             settings.with(|s| {
                 (s.picture.width, s.picture.height) = (17, 9);
                 (s.photons.count, s.photons.caustic_photons) = (3000, Some(500));
-                // Paths that share the rays of a sample have eight or more each: enough for a photon search.
+                // Of the rays of a sample each path has eight or more: enough for a direction table from
+                // photons.
                 s.integrator.gather_rays = if irradiance_error.is_some() { 128 } else { 24 };
                 s.integrator.irradiance_error = irradiance_error;
                 (s.integrator.samples, s.integrator.adaptive_threshold) = (5, Some(0.03));
@@ -276,8 +278,8 @@ fn adaptive_sampling_is_exact() {
 
 #[test]
 fn more_records_than_a_chip_has_room_for_are_exact() {
-    // So small an error bound divides every cell, down to one record at every other pixel: these blocks are
-    // halved.
+    // So small an error bound divides cells until there is a record at every other pixel; blocks with more
+    // records than a chip holds are halved.
     let records = |width: u32, height: u32| (width.div_ceil(2) + 1) * (height.div_ceil(2) + 1);
     assert!(records(61, 61) > REFERENCE.irradiance_records && records(140, 1) > MICRO.irradiance_records);
     let scene = glossy();
@@ -304,8 +306,8 @@ fn more_records_than_a_chip_has_room_for_are_exact() {
     }
 }
 
-/// Positions far to the right of the picture have few bits below the pixel, and may be rounded to the border
-/// of the next pixel.
+/// From x = 32768 on, an `f32` has 8 bits for the position within a pixel: a sample may be rounded to the
+/// border of the next pixel.
 #[test]
 fn samples_rounded_to_the_next_pixel_are_exact() {
     let scene = glossy();
@@ -326,7 +328,7 @@ fn samples_rounded_to_the_next_pixel_are_exact() {
     }
 }
 
-/// Frames of a study, whose gathers the host does.
+/// In frames of the order `hilbert`, which only studies have, the host does the gathers of the chips.
 #[test]
 fn gathers_along_one_curve_through_a_frame_bring_the_light_of_any_order() {
     let scene = everything();

@@ -1,5 +1,5 @@
-//! Scenes and settings at the limits of their ranges: large, tilted, bright or saturated, or with one kind of
-//! rays only.
+//! Scenes and settings at the limits of their ranges: large, tilted, very bright or saturated, or with one
+//! kind of rays alone.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -24,7 +24,8 @@ fn emitting(name: &str, albedo: f32, radiance: Vec3) -> Material {
     Material { emission: radiance, ..lambertian(name, albedo) }
 }
 
-/// Floor of half side `half_side` that is tilted about two axes under a parallel lamp and seen from near.
+/// Floor of half side `half_side`, tilted about two axes, below a small parallel lamp. The camera is close to
+/// it.
 fn tilted_floor(half_side: f32) -> Scene {
     let (u, v) = (Vec3::new(0.8, 0.3, 0.2).normalize(), Vec3::new(-0.2, 0.5, -0.9));
     let v = (v - u * u.dot(v)).normalize();
@@ -86,7 +87,7 @@ fn many_samples_next_to_a_dazzling_lamp_do_not_overflow() {
 
 #[test]
 fn direct_light_by_shadow_rays_by_gather_rays_and_by_both_is_equal() {
-    // Black except for the floor: all light there is direct.
+    // Only the floor reflects light: all light on it is direct.
     let materials =
         vec![lambertian("black", 0.0), lambertian("floor", 0.6), emitting("lamp", 0.0, Vec3::ONE)];
     let scene = scene(room([0, 0, 1, 2, 0, 0]), materials, camera(Vec3::ZERO, Vec3::new(0.01, -1.0, 0.02)));
@@ -128,7 +129,7 @@ fn the_stored_power_of_coloured_light_is_right_in_every_channel() {
     }
 }
 
-/// Cornell box, whose blocks are rotated, with one distant triangle.
+/// Cornell box, with a triangle at `distance` along each axis.
 fn box_and_far_triangle(distance: f32) -> Scene {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenes/cornell.gltf");
     let mut scene = gltf::load(path.as_ref()).expect("a shipped scene loads");
@@ -137,7 +138,7 @@ fn box_and_far_triangle(distance: f32) -> Scene {
     scene
 }
 
-/// Photon positions lie on a grid over the whole scene. A distant triangle must not coarsen it visibly.
+/// Photon positions are rounded to a grid, which a distant triangle must not make visibly coarser.
 #[test]
 fn a_far_triangle_does_not_change_the_picture() {
     let settings = RenderSettings {
@@ -154,7 +155,7 @@ fn a_far_triangle_does_not_change_the_picture() {
     assert!(error.is_input() && error.to_string().contains("too wide"), "{error}");
 }
 
-/// Without gather rays nothing bounds the contribution of a shadow ray from close by.
+/// Without gather rays a shadow ray has the weight 1, however close its emitter is.
 #[test]
 fn shadow_rays_beside_a_small_lamp_do_not_darken() {
     let vertical = |x: f32, side: f32| {

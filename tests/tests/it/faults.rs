@@ -1,4 +1,4 @@
-//! A render over bad lines gives an equal picture, and reports the repairs.
+//! A render over links with faults gives an equal picture, and its statistics report the repairs.
 
 use photoncard_driver::film::PixelValue;
 use photoncard_driver::render::{CardSet, Integrator, PhotonMaps, Picture, RenderSettings, Statistics};

@@ -1,4 +1,5 @@
-//! Albedo and normals that guide a denoiser are those of what mirrors, glass and sharp lobes show.
+//! Features for a denoiser: albedo and normal of a pixel are those of what mirrors, glass and sharp lobes
+//! show.
 
 use glam::{Vec3, Vec4};
 use photoncard_driver::film::Film;
@@ -36,7 +37,7 @@ fn greatest_difference(a: &[[f32; 3]], b: &[[f32; 3]]) -> f32 {
     a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
 }
 
-/// Metal with a lobe.
+/// Metal of this reflectance at normal incidence, with a GGX lobe.
 fn metal(reflectance: f32, roughness: f32) -> Material {
     let mut metal = mirror(reflectance);
     if let Reflection::MetallicRoughness { roughness: of_metal, .. } = &mut metal.reflection {
@@ -45,8 +46,8 @@ fn metal(reflectance: f32, roughness: f32) -> Material {
     metal
 }
 
-/// Room with a floor of two colours and a bright ceiling. The wall at z = -1 has the material `wall`; without
-/// one the room is open there.
+/// Room with a striped floor and an emissive ceiling. Its wall at z = -1 has the material `wall`; the room is
+/// open there if `None`.
 fn room_before(wall: Option<Material>, view: Camera) -> Scene {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.4) };
     let floor = Material { base_texture: Some(0), ..lambertian("floor", 0.9) };
@@ -67,7 +68,7 @@ fn room_before(wall: Option<Material>, view: Camera) -> Scene {
     scene
 }
 
-/// The camera and its mirror image in the plane z = -1.
+/// A camera, and its mirror image in the plane z = -1.
 fn both_cameras() -> [Camera; 2] {
     let view = camera(Vec3::new(0.1, 0.2, 0.4), Vec3::new(-0.1, -0.25, -1.0));
     let view = Camera { vertical_fov: 0.6, ..view };
@@ -146,7 +147,8 @@ fn coats_and_bumps_of_plastic_leave_the_features_of_the_plastic() {
     }
 }
 
-/// Reflectance of a thin wall of glass at normal incidence, with all reflections inside.
+/// Reflectance of a thin wall of glass at normal incidence, with interreflection of its faces: 2R / (1 + R),
+/// R = 0.04.
 const THIN_WALL: f32 = 2.0 * 0.04 / 1.04;
 
 #[test]

@@ -1,5 +1,5 @@
-//! Flat glass (thin walls, slabs and panes): the light that it transmits is direct light, and the light that
-//! it reflects is a caustic.
+//! Flat glass (thin walls, slabs and panes): light that it transmits is direct light, light that it reflects
+//! a caustic.
 
 use std::f64::consts::PI;
 
@@ -32,7 +32,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Settings for direct light, of which photons have no part.
+/// Settings for direct light, to which photons contribute nothing: there are few.
 fn settings_of_direct_light() -> RenderSettings {
     settings().with(|s| s.photons.count = 1000)
 }
@@ -43,7 +43,7 @@ fn square(half: f32, y: f32, sign: f32, material: u32) -> [Triangle; 2] {
     quad([corner(-1., -1.), corner(1., -1.), corner(1., 1.), corner(-1., 1.)], material)
 }
 
-/// Floor below panes, seen by a camera that is also below them.
+/// Floor below panes. The camera is below them too, and sees the floor at the origin.
 fn floor(pane: Material, panes: &[Triangle]) -> Scene {
     let mut view = camera(Vec3::new(0.0, 0.3, 0.4), Vec3::new(0.0, -0.3, -0.4));
     view.vertical_fov = 0.02;
@@ -61,7 +61,8 @@ fn slab(y: f32) -> Vec<Triangle> {
     cuboid(Vec3::Y * y, Vec3::new(40.0, HALF, 40.0), PANE)
 }
 
-/// Mean of each layer over the picture, as an irradiance of the floor.
+/// Irradiance of the floor for each layer (direct, indirect, caustic) and channel, from the mean of the
+/// picture.
 fn irradiances(scene: &Scene, settings: &RenderSettings) -> [[f64; 3]; 3] {
     let rendering = render_or_panic(scene, settings);
     let layers: Vec<PixelLayers> = rendering.film.all().map(|all| all.layers).collect();
@@ -74,7 +75,7 @@ fn irradiances(scene: &Scene, settings: &RenderSettings) -> [[f64; 3]; 3] {
     [mean(|layers| layers.direct), mean(|layers| layers.indirect), mean(|layers| layers.caustic)]
 }
 
-/// Reflectance of a glass surface at the cosine of incidence, and the cosine inside the glass.
+/// Fresnel reflectance of a face of glass of index 1.5, by the cosine of incidence, and the cosine inside.
 fn face(cosine: f64) -> (f64, f64) {
     let inside = (1.0 - (1.0 - cosine * cosine) / 2.25).sqrt();
     let [parallel, perpendicular] = [
@@ -84,26 +85,27 @@ fn face(cosine: f64) -> (f64, f64) {
     (0.5 * (parallel * parallel + perpendicular * perpendicular), inside)
 }
 
-/// Transmittance of clear glass at the cosine of incidence.
+/// Transmittance of a clear pane, with interreflection of its faces, by the cosine of incidence.
 fn clear(cosine: f64) -> f64 {
     let (reflectance, _) = face(cosine);
     (1.0 - reflectance) / (1.0 + reflectance)
 }
 
-/// Transmittance of a slab with optical depth `depth` at the cosine of incidence.
+/// Transmittance of a slab of optical thickness `depth`, by the cosine of incidence.
 fn absorbing(cosine: f64, depth: f64) -> f64 {
     let (reflectance, inside) = face(cosine);
     let once = (-depth / inside).exp();
     (1.0 - reflectance).powi(2) * once / (1.0 - (reflectance * once).powi(2))
 }
 
-/// Irradiance of the floor below glass with a given transmittance as a function of the cosine.
+/// Irradiance of the floor below glass, W/m^2, for a transmittance that is a function of the cosine of
+/// incidence.
 type Irradiance = Box<dyn Fn(&dyn Fn(f64) -> f64) -> f64>;
 
-/// Light: its name, a function that adds it to a scene, and its irradiance.
+/// Light: name, function that adds it to a scene, and irradiance of the floor.
 type Light = (&'static str, fn(&mut Scene), Irradiance);
 
-/// Lights with which transmission is tested.
+/// Lights whose transmission is tested: from one direction, from a point, from a lamp and from a sky.
 fn lights() -> Vec<Light> {
     vec![
         (
@@ -148,7 +150,8 @@ fn lights() -> Vec<Light> {
     ]
 }
 
-/// Checks the direct light below glass under each light, and that there are no caustics.
+/// Checks the direct light below glass under each light, for the transmittance of each channel, and that
+/// there are no caustics.
 #[track_caller]
 fn check(name: &str, pane: &Material, panes: &[Triangle], through: [&dyn Fn(f64) -> f64; 3]) {
     for (light, add, irradiance) in lights() {
@@ -190,7 +193,7 @@ fn set_absorption(material: &mut Material, coefficient: Vec3) {
     }
 }
 
-/// Only direct light counts. Light that two panes reflect between them is a caustic.
+/// The expected direct light passes both panes once: light that they reflect between them is a caustic.
 #[test]
 fn light_through_double_glazing_is_direct_light() {
     let panes = [slab(HEIGHT), slab(HEIGHT + 0.02)].concat();
@@ -258,7 +261,7 @@ fn a_texture_of_a_sheet_tints_the_light() {
     assert_eq!(caustic, [0.0; 3]);
 }
 
-/// Gather rays and shadow rays share the light of a lamp or a sky by weights with a sum of 1, with and
+/// Gather rays and shadow rays share the light of a lamp or a sky, with weights that add up to 1, with and
 /// without irradiance records.
 #[test]
 fn gather_rays_and_shadow_rays_agree_on_light_through_panes() {
@@ -276,7 +279,8 @@ fn gather_rays_and_shadow_rays_agree_on_light_through_panes() {
                 let mut scene = floor(material.clone(), &panes);
                 add(&mut scene);
                 let [direct, indirect, caustic] = irradiances(&scene, &settings);
-                // Of the dark floor the pane shows little.
+                // With irradiance records, light by gather rays is indirect light. What the pane reflects of
+                // the dark floor is little.
                 let found = direct[0] + if irradiance_error.is_some() { indirect[0] } else { 0.0 };
                 let error = found / expected - 1.0;
                 let rays = (gather_rays, shadow_rays, irradiance_error);
@@ -287,7 +291,7 @@ fn gather_rays_and_shadow_rays_agree_on_light_through_panes() {
     }
 }
 
-/// A glass wall beside the floor reflects sunlight to it.
+/// A glass wall beside the floor reflects sunlight to the floor.
 #[test]
 fn light_reflected_by_a_pane_is_a_caustic() {
     for thickness in [0.0, 0.02] {
@@ -302,7 +306,7 @@ fn light_reflected_by_a_pane_is_a_caustic() {
         let half = std::f32::consts::FRAC_1_SQRT_2;
         let kind = PunctualKind::Directional { direction: Vec3::new(half, -half, 0.0) };
         scene.lights.push(PunctualLight { name: "sun".into(), kind, intensity: Vec3::splat(3.0) });
-        // Gathers of many places.
+        // In a wider field of view the caustic is gathered at many positions.
         scene.cameras[0].vertical_fov = 0.6;
         let [direct, _, caustic] = irradiances(&scene, &settings());
         let [sun, cosine] = [3.0 * f64::from(half), f64::from(half)];

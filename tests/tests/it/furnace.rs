@@ -1,4 +1,5 @@
-//! White furnace: a closed room of albedo rho whose walls emit L shows L / (1 - rho) everywhere.
+//! White furnace: in a closed room whose walls have albedo rho and emit L, the radiance is L / (1 - rho)
+//! everywhere.
 
 use glam::Vec3;
 use photoncard_driver::render::{
@@ -27,7 +28,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Checks the mean over the picture and over each block of 8x8 pixels.
+/// Checks the mean of the picture, and that of each block of 8x8 pixels.
 fn check(scene: &Scene, expected: f64, tolerance: f64) {
     check_with(scene, &settings(), expected, tolerance);
 }
@@ -64,12 +65,12 @@ fn a_diffuse_furnace_has_uniform_radiance_by_precomputed_irradiance() {
     }
 }
 
-/// A Phong lobe reflects less at grazing angles. A small wall with a lobe in a room of uniform radiance shows
-/// its directional albedo.
+/// A Phong lobe reflects less at grazing angles: in uniform radiance, a small wall with a lobe shows its
+/// directional albedo.
 #[test]
 fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
     let (diffuse, specular, exponent) = (0.3, 0.4, 16.0);
-    // A small wall in a far larger room: the room's radiance is that of the diffuse furnace.
+    // The wall is so small that the room's radiance stays that of the diffuse furnace.
     let mut triangles = room([0; 6]);
     let size = 0.05;
     let corner = |x: f32, y: f32| Vec3::new(x * size, y * size, 0.0);
@@ -99,7 +100,7 @@ fn a_phong_wall_in_a_diffuse_furnace_shows_its_directional_albedo() {
     }
 }
 
-/// Integral of `ks (n + 2) / (2 pi) cos(alpha)^n cos(theta)` over the hemisphere, for a view at `angle`.
+/// Directional albedo of Phong's lobe `ks (n + 2) / (2 pi) cos(alpha)^n`, seen at `angle` to the normal.
 fn lobe_albedo(specular: f64, exponent: f64, angle: f64) -> f64 {
     let steps = 1000;
     let (sin, cos) = angle.sin_cos();
@@ -116,8 +117,8 @@ fn lobe_albedo(specular: f64, exponent: f64, angle: f64) -> f64 {
     specular * (exponent + 2.0) / std::f64::consts::TAU * sum * std::f64::consts::TAU / (steps * steps) as f64
 }
 
-/// A room whose walls all have a lobe has no uniform radiance. The expected radiance is computed by a plain
-/// path tracer of this room in double precision.
+/// The radiance of a room is not uniform if all walls have a lobe: the expected one is that of a path tracer
+/// in double precision.
 #[test]
 fn the_radiance_of_a_phong_furnace_equals_that_of_a_path_tracer() {
     let (diffuse, specular, exponent) = (0.25, 0.35, 12.0);
@@ -158,7 +159,7 @@ mod oracle {
     }
 
     impl PhongRoom {
-        /// Mean radiance in a square picture of a camera with 90 degrees.
+        /// Mean radiance of a square picture with a field of view of 90 degrees.
         pub(super) fn mean_radiance(&self, camera: &Camera, paths: u32) -> f64 {
             let mut random = Random(7);
             let [forward, right, up] = [camera.forward, camera.right, camera.up].map(glam::Vec3::as_dvec3);
@@ -184,7 +185,7 @@ mod oracle {
                 let mirror = direction - normal * (2.0 * direction.dot(normal));
                 let lobe =
                     self.specular * (self.exponent + 2.0) * mirror.dot(incoming).max(0.0).powf(self.exponent);
-                // f cos over a density of 1 / (2 pi).
+                // The weight of a direction is f cos, divided by its density of 1 / (2 pi).
                 throughput *= (2.0 * self.diffuse + lobe) * normal.dot(incoming);
                 if throughput < 0.2 {
                     if random.next() < 0.5 {
@@ -197,7 +198,7 @@ mod oracle {
         }
     }
 
-    /// Intersection of a ray from inside with the cube, and the inward normal there.
+    /// First point of a wall of the cube on a ray from inside, with the wall's inward normal.
     fn wall(origin: DVec3, direction: DVec3) -> (DVec3, DVec3) {
         let distance = |axis: usize| (direction[axis].signum() - origin[axis]) / direction[axis];
         let axis = (0..3).min_by(|&a, &b| distance(a).total_cmp(&distance(b))).unwrap_or(0);

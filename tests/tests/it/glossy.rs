@@ -1,5 +1,4 @@
-//! Metallic-roughness surfaces with known radiance: plates, balls and grooves under a sky of uniform
-//! radiance.
+//! Metallic-roughness surfaces of known radiance: plates, balls and grooves under a uniform sky.
 
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
@@ -29,7 +28,7 @@ fn surface(base: f32, metallic: f32, roughness: f32) -> Material {
     Material::new("surface", reflection)
 }
 
-/// Distant camera with a field of view of 2 degrees that looks at the origin.
+/// Camera 20 m from the origin, at which it looks with a field of view of 2 degrees.
 fn far_camera(direction: Vec3) -> Camera {
     let origin = direction.normalize() * 20.0;
     Camera { vertical_fov: 2.0_f32.to_radians(), ..camera(origin, -origin) }
@@ -39,7 +38,7 @@ fn under_a_white_sky(scene: Scene) -> Scene {
     scene.with(|scene| scene.environment = Some(Environment::constant(Vec3::ONE)))
 }
 
-/// Horizontal plate, seen at the given cosine to its normal.
+/// Horizontal plate under a white sky, seen at this cosine to its normal.
 fn plate(material: Material, cosine: f32) -> Scene {
     let corner = |x: f32, z: f32| Vec3::new(40.0 * x, 0.0, 40.0 * z);
     let quad = quad([corner(-1., 1.), corner(1., 1.), corner(1., -1.), corner(-1., -1.)], 0);
@@ -47,7 +46,7 @@ fn plate(material: Material, cosine: f32) -> Scene {
     under_a_white_sky(scene(quad.to_vec(), vec![material], far_camera(Vec3::new(sine, cosine, 0.01))))
 }
 
-/// Directional albedos by quadrature over half vectors: roughness, cosine, albedo of a metal with base colour
+/// Directional albedos by quadrature over half vectors: roughness, cosine, albedo of a metal of base colour
 /// 0.8, albedo of a black dielectric.
 const ALBEDOS: [(f32, f32, f64, f64); 10] = [
     (0.1, 0.15, 0.8854, 0.4608),
@@ -76,7 +75,7 @@ fn plates_in_a_white_furnace_show_their_albedo() {
     }
 }
 
-/// Two metal plates at a right angle that extend to `far` along each axis, seen from above.
+/// Two metal plates at a right angle, which extend up to `far` from their common edge, seen from above.
 fn groove(roughness: f32, far: f32) -> Scene {
     let side = |x: f32| {
         let corner = |s: f32, z: f32| Vec3::new(x * s * far, s * far, z * far);
@@ -90,8 +89,8 @@ fn groove(roughness: f32, far: f32) -> Scene {
     scene(triangles, vec![surface(0.9, 1.0, roughness)], far_camera(Vec3::new(0.01, 1.0, 0.02)))
 }
 
-/// Two plates at a right angle reflect most light twice: F0^2 at low roughness. Expected values are Monte
-/// Carlo estimates by traced paths, with standard errors below 0.0002.
+/// Two plates at a right angle reflect most light twice, F0^2 of it at low roughness. Expected values are
+/// path-traced, with standard errors below 0.0002.
 #[test]
 fn a_groove_of_glossy_metal_is_not_black() {
     for (roughness, expected) in [(0.05, 0.8104), (0.1, 0.8102), (0.3, 0.7849)] {
@@ -104,9 +103,8 @@ fn a_groove_of_glossy_metal_is_not_black() {
     }
 }
 
-/// A punctual light is seen by reflection at two plates. No ray hits it, so that the caustic map supplies the
-/// light and blurs it at the edge between the plates. Expected values are estimates by traced paths, with
-/// standard errors below 0.2 %.
+/// No ray hits a punctual light, so that the light which both plates reflect comes by the caustic map,
+/// blurred at their common edge. Expected values are path-traced, with standard errors below 0.2 %.
 #[test]
 fn a_groove_of_glossy_metal_reflects_a_distant_light() {
     for (roughness, expected) in [(0.3, 1.4976), (0.45, 0.6705)] {
@@ -120,7 +118,7 @@ fn a_groove_of_glossy_metal_reflects_a_distant_light() {
         let many = settings().with(|s| s.photons.caustic_photons = Some(1_000_000));
         let found = mean(&radiances(&render_or_panic(&lit, &many).film));
         assert!((found / expected - 1.0).abs() < 0.03, "{roughness}: {found} of {expected}");
-        // Without the map rays sample the light where they meet the second plate.
+        // Without the caustic map, gather rays that end on the second plate sample the light there.
         let without = settings().with(|s| s.photons.caustic_photons = Some(0));
         let found = mean(&radiances(&render_or_panic(&lit, &without).film));
         assert!((found / expected - 1.0).abs() < 0.02, "{roughness} without a map: {found} of {expected}");

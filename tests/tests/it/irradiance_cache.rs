@@ -1,4 +1,4 @@
-//! Irradiance cache: interpolated light is correct, other light is gathered, and fewer rays are cast.
+//! Irradiance cache: interpolated light is right, other light is gathered, and fewer rays are cast.
 
 use glam::Vec3;
 use photoncard_driver::film::Window;
@@ -12,7 +12,7 @@ fn load(name: &str) -> Scene {
     gltf::load(path.as_ref()).expect("a shipped scene loads")
 }
 
-/// Settings for the middle of the Cornell box, as in a large picture.
+/// Settings of a part of the Cornell box, at the resolution of a larger picture.
 fn settings() -> RenderSettings {
     RenderSettings {
         picture: Picture {
@@ -43,7 +43,7 @@ fn most_pixels_of_the_cornell_box_are_interpolated_at_no_greater_error() {
             s.integrator.gather_rays = gather_rays;
         }))
     };
-    // Its noise is half of that without the cache, and adds to both errors alike.
+    // The noise of the reference is half of that without the cache, and adds to both errors alike.
     let reference = with(None, 400);
     let [off, on] = [with(None, 100), with(Some(0.025), 100)];
     let share = on.counters.interpolated_samples as f64 / on.counters.lambertian_samples as f64;
@@ -90,8 +90,8 @@ fn furnace(albedo: f32) -> Scene {
     scene(room([0; 6]), vec![wall], camera(Vec3::new(0.2, -0.1, 0.6), Vec3::new(0.1, 0.2, -1.0)))
 }
 
-/// Every wall of the furnace emits 1 and reflects `albedo`, so that every pixel is `1 / (1 - albedo)`. Shadow
-/// rays and irradiance records share the direct light, because the walls are near and large.
+/// Walls emit 1 and reflect `albedo`: every pixel is `1 / (1 - albedo)`. Shadow rays and irradiance records
+/// share the direct light, as the emissive walls are near and large.
 #[test]
 fn a_furnace_is_uniform_with_records_of_any_sampling() {
     for (albedo, sampling) in [
@@ -120,7 +120,8 @@ fn a_furnace_is_uniform_with_records_of_any_sampling() {
     }
 }
 
-/// Ratio of the mean difference across borders of 16x16 cells to that across other columns.
+/// Compares mean squared differences of the error across borders of 16x16 cells with those across other
+/// columns.
 #[test]
 fn no_seam_shows_at_the_borders_of_tiles() {
     let mapped = MappedScene::new(load("cornell.gltf"), &settings());
@@ -135,8 +136,7 @@ fn no_seam_shows_at_the_borders_of_tiles() {
     };
     let [mut at_borders, mut elsewhere] = [(0.0_f64, 0_u32); 2];
     for seed in 0..4 {
-        // The difference from a render with equal eye and shadow rays, but without interpolation, is the
-        // error of interpolation.
+        // Both renders have the same eye and shadow rays: their difference is the error of interpolation.
         let [on, off] = [with(seed, Some(0.025)), with(seed, None)];
         let errors: Vec<f32> = on.iter().zip(&off).map(|(on, off)| (*on - *off).element_sum()).collect();
         for row in errors.chunks(192) {

@@ -1,5 +1,5 @@
-//! Irradiance records that a chip keeps between the frames of a picture. They are gathered once while there
-//! is room, and no pixel depends on it.
+//! Irradiance records that a chip keeps for later passes of a picture: they are gathered once while there is
+//! room, and no pixel depends on that.
 
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tiles};
@@ -19,12 +19,12 @@ use photoncard_shared::message::{Fault, FrameParameters, PixelSums, Tile};
 use photoncard_tests::everything::everything;
 use photoncard_tests::with_room_for_a_card;
 
-/// Number of lines of the directory of kept records.
+/// Number of lines of the directory, which precedes the kept records.
 const DIRECTORY: usize = 128;
-/// Number of lines that suffices for all records of the picture.
+/// Number of lines in which all records of the picture have room.
 const PLENTY: usize = 4000;
 
-/// Card image, with the frames and tiles of a picture.
+/// Card image, and a picture's frame and tiles.
 struct World {
     scene: SceneImage,
     image: Vec<Line>,
@@ -32,7 +32,7 @@ struct World {
     tiles: Vec<Tile>,
 }
 
-/// Sums of all pixels, and the work.
+/// Sums of all pixels, and counters of all tiles.
 type Picture = (Vec<PixelSums>, Counters);
 
 impl World {
@@ -56,7 +56,7 @@ impl World {
         Self { scene, image: image.lines().to_vec(), frame, tiles }
     }
 
-    /// Card memory with the image and `room` lines after it.
+    /// Card memory with the image and `room` further lines.
     fn memory(&self, room: usize) -> Vec<Line> {
         let mut lines = self.image.clone();
         lines.resize(self.image.len() + room, Line([0xa5; 128]));
@@ -67,7 +67,7 @@ impl World {
         FrameParameters { first_sample, samples, ..self.frame }
     }
 
-    /// Renders a frame on the chip of a card with `room` lines after the image.
+    /// Renders all tiles of a frame on a chip whose memory has `room` lines after the image.
     fn render<K: ChipKind>(
         &self,
         chip: &mut Chip<K>,
@@ -92,7 +92,7 @@ impl World {
         Ok((parts.iter().flat_map(sums).collect(), counters))
     }
 
-    /// Renders the frame on a new chip that keeps no records.
+    /// Renders a frame on a new chip that keeps no records.
     fn alone(&self, frame: &FrameParameters) -> Picture {
         let mut lines = self.memory(0);
         let frame = FrameParameters { keep_records: false, ..*frame };
@@ -100,7 +100,8 @@ impl World {
     }
 }
 
-/// Renders two passes on one new chip for each amount of room after the image, and checks pixels and work.
+/// Renders two passes on one chip, for several numbers of lines after the image, and checks pixels and
+/// counters.
 fn check_passes<K: ChipKind>(world: &World, new_chip: impl Fn() -> Box<Chip<K>>) {
     let passes = [world.samples(0, 2), world.samples(2, 1)];
     let alone = passes.map(|frame| world.alone(&frame));
@@ -129,7 +130,7 @@ fn a_chip_keeps_records_while_there_is_room_and_gathers_others_again() {
         let world = World::new();
         check_passes(&world, || Box::new(MicroChip::new()));
         check_passes(&world, || Box::new(EmulatedKind::Micro.emulated().chip()));
-        // Several tiles in flight write their blocks in turn.
+        // With several tiles in flight, blocks of different tiles are written in turn.
         check_passes(&world, || Box::new(EmulatedKind::Large.emulated().chip()));
     });
 }
@@ -148,8 +149,8 @@ fn all_passes_together_do_the_work_of_one_frame() {
         }
         let (_, whole) = world.alone(&world.samples(0, 4));
         assert_eq!(sum.kept_records, 2 * whole.records);
-        // Drains depend on what waits. Pixels with gather rays are found by looking at samples, which a pass
-        // has more or fewer of.
+        // The number of drains depends on which gathers wait together. To find pixels with gather rays a chip
+        // looks at samples, of which each pass has its own.
         let Counters { drains, most_waiting, eye_rays, shadow_rays, .. } = whole;
         let Counters { specular_rays, caustic_gathers, normals_decoded, .. } = whole;
         let by_pass = Counters {
@@ -220,7 +221,7 @@ fn a_single_frame_writes_nothing_and_accesses_of_passes_are_counted() {
     });
 }
 
-/// Kept records are in a memory that may fail. Whatever they contain, a frame ends.
+/// The memory of kept records may fail: whatever it contains, a frame ends.
 #[test]
 fn damaged_records_do_not_stop_a_chip() {
     with_room_for_a_card(|| {
@@ -240,7 +241,7 @@ fn damaged_records_do_not_stop_a_chip() {
                 *word = [0, 1, u32::MAX, used as u32 - 1, number, number % used as u32][number as usize % 6]
                     .to_le_bytes();
             }
-            // A chain of blocks that lead to each other, or records that are none.
+            // Damage may link blocks in a circle, or make records invalid.
             let result = world.render(&mut chip, &mut Dram::new(&mut lines), (&world.samples(1, 1), PLENTY));
             assert!(result.is_ok(), "{result:?}");
         }

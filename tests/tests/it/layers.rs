@@ -1,4 +1,4 @@
-//! Material layers with known radiance: coat, sheen, diffuse transmission, rough glass, textures of the
+//! Material layers of known radiance: coat, sheen, diffuse transmission, rough glass, and textures of the
 //! specular reflectance.
 
 use glam::Vec3;
@@ -19,7 +19,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Dielectric material of glTF with a base colour, an F0 and layers.
+/// Dielectric of roughness 0.9 with this base colour, F0 and layers.
 fn dielectric(base: f32, f0: f32, layers: Layers) -> Material {
     let reflection = Reflection::MetallicRoughness {
         base_colour: Vec3::splat(base),
@@ -55,7 +55,7 @@ fn leaf(factor: f32, colour: f32) -> Layers {
     Layers { diffuse_transmission: Some(part), ..none() }
 }
 
-/// Radiance of a horizontal plate under a white sky, seen from afar at the given cosine to its normal.
+/// Radiance of a horizontal plate under a white sky, seen at this cosine to its normal.
 fn plate(material: Material, cosine: f32) -> f64 {
     shown(&plate_of(material, cosine))
 }
@@ -133,8 +133,8 @@ fn a_leaf_shows_the_light_on_both_of_its_sides() {
     assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}");
 }
 
-/// A plate of black dielectric with roughness 0.1 shows its F0 when seen from above. The sRGB code 188 is
-/// 0.5029; an alpha of 128 is 0.5.
+/// Seen from above, a plate of black dielectric with roughness 0.1 shows its F0. The sRGB code 188 is 0.5029,
+/// an alpha of 128 is 0.5.
 #[test]
 fn textures_of_the_reflectance_multiply_it_before_its_limit() {
     for (specular, texel, expected) in [
@@ -174,7 +174,7 @@ fn textures_of_the_reflectance_multiply_it_before_its_limit() {
 const EMISSION: f32 = 1.0;
 const ALBEDO: f32 = 0.5;
 
-/// Radiance of each pixel in a closed room of uniform radiance 1 with an object in it.
+/// Radiance of each pixel in a room of uniform radiance 1 with an object in it.
 fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Vec<[f32; 3]> {
     let wall = Material { emission: Vec3::splat(EMISSION * (1.0 - ALBEDO)), ..lambertian("wall", ALBEDO) };
     let view = camera(Vec3::new(0.1, 0.05, 0.9), Vec3::new(-0.1, -0.05, -1.0));
@@ -190,7 +190,7 @@ fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Vec<[f32; 3]> {
     radiances(&render_or_panic(&scene, &settings).film)
 }
 
-/// Checks the mean over the picture and over each block of 8x8 pixels.
+/// Checks that the object does not show: the mean of the picture, and of each block of 8x8 pixels, is 1.
 fn does_not_show(all: &[[f32; 3]], tolerance: f64) {
     let error = mean(all) - 1.0;
     assert!(error.abs() < 0.4 * tolerance, "the mean is off by {error}");
@@ -220,8 +220,8 @@ fn glass(roughness: f32, is_volume: bool) -> Material {
     Material::new("glass", reflection)
 }
 
-/// Sunlight through a pane is a caustic on the floor below. A coat on the floor takes its share of the light,
-/// and photons are stored once.
+/// Sunlight through a pane is a caustic on the floor. A coat on the floor takes its share of the light, and
+/// each photon is stored once for both layers.
 #[test]
 fn a_caustic_below_a_coat_is_dimmed_by_the_coat() {
     let look = |floor: Material| {

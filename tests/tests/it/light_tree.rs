@@ -1,4 +1,4 @@
-//! Light tree: sampling and its density agree, every light is sampled, and many lights add little noise.
+//! Light tree: samples have the stated density, no light is left out, and many lights add little noise.
 
 use std::ops::Range;
 
@@ -25,7 +25,8 @@ fn place(index: u32, dimension: u32) -> Vec3 {
     Vec3::new(random(index, dimension), random(index, dimension + 1), random(index, dimension + 2)) - 0.5
 }
 
-/// Hall of ten metres with small emissive triangles in all orientations, and some point and spot lights.
+/// Hall, some ten metres wide, of small emissive triangles in all orientations, with 40 point and spot
+/// lights.
 fn hall(triangles: u32) -> Scene {
     let triangle = |i: u32| {
         let middle = place(i, 0) * 10.0;
@@ -122,14 +123,14 @@ fn the_probabilities_of_all_emitters_sum_to_that_of_any() {
                 .is_some()
         };
         let found = (0..samples).filter(finds).count() as f64 / f64::from(samples);
-        // No light is found if all children of a node are behind the receiver, though the node as a whole is
-        // not.
+        // No light is found if all children of a node are behind the receiver: the node's own bounds may be
+        // in front.
         assert!((found - sum).abs() < 0.02 && sum < 1.0 + 1e-5, "{found} are found of {sum}");
         assert!(sum > 0.3, "{sum}");
     }
 }
 
-/// Unshadowed irradiance of a receiver by one light sample, W/m^2.
+/// Irradiance of a receiver without shadows, by one light sample, W/m^2.
 fn estimate(image: &SceneImage, memory: &mut impl MemoryPort, receiver: &Receiver, index: u32) -> f64 {
     let point = [random(index, 50), random(index, 51)];
     let mut choices = LightChoices::new(*receiver);
@@ -137,7 +138,7 @@ fn estimate(image: &SceneImage, memory: &mut impl MemoryPort, receiver: &Receive
     light.map_or(0.0, |light| f64::from(light.irradiance.x * light.direction.dot(receiver.normal).max(0.0)))
 }
 
-/// Unshadowed irradiance of a receiver by each emitter, each sampled equally often.
+/// Irradiance of a receiver without shadows by each emissive triangle, W/m^2.
 fn by_each(scene: &Scene, receiver: &Receiver) -> Vec<f64> {
     scene
         .triangles
@@ -188,7 +189,7 @@ fn the_tree_samples_ten_thousand_emitters_with_less_noise_than_by_power() {
         better += u32::from(variance < 0.25 * variance_by_power);
     }
     assert!(better >= 18, "at {better} of 20 receivers the tree has less than a quarter of the variance");
-    // The minimum is seven levels, and the emitter's own line.
+    // A sample reads seven levels at least, and the line of the emitter.
     let reads = memory.reads as f64 / f64::from(20 * samples);
     assert!(reads < 14.0, "{reads} lines a sample");
 }
@@ -221,9 +222,9 @@ fn samples_of_the_environment_have_its_stated_density() {
         agreeing += u32::from((told / density - 1.0).abs() < 1e-5);
         inverse += 1.0 / f64::from(density);
     }
-    // At the borders of cells rounding moves a direction into the next one.
+    // By rounding, a direction at a cell's border may be looked up in the next cell.
     assert!(agreeing * 1000 > all * 998, "{agreeing} of {all}");
-    // The mean of the inverse densities is the solid angle of the sphere.
+    // The mean of 1 / density is the solid angle of the sphere.
     let sphere = inverse / 20_000.0;
     assert!((sphere / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.05, "{sphere}");
 }
@@ -250,7 +251,7 @@ fn an_invalid_tree_is_a_fault_and_never_a_panic() {
         let mut lines = sound.to_vec();
         for line in &mut lines[of_tree.clone()] {
             for child in line.0.as_chunks_mut::<32>().0 {
-                // Everywhere, in all directions.
+                // The children's bounds contain all positions and directions.
                 child[12..16].copy_from_slice(&1e9_f32.to_le_bytes());
                 child[28..].copy_from_slice(&link.to_le_bytes());
             }

@@ -1,4 +1,4 @@
-//! Lights of every kind give a floor the known radiance, by every kind of rays.
+//! Lights of every kind give a floor its known radiance, by shadow rays, by gather rays and by both.
 
 use std::f64::consts::PI;
 
@@ -12,13 +12,13 @@ use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_pani
 
 const ALBEDO: f32 = 0.5;
 
-/// Floor at y = 0 that faces up, with half side `half`, metres.
+/// Square floor at y = 0 that faces up.
 fn floor(half: f32, material: u32) -> [Triangle; 2] {
     let at = |x: f32, z: f32| Vec3::new(x * half, 0.0, z * half);
     quad([at(-1.0, 1.0), at(1.0, 1.0), at(1.0, -1.0), at(-1.0, -1.0)], material)
 }
 
-/// Camera that sees a small area of the floor at `place`.
+/// Camera that sees about a centimetre of the floor around `place`.
 fn view(place: Vec3) -> Camera {
     let origin = place + Vec3::new(0.3, 1.0, 0.2);
     Camera { vertical_fov: 0.01, ..camera(origin, place - origin) }
@@ -57,7 +57,7 @@ fn check(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64
     assert!(error.abs() <= tolerance, "{found} instead of {expected}: off by {error}");
 }
 
-/// Radiance that the floor reflects for an irradiance.
+/// Radiance of the Lambertian floor under an irradiance.
 fn reflected(irradiance: f64) -> f64 {
     f64::from(ALBEDO) / PI * irradiance
 }
@@ -71,7 +71,7 @@ fn a_point_lights_by_the_cosine_and_the_inverse_square_of_its_distance() {
         let distance = (x * x + height * height).sqrt();
         let expected = reflected(7.0 * height / distance.powi(3));
         check(&lit_by(kind, 7.0, place), &settings(1, 0), expected, 0.005);
-        // Gather rays neither add nor remove any of this light.
+        // Gather rays neither add nor remove light of a punctual light.
         check(&lit_by(kind, 7.0, place), &settings(1, 16), expected, 0.005);
     }
 }
@@ -113,12 +113,12 @@ fn a_floor_under_a_constant_environment_shows_its_albedo() {
     let scene = bare_floor(Vec3::ZERO).with(|scene| scene.environment = environment);
     let expected = 3.0 * f64::from(ALBEDO);
     check(&scene, &settings(64, 0), expected, 0.01);
-    // Without shadow rays gather rays carry this light, cosine-weighted: exactly.
+    // Without shadow rays, gather rays carry the light of the sky: cosine-weighted, they do so without noise.
     check(&scene, &settings(0, 16), expected, 1e-4);
     check(&scene, &settings(32, 32), expected, 0.01);
 }
 
-/// Sky of 8 by 4 texels with one bright quarter.
+/// Sky of 8x4 texels, two of which are bright.
 fn sky() -> Environment {
     let mut texels = vec![[0.25, 0.5, 1.0]; 32];
     texels[9..11].fill([30.0, 20.0, 10.0]);
@@ -127,7 +127,7 @@ fn sky() -> Environment {
 
 #[test]
 fn the_eye_sees_the_environment() {
-    // The centre of a texel: row 1, column 4 of 8, beside the map's centre.
+    // Direction of the texel in row 1, column 4 of 8, next to the middle of the map.
     let (theta, phi) = (PI * 1.5 / 4.0, 2.0 * PI * (4.5 / 8.0 - 0.5));
     let direction =
         Vec3::new((theta.sin() * phi.sin()) as f32, theta.cos() as f32, -(theta.sin() * phi.cos()) as f32);
@@ -143,7 +143,7 @@ fn the_eye_sees_the_environment() {
     }
 }
 
-/// Lamps of different sizes, heights and brightness above a floor, one of them double-sided, and a sky.
+/// Floor below lamps of different sizes, heights and brightness, one of them double-sided, and a sky.
 fn lamps_and_sky() -> Scene {
     let mut all = bare_floor(Vec3::ZERO);
     let mut lamp = |centre: Vec3, half: f32, emission: f32, double_sided: bool| {
@@ -175,7 +175,7 @@ fn shadow_rays_gather_rays_and_both_give_equal_light() {
     }
 }
 
-/// Panel above the floor, whose emission has the texture `image` if there is one.
+/// Floor below an emissive panel, with the emissive texture `image` if stated.
 fn panel(emission: f32, image: Option<Image>) -> Scene {
     let at = |x: f32, z: f32| Vec3::new(x, 1.0, z);
     let mut scene = bare_floor(Vec3::new(0.2, 0.0, 0.1));
@@ -212,7 +212,7 @@ fn a_panel_with_a_fine_texture_lights_by_its_mean() {
 
 #[test]
 fn a_white_bowl_under_a_white_sky_is_white() {
-    // A bowl of albedo 1 reflects all light it receives: every pixel has the radiance of the sky.
+    // Of albedo 1, the bowl reflects all light: each of its points has the radiance of the sky.
     let at = Vec3::new;
     let ring = [at(-1.0, 0.0, 1.0), at(1.0, 0.0, 1.0), at(1.0, 0.0, -1.0), at(-1.0, 0.0, -1.0)];
     let rim = ring.map(|corner| corner * 1.5 + Vec3::Y);

@@ -1,4 +1,4 @@
-//! Paths of many specular bounces are not truncated, in pictures of known radiance.
+//! Paths of many specular bounces are not cut off, in scenes of known radiance.
 
 use glam::Vec3;
 use photoncard_driver::render::{
@@ -22,7 +22,8 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Double-sided material that reflects `albedo` and emits the rest of a radiance of 1.
+/// Double-sided Lambertian material of `albedo` that emits `1 - albedo`: in uniform radiance 1 it is
+/// invisible.
 fn part_of_furnace(albedo: f32) -> Material {
     Material {
         emission: Vec3::splat(1.0 - albedo),
@@ -36,8 +37,8 @@ fn rendered(scene: &Scene, settings: &RenderSettings) -> (f64, Rendering) {
     (mean(&radiances(&rendering.film)), rendering)
 }
 
-/// The lamp is at the end of a corridor between two mirrors. The angle determines the number of reflections
-/// after which its light arrives.
+/// The lamp is at the end of a corridor between two mirrors. The camera's angle determines after how many
+/// reflections it is seen.
 #[test]
 fn a_lamp_is_seen_after_any_number_of_reflections() {
     for (bounces, reflectance) in [(10_u16, 0.95_f32), (40, 0.95), (40, 0.99), (150, 0.99)] {
@@ -56,15 +57,15 @@ fn a_lamp_is_seen_after_any_number_of_reflections() {
         );
         let (seen, rendering) = rendered(&scene, &settings().with(|s| s.integrator.samples = 128));
         let expected = f64::from(reflectance).powi(bounces.into());
-        // Of 32,768 paths this share survives, each with the light of all.
+        // Of 32,768 paths, the share `expected` survives Russian roulette, with weight 1.
         let tolerance = 4.0 * ((1.0 - expected) / (32_768.0 * expected)).sqrt() + 1e-3;
         assert!((seen / expected - 1.0).abs() < tolerance, "{bounces}: {seen} instead of {expected}");
         assert_eq!(rendering.statistics.lost_paths, 0);
     }
 }
 
-/// Closed room of lossless mirrors with a small lamp and a small Lambertian plate. No walls are parallel,
-/// because between parallel ones some paths would never hit lamp or plate.
+/// Closed room of lossless mirrors with a small lamp and a small Lambertian plate. No two walls are parallel:
+/// between parallel ones some paths would never leave.
 fn mirror_room(forward: Vec3) -> Scene {
     let plate = |centre: Vec3, material: u32| -> [Triangle; 2] {
         let corner = |x: f32, z: f32| centre + Vec3::new(0.4 * x, 0.0, -0.3 * z);
@@ -80,7 +81,7 @@ fn mirror_room(forward: Vec3) -> Scene {
     scene(triangles, materials, camera(Vec3::new(0.31, 0.17, 0.67), forward))
 }
 
-/// All pixels show the radiance of the lamp, however many mirrors an eye path, gather ray or photon hits.
+/// All pixels show the lamp's radiance, after any number of reflections of eye paths, gather rays or photons.
 #[test]
 fn a_room_of_mirrors_shows_the_radiance_of_its_lamp_everywhere() {
     let gathering = |caustic_photons| {

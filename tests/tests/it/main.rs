@@ -1,4 +1,4 @@
-//! Properties of photoncard as a whole.
+//! Tests of several crates together.
 
 mod adaptive;
 mod blender;

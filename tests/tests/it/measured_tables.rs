@@ -1,10 +1,10 @@
-//! Tables of measurements in documents follow from the CSV files beside them. `UPDATE_DOCS=1 cargo test -p
-//! photoncard-tests --test it measured_tables` writes them.
+//! Tables of measurements in documents equal those made from the CSV files beside them. `UPDATE_DOCS=1 cargo
+//! test -p photoncard-tests --test it measured_tables` writes them.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Line of `docs/quality.csv`: a scene with some settings, or rendered by another renderer.
+/// Line of `docs/quality.csv`: a scene, by photoncard with some settings or by another renderer.
 struct Row {
     scene: String,
     settings: String,
@@ -12,14 +12,14 @@ struct Row {
     seconds: f64,
     /// Relative RMSE, %.
     error: f64,
-    /// Mean, median and 95th percentile of the errors of blocks, as text of the file.
+    /// Mean, median and 95th percentile of the errors of blocks, as the file states them.
     others: [String; 3],
 }
 
 impl Row {
     fn new(line: &str) -> Option<Self> {
         let (scene, rest) = line.split_once(',')?;
-        // The settings may hold commas.
+        // The settings may contain commas.
         let mut fields: Vec<&str> = rest.rsplitn(8, ',').collect();
         fields.reverse();
         let [settings, seconds, _noise, _bias, error, others @ ..] = &fields[..] else { return None };
@@ -32,13 +32,13 @@ impl Row {
         })
     }
 
-    /// Time times squared error, which does not depend on the number of independent samples.
+    /// CPU time times squared error: for independent samples, their number has no influence.
     fn cost(&self) -> f64 {
         self.seconds * self.error * self.error
     }
 }
 
-/// Lines of the table in `docs/quality.md`.
+/// Rows of the table in `docs/quality.md`.
 fn quality_table(csv: &str) -> Vec<String> {
     let rows: Vec<Row> = csv.lines().skip(1).filter_map(Row::new).collect();
     assert_eq!(rows.len(), csv.lines().count() - 1, "each line of the CSV is a row");
@@ -63,7 +63,7 @@ fn documents() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs")
 }
 
-/// Indices of the first line of the table below a heading row, and of the line after the table.
+/// Indices of the first row of the table below a heading row, and of the line after the table.
 fn table_of(document: &str, heading: &str) -> (usize, usize) {
     let lines: Vec<&str> = document.lines().collect();
     let first = lines.iter().position(|line| *line == heading).expect("the document has the table") + 2;
@@ -71,8 +71,7 @@ fn table_of(document: &str, heading: &str) -> (usize, usize) {
     (first, first + length)
 }
 
-/// Lines of the table in `docs/memory.md`: bytes per frame, the factor by which they are fewer than in the
-/// naive order, and the measured program.
+/// Rows of the table in `docs/memory.md`: bytes per frame, the factor below the naive order, and the program.
 fn memory_table(csv: &str) -> Vec<String> {
     let rows = csv.lines().skip(1).map(|line| {
         let fields = <[&str; 7]>::try_from(line.split(',').collect::<Vec<_>>()).expect("seven fields");
@@ -95,7 +94,7 @@ fn memory_table(csv: &str) -> Vec<String> {
         .collect()
 }
 
-/// Compares the table below a heading row with the expected lines, or writes these.
+/// Compares the rows below a heading row with `expected`, or writes these if `UPDATE_DOCS` is set.
 fn check_table(name: &str, heading: &str, expected: &[String]) {
     let path = documents().join(name);
     let document = fs::read_to_string(&path).expect("the document can be read");

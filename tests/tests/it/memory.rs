@@ -1,4 +1,4 @@
-//! Model of a chip's memory: it counts reads and cache misses, and does not change the picture.
+//! Model of a chip's memory: it counts reads and cache misses, and leaves the picture as it is.
 
 use photoncard_driver::emulator::contents::Inspected;
 use photoncard_driver::emulator::direct::{RenderedTile, render_tile};
@@ -32,7 +32,7 @@ fn settings() -> RenderSettings {
         picture: Picture { width: 21, height: 18, ..Picture::default() },
         photons: PhotonMaps { count: 5000, neighbors: 30, ..PhotonMaps::default() },
         integrator: Integrator { gather_rays: 8, shadow_rays: 2, ..Integrator::default() },
-        // With several tiles in flight misses depend on the tiles that a chip has together.
+        // With several tiles in flight, misses depend on which tiles a chip has together.
         schedule: Schedule { tile: Some(8), in_flight: Some(1), ..Schedule::default() },
         cards: CardSet { addresses: vec!["emulated:1".parse().unwrap()], ..CardSet::default() },
         ..RenderSettings::default()
@@ -43,11 +43,11 @@ fn caches(text: &str) -> CacheSettings {
     text.parse().unwrap()
 }
 
-/// Caches that are small enough to miss often.
+/// Caches that are so small that reads often miss.
 const SPLIT: &str = "photon=16K/128/4,scene=16K/128/4";
 const UNIFIED: &str = "unified=9K/384/3,index=hash";
 
-/// Card image of a scene, and the tiles of a frame.
+/// Card image of a scene, and a picture's frame and tiles.
 struct Frame {
     mapped: MappedImage,
     frame: photoncard_shared::message::FrameParameters,
@@ -77,7 +77,7 @@ impl Frame {
     }
 }
 
-/// Memory that records the lines that a tile reads, and compares them with those of the image.
+/// Memory that records which lines are read, and compares each with that of the card image.
 struct Recorder<'a, M> {
     memory: M,
     image: &'a [Line],
@@ -148,7 +148,7 @@ fn a_tile_hits_and_misses_by_the_definition_of_its_caches() {
     });
 }
 
-/// Boards store their caches in arrays, emulated chips in vectors.
+/// Caches of boards are arrays, those of emulated chips vectors.
 #[test]
 fn caches_in_arrays_and_in_vectors_are_equal() {
     with_room_for_a_card(|| {
@@ -230,12 +230,12 @@ fn counts_do_not_depend_on_the_assignment_of_tiles() {
         assert_eq!(one.written_bytes, statistics.image_bytes);
         for chips in 2..4 {
             let (several, statistics) = measured(&with(&format!("emulated:{chips}")));
-            // The others may have completed all tiles before a chip is loaded.
+            // A chip may not be loaded before the others have rendered all tiles.
             let written = statistics.image_bytes..=chips * statistics.image_bytes;
             assert!(written.contains(&several.written_bytes), "{}", several.written_bytes);
             assert_eq!(MemoryStatistics { written_bytes: one.written_bytes, ..several }, one);
         }
-        // Chips without cards, one for all tiles, in reverse order.
+        // One chip without a card renders all tiles in reverse order.
         with_room_for_a_card(|| {
             let frame = Frame::new(&with("emulated:1"));
             let mut chip = EmulatedKind::Reference.emulated().chip();
@@ -272,7 +272,7 @@ fn tiles_in_flight_fetch_less_of_the_photon_map_for_equal_requests() {
         assert_eq!(of_several.gathers, of_one.gathers);
         let after = (of_several.drains, several.photon_map.dram_bytes);
         assert!(after.0 < before.0 && after.1 < before.1, "{in_flight:?}: {after:?} instead of {before:?}");
-        // Nothing in it depends on time.
+        // The counts depend on no timing: a second render has the same.
         assert_eq!(with("emulated-large:1", in_flight).0, several);
         before = after;
     }
@@ -310,8 +310,8 @@ fn counts_are_of_whole_records_and_whole_lines() {
         ] {
             assert_eq!(reads.raw_bytes, reads.requests * record as u64, "{record}");
         }
-        // A leaf is read as a whole by a ray that visits it, without its last byte for the surface where a
-        // ray ends.
+        // A ray that visits a leaf reads all 128 bytes; to read the surface at its hit, the last byte is not
+        // needed.
         let triangles = structures.triangles;
         let surfaces = triangles.requests * LINE_BYTES as u64 - triangles.raw_bytes;
         assert!((1..triangles.requests).contains(&surfaces), "{surfaces} of {}", triangles.requests);

@@ -1,4 +1,5 @@
-//! The k nearest photons in both layouts equal those of a brute-force search, for all kinds of photons.
+//! The k nearest photons in both layouts equal those of a brute-force search, for several distributions of
+//! photons.
 
 use glam::Vec3;
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -11,8 +12,8 @@ use photoncard_shared::layout::{FULL_DISC, Photon, Rgbe};
 use photoncard_tests::{camera, lambertian, room, scene};
 use proptest::prelude::*;
 
-/// Card images of an empty room with a photon at each position, in both layouts. Photons at one position
-/// differ in their contents.
+/// Card images of a room with a photon at each position, in both layouts. Photons at equal positions differ
+/// in their contents.
 fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
     let photons = (0_u16..).zip(places).map(|(index, &position)| Photon {
@@ -30,10 +31,10 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     [to_kd_tree(image()).unwrap(), image()]
 }
 
-/// Bits of the squared distance, and direction code, of a photon, by which tests distinguish photons.
+/// What distinguishes photons here: `f32::to_bits` of the squared distance, and the direction code.
 type Found = (u32, [u8; 2]);
 
-/// Photons that the chip's search finds, the nearest first. All instruction sets must agree.
+/// Photons that the chip's search finds, in order of distance. All instruction sets must agree.
 fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let (scene, mut memory) = image.view();
@@ -58,7 +59,7 @@ fn found(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> V
     first.1
 }
 
-/// Expected result of [`found`], by brute force.
+/// Photons that [`found`] must return, by brute force.
 fn expected(image: &CardImage, query: Vec3, neighbors: u32, max_distance: f32) -> Vec<Found> {
     let (scene, mut memory) = image.view();
     let photons = scene.header.section(SectionKind::Photons).records;
@@ -96,8 +97,8 @@ fn place(range: f32) -> impl Strategy<Value = [f32; 3]> {
     [-range..range, -range..range, -range..range]
 }
 
-/// Positions of one kind: random, clustered, on a coarse grid (many coincide or are equidistant), or in a
-/// plane.
+/// Positions of one distribution: random, clustered, on a coarse grid (many coincide or are equidistant), or
+/// in a plane.
 fn places() -> impl Strategy<Value = Vec<[f32; 3]>> {
     let random = proptest::collection::vec(place(1.0), 1..400);
     let clustered =
@@ -125,7 +126,7 @@ proptest! {
         neighbors in 1_u32..200,
         max_distance in prop_oneof![0.02_f32..0.2, 0.2_f32..3.0],
     ) {
-        // A query at a photon, as in a scene.
+        // One query is at a photon, which occurs in scenes.
         queries.push(places[0]);
         check(&places, &queries, neighbors, max_distance);
     }

@@ -1,5 +1,5 @@
-//! The cost model's operations per step equal those counted in the firmware. Rays and photons of visible
-//! regions, and rays that search for covers, are excepted, because the model has no steps for them.
+//! Operations per step of the cost model equal those counted in the firmware, but for the rays and tests of
+//! visible regions and for rays that search covers, for which the model has no steps.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::arithmetic::{OPERATIONS, Operations, Step, Unit};
@@ -10,12 +10,11 @@ use photoncard_tests::operations::Instrument;
 use photoncard_tests::operations::run::Run;
 use photoncard_tests::skip;
 
-/// Maximum relative difference that visible regions and covers cause: their rays, and the tests of photons
-/// against sectors. It is large because these renders have few photons, so that gathers have a large radius
-/// and many rays are short.
+/// Maximum relative difference by what the model leaves out: rays of visible regions and covers, and tests of
+/// photons against sectors. It is large here, as few photons make gathers wide and rays short.
 const OF_REGIONS: f64 = 0.18;
 
-/// Steps whose operations do not depend on the data. Rays of a bundle share parts of a node's decoding.
+/// Steps whose operations are equal for all data, except that rays of a bundle share decoded nodes.
 const FIXED: [Step; 6] = [Step::Ray, Step::Box, Step::Vertex, Step::Triangle, Step::PhotonBox, Step::Photon];
 
 fn settings(layout: PhotonLayout, sampling: Sampling, irradiance_error: Option<f32>) -> RenderSettings {
@@ -34,7 +33,7 @@ fn settings(layout: PhotonLayout, sampling: Sampling, irradiance_error: Option<f
     .with(|s| s.schedule.order = GatherOrder::Sort)
 }
 
-/// Relative difference of two numbers.
+/// Difference of `a` from `b`, relative to `b`.
 fn difference(a: f64, b: f64) -> f64 {
     (a - b).abs() / b.abs().max(f64::MIN_POSITIVE)
 }
@@ -55,8 +54,8 @@ fn check(name: &str, run: &Run) {
     let of_all = modelled.sum(|_| true).flops();
     println!("{name}: all: {}", difference(of_all, total.flops()));
     assert!(difference(of_all, total.flops()) < 0.05, "{name}: {of_all} instead of {}", total.flops());
-    // A quarter of the unit, as directions depend on the few surfaces of the tiles, and a fiftieth of all:
-    // the model of shading and of pixels is by their mean.
+    // A quarter of the unit's operations and a fiftieth of all are allowed: directions depend on the few
+    // surfaces in the tiles, and the model of shading and pixels is a mean.
     for &unit in Unit::ALL {
         let (counted, modelled) = (run.counted(unit).flops(), modelled.unit(unit).flops());
         let allowed = 0.25 * counted + 0.02 * total.flops();

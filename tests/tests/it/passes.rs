@@ -1,5 +1,5 @@
-//! A picture whose samples are divided into passes, each on other cards and in another order, equals that of
-//! one render bit for bit.
+//! A picture rendered by passes, each on other cards and in another order, equals the picture of one render
+//! bit for bit.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -31,7 +31,7 @@ fn cards(text: &str) -> Vec<CardAddress> {
     text.split('+').map(|card| card.parse().expect("a card")).collect()
 }
 
-/// Renders until the picture has `samples` samples, starting from `before` if given.
+/// Renders until the picture has `samples` samples per pixel, on top of those of `before` if stated.
 fn pass(
     renderer: &mut Renderer,
     scene: &Scene,
@@ -62,10 +62,10 @@ fn technique() -> impl Strategy<Value = RenderSettings> {
     )
 }
 
-/// Number of samples, gather order and cards of a pass.
+/// Samples per pixel after a pass, its gather order, and its cards.
 type Pass = (u32, GatherOrder, &'static str);
 
-/// Sequences of passes, on cards that stay open or on other cards each time.
+/// Sequences of passes, whose cards may stay or change.
 fn passes() -> impl Strategy<Value = Vec<Pass>> {
     use GatherOrder::{DirectionBins, Hash, Naive, Sort, Tiled};
     let order = || prop::sample::select(vec![Naive, Tiled, DirectionBins, Hash, Sort]);
@@ -111,7 +111,7 @@ proptest! {
     }
 }
 
-/// Settings of a picture by passes with irradiance records.
+/// Settings of a picture by passes, with irradiance records that chips keep.
 fn with_records() -> RenderSettings {
     settings().with(|s| {
         (s.integrator.irradiance_error, s.integrator.planned_samples) = (Some(0.1), Some(4));
@@ -144,7 +144,7 @@ fn records_are_gathered_once_while_camera_scene_settings_and_cards_stay() {
         assert!(picture.expect("a pass").film.sums().eq(whole.film.sums()), "{on}");
         let all = whole.statistics.records;
         assert_eq!(records + kept, 3 * all, "{on}");
-        // Of several cards one may take a tile of another that is late.
+        // With several cards, one may take over a late tile of another, whose records it has not kept.
         if settings.cards.count() == 1 {
             assert_eq!((gathers, records), (whole.statistics.gathers, all), "{on}");
         }
@@ -160,7 +160,7 @@ fn records_are_gathered_again_on_other_cards_and_for_another_camera() {
     let records = first.statistics.records;
     let second = pass(&mut renderer, &scene, &settings, (2, Some(first)));
     assert_eq!((second.statistics.records, second.statistics.kept_records), (0, records));
-    // The cards are lost, and others in their place.
+    // New cards take the place of those that kept the records.
     renderer.close_cards();
     let third = pass(&mut renderer, &scene, &settings, (3, Some(second)));
     assert_eq!((third.statistics.records, third.statistics.kept_records), (records, 0));
@@ -168,7 +168,7 @@ fn records_are_gathered_again_on_other_cards_and_for_another_camera() {
     pass(&mut renderer, &scene, &elsewhere, (1, None));
     let fourth = pass(&mut renderer, &scene, &settings, (4, Some(third)));
     assert_eq!((fourth.statistics.records, fourth.statistics.kept_records), (records, 0));
-    // Cards that are compared keep nothing.
+    // With verification, cards keep no records.
     let verified =
         settings.clone().with(|s| (s.cards.verify, s.cards.addresses) = (Some(0.5), cards("emulated:2")));
     let mut picture = Some(fourth);
@@ -194,7 +194,7 @@ fn a_picture_with_kept_samples_continues_even_after_a_stop() {
     let scene = everything();
     let expected =
         |samples| render_or_panic(&scene, &settings().with(|s| s.integrator.samples = samples)).film;
-    // The file stays, as the pictures' partial renders are not removed.
+    // `render` leaves the partial file; removing it is up to the caller.
     drop(render_or_panic(&scene, &with(2, false)));
     let bytes = std::fs::read(&path).expect("kept");
     let more = render_or_panic(&scene, &with(5, true));
@@ -204,7 +204,7 @@ fn a_picture_with_kept_samples_continues_even_after_a_stop() {
     let share = more.statistics.rays.eye as f64 / all_rays;
     assert!((share - 0.6).abs() < 0.05, "two of five samples are taken over, and not {share}");
     drop(more);
-    // A render that ended within the first record of the further samples, and one that has all of them.
+    // The file ends within the first tile of the further samples, or has all their tiles.
     let all = std::fs::read(&path).expect("kept");
     for length in [bytes.len() + 9, all.len()] {
         std::fs::write(&path, &all[..length]).expect("written");
@@ -212,9 +212,9 @@ fn a_picture_with_kept_samples_continues_even_after_a_stop() {
         assert!(again.film.sums().eq(expected(5).sums()));
         assert_eq!(again.statistics.samples, 5);
     }
-    // A picture of more goes on from both.
+    // A render of more samples continues from the file.
     assert!(render_or_panic(&scene, &with(6, true)).film.sums().eq(expected(6).sums()));
-    // Fewer samples, or an unfinished number of other samples, are another picture.
+    // A file of unfinished samples continues only with the number of samples that it was begun for.
     std::fs::write(&path, &bytes[..bytes.len() - 1]).expect("written");
     for samples in [1, 3] {
         let error = photoncard_driver::render::render(&scene, &with(samples, true), &Unobserved).err();

@@ -1,11 +1,11 @@
-//! Shadow rays of many samples with one ray each are stratified over a lamp like those of one sample.
+//! Shadow rays of many samples, one ray each, are stratified over a lamp as those of one sample are.
 
 use glam::Vec3;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{Material, Scene};
 use photoncard_tests::{camera, lambertian, quad, radiances, render_or_panic, scene};
 
-/// Floor whose half is in the shadow of a board under a square lamp.
+/// Floor below a square lamp, half of it in the shadow of a board between them.
 fn penumbra() -> Scene {
     let at = Vec3::new;
     let floor = [at(-2.0, -1.0, 2.0), at(2.0, -1.0, 2.0), at(2.0, -1.0, -2.0), at(-2.0, -1.0, -2.0)];

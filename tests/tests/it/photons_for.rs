@@ -1,4 +1,4 @@
-//! Photons guided to a camera give the picture the mean of photons guided to the scene.
+//! Photons guided to a camera give the same mean of a picture as photons guided to the whole scene.
 
 use glam::Vec3;
 use photoncard_driver::photon_map::PhotonsFor;
@@ -6,11 +6,11 @@ use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Pi
 use photoncard_driver::scene::{Material, Scene, Triangle};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
 
-/// Cells of a winding corridor, each 1 m wide, from the lit end to the dark one.
+/// Cells (x, z) of a winding corridor 1 m wide, from its lit end to its dark end.
 const CORRIDOR: [[i32; 2]; 10] =
     [[0, 0], [1, 0], [2, 0], [2, 1], [2, 2], [3, 2], [4, 2], [4, 1], [4, 0], [5, 0]];
 
-/// Grey corridor with a lamp on the first wall, seen from its dark end.
+/// Corridor of [`CORRIDOR`] with a lamp on its first wall, seen from its dark end.
 fn corridor(albedo: f32) -> Scene {
     let mut triangles: Vec<Triangle> = Vec::new();
     for [x, z] in CORRIDOR {
@@ -35,7 +35,7 @@ fn corridor(albedo: f32) -> Scene {
     scene(triangles, vec![lambertian("wall", albedo), lamp], view)
 }
 
-/// Number of photons. They are few, so that those of the dark end are far apart.
+/// Number of photons: so few that they are far apart at the dark end.
 const PHOTONS: usize = 20_000;
 
 fn settings(photons_for: PhotonsFor, seed: u32) -> RenderSettings {
@@ -51,7 +51,7 @@ fn settings(photons_for: PhotonsFor, seed: u32) -> RenderSettings {
     }
 }
 
-/// Mean of the means of pictures with different seeds, and its standard error.
+/// Mean over seeds of the pictures' means, and its standard error.
 struct Pictures {
     mean: f64,
     error: f64,
@@ -70,8 +70,7 @@ impl Pictures {
     }
 }
 
-/// Photons are sparse at the dark end. A gather that extended to fifty of them would include those in the
-/// light around the corner.
+/// At the dark end photons are so sparse that a gather of fifty would reach into the light around the corner.
 #[test]
 fn photons_for_the_scene_and_for_the_camera_give_a_dark_corridor_equal_means() {
     let scene = corridor(0.8);

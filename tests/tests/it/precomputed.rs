@@ -1,5 +1,5 @@
-//! Precomputed irradiance equals the chip's density estimate at a photon, searches find the same points as
-//! brute force, and the mean over positions is unbiased.
+//! Precomputed irradiance: it equals the chip's density estimate at a photon, searches find the same points
+//! as brute force, and its mean over positions is unbiased.
 
 use core::f32::consts::PI;
 
@@ -24,7 +24,7 @@ use proptest::prelude::*;
 /// Position of a photon, and the code of its normal.
 type Placed = ([f32; 3], u8);
 
-/// Card images of an empty room with photons of power 1, in both layouts, with irradiance points.
+/// Card images of a room with photons of power (1, 0.5, 0.25) and irradiance points, in both layouts.
 fn images(photons: &[Placed], neighbors: u32, max_distance: f32) -> [CardImage; 2] {
     let scene = scene(room([0; 6]), vec![lambertian("wall", 0.5)], camera(Vec3::ZERO, Vec3::NEG_Z));
     let photons = photons.iter().map(|&(position, normal)| Photon {
@@ -56,7 +56,7 @@ fn points(image: &CardImage) -> Vec<(Vec3, [u8; PHOTON_CONTENT_BYTES])> {
     points
 }
 
-/// Irradiance that the chip's search finds. All instruction sets must agree.
+/// Irradiance by the chip's search for the nearest point. All instruction sets must agree.
 fn found(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Vec3 {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let (scene, mut memory) = image.view();
@@ -68,7 +68,7 @@ fn found(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Ve
     first.irradiance
 }
 
-/// Expected result of [`found`], by brute force.
+/// Irradiance that [`found`] must return, by brute force.
 fn expected(image: &CardImage, position: Vec3, normal: u8, max_distance: f32) -> Vec3 {
     let unit = |code: u8| Vec3::from(decode_normal(code)).normalize();
     let nearest = points(image)
@@ -102,8 +102,8 @@ fn place(range: f32) -> impl Strategy<Value = [f32; 3]> {
     [-range..range, -range..range, -range..range]
 }
 
-/// Photons of one kind: random, on a coarse grid (many coincide or are equidistant), or in a plane; on a few
-/// surfaces.
+/// Photons of one distribution: random, on a coarse grid (many coincide or are equidistant), or in a plane.
+/// They have up to three different normals.
 fn photons() -> impl Strategy<Value = Vec<Placed>> {
     let random = proptest::collection::vec(place(1.0), 1..400);
     let coincident = proptest::collection::vec([-2_i8..3, -2_i8..3, -2_i8..3], 1..400)
@@ -129,7 +129,7 @@ proptest! {
         let normal = |i: usize| if i == 0 { other } else { photons[i % photons.len()].1 };
         let mut queries: Vec<Placed> =
             queries.into_iter().enumerate().map(|(i, place)| (place, normal(i))).collect();
-        // A query at a photon, as in a scene.
+        // One query is at a photon, which occurs in scenes.
         queries.push(photons[0]);
         check(&photons, &queries, neighbors, max_distance);
     }
@@ -156,14 +156,14 @@ fn photons_at_one_position_have_one_point() {
     assert_eq!(found(&image, Vec3::new(-0.1, -1.0, 0.25), up(), 0.5), Vec3::ZERO);
 }
 
-/// Pseudo-random positions on the floor within `half_side` of its centre.
+/// Pseudo-random positions on the floor, at most `half_side` from its middle along x and z.
 fn floor(count: u32, seed: u32, half_side: f32) -> Vec<[f32; 3]> {
     let coordinate = |i: u32| (hash(hash(seed) ^ i) >> 8) as f32 / 8_388_608.0 - 1.0;
     (0..count).map(|i| [half_side * coordinate(2 * i), -1.0, half_side * coordinate(2 * i + 1)]).collect()
 }
 
-/// At the positions of photons a density estimate of k - 1 photons is too high by about 1 / (k - 2). At the
-/// photon nearest to a random position it is not.
+/// At a photon's own position, an estimate from k - 1 photons is too high by a share of about 1 / (k - 2). At
+/// the photon nearest to a random position it is not.
 #[test]
 fn the_mean_over_positions_is_unbiased_unlike_that_over_photons() {
     let neighbors = 12;
@@ -171,7 +171,7 @@ fn the_mean_over_positions_is_unbiased_unlike_that_over_photons() {
     for seed in 0..8 {
         let photons: Vec<Placed> = floor(10_000, seed, 1.0).into_iter().map(|place| (place, up())).collect();
         let [_, image] = images(&photons, neighbors, 0.5);
-        // Watts over 4 m^2; the estimate of this map away from the edges.
+        // Power of all photons over the 4 m^2 of the floor: the expected irradiance away from its edges.
         let unit = f64::from(image.view().0.header.photon_power_unit) * 4.0 / f64::from(photons.len() as u32);
         for place in floor(4000, 100 + seed, 0.8) {
             over_places += f64::from(found(&image, place.into(), up(), 0.5).x) * unit;
@@ -191,7 +191,7 @@ fn the_mean_over_positions_is_unbiased_unlike_that_over_photons() {
     assert!((over_points / too_high - 1.0).abs() < 0.015, "{over_points}");
 }
 
-/// Regions where a gather finds at most two or three photons must have the right mean.
+/// Where a gather finds at most two or three photons, the mean irradiance must be right too.
 #[test]
 fn little_light_is_lost_or_gained_where_photons_are_few() {
     for (count, max_distance) in [(500, 0.05), (500, 0.08), (2000, 0.06)] {
@@ -212,8 +212,8 @@ fn little_light_is_lost_or_gained_where_photons_are_few() {
     }
 }
 
-/// An irradiance point equals the gather's estimate at its position from all photons on its surface, except
-/// for its 16-bit mantissa.
+/// Up to its 16-bit mantissa, an irradiance point has the estimate that a gather makes at its position from
+/// all photons on its surface.
 #[test]
 fn a_point_has_the_density_of_the_photons_around_it() {
     let neighbors = 30;

@@ -1,4 +1,4 @@
-//! Firmware images on machines that QEMU emulates render the same bits as the emulated card.
+//! Board images on machines of QEMU render the same bits as the emulated card.
 #![cfg(unix)]
 
 use std::io::{BufRead, BufReader, Read, Write};
@@ -20,18 +20,18 @@ use photoncard_firmware::memory::Dram;
 use photoncard_tests::everything::everything;
 use photoncard_tests::{render_or_panic, skip};
 
-/// Time limit for building an image and starting a machine.
+/// Time limit for building a board image and starting the machine.
 const START: Duration = Duration::from_secs(600);
 /// Prints a line even if the test passes.
 fn say(line: &str) {
-    // The test goes on if standard error is closed.
+    // A closed standard error does not end the test.
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Running machine with its image.
+/// Process of QEMU that runs a board image.
 struct Machine {
     process: Child,
-    /// Output lines of QEMU and of the image.
+    /// Lines that QEMU and `tests/qemu.sh` print.
     lines: Receiver<String>,
 }
 
@@ -47,7 +47,7 @@ fn forward(stream: impl Read + Send + 'static, sender: Sender<String>) {
 }
 
 impl Machine {
-    /// Starts a machine and waits until its image is ready. Returns it with the address of its UART.
+    /// Starts a machine, and waits until its card is ready. Also returns the address of its UART.
     fn start(name: &str) -> (Self, CardAddress) {
         let mut process = Command::new(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("qemu.sh"))
             .args([name, "pty"])
@@ -88,23 +88,23 @@ impl Machine {
 
 impl Drop for Machine {
     fn drop(&mut self) {
-        // The machine may have ended already.
+        // The process may have ended already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// True if the frame is rendered of which docs/bring-up.md has the times. It takes minutes.
+/// Returns whether to render the frame whose times are in docs/bring-up.md, which takes minutes.
 fn is_full() -> bool {
     std::env::var_os("PHOTONCARD_QEMU_FULL").is_some()
 }
 
-/// Width and height of the picture of the Cornell box, pixels, and its number of photons.
+/// Side of the picture of the Cornell box, pixels, and number of photons.
 fn scale() -> (u32, usize) {
     if is_full() { (64, 20_000) } else { (32, 4000) }
 }
 
-/// Settings of the Cornell box as a small frame, with `PHOTONCARD_QEMU_GATHER_RAYS` gather rays.
+/// Settings of a small picture, with `PHOTONCARD_QEMU_GATHER_RAYS` gather rays a sample, by default 8.
 fn settings() -> RenderSettings {
     let (side, photons) = scale();
     let gather_rays = std::env::var("PHOTONCARD_QEMU_GATHER_RAYS").map(|text| text.parse());
@@ -121,7 +121,7 @@ fn settings() -> RenderSettings {
     }
 }
 
-/// Faults of lines to test, from `PHOTONCARD_QEMU_FAULTS`, separated by blanks.
+/// Faults of links to render with, from `PHOTONCARD_QEMU_FAULTS`, separated by blanks.
 fn faults() -> Vec<LineFaults> {
     let asked = std::env::var("PHOTONCARD_QEMU_FAULTS");
     let asked = asked.as_deref().unwrap_or("flips=3e-4,drops=5e-5,repeats=5e-5,delays=3e-4,seed=1");
@@ -136,7 +136,7 @@ fn renders_as_the_emulated_card(name: &str) {
     let scene = gltf::load(&path).expect("a shipped scene loads");
     let (machine, address) = Machine::start(name);
     let cached = settings().with(|s| s.integrator.irradiance_error = Some(0.1));
-    // Other photons give another image, of which the card has few lines.
+    // Renders with faults have other photons: most lines of their card image have to be sent.
     let mut renders = vec![(settings(), None), (cached, None)];
     for (seed, faults) in (1..).zip(faults()) {
         renders.push((
@@ -169,7 +169,7 @@ fn renders_as_the_emulated_card(name: &str) {
         if number == 0 && !is_full() {
             check_page("card image, 4,000 photons, bytes", name, statistics.image_bytes as u32);
         }
-        // An image that is loaded already is not sent again.
+        // Only the second render has the card image of the one before, of which nothing is sent.
         assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
     }
     passes_the_self_test(name, &address);
@@ -179,8 +179,8 @@ fn renders_as_the_emulated_card(name: &str) {
     drop(machine);
 }
 
-/// Runs the self-test: the machine computes as the host does, and has all of its memory. The scene after the
-/// test is loaded completely.
+/// Runs the self-test: arithmetic equals the host's, and all memory is there. The next scene is loaded
+/// completely.
 fn passes_the_self_test(name: &str, address: &CardAddress) {
     let test = card_self_test(address, &Unobserved).expect("the card answers");
     for PatternTest { pattern, write, check, .. } in &test.patterns {
@@ -189,7 +189,7 @@ fn passes_the_self_test(name: &str, address: &CardAddress) {
     assert!(test.is_passed(), "{test:?}");
 }
 
-/// Renders textures, cut-outs, mirrors, glass and lights of every kind.
+/// Renders the scene with every feature.
 fn renders_everything(name: &str, address: &CardAddress) {
     let scene = everything();
     let settings = settings().with(|s| {
@@ -208,7 +208,7 @@ fn renders_everything(name: &str, address: &CardAddress) {
     }
 }
 
-/// Renders two passes, of which the first gathers all irradiance records.
+/// Renders two passes, the second with the irradiance records that the first has gathered.
 fn keeps_irradiance_records(name: &str, address: &CardAddress) {
     let scene = everything();
     let settings = settings().with(|s| {
@@ -233,7 +233,7 @@ fn keeps_irradiance_records(name: &str, address: &CardAddress) {
     assert_eq!((all.statistics.records, all.statistics.kept_records), (0, records), "{name}");
 }
 
-/// Checks the on-chip memory that the image reports over its link after all renders.
+/// Checks the use of on-chip memory that the firmware reports, after all renders.
 fn stays_within_the_budget(name: &str, address: &CardAddress) {
     let MemoryUse { static_bytes, stack_bytes, stack_used } =
         card_info(address).expect("the card answers").memory_use.expect("a board measures its memory");
@@ -241,13 +241,13 @@ fn stays_within_the_budget(name: &str, address: &CardAddress) {
     assert!(0 < stack_used && stack_used < stack_bytes && stack_bytes <= MICRO.stack_bytes);
     check_page("stack used, bytes", name, stack_used);
     assert!(static_bytes as usize >= size_of::<MicroCard<Dram<'static>>>() / 2, "32-bit pointers take half");
-    // The images have no caches: the memory that the budget has for caches must stay free.
+    // Board images have no caches: the caches' share of the budget must stay free.
     let caches = MICRO.photon_cache_bytes + MICRO.scene_cache_bytes;
     assert!(static_bytes + stack_bytes + caches <= MICRO.sram_bytes);
 }
 
-/// Checks a figure in the table of machines in `docs/bring-up.md`, within a tenth, because other compilers
-/// give other figures.
+/// Checks a figure in the table of machines in `docs/bring-up.md`; other compilers may give up to a tenth
+/// more or less.
 fn check_page(row: &str, name: &str, measured: u32) {
     let page = include_str!("../../../docs/bring-up.md");
     let cells = |start: &str| {

@@ -1,4 +1,4 @@
-//! Qualities: settings that pilot renders find for a scene.
+//! Qualities: settings that pilot renders choose for a scene.
 
 use glam::Vec3;
 use photoncard_driver::film::Window;
@@ -27,7 +27,7 @@ fn shipped(name: &str) -> Scene {
     gltf::load(path.as_ref()).expect("a shipped scene loads")
 }
 
-/// Room with white walls, one of which emits.
+/// Room with grey walls, one of which emits.
 fn lit_room() -> Scene {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
     let materials = vec![lambertian("wall", 0.5), lamp];
@@ -56,14 +56,15 @@ fn found_settings_depend_neither_on_threads_nor_on_the_crop_window() {
     }
 }
 
-/// A point light has one direction and distance. The parts of a lamp differ in distance, angle and occlusion.
+/// From a point, a point light has one direction and distance; parts of a lamp differ in distance, angle and
+/// occlusion.
 #[test]
 fn a_point_light_takes_one_shadow_ray_and_a_lamp_more() {
     assert_eq!(fit(&room_with_a_point(), &small()).shadow_rays, 1);
     assert!(fit(&shipped("cornell.gltf"), &small()).shadow_rays > 1);
 }
 
-/// More samples resolve textures and edges; more rays do not.
+/// The noise of textures and edges falls with more samples, and not with more rays per sample.
 #[test]
 fn a_textured_room_takes_more_samples_than_one_of_plain_walls() {
     let [plain, textured] = ["cornell.gltf", "room.glb"].map(|name| fit(&shipped(name), &small()));
@@ -71,7 +72,7 @@ fn a_textured_room_takes_more_samples_than_one_of_plain_walls() {
     assert!(textured.measured.place > plain.measured.place, "{textured:?} {plain:?}");
 }
 
-/// Irradiance records of a larger picture are farther apart, in pixels.
+/// In a larger picture, an irradiance record serves more pixels.
 #[test]
 fn a_pixel_of_a_larger_picture_has_a_smaller_share_in_the_gather_rays_of_records() {
     let scene = shipped("cornell.gltf");
@@ -80,14 +81,14 @@ fn a_pixel_of_a_larger_picture_has_a_smaller_share_in_the_gather_rays_of_records
     assert!(large < 0.7 * small, "{large} {small}");
 }
 
-/// Pilot renders with two seeds differ by noise, but must choose equal settings.
+/// Pilot renders with two seeds differ by their noise, and must choose equal settings.
 #[test]
 fn found_settings_do_not_depend_on_the_seed() {
     let seeded = |seed| fit(&lit_room(), &small().with(|s| s.integrator.seed = seed));
     assert_eq!(seeded(0), seeded(7));
 }
 
-/// Pictures of a few pixels are as noisy as large ones.
+/// A pixel is as noisy in a picture of few pixels as in a large one.
 #[test]
 fn settings_are_found_for_pictures_of_a_pixel() {
     let scene = shipped("cornell.gltf");
@@ -99,7 +100,7 @@ fn settings_are_found_for_pictures_of_a_pixel() {
     assert!(expected.shadow_rays > 1, "{expected:?}");
 }
 
-/// Metal has no Lambertian part.
+/// Metal has no Lambertian part, whose irradiance could be interpolated.
 #[test]
 fn irradiance_is_not_interpolated_in_a_scene_of_metal() {
     let mut scene = lit_room();
@@ -115,7 +116,7 @@ fn irradiance_is_not_interpolated_in_a_scene_of_metal() {
     assert!(fit(&lit_room(), &small()).interpolates);
 }
 
-/// Light that reaches many surfaces from one spot takes more gather rays and photons than light from a
+/// Light that many surfaces receive from one bright spot takes more gather rays and photons than light of a
 /// visible lamp.
 #[test]
 fn indirect_light_from_a_spot_takes_more_rays_and_photons() {

@@ -1,5 +1,5 @@
-//! The ray caster agrees with brute force, gives equal bits on every processor and in bundles, and loses no
-//! ray at an edge.
+//! The ray caster equals brute force, gives equal bits on every processor and in bundles, and loses no ray at
+//! an edge.
 
 use glam::Vec3;
 use photoncard_driver::pack::PackedScene;
@@ -21,7 +21,7 @@ fn packed(triangles: Vec<Triangle>) -> PackedScene {
     PackedScene::new(&scene).expect("packs")
 }
 
-/// Pseudo-random number in [0, 1].
+/// Pseudo-random number in [0, 1).
 fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
 }
@@ -30,13 +30,13 @@ fn random_point(index: u32, dimension: u32) -> Vec3 {
     Vec3::from([0, 1, 2].map(|axis| random(index, dimension + axis))) * 2.0 - 1.0
 }
 
-/// Closed surface: a dented sphere of about `2 rings^2` triangles.
+/// Sphere with dents, a closed surface of about `4 rings^2` triangles.
 fn dented_sphere(center: Vec3, radius: f32, rings: u32) -> Vec<Triangle> {
     let segments = 2 * rings;
     let point = |ring: u32, segment: u32| {
         let polar = core::f32::consts::PI * ring as f32 / rings as f32;
         let around = core::f32::consts::TAU * (segment % segments) as f32 / segments as f32;
-        // A pole is a single point, and the last segment ends at the first.
+        // All points of a pole, and the ends of a ring, are equal to the bit.
         let (sine, cosine) = match ring {
             0 => (0.0, 1.0),
             _ if ring == rings => (0.0, -1.0),
@@ -60,7 +60,7 @@ fn dented_sphere(center: Vec3, radius: f32, rings: u32) -> Vec<Triangle> {
     triangles
 }
 
-/// Boards that cross at right angles, each flat along one axis.
+/// Axis-aligned squares that cross each other.
 fn boards() -> Vec<Triangle> {
     (0..40)
         .flat_map(|i| {
@@ -71,7 +71,8 @@ fn boards() -> Vec<Triangle> {
         .collect()
 }
 
-/// Random rays, rays along axes, in the planes of triangles, at vertices and edges, and from far away.
+/// Random rays, rays along axes or in planes of triangles, rays to vertices and edges, and rays from far
+/// away.
 fn rays(triangles: &[Triangle], count: u32) -> Vec<Ray> {
     let unit = |v: Vec3| v.normalize_or(Vec3::X);
     (0..count)
@@ -95,7 +96,7 @@ fn rays(triangles: &[Triangle], count: u32) -> Vec<Ray> {
         .collect()
 }
 
-/// First hit among all triangles, by distance and then by index.
+/// Closest hit by testing all triangles; of equal distances, that of the least index.
 fn brute_force(image: &SceneImage, memory: &mut Lines, ray: &Ray) -> Option<Hit> {
     let frame = RayFrame::new(ray);
     let mut nearest: Option<Hit> = None;
@@ -163,7 +164,7 @@ fn no_ray_leaves_a_closed_surface() {
         for (i, triangle) in (0..).zip(triangles.iter().cycle().take(60_000)) {
             let [a, b, _] = triangle.vertices;
             let origin = center + random_point(i, 10) * (0.3 * radius);
-            // At a vertex, at an edge, or near one.
+            // Targets are vertices, edges, and points near edges.
             let target = match i % 4 {
                 0 => a,
                 1 => a.midpoint(b),
@@ -177,8 +178,8 @@ fn no_ray_leaves_a_closed_surface() {
     }
 }
 
-/// Rays as a chip casts them together: of neighbouring pixels, from one point to a light or in all
-/// directions, or unordered.
+/// Rays as a chip casts them together: of neighbouring pixels, or from one point to a light or in all
+/// directions; and random rays.
 fn bundle(scene: &Scene, triangles: &[Triangle], index: u32) -> Vec<Ray> {
     let count = 1 + index % BUNDLE_RAYS as u32;
     let of = |ray: u32| index * BUNDLE_RAYS as u32 + ray;

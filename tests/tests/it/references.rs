@@ -1,7 +1,7 @@
-//! Pictures agree with path-traced references in their block means.
+//! Pictures equal path-traced references in the means of blocks.
 //!
-//! A render has a fourth of its reference's pixels along each axis. A block of 16x16 pixels of the reference
-//! corresponds to one of 4x4 pixels of the render, because both use a box filter.
+//! The width of a render is a fourth of its reference's. As both have a box filter, a block of 4x4 pixels of
+//! the render corresponds to one of 16x16 pixels of the reference.
 
 use std::path::PathBuf;
 
@@ -13,18 +13,18 @@ use photoncard_driver::render::{
 use photoncard_driver::scene::{Environment, gltf};
 use photoncard_tests::render_or_panic;
 
-/// Side of a block of a reference, pixels.
+/// Side of a block, in pixels of the reference.
 const BLOCK: usize = 16;
 /// Ratio of the reference's width to that of the render.
 const SHRUNK: usize = 4;
-/// Radiance above which a block of the reference is considered to see an emitter, and is excluded.
+/// Radiance above which a block of the reference counts as seeing an emitter, and is left out.
 const EMITTER: f32 = 5.0;
 
 fn path(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(name)
 }
 
-/// Mean over pixels and channels of each block, and its maximum channel.
+/// For each block, mean over pixels and channels, and greatest channel.
 fn blocks(pixels: &[[f32; 3]], width: usize, block: usize) -> Vec<(f64, f32)> {
     let across = width / block;
     let block_of = |index: usize| (index / width / block) * across + (index % width) / block;
@@ -37,8 +37,8 @@ fn blocks(pixels: &[[f32; 3]], width: usize, block: usize) -> Vec<(f64, f32)> {
     blocks
 }
 
-/// Checks the error of the picture's mean, and the median and 95th percentile of the blocks' errors against
-/// `most`.
+/// Checks the error of the picture's mean; and that the median and the 95th percentile of the blocks' errors
+/// are at most `most`.
 fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     let image: Vec<[f32; 3]> = film.pixels().map(|pixel| pixel.radiance).collect();
     let pairs: Vec<(f64, f64)> = blocks(&image, film.width() as usize, BLOCK / SHRUNK)
@@ -59,8 +59,8 @@ fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     assert!(high < most_high, "the 95th percentile of the blocks is off by {high}");
 }
 
-/// Checks a scene with default settings, with all techniques that save gathers, and with precomputed
-/// irradiance.
+/// Checks a scene with default settings, with importance sampling and irradiance records, and with
+/// precomputed irradiance.
 fn check(scene: &str, reference: &str) {
     check_with(scene, reference, Sampling::Reflection, None, Radiance::Density);
     check_with(scene, reference, Sampling::Product, Some(0.025), Radiance::Density);
@@ -96,7 +96,7 @@ fn read(reference: &str) -> RgbImage {
     exr::read(&path("references").join(reference), Shown::Rendered).expect("a shipped reference reads")
 }
 
-/// Checks a scene of mirrors, glass, textures or sky with a number of photons and of samples.
+/// Checks a scene with mirrors, glass, textures or a sky, for a number of photons and of samples.
 fn check_light_paths(scene: &str, reference: &str, environment: Option<&str>, [photons, samples]: [u32; 2]) {
     let mut scene = gltf::load(&path("../scenes").join(scene)).expect("a shipped scene loads");
     let file = environment.map(|file| path("../scenes").join(file));

@@ -1,4 +1,4 @@
-//! A card polls its link after a bounded amount of work, whatever its task.
+//! A card polls its link after a bounded amount of work, whatever it is doing.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -22,7 +22,7 @@ use photoncard_shared::message::{self, Command, Fault, FrameParameters, PROTOCOL
 use photoncard_shared::transport::Transport;
 use photoncard_tests::{camera, lambertian, room, scene, with_room_for_a_card};
 
-/// Memory that contains an image and counts reads.
+/// Memory with a card image that counts reads.
 struct CountingMemory<'a> {
     lines: Vec<Line>,
     reads: &'a Cell<u64>,
@@ -45,12 +45,12 @@ impl CardMemory for CountingMemory<'_> {
     }
 }
 
-/// Host that sends one command after another, each once the card is idle.
+/// Host that sends its commands one by one, each when the card is idle.
 struct HostPort<'a> {
     host: Transport,
     commands: VecDeque<Command<'static>>,
     reads: &'a Cell<u64>,
-    /// Number of reads before the last poll of the link.
+    /// Number of reads at the last poll of the link.
     before: u64,
     /// Maximum number of reads between two polls.
     most: u64,
@@ -87,8 +87,7 @@ impl Port for HostPort<'_> {
     }
 }
 
-/// Maximum number of lines that a card reads between two polls of its link while it renders a tile of a lit
-/// room.
+/// Maximum number of lines that a card reads between two polls of its link, during a tile of a lit room.
 fn most_reads(frame: &FrameParameters) -> u64 {
     let mut lamp = lambertian("lamp", 0.5);
     lamp.emission = Vec3::ONE;

@@ -1,11 +1,11 @@
-//! Every sampling of gather rays converges to the same picture.
+//! Pictures by every `--sampling` of gather rays converge to the same one.
 
 use glam::{DVec3, Vec3};
 use photoncard_driver::render::{PhotonMaps, Picture, RenderSettings, Sampling};
 use photoncard_driver::scene::gltf;
 use photoncard_tests::mapped::{IndirectLight, MappedScene};
 
-/// Checks the mean over many seeds against a gather of 10,000 rays, within the standard error of both.
+/// Checks the mean over seeds of each sampling against 10,000 gather rays, within their standard errors.
 fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
     with_light_of(scene, camera, assignments, |light| {
         let reference = light.radiance(Sampling::Reflection, 10_000, 1);
@@ -16,7 +16,7 @@ fn check(scene: &str, camera: Option<&str>, assignments: &[&str]) {
     });
 }
 
-/// Calls a function with the indirect light at points that a camera of a shipped scene sees.
+/// Calls `check` with the indirect light at points that a camera of a shipped scene sees.
 fn with_light_of(
     scene: &str,
     camera: Option<&str>,
@@ -36,7 +36,7 @@ fn with_light_of(
 }
 
 fn check_sampling(light: &IndirectLight, sampling: Sampling, reference: &[DVec3]) {
-    // Sampling by photons has rare rays of great weight: few seeds underestimate its variance.
+    // With `photon`, rare rays have great weights: the variance over few seeds would be too low.
     const SEEDS: u32 = 120;
     const RAYS: u32 = 32;
     let runs: Vec<Vec<Vec3>> = (100..100 + SEEDS).map(|seed| light.radiance(sampling, RAYS, seed)).collect();
@@ -46,7 +46,7 @@ fn check_sampling(light: &IndirectLight, sampling: Sampling, reference: &[DVec3]
         let values = || runs.iter().map(|run| run[point].as_dvec3().element_sum());
         let mean = values().sum::<f64>() / count;
         let variance = values().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0) / count;
-        // Lower bound of the reference's variance: its rays count as further seeds.
+        // Variance of the difference, if the reference's rays have the variance of the sampling's.
         let variance =
             variance * (1.0 + count * RAYS as f64 / 10_000.0) + (1e-4 * expected.element_sum()).powi(2);
         let deviation = mean - expected.element_sum();

@@ -1,4 +1,4 @@
-//! The first k selected candidates equal those of sorting, for all kinds of candidates.
+//! The k nearest candidates that are selected equal those of sorting, for several distributions of distances.
 
 use photoncard_firmware::photon::{Candidate, CandidateBuffer, Selection};
 use photoncard_firmware::simd::Level;
@@ -9,7 +9,7 @@ fn candidate(distance: f32, content: u8) -> Candidate {
     Candidate::new(distance, [content, 0, 0, 0, content / 2, 0, content / 4, 0])
 }
 
-/// Candidates with distances as on a surface, and with distributions that no guess or pivot divides well.
+/// Candidates with distances as on a surface, and with distances that no guess or pivot divides well.
 fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
     let distance = prop_oneof![
         4 => 0.0_f32..1.0,
@@ -37,7 +37,8 @@ fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
         .prop_map(|pairs| pairs.into_iter().map(|(distance, content)| candidate(distance, content)).collect())
 }
 
-/// Last of the first `count` candidates, and all selected ones. All instruction sets must agree.
+/// The `count`-th nearest candidate, and the nearest `count`; `None` and all if there are fewer. All
+/// instruction sets must agree.
 fn select(candidates: &[Candidate], count: usize) -> (Option<Candidate>, Vec<Candidate>) {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let mut buffer = CandidateBuffer::<600>::new();
@@ -77,8 +78,8 @@ fn more_candidates_than_there_are_cannot_be_selected() {
     }
 }
 
-/// The median of three medians is nearly the minimum at first in this order, so that many pivots are needed
-/// before bits decide.
+/// In this order the median of three medians, the pivot, is nearly the least at first: many pivots are
+/// needed.
 #[test]
 fn candidates_in_the_worst_order_are_selected() {
     for length in [300, 512] {

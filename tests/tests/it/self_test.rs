@@ -1,4 +1,4 @@
-//! Self-test of a card over its link: sound cards pass on good and bad lines, and defects are named.
+//! Self-test of a card over its link: sound cards pass, on links with faults too, and defects are named.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -25,7 +25,7 @@ use photoncard_shared::transport::Transport;
 use photoncard_tests::with_room_for_a_card;
 use proptest::prelude::*;
 
-/// Port whose line has faults.
+/// Port of a link with faults.
 struct BadLine(LoopbackPort, FaultInjector);
 
 impl Port for BadLine {
@@ -38,7 +38,7 @@ impl Port for BadLine {
     }
 }
 
-/// Result of the self-test of an emulated micro chip with `lines` lines of memory.
+/// Self-test of an emulated micro chip with `lines` lines of memory, over a link with `faults`.
 fn tested(lines: usize, faults: &str) -> SelfTest {
     let mut result = None;
     let faults: LineFaults = faults.parse().unwrap();
@@ -80,22 +80,22 @@ fn a_memory_smaller_than_that_of_the_budget_fails() {
     assert!(test.patterns.iter().all(|pattern| pattern.wrong.count == 0));
 }
 
-/// Arithmetic of a chip: the results for a triple of operands.
+/// Arithmetic of a chip: results of all expressions for three operands.
 type Arithmetic = fn([f32; 3]) -> [u32; RESULTS];
 
-/// Card with the given arithmetic, on a port without a thread. Prepared replies stand for a test of its
-/// memory.
+/// Model of a card, without a thread: it computes by `arithmetic`, and answers the memory test by prepared
+/// replies.
 struct Chip {
     transport: Transport,
     arithmetic: Arithmetic,
-    /// Replies to the test of the memory.
+    /// Replies to the memory test.
     memory: VecDeque<Reply<'static>>,
     is_testing: bool,
     /// Number of commands after which the card is reset; `None` for never.
     reset_after: Option<u32>,
 }
 
-/// Progress at the end of a pattern, for a memory of the budget's size.
+/// Report at the end of a pattern without errors, for a memory of the budget's size.
 fn end(pattern: MemoryPattern) -> MemoryTest {
     let lines = MICRO.dram_bytes / LINE_BYTES as u32;
     MemoryTest { lines, pattern, written: lines, checked: lines, wrong: WrongWords::default() }
@@ -170,7 +170,7 @@ fn test_of(mut chip: Chip) -> Result<SelfTest, RenderError> {
     self_test_on(&mut chip, "card 0", &Unobserved)
 }
 
-/// Expressions with wrong results of a chip, each with the likely cause of the first error.
+/// Expressions with wrong results, each with the likely cause of its first error.
 fn wrong_results(arithmetic: Arithmetic) -> Vec<(&'static str, Option<&'static str>)> {
     let test = test_of(Chip::new(arithmetic)).unwrap();
     assert_eq!(test.is_passed(), test.arithmetic.wrong.is_empty());
@@ -210,7 +210,7 @@ fn flushed_denormal_numbers_are_named() {
     for expression in ["a + b", "a - b", "a * b", "a / b", "a * b + c"] {
         assert!(found.contains(&(expression, cause)), "{expression}: {found:?}");
     }
-    // Results alone.
+    // Only results that are denormal numbers are flushed, operands are not.
     let found = wrong_results(|operands| compute(operands).map(flushed));
     assert!(found.contains(&("a * b", cause)), "{found:?}");
 }
@@ -219,7 +219,7 @@ fn flushed_denormal_numbers_are_named() {
 fn a_wrong_rounding_mode_is_named() {
     let found = wrong_results(|operands| {
         let mut results = compute(operands);
-        // Towards zero: the sum of two f32 as f64 is above it if the f32 sum was rounded up.
+        // Rounds towards zero: an `f32` sum whose absolute value exceeds the `f64` sum's was rounded up.
         let exact = f64::from(operands[0]) + f64::from(operands[1]);
         if exact.is_finite() && f64::from(f32::from_bits(results[0])).abs() > exact.abs() {
             results[0] -= 1;
@@ -229,7 +229,7 @@ fn a_wrong_rounding_mode_is_named() {
     assert_eq!(found, [("a + b", Some("results are rounded in another direction"))]);
 }
 
-/// Inverts each bit of each result once; every inversion must be found.
+/// One bit of one result is wrong, for each expression in turn; the test must find it.
 #[test]
 fn a_wrong_bit_is_found_in_any_result() {
     for (place, expression) in EXPRESSIONS.into_iter().enumerate() {
@@ -247,7 +247,7 @@ thread_local! {
     static PLACE: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Arithmetic with one wrong bit for one triple of operands.
+/// Arithmetic with one wrong bit, for one triple of operands.
 fn flip(operands: [f32; 3]) -> [u32; RESULTS] {
     let mut results = compute(operands);
     if operands == [1.0, 3.0, -1.0 / 3.0] {
@@ -263,7 +263,8 @@ fn card_error(chip: Chip) -> CardError {
     }
 }
 
-/// Resets the card at the first results, in between, and at the memory test, which is its 34th command.
+/// Resets the card at the first results, during the arithmetic, and at the memory test, which is its 34th
+/// command.
 #[test]
 fn a_card_that_is_reset_fails() {
     for after in [2, 20, 34] {
@@ -279,7 +280,7 @@ fn a_fault_ends_the_test() {
     assert!(matches!(error, CardError::Session(SessionError::Fault(found)) if found == fault), "{error}");
 }
 
-/// Tries reports that contradict themselves, the previous report or the pattern.
+/// Reports contradict themselves, the report before, or the pattern.
 #[test]
 fn impossible_reports_are_refused() {
     let [ones, zeros, ..] = MemoryPattern::ALL;
@@ -327,7 +328,7 @@ fn wrong_words_in_any_pattern_fail_the_card() {
     }
 }
 
-/// Observer that stops the test after a number of bytes.
+/// Observer that stops the self-test once this number of bytes is tested.
 struct Stop(u64, AtomicBool);
 
 impl Observer for Stop {
@@ -344,7 +345,7 @@ impl Observer for Stop {
 #[test]
 fn an_observer_stops_the_test() {
     let mut chip = Chip::new(compute);
-    // The card says no more than that it is at work.
+    // After two reports, the card only says that it is still at work.
     chip.memory.truncate(2);
     let stop = Stop(4 * u64::from(MICRO.dram_bytes), AtomicBool::new(false));
     let result = self_test_on(&mut chip, "card 0", &stop);
@@ -352,9 +353,8 @@ fn an_observer_stops_the_test() {
 }
 
 proptest! {
-    /// The expected results are those of IEEE 754. Sums, products, quotients and roots of floats are computed
-    /// in double precision, which has so many digits that the second rounding, to a float, gives the
-    /// correctly rounded result (Figueroa 1995).
+    /// The expected results are those of IEEE 754. A sum, product, quotient or root in double precision has
+    /// so many digits that rounding it once more to `f32` gives the correctly rounded result (Figueroa 1995).
     #[test]
     fn the_hosts_results_are_correctly_rounded(bits in any::<[u32; 3]>()) {
         let operands = bits.map(f32::from_bits);
@@ -368,7 +368,7 @@ proptest! {
     }
 }
 
-/// Compares bits that every processor must compute.
+/// Compares results with recorded bits, which every processor must compute.
 #[test]
 fn results_equal_the_recorded_bits() {
     let tiny = f32::MIN_POSITIVE;
@@ -381,7 +381,7 @@ fn results_equal_the_recorded_bits() {
     assert_eq!((ends[0], ends[17], ends[18], ends[19], ends[20]), (0x7fc0_0000, 0, 0, 0, 0));
     let large = compute([-9.3e18, 1.0, 0.0]);
     assert_eq!((large[17], large[18], large[19], large[20]), (0x8000_0000, 0, 0x8000_0000, 1));
-    // sin, cos, exp, pow and atan2 of 1 and 2, to the last bit.
+    // sin, cos and exp of 1, and pow and atan2 of 1 and 2.
     let functions = compute([1.0, 2.0, 0.0]);
     assert_eq!(functions[12..17], [0x3f57_6aa4, 0x3f0a_5140, 0x402d_f854, 0x3f80_0000, 0x3eed_6338]);
 }

@@ -1,5 +1,5 @@
-//! The test of card memory finds faults of data lines, address lines, byte lanes and cells, names the first
-//! wrong word, and counts all wrong words.
+//! The test of card memory finds faults of data lines, address lines, byte lanes and cells. It names the
+//! first wrong word, and counts all of them.
 
 use std::ops::Range;
 
@@ -11,7 +11,7 @@ use photoncard_shared::message::{
 };
 use proptest::prelude::*;
 
-/// Number of lines of the memory under test: several steps of the tester, the last one incomplete.
+/// Number of lines of the tested memory: several steps of the tester, of which the last is not full.
 const LINES: u32 = 1000;
 const WORDS: u32 = LINES * WORDS_PER_LINE;
 
@@ -19,25 +19,25 @@ const WORDS: u32 = LINES * WORDS_PER_LINE;
 #[derive(Clone, Copy, Debug)]
 enum Defect {
     None,
-    /// A data line is stuck at this value.
+    /// One data line is stuck at this value.
     DataLine {
         bit: u32,
         value: bool,
     },
-    /// Two data lines are shorted: both carry the conjunction.
+    /// Two data lines are shorted: each carries the AND of both.
     DataShort {
         bits: [u32; 2],
     },
-    /// An address line is stuck at this value.
+    /// One address line is stuck at this value.
     AddressLine {
         bit: u32,
         value: bool,
     },
-    /// Two address lines are shorted: both carry the conjunction.
+    /// Two address lines are shorted: each carries the AND of both.
     AddressShort {
         bits: [u32; 2],
     },
-    /// The memory has only this number of words, and repeats.
+    /// The memory has only this number of words, and repeats them.
     Mirror {
         words: u32,
     },
@@ -47,8 +47,7 @@ enum Defect {
         bit: u32,
         value: bool,
     },
-    /// Byte lanes are missing: a store of a byte writes the whole word, of which each byte is that byte,
-    /// because the processor drives all lanes.
+    /// Byte lanes are missing: storing a byte writes the whole word, with this byte on all lanes.
     NoByteLanes,
 }
 
@@ -57,13 +56,13 @@ fn with_bit(word: u32, bit: u32, value: bool) -> u32 {
     word & !(1 << bit) | u32::from(value) << bit
 }
 
-/// Sets two bits of `word` to their conjunction.
+/// Replaces two bits of `word` by their AND.
 fn with_conjunction(word: u32, [a, b]: [u32; 2]) -> u32 {
     let both = word >> a & word >> b & 1 == 1;
     with_bit(with_bit(word, a, both), b, both)
 }
 
-/// Memory with a defect. The defect decides where a word is stored, and at which addresses it is visible.
+/// Memory with a defect. `lines` is what its cells hold, `shown` what each address reads.
 struct DefectiveMemory {
     lines: Vec<Line>,
     shown: Vec<Line>,
@@ -78,7 +77,7 @@ impl DefectiveMemory {
         Self { shown: lines.clone(), lines, defect, writes: 0 }
     }
 
-    /// Index of the word that an address selects.
+    /// Index of the word that the index on the address lines selects.
     fn selected(&self, index: u32) -> u32 {
         match self.defect {
             Defect::AddressLine { bit, value } => with_bit(index, bit, value) % WORDS,
@@ -99,7 +98,7 @@ impl DefectiveMemory {
         put(&mut self.lines, place, value);
     }
 
-    /// Updates [`Self::shown`]. Call it after each step, because a write may change any number of addresses.
+    /// Updates `shown` after a step of the tester: a write may change what any number of addresses read.
     fn show(&mut self) {
         for index in 0..WORDS {
             let value = get(&self.lines, self.selected(index));
@@ -155,7 +154,7 @@ impl CardMemory for DefectiveMemory {
     }
 }
 
-/// Wrong words by pattern, as the tester reports them.
+/// Wrong words of each pattern, as the tester reports them.
 fn tested(defect: Defect) -> Vec<WrongWords> {
     let mut memory = DefectiveMemory::new(defect);
     let mut tester = MemoryTester::new(&memory).unwrap();
@@ -177,7 +176,7 @@ fn tested(defect: Defect) -> Vec<WrongWords> {
     found
 }
 
-/// Expected wrong words by pattern, from the words that each address shows after all writes in order.
+/// Wrong words of each pattern, from what each address reads after all writes in order.
 fn foreseen(defect: Defect) -> Vec<WrongWords> {
     let mut memory = DefectiveMemory::new(defect);
     MemoryPattern::ALL
@@ -250,7 +249,7 @@ fn a_report_identifies_the_defective_line() {
     assert_eq!((ones.count, zeros.count), (WORDS / 32 * 31, WORDS / 32));
     assert_eq!(ones.first, Some(WrongWord { index: 0, expected: 1, found: 1 | 1 << 9 }));
 
-    // Half of the words are those of the other half: the last to be written.
+    // Half of the words read what was written last to the other half.
     let found = tested(Defect::AddressLine { bit: 8, value: false });
     assert_eq!(found[..2], [WrongWords::default(); 2], "lines 32 words apart hold the same walking bits");
     let [address, complement] = [found[2], found[3]];
@@ -258,7 +257,7 @@ fn a_report_identifies_the_defective_line() {
     assert_eq!(address.first, Some(WrongWord { index: 0, expected: 0, found: 1 << 8 }));
     assert_eq!(complement.first, Some(WrongWord { index: 0, expected: !0, found: !(1 << 8) }));
 
-    // A quarter of the memory, four times.
+    // The memory repeats after 8192 words, a quarter of its size.
     let address = tested(Defect::Mirror { words: 8192 })[2];
     assert_eq!(address.bits, 3 << 13);
     assert_eq!(address.count, WORDS - 8192);
@@ -273,7 +272,7 @@ fn a_report_identifies_the_defective_line() {
     assert!(found[4].count > WORDS / 2);
 }
 
-/// The memory has fewer lines than it reports, or none.
+/// The memory has fewer lines than it says, or none.
 #[test]
 fn a_memory_without_its_lines_is_a_fault() {
     struct Short(Vec<Line>, u32);

@@ -1,4 +1,4 @@
-//! Pixels depend on the settings in a picture's provenance, and on no others.
+//! Pixels depend on the settings in a picture's provenance, and on no other settings.
 
 use std::path::Path;
 
@@ -19,7 +19,7 @@ use photoncard_driver::study::{Point, Scale};
 use photoncard_tests::everything::everything;
 use photoncard_tests::{camera, lambertian, quad, render_or_panic, scene};
 
-/// Settings that all differ from the defaults.
+/// Settings of a small picture, of which [`changes`] replaces one field at a time.
 fn settings() -> RenderSettings {
     RenderSettings {
         picture: Picture { width: 12, height: 10, ..Picture::default() },
@@ -40,22 +40,23 @@ fn cards(text: &str) -> Vec<CardAddress> {
     vec![text.parse().expect("an address")]
 }
 
-/// Results that depend on a setting.
+/// What depends on a setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Dependence {
-    /// Pixels and the card image.
+    /// Pixels and card image.
     Image,
     /// Pixels only.
     Pixels,
-    /// The card image, but no pixel.
+    /// Card image, but no pixel.
     Layout,
-    /// The work of a chip, but no pixel.
+    /// Work of a chip, but no pixel.
     Work,
     /// Neither pixels nor work.
     Nothing,
 }
 
-/// Lists one change per field, by name. The list does not compile if it lacks a field.
+/// Lists a change for each field, as (name, what depends on it, settings). It does not compile if a field is
+/// missing.
 macro_rules! changes {
     ($($group:ident: $type:ident { $($field:ident: $dependence:ident = $value:expr),+ $(,)? })+) => {{
         let RenderSettings { $($group: $type { $($field: _),+ }),+ } = settings();
@@ -93,7 +94,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
         integrator: Integrator {
             seed: Image = 1,
             samples: Pixels = 2,
-            // There is no irradiance cache.
+            // Without the irradiance cache, planned samples have no effect.
             planned_samples: Nothing = Some(5),
             gather_rays: Pixels = 9,
             shadow_rays: Pixels = 3,
@@ -108,9 +109,9 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
             queue: Work = Some(9),
             in_flight: Work = Some(1),
             focus: Nothing = Some([3, 4]),
-            // A part that is all of the picture.
+            // The only part is the whole picture.
             part: Nothing = Part::new(1, 1),
-            // There is no irradiance cache.
+            // Without the irradiance cache, there are no records to keep.
             keep_records: Nothing = true,
         }
         cards: CardSet {
@@ -126,7 +127,7 @@ fn changes(folder: &Path) -> Vec<(&'static str, Dependence, RenderSettings)> {
         }
         outputs: TileOutputs {
             partial: Nothing = Some(PartialSettings { path: folder.join("a.exr.partial"), resume: false }),
-            // No server listens at this address.
+            // No display server listens at this address.
             display: Nothing = Some(DisplaySettings {
                 address: "127.0.0.1:1".parse().expect("an address"),
                 image: "a.exr".to_owned(),
@@ -151,7 +152,7 @@ fn with_two_cameras() -> Scene {
     scene
 }
 
-/// Bits of a film's contents, size and window.
+/// Size, window, and `f32::to_bits` of all pixels and layers of a film.
 fn bits(film: &Film) -> Vec<u32> {
     let window = film.window();
     let size = [film.width(), film.height(), window.x0, window.x1, window.y0, window.y1];
@@ -183,7 +184,7 @@ fn a_setting_is_in_the_identity_of_a_picture_exactly_if_pixels_depend_on_it() {
         assert_eq!(changed.identity(&scene) != settings().identity(&scene), is_of_pixels, "{name}");
         differing += usize::from(is_of_pixels);
     }
-    // Width and height are one option.
+    // Width and height are two fields, and one option.
     assert_eq!(settings().of_pixels().len(), differing - 1);
 }
 

@@ -1,5 +1,4 @@
-//! Mirrors and glass of known radiance, on every light path: seen by eye rays, by gather rays, and as
-//! caustics.
+//! Mirrors and glass of known radiance, seen by eye rays, by gather rays, and as caustics.
 
 use glam::Vec3;
 use photoncard_driver::render::{CardAddress, CardSet, Integrator, PhotonMaps, Picture, RenderSettings};
@@ -52,7 +51,7 @@ fn glass(is_volume: bool, absorption: f32) -> Material {
     Material::new("glass", reflection)
 }
 
-/// Reflectance of a glass surface at normal incidence.
+/// Fresnel reflectance of a face of glass at normal incidence.
 const FACE: f64 = 0.04;
 
 fn wall() -> Material {
@@ -67,7 +66,7 @@ fn furnace_with(thing: Material, add: impl Fn(&mut Scene)) -> Scene {
     scene
 }
 
-/// Checks the mean over the picture and over each block of 8x8 pixels.
+/// Checks the mean of the picture, and that of each block of 8x8 pixels.
 fn shows(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64) {
     let all = radiances(&render_or_panic(scene, settings).film);
     let error = mean(&all) / expected - 1.0;
@@ -80,8 +79,8 @@ fn shows(scene: &Scene, settings: &RenderSettings, expected: f64, tolerance: f64
     }
 }
 
-/// An object without loss is invisible in a room of uniform radiance. The walls that receive light through it
-/// are neither darker nor brighter.
+/// In uniform radiance, an object without loss is invisible, and walls that receive light through it are
+/// neither darker nor brighter.
 #[test]
 fn lossless_objects_are_invisible_in_a_furnace() {
     let ball = |scene: &mut Scene| add_ball(scene, Vec3::new(-0.2, -0.1, 0.0), 0.4, 24, 1);
@@ -91,12 +90,12 @@ fn lossless_objects_are_invisible_in_a_furnace() {
     shows(&furnace_with(glass(true, 0.0), block), &settings, FURNACE, 0.03);
     shows(&furnace_with(mirror(1.0), ball), &settings, FURNACE, 0.04);
     shows(&furnace_with(glass(true, 0.0), ball), &settings, FURNACE, 0.04);
-    // Gather rays carry the light that the caustic map would.
+    // Without a caustic map, gather rays carry the light of caustics.
     let without_map = settings.with(|s| s.photons.caustic_photons = Some(0));
     shows(&furnace_with(glass(true, 0.0), ball), &without_map, FURNACE, 0.04);
 }
 
-/// Mean of a picture of a small area at the origin, seen from distance 1.
+/// Mean of a picture of a small area at the origin, seen from `from`.
 fn glance(triangles: Vec<photoncard_driver::scene::Triangle>, materials: Vec<Material>, from: Vec3) -> f64 {
     let mut view = camera(from, -from);
     view.vertical_fov = 0.02;
@@ -157,8 +156,8 @@ fn a_mirror_shows_its_reflectance_at_the_viewing_angle() {
     }
 }
 
-/// Radiance inside glass is that outside times the square of the index of refraction. Seen from outside, a
-/// surface inside shows its radiance divided by that square.
+/// Inside glass, radiance is that outside times the square of the index of refraction. From outside, an
+/// emitter inside shows its radiance divided by this square.
 #[test]
 fn surfaces_inside_glass_show_their_radiance_over_the_square_of_the_index() {
     let mut triangles = cuboid(Vec3::ZERO, Vec3::new(1.0, 1.0, 0.2), 1);
@@ -169,8 +168,8 @@ fn surfaces_inside_glass_show_their_radiance_over_the_square_of_the_index() {
     assert!((seen / expected - 1.0).abs() < 0.01, "{seen} instead of {expected}");
 }
 
-/// A coat or a mirror alone has no surface on which to cast a caustic. It shows the sky, and its base's
-/// reflection of the sky.
+/// A coat or a mirror without any other surface shows the sky, and a coat's base reflects the sky; no caustic
+/// is stored.
 #[test]
 fn specular_surfaces_alone_show_the_sky() {
     let corner = |x: f32, y: f32| Vec3::new(x, y, 0.0);
@@ -199,7 +198,7 @@ fn specular_surfaces_alone_show_the_sky() {
     }
 }
 
-/// A texture may make glass of a material whose factor is that of a metal.
+/// A texture with metalness 0 makes glass of a material whose metallic factor is 1.
 #[test]
 fn a_texture_without_metal_makes_glass_of_a_metallic_factor() {
     let texel = |blue: u8| {

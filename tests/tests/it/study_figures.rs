@@ -1,6 +1,6 @@
-//! Figures in `docs/studies.md` equal those of `docs/studies.csv`, the `figures.csv` of a run of `photoncard
-//! study all`. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test it study_figures` writes them into the
-//! document.
+//! Figures in `docs/studies.md` equal those of `docs/studies.csv`, which is the `figures.csv` of a run of
+//! `photoncard study all`. `UPDATE_DOCS=1 cargo test -p photoncard-tests --test it study_figures` writes them
+//! into the document.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -11,7 +11,7 @@ use photoncard_driver::study::{Figure, Laboratory, StudyObserver, check, human};
 use photoncard_shared::image::LAYOUT_VERSION;
 use serde::Deserialize;
 
-/// Line of the CSV.
+/// Line of `docs/studies.csv`.
 #[derive(Debug, Deserialize, PartialEq)]
 struct Line {
     name: String,
@@ -36,7 +36,7 @@ fn figures(csv: &str) -> Figures {
     figures
 }
 
-/// Text of a figure for a marker: `=` is its value, `~` its confidence interval; numbers have three
+/// Text of a figure: its value for the kind `=`, its confidence interval for `~`. Numbers have three
 /// significant digits.
 fn text(figure: &Line, kind: char) -> String {
     let number = |value: f64| human(value, 3);
@@ -49,17 +49,17 @@ fn text(figure: &Line, kind: char) -> String {
 
 const END: &str = "<!--/-->";
 
-/// Text of a figure that the run did not measure, and of the interval of a figure without one.
+/// Text for a figure that was not measured, and for the interval of a figure without one.
 const NOT_MEASURED: &str = "–";
 
-/// Returns whether any figure is of the same study: its name has the same part before the first dot.
+/// Returns whether there is a figure of the same study, which is the part of the name before the first dot.
 fn has_study(figures: &Figures, name: &str) -> bool {
     let study = |name: &str| name.split('.').next().map(str::to_owned);
     figures.keys().any(|(other, _)| study(other) == study(name))
 }
 
-/// Document with updated figures: the text between each marker `<!--=NAME@SCENE-->` or `<!--~NAME@SCENE-->`
-/// and the next `<!--/-->` is replaced.
+/// Document with new figures: the text from each marker `<!--=NAME@SCENE-->` or `<!--~NAME@SCENE-->` to the
+/// next `<!--/-->` is replaced.
 fn filled(document: &str, figures: &Figures) -> Result<String, String> {
     let mut filled = String::new();
     let mut rest = document;
@@ -111,7 +111,7 @@ impl StudyObserver for Silent {
     }
 }
 
-/// Value of a figure of the committed run that belongs to no scene.
+/// Value in `docs/studies.csv` of a figure without a scene.
 fn committed(name: &str) -> Option<String> {
     figures(&read("studies.csv")).remove(&(name.to_owned(), String::new())).map(|line| line.value)
 }
@@ -123,7 +123,7 @@ fn the_csv_is_of_this_version_and_layout_and_of_a_full_run() {
     assert_eq!(committed("trial"), None);
 }
 
-/// Compares the bytes of two small renders. If they change, all figures are outdated.
+/// Compares figures of two small renders with `docs/studies.csv`. If they differ, all figures are outdated.
 #[test]
 #[ignore = "figures of documents are compared by a command of their own: CONTRIBUTING.md, Documents"]
 fn the_csv_is_of_this_program() {

@@ -31,8 +31,8 @@ fn with_texture(mut scene: Scene, image: Image, texture: Texture) -> Scene {
     scene
 }
 
-/// Square of side 2 in the plane z = 0 that faces the camera and fills the picture. Texture coordinates are 0
-/// to 1 from the upper left corner.
+/// Square of side 2 in the plane z = 0 that fills the picture. Texture coordinates are 0 to 1 from its upper
+/// left corner.
 fn canvas(material: Material) -> Scene {
     let mut view = camera(Vec3::Z, Vec3::NEG_Z);
     view.vertical_fov = std::f32::consts::FRAC_PI_2;
@@ -71,7 +71,7 @@ fn an_emissive_texture_glows_texel_by_texel() {
     near(at(10, 10), [2.0, 0.0, 0.0]);
     near(at(37, 10), [0.0, 4.0, 0.0]);
     near(at(10, 37), [0.0, 0.0, 8.0]);
-    // The code 188 is 0.5029 of white.
+    // The sRGB code 188 is 0.5029.
     near(at(37, 37), [1.0058, 2.0116, 4.0232]);
 }
 
@@ -100,7 +100,7 @@ fn textured_room(wall: Material) -> Scene {
     scene
 }
 
-/// Closed room whose albedo comes from a texture, vertex colours, or both.
+/// Closed room whose albedo is the product of a factor, a texture and vertex colours.
 fn furnace(albedo: f32, texel: u8, colour: f32) -> Scene {
     let wall = Material {
         emission: Vec3::ONE,
@@ -111,7 +111,7 @@ fn furnace(albedo: f32, texel: u8, colour: f32) -> Scene {
     for attributes in &mut scene.attributes {
         attributes.colours = [[colour, colour, colour, 1.0]; 3];
     }
-    // Two repeated texels, mirrored along one axis: one light, one dark; only their mean is known.
+    // Repeated along one axis, mirrored along the other, the texture has one value everywhere.
     let repeated = Texture { wrap: [Wrap::Mirror, Wrap::Repeat], ..Texture::new(0) };
     with_texture(scene, image(3, Encoding::Linear, vec![[texel; 4]; 6]), repeated)
 }
@@ -126,8 +126,8 @@ fn a_textured_furnace_has_uniform_radiance() {
     }
 }
 
-/// The texture's green and blue are roughness and metalness: metal of roughness 0.3 in one half, a rough
-/// dielectric in the other.
+/// Green and blue of the texture are roughness and metalness: one half is metal of roughness 0.3, the other a
+/// rough dielectric.
 #[test]
 fn roughness_and_metalness_follow_their_texture() {
     let reflection = Reflection::MetallicRoughness {
@@ -147,7 +147,7 @@ fn roughness_and_metalness_follow_their_texture() {
     scene.triangles.extend(quad([corner(-9., -9.), corner(9., -9.), corner(9., 9.), corner(-9., 9.)], 1));
     let film = film(&scene);
     let albedo = |x: u32| Vec3::from(film.pixel(x, 24).unwrap().albedo);
-    // Integrals of the GGX lobe at a cosine of 0.95, by quadrature.
+    // Directional albedos at a cosine of 0.95, by quadrature of the GGX lobe.
     let metal = Vec3::new(0.792, 0.396, 0.198);
     assert!((albedo(10) - metal).abs().max_element() < 0.005, "{}", albedo(10));
     let (coat, fresnel) = (0.013, 0.04);
@@ -155,8 +155,8 @@ fn roughness_and_metalness_follow_their_texture() {
     assert!((albedo(37) - dull).abs().max_element() < 0.005, "{}", albedo(37));
 }
 
-/// A texture may make a dielectric of a material whose factors are those of a mirror. Photons are then stored
-/// on it, and their disc fractions are measured. With a texture that leaves it a metal, it is a mirror.
+/// By a texture of metalness 0, a material with the factors of a mirror is a dielectric: photons are stored
+/// on it, and their disc fractions are measured. By a texture of metalness 1 it stays a mirror.
 #[test]
 fn a_texture_decides_where_a_material_is_a_mirror() {
     let film = |metallic, texture: Option<u8>| {
@@ -185,7 +185,7 @@ fn a_texture_decides_where_a_material_is_a_mirror() {
     assert_eq!(film(1.0, Some(255)), film(1.0, None), "all metal is left");
 }
 
-/// Eye rays, shadow rays, gather rays and photons pass through the holes of a lattice before a lamp.
+/// A lattice with cut-outs is before a lamp: eye, shadow and gather rays and photons pass its holes.
 #[test]
 fn cut_outs_let_light_through() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
@@ -207,7 +207,7 @@ fn cut_outs_let_light_through() {
         mean(&radiances(&render_or_panic(&scene, &settings().with(|s| s.integrator.samples = 1)).film))
     };
     let [closed, open] = [[255; 4], [0; 4]].map(sky);
-    // Photons on the walls above it are gathered a little below it as well.
+    // A gather close below the lattice may still find photons of the walls above it.
     assert!(closed < 0.01 * open, "{closed} of {open}");
     let half = sky([0, 255, 255, 0]);
     let bare = {
@@ -219,8 +219,7 @@ fn cut_outs_let_light_through() {
     assert!(half > 0.15 * open && half < 0.5 * open, "{half} of {open}");
 }
 
-/// Eye rays, shadow rays, gather rays and photons pass through a sheet of partial coverage in the share 1 -
-/// alpha.
+/// A share 1 - alpha of eye, shadow and gather rays and of photons passes a sheet of partial coverage.
 #[test]
 fn an_alpha_of_a_half_lets_half_of_the_light_through() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
@@ -234,7 +233,7 @@ fn an_alpha_of_a_half_lets_half_of_the_light_through() {
         mean(&radiances(&render_or_panic(&scene, &settings()).film))
     };
     let open = light(0.0);
-    // The sheet absorbs light of either side: below it every path to the lamp passes it once at least.
+    // The sheet absorbs light on both sides, and each path from below to the lamp passes it at least once.
     for alpha in [0.25_f32, 0.75] {
         let found = light(alpha) / open;
         let most = f64::from(1.0 - alpha);
@@ -242,7 +241,7 @@ fn an_alpha_of_a_half_lets_half_of_the_light_through() {
     }
 }
 
-/// Radiance of a black sheet of partial coverage, and of the lamp that is seen through it.
+/// The picture has alpha of the sheet's emission, and 1 - alpha of the lamp behind it.
 #[test]
 fn a_sheet_shows_alpha_of_itself_and_the_rest_of_the_background() {
     let sheet = Material {
@@ -266,7 +265,7 @@ fn a_sheet_shows_alpha_of_itself_and_the_rest_of_the_background() {
     assert!((found / expected - 1.0).abs() < 0.01, "{found}, not {expected}");
 }
 
-/// glTF culls back faces: rays and photons pass through the back of a one-sided sheet of partial coverage.
+/// As glTF culls back faces, rays and photons pass the back of a one-sided sheet.
 #[test]
 fn the_back_of_a_one_sided_sheet_of_partial_coverage_is_culled() {
     let sheet = Material { blends: true, alpha: 0.9, ..lambertian("sheet", 0.0) };
@@ -282,8 +281,8 @@ fn the_back_of_a_one_sided_sheet_of_partial_coverage_is_culled() {
     }
 }
 
-/// A sheet that returns all light is invisible in a furnace, because photons are stored on it as often as
-/// gathers search for them.
+/// A sheet without loss is invisible in a furnace: photons are stored on it with the probability with which
+/// gathers look for them.
 #[test]
 fn a_sheet_of_partial_coverage_is_invisible_in_a_furnace() {
     let wall = Material { emission: Vec3::splat(0.5), ..lambertian("wall", 0.5) };
@@ -298,7 +297,7 @@ fn a_sheet_of_partial_coverage_is_invisible_in_a_furnace() {
     assert!(error.abs() < 0.012, "{error}");
 }
 
-/// Interpolated normals equal those of the ball, however few faces it has.
+/// Interpolated normals are those of the ball, however few facets it has.
 #[test]
 fn smooth_normals_are_interpolated_between_corners() {
     let mut ball = scene(Vec::new(), vec![Material { emission: Vec3::ONE, ..lambertian("ball", 0.0) }], {
@@ -311,18 +310,18 @@ fn smooth_normals_are_interpolated_between_corners() {
     let mut places = 0;
     for (index, pixel) in film(&ball).pixels().enumerate() {
         let [x, y] = [index % 48, index / 48].map(|i| (i as f32 + 0.5) / 24.0 - 1.0);
-        // Near the silhouette of the ball facets lie far behind it.
+        // At the silhouette, facets lie far inside the ball.
         if x * x + y * y > 0.4 {
             continue;
         }
         places += 1;
         let direction = Vec3::new(x * 0.2_f32.tan(), -y * 0.2_f32.tan(), -1.0).normalize();
-        // Intersection of the ray with the ball of radius 1.
+        // Point of the unit ball on the pixel's ray.
         let along = 4.0 * -direction.z;
         let position =
             Vec3::new(0.0, 0.0, 4.0) + direction * (along - (along * along - 15.0).max(0.0).sqrt());
         worst = worst.max((Vec3::from(pixel.normal).normalize() - position).length());
     }
-    // The geometric normal of a facet deviates by up to 0.13.
+    // The geometric normal of a facet differs from the ball's by up to 0.13.
     assert!(worst < 0.03 && places > 600, "{worst} at {places} places");
 }

@@ -1,4 +1,4 @@
-//! A product on a ground of many kilometres is lit as on a small one.
+//! A product on a ground many kilometres wide is lit as on a small one.
 
 use glam::Vec3;
 use photoncard_driver::photon_map::PhotonsFor;
@@ -6,19 +6,19 @@ use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings}
 use photoncard_driver::scene::{Environment, Scene};
 use photoncard_tests::{camera, lambertian, mean, quad, radiances, render_or_panic, scene};
 
-/// Radiance of the sky in all directions, W/(sr m^2).
+/// Radiance of the sky, W/(sr m^2).
 const SKY: f32 = 1.0;
 const ALBEDO_OF_GROUND: f32 = 0.5;
 const ALBEDO_OF_BOX: f32 = 0.8;
-/// Height of the ground, metres.
+/// Height of the ground (y), metres.
 const HEIGHT: f32 = -0.137;
 /// Side of the picture, pixels.
 const SIDE: u32 = 16;
-/// Side of a block of pixels.
+/// Side of a block, pixels.
 const BLOCK: usize = 4;
 
-/// A box of 10 cm on a ground of a given half side, metres, under a constant sky. The picture shows a part of
-/// its front.
+/// Box of 10 cm on a ground of this half side, metres, under a constant sky. The picture shows a part of its
+/// front.
 fn product(half_side: f32) -> Scene {
     let on_ground = |x: f32, z: f32| Vec3::new(x, 0.0, z) * half_side + Vec3::Y * HEIGHT;
     let mut triangles =
@@ -39,7 +39,7 @@ fn product(half_side: f32) -> Scene {
         .with(|scene| scene.environment = Some(Environment::constant(Vec3::splat(SKY))))
 }
 
-/// Radiances of the picture.
+/// Radiance of each pixel, W/(sr m^2).
 fn picture(half_side: f32) -> Vec<[f32; 3]> {
     let settings = RenderSettings {
         picture: Picture { width: SIDE, height: SIDE, ..Picture::default() },
@@ -50,7 +50,7 @@ fn picture(half_side: f32) -> Vec<[f32; 3]> {
     radiances(&render_or_panic(&product(half_side), &settings).film)
 }
 
-/// Means of blocks of pixels.
+/// Means of the red channel over blocks of 4x4 pixels.
 fn blocks(radiances: &[[f32; 3]]) -> Vec<f64> {
     let across = SIDE as usize / BLOCK;
     let mut sums = vec![0.0; across * across];
@@ -61,8 +61,8 @@ fn blocks(radiances: &[[f32; 3]]) -> Vec<f64> {
     sums
 }
 
-/// A front that sees as much of the sky as of an open ground has the irradiance `pi/2 (sky + ground)`. The
-/// ground near the box is a few per cent darker, as the box hides a part of the sky.
+/// A vertical front sees half sky and half ground: its irradiance is `pi/2 (sky + ground)`. Near the box the
+/// ground is a few per cent darker, as the box hides a part of the sky.
 #[test]
 fn a_product_is_lit_the_same_on_a_ground_of_10_m_and_of_1000_km() {
     let open = 0.5 * f64::from(ALBEDO_OF_BOX * SKY * (1.0 + ALBEDO_OF_GROUND));

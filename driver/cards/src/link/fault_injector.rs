@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use photoncard_shared::hash::hash;
 use photoncard_shared::link::{Port, PortError};
 
-/// Fault rates of a line, each a probability per byte of 0 to 0.1, and the seed.
+/// Probabilities of faults per byte of a line, 0 to 0.1 each, and the seed that selects the bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LineFaults {
     /// Rate of bytes with one inverted bit.
@@ -128,7 +128,7 @@ impl Direction {
         f64::from(self.random(kind)) < rate * 4_294_967_296.0
     }
 
-    /// Puts bytes into the line.
+    /// Appends bytes to the line, with their faults applied.
     fn pass(&mut self, bytes: &[u8], faults: &LineFaults) {
         for &byte in bytes {
             let is_delayed = self.happens(Kind::Delay, faults.delays);
@@ -143,21 +143,21 @@ impl Direction {
         }
     }
 
-    /// Number of bytes of the next piece, at most `most`.
+    /// Pseudo-random number of bytes for the next read or write, at most `most`.
     fn piece(&self, most: usize) -> usize {
         (1 + self.random(Kind::Piece) as usize % PIECE).min(most)
     }
 }
 
 impl FaultInjector {
-    /// Creates the faults of the line to card `index`. Every card has different ones.
+    /// Creates the injector for the line to card `index`. Lines of different cards have different faults.
     pub fn new(faults: LineFaults, index: usize) -> Self {
         let key = hash(faults.seed) ^ hash(index as u32 + 1);
         let [incoming, outgoing] = [1, 2].map(|direction| Direction::new(hash(key ^ hash(direction))));
         Self { faults, incoming, outgoing, held: Instant::now() }
     }
 
-    /// Reads from a port like [`Port::read`].
+    /// Reads from a port as [`Port::read`] does, with the line's faults.
     ///
     /// # Errors
     /// As for the port.
@@ -167,8 +167,8 @@ impl FaultInjector {
         buffer: &mut [u8],
         wait: Duration,
     ) -> Result<usize, PortError> {
-        // The caller may not write again for long, so pending bytes are sent here. The read reports a closed
-        // port as well.
+        // The caller may not write again for long, so pending outgoing bytes are sent here. The read below
+        // reports a closed port as well.
         let _ = self.flush(port, Duration::ZERO);
         if self.incoming.bytes.is_empty() {
             let mut bytes = [0; PIECE];
@@ -201,7 +201,7 @@ impl FaultInjector {
         count
     }
 
-    /// Writes to a port like [`Port::write`].
+    /// Writes to a port as [`Port::write`] does, with the line's faults.
     ///
     /// # Errors
     /// As for the port.
@@ -215,7 +215,7 @@ impl FaultInjector {
         Ok(taken)
     }
 
-    /// Writes pending bytes to the port.
+    /// Writes the pending outgoing bytes to the port.
     fn flush(&mut self, port: &mut dyn Port, wait: Duration) -> Result<(), PortError> {
         if self.outgoing.bytes.is_empty() {
             return Ok(());

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use photoncard_shared::link::{Port, PortError};
 
-/// Time after the first unreported write at which a patient port's next call wakes the reader.
+/// Maximum age of an unreported write: the first call of a patient port after it wakes the reader.
 const PATIENCE: Duration = Duration::from_micros(500);
 
 /// One direction of the link.
@@ -31,7 +31,7 @@ struct ByteQueue {
 
 impl Direction {
     fn lock(&self) -> MutexGuard<'_, ByteQueue> {
-        // A thread that panicked holding the lock has left whole bytes.
+        // A poisoned lock is taken over: a panic leaves no byte incomplete.
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -99,7 +99,7 @@ impl Port for LoopbackPort {
     fn read(&mut self, buffer: &mut [u8], wait: Duration) -> Result<usize, PortError> {
         self.wake(!wait.is_zero());
         let mut queue = self.incoming.wait(wait, |queue| !queue.bytes.is_empty());
-        // To read from a queue in memory does not fail.
+        // Reading from a queue in memory does not fail.
         let count = queue.bytes.read(buffer).unwrap_or(0);
         if count == 0 {
             return if queue.closed { Err(PortError::Closed) } else { Ok(0) };

@@ -28,9 +28,9 @@ pub(super) struct Card {
     /// Indices of the tiles assigned to the card. It works on the first ones, up to its number of tiles in
     /// flight.
     pub(super) tiles: Vec<usize>,
-    /// Indices of waiting tiles that this card has rendered before.
+    /// Indices of the waiting tiles reserved for the card, which rendered them in an earlier pass.
     pub(super) at_home: VecDeque<usize>,
-    /// Work on the tiles that no other card has confirmed.
+    /// Sum of the counters of the card's tiles that no other card has confirmed.
     pub(super) counters: Counters,
     /// Mean time per ray or gather of the card's slowest tile, seconds.
     pub(super) slowest: Option<f64>,
@@ -48,7 +48,7 @@ impl Card {
         }
     }
 
-    /// Updates [`Self::slowest`] by the time and the work of a tile.
+    /// Raises [`Self::slowest`] to the mean time per ray or gather of a tile, if that is greater.
     pub(super) fn count_time(&mut self, took: Duration, work: &Counters) {
         let rays = work.rays_and_gathers();
         if rays > 0 {
@@ -58,7 +58,7 @@ impl Card {
     }
 }
 
-/// Mean time from a tile's assignment to its answer.
+/// Mean time from the earliest possible start of a tile on its card to its answer.
 #[derive(Debug, Default)]
 pub(super) struct TileTimes {
     sum: Duration,

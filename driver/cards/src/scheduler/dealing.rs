@@ -10,19 +10,18 @@ use super::entry::{Copy, Entry, Progress};
 use super::{CRASHES_APART, Scheduler};
 use crate::session::Assignment;
 
-/// Time after which an idle card duplicates another card's tile, in mean times of a tile.
+/// Time after which an idle card duplicates another card's tile, as a multiple of the mean time of a tile.
 const HELP_AFTER: u32 = 2;
 /// Time after which an idle card duplicates another card's tile before any tile is done.
 const HELP_WITHOUT_MEAN: Duration = Duration::from_secs(1);
-/// Ratio of waiting tiles to (tiles of a card times number of other cards) above which the card may take
-/// another tile.
+/// A card takes another tile while more tiles wait than this number times its own tiles times the number of
+/// other cards.
 const PLENTY: usize = 4;
-/// Number of tiles awaiting comparison that are searched for one that a card can verify, before other waiting
-/// tiles are considered.
+/// Number of tiles awaiting comparison among which a card seeks one to verify before it takes a waiting tile.
 pub(super) const COMPARED_AT_ONCE: usize = 256;
 
 impl Scheduler {
-    /// Assigns the next tile to a card with a free credit; `None` if there is none for it.
+    /// Assigns the next tile to a card with a free credit; `None` if no tile is available for the card.
     pub fn take(&mut self, card: CardNumber, now: Duration) -> Option<Assignment> {
         if self.cards[card].standing != Standing::Living {
             return None;
@@ -51,7 +50,7 @@ impl Scheduler {
     }
 
     /// Returns whether a card may take another tile. A card without tiles may; another one may while enough
-    /// tiles wait for the other cards. Otherwise tiles would wait behind a slow one, and near the end idle
+    /// tiles wait for the other cards. Otherwise tiles would wait behind a slow tile, and near the end idle
     /// cards could not take them.
     fn has_share(&self, card: CardNumber) -> bool {
         let others = self.living().filter(|&other| other != card).count();
@@ -68,7 +67,7 @@ impl Scheduler {
         self.waiting.remove(next)
     }
 
-    /// Takes a tile that another card has rendered and this one can verify.
+    /// Finds a tile that another card has rendered and this one can verify.
     fn next_compared(&mut self, card: CardNumber) -> Option<usize> {
         while self.compared.front().is_some_and(|&index| !self.entries[index].is_open()) {
             self.compared.pop_front();
@@ -76,12 +75,12 @@ impl Scheduler {
         self.compared_for(card, COMPARED_AT_ONCE)
     }
 
-    /// Position of a tile that the card can verify, among the first `tiles` tiles awaiting comparison.
+    /// Index of the first tile that the card can verify, among the first `tiles` ones awaiting comparison.
     fn compared_for(&self, card: CardNumber, tiles: usize) -> Option<usize> {
         self.compared.iter().take(tiles).copied().find(|&index| self.is_for(card, index))
     }
 
-    /// Returns whether a card can verify a tile that no other card is rendering.
+    /// Returns whether tile `index` is open, on no card, and without an answer of this card.
     pub(super) fn is_for(&self, card: CardNumber, index: usize) -> bool {
         let entry = &self.entries[index];
         entry.is_open() && entry.copies.is_empty() && !entry.has_answer_of(card)
@@ -108,7 +107,7 @@ impl Scheduler {
         cards.filter(|(_, card)| card.standing == Standing::Living).map(|(number, _)| number)
     }
 
-    /// Tiles that are not done.
+    /// Tiles that are neither accepted nor abandoned.
     pub(super) fn open_entries(&self) -> impl Iterator<Item = &Entry> {
         self.entries.iter().filter(|entry| entry.is_open())
     }
@@ -147,7 +146,7 @@ impl Scheduler {
     }
 }
 
-/// Number of reserved tiles of a working card that other cards do not take, because they would have to gather
+/// Number of a working card's reserved tiles that other cards leave to it, because they would have to gather
 /// the irradiance records again.
 const MAX_AT_HOME: usize = 4;
 
@@ -167,13 +166,13 @@ impl Scheduler {
         self
     }
 
-    /// Tiles of which this card's answer was accepted without another.
+    /// Finished tiles for which this card's answer alone was accepted.
     pub fn rendered_by(&self, card: CardNumber) -> impl Iterator<Item = &Tile> {
         let entries = self.entries.iter().filter(move |entry| entry.progress == Progress::Done(Some(card)));
         entries.map(|entry| &entry.tile)
     }
 
-    /// Number of tiles that are on no card.
+    /// Number of waiting tiles, reserved ones included.
     pub(super) fn waiting_anywhere(&self) -> usize {
         self.waiting.len() + self.cards.iter().map(|card| card.at_home.len()).sum::<usize>()
     }
@@ -184,8 +183,8 @@ impl Scheduler {
         self.waiting.extend(tiles);
     }
 
-    /// Takes the last tile from the card with the most reserved tiles; `None` if that card will soon render
-    /// it itself.
+    /// Takes the last reserved tile of the card with the most of them; `None` if that card will soon render
+    /// the tile itself.
     pub(super) fn next_of_others(&mut self, now: Duration) -> Option<usize> {
         let patience = self.patience();
         let has_most = |card: &CardNumber| self.cards[*card].at_home.len();

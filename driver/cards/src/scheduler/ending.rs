@@ -70,7 +70,7 @@ impl Scheduler {
         }
     }
 
-    /// Returns the remaining tiles if all are set apart because cards have crashed at them.
+    /// Returns the remaining tiles if all are set apart because cards have crashed at them, else none.
     pub fn crashed_at(&self) -> Vec<Tile> {
         let left = || self.entries.iter().filter(|entry| !matches!(entry.progress, Progress::Done(_)));
         if left().any(|entry| entry.crashes.len() < CRASHES_APART) {

@@ -30,7 +30,7 @@ pub(super) struct Copy {
     pub(super) since: Duration,
 }
 
-/// Rendered tile that awaits comparison with another.
+/// Rendered tile, of a card or a partial file, that awaits comparison with another answer.
 #[derive(Debug)]
 pub(super) struct Answer {
     pub(super) source: Source,
@@ -38,7 +38,7 @@ pub(super) struct Answer {
 }
 
 impl Answer {
-    /// Returns whether two answers are equal, bit for bit.
+    /// Returns whether two answers have equal pixels and, if both are of cards, equal counters.
     fn agrees_with(&self, other: &Self) -> bool {
         let is_kept = [self, other].iter().any(|answer| answer.source == Source::Kept);
         let work = |answer: &Self| {
@@ -112,7 +112,7 @@ impl Entry {
         self.is_open() && self.answers.len() > 1
     }
 
-    /// If two answers agree, removes all answers and returns the verdict.
+    /// Removes the answers and returns the verdict, if two answers agree or exactly one of two is dazzling.
     pub(super) fn judge(&mut self) -> Option<Judgement> {
         let Some([first, second]) = self.agreeing() else { return self.judge_by_light() };
         let answers = std::mem::take(&mut self.answers);

@@ -4,7 +4,7 @@
 //! cards would have none. No card waits for another, and results arrive in any order. The pixels of a tile
 //! depend neither on its card nor on time.
 //!
-//! - A second card renders a tile that requires verification, as soon as one is free. If the two differ, a
+//! - A second card renders a tile that requires verification, as soon as a card is free. If the two differ, a
 //!   third decides. All tiles of the outvoted card that no other card has confirmed are rendered again.
 //! - A dazzling tile is verified as well, if there is another card. A tile is dazzling if its radiance is
 //!   higher than any source but a lamp next to a surface explains. If exactly one of two answers is dazzling,
@@ -60,11 +60,11 @@ const SLOWER_THAN_OTHERS: f64 = 1000.0;
 pub struct Scheduler {
     entries: Vec<Entry>,
     by_id: HashMap<u32, usize>,
-    /// Queue of tiles that are on no card.
+    /// Queue of the waiting tiles' indices, without reserved tiles.
     waiting: VecDeque<usize>,
-    /// Tiles with one answer that await a second one.
+    /// Indices of the tiles with an answer that await another one.
     compared: VecDeque<usize>,
-    /// Unfinished tiles with several crashes, which wait until all others are done.
+    /// Indices of the unfinished tiles with several crashes, which wait until all others are done.
     set_apart: Vec<usize>,
     cards: Vec<Card>,
     has_helpers: bool,
@@ -73,7 +73,7 @@ pub struct Scheduler {
     /// Time since which no card can continue an incomplete render; `None` while one can.
     stuck_since: Option<Duration>,
     times: TileTimes,
-    /// Work on verified tiles.
+    /// Sum of the counters of the tiles on which two cards agree.
     verified_work: Counters,
     done: usize,
     counts: TileCounts,
@@ -131,7 +131,8 @@ impl Scheduler {
         Self { has_helpers: true, ..self }
     }
 
-    /// Verifies a share of the tiles (at least one) on a second card; a hash of the seed selects them.
+    /// Verifies a share of the tiles (at least one) on a second card; a hash of seed and tile number selects
+    /// them.
     #[must_use]
     pub fn verifying(mut self, share: f64, seed: u32) -> Self {
         let chance = |entry: &Entry| hash(hash(seed) ^ entry.tile.id);
@@ -164,7 +165,7 @@ impl Scheduler {
         self
     }
 
-    /// Handles a tile that a card has rendered.
+    /// Records a tile that a card has rendered. Compares it with other answers if it needs verification.
     pub fn answer(&mut self, card: CardNumber, tile: FinishedTile, now: Duration) -> Answered {
         let Some((index, since)) = self.remove_copy(card, tile.tile().id, now) else {
             return Answered::default();
@@ -195,11 +196,11 @@ impl Scheduler {
         self.judge(index)
     }
 
-    /// Compares the answers to a tile.
+    /// Compares the answers to a tile, and accepts one if they decide.
     fn judge(&mut self, index: usize) -> Answered {
         let entry = &mut self.entries[index];
         let Some(Judgement { tile, agreed, liars }) = entry.judge() else { return Answered::default() };
-        // Another card was asked.
+        // Only tiles without a second answer count as dazzling.
         entry.is_dazzling = false;
         let was_kept = agreed == Agreement::WithKept;
         match agreed {
@@ -232,8 +233,8 @@ impl Scheduler {
         }
     }
 
-    /// Removes an unfinished tile from a card. The tile goes to the front of the queue, because it has waited
-    /// longest. `has_crashed` is true if the card was working on it.
+    /// Takes an unfinished tile from a card and puts it at the front of the queue; after several crashes the
+    /// tile is set apart or abandoned. `has_crashed`: the card was working on the tile.
     pub fn give_back(&mut self, card: CardNumber, id: u32, has_crashed: bool, now: Duration) {
         let Some((index, _)) = self.remove_copy(card, id, now) else { return };
         let entry = &mut self.entries[index];
@@ -373,14 +374,14 @@ impl Scheduler {
         self.entries.iter().filter(|entry| entry.is_dazzling_of(card)).count()
     }
 
-    /// Work on the tiles of the picture. A tile that was rendered twice counts once.
+    /// Sum of the counters of the rendered tiles. A tile that was rendered twice counts once.
     pub fn counters(&self) -> Counters {
         let mut sum = self.verified_work;
         self.cards.iter().for_each(|card| sum.add(&card.counters));
         sum
     }
 
-    /// Work on the tiles of a card that no other card has confirmed.
+    /// Sum of the counters of a card's tiles that no other card has confirmed.
     pub fn counters_of(&self, card: CardNumber) -> &Counters {
         &self.cards[card].counters
     }

@@ -172,8 +172,8 @@ fn two_cards_that_differ_end_the_render() {
     assert_eq!(scheduler.check(SECOND), Err(SchedulerError::Disagreement { tile: tile(0), sources }));
 }
 
-/// One card alone is believed. Of two that differ, the one with less light is believed. Two that agree are
-/// believed.
+/// One card alone is believed. Of two that differ, the one that is not dazzling is believed. Two that agree
+/// are believed.
 #[test]
 fn dazzling_tiles_are_verified_if_there_is_another_card() {
     let dazzling = 1 << 57;
@@ -219,7 +219,7 @@ fn dazzling_tiles_are_verified_if_there_is_another_card() {
         scheduler.expel(0, None);
         assert_eq!(scheduler.dazzling_of(0), 0);
     }
-    // Modelled memory counts the reads of each tile once.
+    // Without helpers, as with modelled memory, no tile is rendered twice.
     let mut alone = scheduler(1, 2);
     assert_eq!(take(&mut alone, 0, Duration::ZERO), Some(0));
     assert!(alone.answer(0, lit(0, dazzling), SECOND).found.is_some());

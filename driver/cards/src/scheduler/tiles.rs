@@ -83,7 +83,7 @@ pub fn spread(mut tiles: Vec<Tile>) -> Vec<Tile> {
 
 /// Sorts tiles by the distance of their centres from a pixel, the nearest first.
 pub fn near(mut tiles: Vec<Tile>, [x, y]: [u32; 2]) -> Vec<Tile> {
-    // Twice the distance of the middle, which may lie between pixels.
+    // Square of twice the distance along an axis, because the middle may lie between pixels.
     let along = |start: u32, length: u32, at: u32| {
         u128::from((2 * u64::from(start) + u64::from(length)).abs_diff(2 * u64::from(at))).pow(2)
     };

@@ -17,7 +17,7 @@ pub(super) struct Channel {
 }
 
 impl Channel {
-    /// Creates a channel. Its first session has the number after `number`.
+    /// Creates a channel whose first session has the number `number`.
     pub(super) fn before(number: u32) -> Self {
         Self {
             transport: Transport::host(),
@@ -75,13 +75,13 @@ impl Channel {
 /// Bytes that passed a link, and repairs on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LinkBytes {
-    /// Bytes of image lines.
+    /// Bytes of card image lines sent.
     pub image: u64,
-    /// Bytes of image lines and pixels.
+    /// Bytes of card image lines and pixels.
     pub payload: u64,
     /// All bytes in both directions.
     pub wire: u64,
-    /// Frames that the host repeated, and frames that it received damaged or repeated.
+    /// Frames that the host repeated, frames that it received damaged or repeated, and probes that it sent.
     pub line: LineStatistics,
     /// Number of times that the card was greeted again.
     pub resets: u64,

@@ -7,7 +7,7 @@ use super::SessionError;
 
 /// Maximum silence of a card that owes an answer. Cards answer between any two steps of their work.
 const SILENCE: Duration = Duration::from_secs(10);
-/// Silence before the first probe. It doubles with each unanswered probe.
+/// Silence before the first probe. The time doubles with each unanswered probe.
 const PATIENCE: Duration = Duration::from_millis(200);
 const MAX_PATIENCE: Duration = Duration::from_secs(1);
 /// Maximum time from a card's first answer to its hello. A slow serial line takes a second or two.
@@ -64,8 +64,8 @@ impl Clock {
         self.heard.is_some()
     }
 
-    /// Records that bytes were sent; time for the answer starts again. A line that accepts no bytes counts as
-    /// silent.
+    /// Records that bytes were sent; the time for the answer starts again. A line that accepts no bytes
+    /// counts as silent.
     pub(super) fn sent(&mut self, now: Duration) {
         self.asked = now;
     }
@@ -87,7 +87,7 @@ impl Clock {
         self.asked = now;
     }
 
-    /// Returns whether to probe now.
+    /// Returns whether a probe is due. If so, the wait for the next one starts.
     pub(super) fn must_ask(&mut self, now: Duration) -> bool {
         let must_ask = now.saturating_sub(self.asked) > self.patience;
         if must_ask {
@@ -102,8 +102,8 @@ impl Clock {
         self.heard.is_some_and(|heard| now.saturating_sub(heard) > GREETING)
     }
 
-    /// Checks the limits of silence and of time without progress, for a card whose largest tile has `rays`
-    /// rays. `slowest` is the time limit per ray or gather, seconds, if known.
+    /// Checks the limits of silence and of time without progress, for a card that works on tiles of `rays`
+    /// rays in all. `slowest` is the time limit per ray or gather, seconds, if known.
     ///
     /// # Errors
     /// If the card has exceeded either limit.
@@ -128,7 +128,8 @@ fn time(seconds: f64) -> Duration {
     Duration::try_from_secs_f64(seconds).unwrap_or(Duration::MAX)
 }
 
-/// Maximum number of failures without a completed tile. A card receives the tile at which it crashed again.
+/// Maximum number of failures without a completed tile. A card that crashed at a tile receives that tile
+/// again.
 const MAX_FAILURES: u32 = 4;
 
 #[derive(Default)]
@@ -160,7 +161,7 @@ impl Failures {
         std::mem::replace(&mut self.written_lines, written_lines) > written_lines
     }
 
-    /// Records that the card holds an image of `lines` lines.
+    /// Records that the card holds a card image of `lines` lines.
     pub(super) fn is_loaded(&mut self, lines: u32) {
         self.written_lines = lines;
     }

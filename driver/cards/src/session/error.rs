@@ -19,7 +19,7 @@ pub enum SessionError {
         /// Version of this program.
         host: u16,
     },
-    /// Error of a card with another version of the image layout.
+    /// Error of a card with another version of the card image layout.
     #[error("the card reads card images of layout {card}, this program writes {host}")]
     #[diagnostic(help("install the firmware and the program of one release"))]
     Layout {
@@ -28,7 +28,7 @@ pub enum SessionError {
         /// Version of this program.
         host: u16,
     },
-    /// Error of a card that accepts no tiles at once.
+    /// Error of a card whose budget has room for no tile command.
     #[error("the card says that it has room for no tile command at all")]
     #[diagnostic(help("correct `tiles` in the budget of the card's firmware"))]
     NoTiles,
@@ -153,7 +153,8 @@ pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<()
 }
 
 impl SessionError {
-    /// Tile of which the card sent wrong pixels, if this is the error. None of its pixels can be trusted.
+    /// Tile of which the card sent wrong pixels, if this is the error. None of the card's pixels can be
+    /// trusted.
     pub fn lie(&self) -> Option<Tile> {
         match *self {
             Self::Value { tile, .. } | Self::Outvoted { tile } => Some(tile),

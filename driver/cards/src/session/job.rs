@@ -7,7 +7,7 @@ use photoncard_shared::message::{FrameParameters, MemoryTest, Tile};
 
 use super::{PixelLimits, Upload};
 
-/// Work that all cards of a render share: image, frame and limits.
+/// Work that all cards of a render share: card image, frame and limits.
 #[derive(Clone)]
 pub struct Job {
     /// The card image.
@@ -40,7 +40,7 @@ pub enum Restart {
 #[derive(Clone, Debug, PartialEq)]
 #[expect(clippy::large_enum_variant, reason = "most events are finished tiles, and few wait")]
 pub enum Event {
-    /// The card has received image and frame.
+    /// The card has received card image and frame.
     Ready,
     /// The card has rendered a tile with valid values.
     TileDone(FinishedTile),
@@ -51,7 +51,7 @@ pub enum Event {
         /// True if the card may have been working on the tile, which may have caused the loss.
         was_at_work: bool,
     },
-    /// Results of the requested operand triples.
+    /// Results of the self-test's arithmetic for each requested triple of operands, in order.
     Computed(Vec<u8>),
     /// Progress or result of a memory test.
     MemoryTested(MemoryTest),
@@ -65,7 +65,7 @@ pub(super) enum State {
     Ready,
     /// Checksums of the card's chunks are requested.
     Comparing,
-    /// Lines of the image are being sent.
+    /// Lines of the card image are being sent.
     Loading,
     /// All lines are sent.
     Accepting,

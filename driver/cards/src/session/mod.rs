@@ -1,6 +1,6 @@
 //! Host's end of a card's link: a state machine without I/O, whose inputs are bytes, tiles and a clock.
 //!
-//! A session greets the card, sends the parts of the image that the card lacks, sets the frame, requests
+//! A session greets the card, sends the parts of the card image that the card lacks, sets the frame, requests
 //! tiles and checks their pixels. It reports [`Event`]s. A card that was reset is greeted and loaded again,
 //! and its tiles are returned. Threads, ports, time, scheduler and sinks are outside: `photoncard_render`
 //! runs one session per thread, a simulator many in one.
@@ -49,7 +49,7 @@ pub struct Session {
     memory_use: Option<MemoryUse>,
     job: Option<Job>,
     comparison: Comparison,
-    /// Checksum of the image that the card is assumed to hold.
+    /// Checksum of the card image that the card is assumed to hold.
     assumed: Option<u64>,
     load: Load,
     /// Requested part of the self-test.
@@ -112,8 +112,8 @@ impl Session {
         self.memory_use
     }
 
-    /// Declares that the card's memory holds the image with this checksum. The next load sends no lines of
-    /// it; the card checks it like a received one.
+    /// Declares that the card's memory holds the card image with this checksum. The next load sends none of
+    /// its lines, and the card checks the image like a received one.
     pub fn assume(&mut self, checksum: u64) {
         self.assumed = Some(checksum);
     }
@@ -150,8 +150,8 @@ impl Session {
         }
     }
 
-    /// Requests the results of operand triples, at most [`message::CASES_PER_COMMAND`], from a card that has
-    /// said hello and has no job. The answer is [`Event::Computed`].
+    /// Requests the self-test's arithmetic on triples of operands, at most [`message::CASES_PER_COMMAND`],
+    /// from a card that has said hello and has no job. The answer is [`Event::Computed`].
     pub fn compute(&mut self, operands: &[[u8; OPERAND_BYTES]], now: Duration) {
         self.ask(
             Request::Compute(operands.len()),
@@ -191,8 +191,8 @@ impl Session {
         self.send(&Command::RenderTile(assignment.tile));
     }
 
-    /// Sends [`Command::Flush`] when no tile is available: the card does the gathers of its tiles in flight
-    /// instead of waiting for another tile. [`Self::wants_tile`] must be true.
+    /// Makes the card do the gathers of its tiles in flight ([`Command::Flush`]). Sent at most once between
+    /// two tiles. [`Self::wants_tile`] must be true.
     pub fn flush(&mut self) {
         if !self.tiles.is_empty() && !std::mem::replace(&mut self.is_flushed, true) {
             self.send(&Command::Flush);
@@ -210,7 +210,7 @@ impl Session {
         self.channel.statistics()
     }
 
-    /// Number of lines of the image that the card has or that were sent.
+    /// Number of lines of the card image, from the first, that the card has or was sent.
     pub fn loaded_lines(&self) -> usize {
         match self.state {
             State::Greeting | State::Ready | State::Comparing | State::Testing => 0,
@@ -223,7 +223,7 @@ impl Session {
         self.job.as_ref().map_or(0, |job| job.upload.lines().len())
     }
 
-    /// Returns whether the card has the image and the frame.
+    /// Returns whether the card has the card image and the frame.
     pub fn is_loaded(&self) -> bool {
         self.state == State::Rendering
     }
@@ -242,14 +242,14 @@ impl Session {
         }
     }
 
-    /// Fills the send window with commands and lines of the image.
+    /// Fills the send window with commands and lines of the card image.
     pub fn prepare(&mut self) {
         self.channel.forward();
         while self.channel.is_free() && self.load_more() {}
     }
 
-    /// Sends the next lines of the image, or the command that ends it. Returns false if the session is not
-    /// loading.
+    /// Sends the next lines of the card image, or the command that ends it. Returns false if the session is
+    /// not loading.
     fn load_more(&mut self) -> bool {
         let (State::Loading, Some(job)) = (self.state, &self.job) else { return false };
         let sent = self.load.next_lines(&job.upload, &mut self.channel.transport);
@@ -268,7 +268,7 @@ impl Session {
         self.channel.transport.outgoing()
     }
 
-    /// Returns whether there are bytes to send before the card answers.
+    /// Returns whether the host can send more before the card answers.
     pub fn has_more_to_send(&mut self) -> bool {
         !self.channel.transport.outgoing().is_empty()
             || self.state == State::Loading && self.channel.transport.can_send()
@@ -375,7 +375,7 @@ impl Session {
         self.tiles.give_back(at_work, &mut self.events);
     }
 
-    /// Greets the card with a new session number, by which it drops its work.
+    /// Greets the card with a new session number, upon which the card drops its work.
     pub fn restart(&mut self, reason: Restart, now: Duration) {
         if reason == Restart::Lost {
             self.left_suspect = self.tiles.is_at_suspect();

@@ -17,13 +17,13 @@ const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 /// |---|---|
 /// | light, direct, indirect, caustic | at least 0; beside a lamp without extent there is no upper limit |
 /// | albedo | 0 to s |
-/// | normals | length 0 to s, and 2^-19 s for the rounding of normals |
-/// | depths | 0 to s times the farthest distance within the scene's reach; 2^-19 s maximum coordinates beyond |
+/// | normals | length 0 to s (1 + 2^-19) |
+/// | depths | 0 to s times the distance from the eye to the farthest corner of the scene's reach, with a tolerance of 2^-19 of the coordinates and one step per sample |
 /// | surfaces s, gathers | 0 to n |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     format: SumFormat,
-    /// Minimum and maximum depth of a sample, in units of 1 / [`DEPTH_STEPS`].
+    /// Minimum and maximum depth of a sample, in steps of 1 / [`DEPTH_STEPS`] depth units.
     depths: [f64; 2],
 }
 
@@ -35,7 +35,7 @@ pub(super) struct BadValue {
 }
 
 impl PixelLimits {
-    /// Computes the limits of a frame of the image with this header.
+    /// Computes the limits of a frame of the card image with the header `header`.
     pub fn new(header: &Header, frame: &FrameParameters) -> Self {
         let eye = frame.camera.origin.iter().fold(0.0, |most: f32, coordinate| most.max(coordinate.abs()));
         let format = SumFormat::new(header, frame);
@@ -83,8 +83,8 @@ impl PixelLimits {
     }
 }
 
-/// Maximum distance from the eye to a corner of the box of all coordinates up to the scene's reach, metres.
-/// It is multiplied by the length of the view vector if that exceeds 1.
+/// Upper bound of depths, metres: distance from the eye to the farthest corner of the cube of coordinates up
+/// to the scene's reach, times the length of the view vector if that exceeds 1.
 fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
     let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();
     let ways = frame.camera.origin.map(|eye| f64::from(eye.abs()) + f64::from(header.reach));

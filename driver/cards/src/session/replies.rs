@@ -28,7 +28,7 @@ impl Session {
             (State::Accepting, Reply::Fault(Fault { code: FaultCode::ImageChecksum, .. }))
                 if self.load.is_change =>
             {
-                // The card has written as many lines as the image has.
+                // The card has written as many lines as the card image has.
                 self.comparison = Comparison::new(self.upload_lines() as u32);
                 self.begin_load();
                 Ok(())

@@ -57,7 +57,8 @@ impl TilesInFlight {
         if range.is_empty() || !pixels.remainder().is_empty() || range.end as u64 > tile.pixels() {
             return Err(SessionError::Unexpected("pixels outside their tile"));
         }
-        // A tile has at most as many pixels as the card's budget; memory is taken with the first.
+        // A tile has at most as many pixels as the card's budget allows; memory is allocated with its first
+        // pixels.
         in_flight.is_received.resize(tile.pixels() as usize, false);
         in_flight.records.resize(tile.pixels() as usize * bytes, 0);
         if in_flight.is_received[range.clone()].contains(&true) {

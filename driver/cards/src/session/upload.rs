@@ -1,6 +1,6 @@
 //! Card image as it is sent to cards, with checksums that are computed once for all of them; and its load
-//! into a card, which sends only runs of lines that the card lacks. They follow from the image that the card
-//! holds or, if that is unknown, from the checksums of its chunks.
+//! into a card, which sends only runs of lines that the card lacks. These lines follow from the card image
+//! that the card holds or, if that is unknown, from the checksums of the chunks in its memory.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -12,10 +12,10 @@ use photoncard_shared::transport::Transport;
 
 use super::SessionError;
 
-/// Ascending, disjoint runs of consecutive lines of an image.
+/// Ascending, disjoint runs of consecutive lines of a card image.
 pub(super) type Runs = Arc<[Range<usize>]>;
 
-/// Lines of an image in memory that the host keeps.
+/// Lines of a card image that the host keeps in memory.
 type SharedLines = Arc<dyn AsRef<[Line]> + Send + Sync>;
 
 /// Card image as it is sent to cards. Checksums and changed lines are computed once for all cards.
@@ -29,7 +29,7 @@ pub struct Upload {
 }
 
 impl Upload {
-    /// Creates the upload of an image to cards with unknown contents.
+    /// Creates the upload of a card image to cards with unknown contents.
     pub fn new(lines: Arc<impl AsRef<[Line]> + Send + Sync + 'static>) -> Self {
         let checksum = image_checksum((*lines).as_ref());
         Self { lines, checksum, chunks: OnceLock::new(), change: None }
@@ -42,7 +42,7 @@ impl Upload {
         Self { change: Some((before.checksum, runs.into())), ..self }
     }
 
-    /// Lines of the image.
+    /// Lines of the card image.
     pub fn lines(&self) -> &[Line] {
         (*self.lines).as_ref()
     }
@@ -52,13 +52,13 @@ impl Upload {
         self.checksum
     }
 
-    /// Checksums of all whole chunks.
+    /// Checksums of all whole chunks of [`CHUNK_LINES`] lines.
     pub(super) fn chunks(&self) -> &[u64] {
         let sums = || self.lines().chunks_exact(CHUNK_LINES as usize).map(image_checksum).collect();
         self.chunks.get_or_init(sums)
     }
 
-    /// Runs of lines that a card lacks if it holds the image with checksum `held`; `None` if they are
+    /// Runs of lines that a card lacks if it holds the card image with checksum `held`; `None` if they are
     /// unknown.
     pub(super) fn missing_from(&self, held: u64) -> Option<Runs> {
         if held == self.checksum {
@@ -68,7 +68,7 @@ impl Upload {
     }
 }
 
-/// Runs of the lines of `after` that `before` lacks or that differ in it.
+/// Runs of the lines of `after` that differ from the line of `before` at the same index, or have none there.
 pub fn changed_runs(before: &[Line], after: &[Line]) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     for (index, line) in after.iter().enumerate() {
@@ -88,10 +88,10 @@ pub(super) fn add_run(runs: &mut Vec<Range<usize>>, run: Range<usize>) {
     }
 }
 
-/// Comparison of chunk checksums between the card's memory and the image.
+/// Comparison of chunk checksums between the card's memory and the card image.
 #[derive(Default)]
 pub(super) struct Comparison {
-    /// Number of lines that the card has written, of any image.
+    /// Number of lines that the card has written, of any card image.
     written: u32,
     /// Number of chunks whose checksums were requested.
     asked: u32,
@@ -109,7 +109,7 @@ impl Comparison {
 
     /// Command that requests the next checksums; `None` after all chunks that the card has written.
     pub(super) fn next_question(&mut self, upload: &Upload) -> Option<Command<'static>> {
-        // An incomplete chunk, of the card or of the image, is not compared.
+        // An incomplete chunk, of the card or of the card image, is not compared.
         let chunks = (self.written.min(upload.lines().len() as u32)) / CHUNK_LINES;
         let first = self.asked;
         let count = chunks.saturating_sub(first).min(CHECKSUMS_PER_REPLY);
@@ -117,7 +117,7 @@ impl Comparison {
         (count > 0).then_some(Command::ReadChecksums { first, count })
     }
 
-    /// Compares received checksums with those of the image.
+    /// Compares received checksums with those of the card image.
     ///
     /// # Errors
     /// If they are not the checksums that were last requested.
@@ -154,7 +154,7 @@ pub(super) struct Load {
     run: usize,
     /// Index of the next line, in or before the next run.
     next: usize,
-    /// True if the runs are the difference to the image that the card held.
+    /// True if the runs are the difference to the card image that the card held.
     pub(super) is_change: bool,
 }
 
@@ -163,7 +163,7 @@ impl Load {
         Self { runs, run: 0, next: 0, is_change }
     }
 
-    /// Number of lines that the card has or that were sent.
+    /// Number of lines, from the first, that the card has or was sent.
     pub(super) fn done(&self) -> usize {
         self.next
     }

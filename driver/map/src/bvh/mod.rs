@@ -14,21 +14,21 @@ use crate::fold::{Folded, Tree};
 
 mod reinsertion;
 
-/// A bounding volume hierarchy in the chip's records.
+/// A bounding volume hierarchy, encoded as the chip's records.
 #[derive(Debug)]
 pub struct Hierarchy {
-    /// Nodes; the root is the first.
+    /// [`BvhNode`] records; the root is the first.
     pub nodes: Vec<[u8; LINE_BYTES]>,
-    /// Leaves of triangles.
+    /// [`BvhLeaf`] records, of up to [`LEAF_TRIANGLES`] triangles each.
     pub leaves: Vec<[u8; LINE_BYTES]>,
-    /// Indices of the triangles of each leaf, in the leaf's order.
+    /// For each leaf, the indices of its triangles in the list given to [`build`], by slot.
     pub leaf_triangles: Vec<LeafTriangles>,
 }
 
-/// Indices of the triangles of a leaf, in the leaf's order.
+/// Indices of a leaf's triangles in the list given to [`build`], by slot.
 pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
 
-/// Properties of materials that leaves store for their triangles. Materials past the end of a list have none.
+/// Flags that leaves store for their triangles, indexed by material; false past the end of a list.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Finishes<'a> {
     /// True for materials whose triangles may have cut-outs.
@@ -37,7 +37,7 @@ pub struct Finishes<'a> {
     pub flat_glass: &'a [bool],
 }
 
-/// Triangles of a hierarchy.
+/// Triangles with the flags of their materials, from which leaves are encoded.
 struct Mesh<'a> {
     triangles: &'a [Triangle],
     finishes: Finishes<'a>,
@@ -80,15 +80,16 @@ const MAX_TRIANGLES: usize = (u32::MAX / LEAF_TRIANGLES as u32 / 2) as usize;
 /// Cost of a visit of a leaf relative to a visit of a node.
 const LEAF_COST: f32 = 1.0;
 
-/// Number of nodes at a depth that one thread converts at once.
+/// Minimum number of nodes of one depth that a thread converts at a time.
 const SEQUENTIAL: usize = 256;
 
 /// Maximum number of concentric boxes that the builder receives individually.
 const MAX_CONCENTRIC: usize = 64;
 
-/// Fractions of the nodes that the two passes of [`reinsertion`] reinsert.
+/// Fractions of the nodes that the two calls of [`reinsertion::optimize`] try to reinsert in their first
+/// rounds.
 const REINSERTED: [f32; 2] = [0.2, 0.4];
-/// Depth of the binary tree above which the builder searches for partners only among adjacent parts.
+/// Number of the builder's passes, counted from the leaves, that join only adjacent parts.
 const SEARCH_DEPTH: usize = 2;
 
 /// Builds the hierarchy of at least one triangle. The result depends neither on the machine nor on threads.
@@ -146,7 +147,7 @@ fn binary(boxes: &[Aabb]) -> Bvh2 {
 /// Input of the builder: one box for many triangles whose boxes have a common centre, and one box for each
 /// other triangle.
 ///
-/// Concentric boxes, each inside the next, are all at one distance from the smallest box. Hardly two of them
+/// Of nested boxes, each has an equal cost (the area of the union) with all smaller ones. Hardly two of them
 /// are each other's nearest, so that the builder would search all of them for each pair that it joins.
 struct Parts {
     crowds: Vec<Vec<u32>>,
@@ -375,7 +376,7 @@ mod tests {
         }
     }
 
-    /// The builder would join only two of them at a time.
+    /// If the builder received them singly, it would join only two of them at a time.
     #[test]
     fn concentric_triangles_reach_the_builder_as_one_part() {
         for step in [0.0, 1e-5] {

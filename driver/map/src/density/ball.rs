@@ -22,8 +22,7 @@ pub(super) struct Ball {
 pub(super) struct LeafNearBall {
     /// Corners, indexed by corner, axis and slot.
     corners: [[[f32; LEAF_TRIANGLES]; 3]; 3],
-    /// Bit mask of the triangles that have an area and whose bounding box and plane are within distance 1 of
-    /// the origin.
+    /// Bit mask of the triangles that have an area and whose bounding box and plane touch the unit ball.
     near: u32,
     /// Bit mask of the triangles with a coordinate above [`MAX_EXTENT`].
     large: u32,
@@ -34,10 +33,10 @@ const MAX_EXTENT: f32 = 1e4;
 
 /// A triangle that may intersect a ball, in the ball's coordinates.
 pub(super) struct NearTriangle {
-    /// Index of the triangle in the image.
+    /// Index of the triangle in the card image.
     pub(super) index: u32,
     pub(super) corners: [Vec3; 3],
-    /// True if a corner is so far away that rounding is too coarse near the ball.
+    /// True if a coordinate exceeds [`MAX_EXTENT`].
     pub(super) is_large: bool,
 }
 
@@ -89,8 +88,8 @@ impl Kernel for NearTriangles<'_> {
     }
 }
 
-/// Returns whether a triangle has an area and its bounding box and plane are within distance 1 of the origin,
-/// and whether it is large.
+/// Returns whether triangle `slot` has an area and its box and plane touch the unit ball, and whether a
+/// coordinate exceeds [`MAX_EXTENT`].
 #[inline(always)]
 fn place([a, b, c]: &[[[f32; LEAF_TRIANGLES]; 3]; 3], slot: usize) -> (bool, bool) {
     let (mut outside, mut extent) = ([0.0; 3], 0.0);

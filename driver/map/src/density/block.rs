@@ -10,7 +10,7 @@ use super::sides::Sides;
 #[derive(Default)]
 pub(super) struct Block {
     pub(super) corners: [LaneVector; 3],
-    /// Indices of the triangles in the image.
+    /// Indices of the triangles in the card image.
     pub(super) indices: [u32; LANES],
     pub(super) sides: [Sides; LANES],
     /// Bit mask of the triangles whose back faces the inside of a solid.
@@ -18,7 +18,7 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// Returns true if the block contains a triangle with these corners.
+    /// Returns whether a triangle of the block has exactly these corners.
     pub(super) fn holds(&self, corners: &[Vec3; 3]) -> bool {
         let [a, b, c] = &self.corners;
         let [p, q, r] = corners.map(|corner| corner.to_array());
@@ -26,10 +26,10 @@ impl Block {
     }
 }
 
-/// Planes through a point and each edge of a triangle, and six times the volume of the tetrahedron.
+/// Normals of the planes through a point and each edge of a triangle, and six times the signed volume of the
+/// tetrahedron.
 ///
-/// For an edge that two triangles share, their planes are opposite to the last bit, so that no ray passes
-/// between them.
+/// Two triangles that share an edge have exactly opposite normals for it, so that no ray passes between them.
 #[inline(always)]
 fn seen_from(point: [f32; 3], block: &Block, lane: usize) -> ([[f32; 3]; 3], f32) {
     let corner = |corner: usize| minus(at(&block.corners[corner], lane), point);

@@ -36,7 +36,7 @@ impl Batch {
         Self { x, y, squares: squares(&x, &y), lower: bound(f32::min), upper: bound(f32::max) }
     }
 
-    /// The batch on a disc `factor` times as large.
+    /// Returns the batch with all coordinates multiplied by `factor`.
     fn scaled(&self, factor: f32) -> Self {
         let [x, y] = [self.x, self.y].map(|axis| axis.map(|coordinate| coordinate * factor));
         Self {
@@ -86,17 +86,18 @@ impl Chords {
     }
 }
 
-/// Coordinate frame along a surface normal, in a ball's coordinates. It has a reference point outside all
-/// solids.
+/// Coordinate frame whose third axis is a surface normal, with a reference point outside all solids; in a
+/// ball's coordinates.
 pub(super) struct ChordFrame {
-    /// Two axes perpendicular to the chords, and the normal along them.
+    /// Orthonormal axes: two perpendicular to the chords, and the surface normal, to which the chords are
+    /// parallel.
     pub(super) axes: [Vec3; 3],
     /// Reference point outside all solids, in coordinates along the axes.
     pub(super) open: Vec3,
 }
 
 impl ChordFrame {
-    /// Coordinates along the axes of a vector from the ball's centre.
+    /// Returns the components of `place`, a vector from the ball's centre, along the axes.
     pub(super) fn along(&self, place: Vec3) -> Vec3 {
         let [x, y, z] = self.axes.map(|axis| axis.dot(place));
         Vec3::new(x, y, z)

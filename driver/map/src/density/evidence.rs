@@ -30,17 +30,18 @@ struct Place {
     normal: Vec3,
 }
 
-/// Photons around the centre of a ball.
+/// Photons in a ball, as evidence that surfaces are lit.
 #[derive(Default)]
 pub(super) struct Evidence {
     places: Vec<Place>,
     stack: Vec<Child>,
-    /// Photons on surfaces that face along the chords, in the ball's coordinates along the frame's axes.
-    /// Unused lanes are infinitely far away.
+    /// Positions of photons whose normals are near the chords' direction, relative to the ball's centre, in
+    /// radii along the frame's axes. Unused lanes are infinitely far away.
     along: Vec<LaneVector>,
     /// Squared distances of the photons on the measured photon's own surface, m^2.
     own: Vec<f32>,
-    /// Squared distance perpendicular to the chords within which a photon is evidence.
+    /// Squared distance perpendicular to the chords within which a photon is evidence, in square radii of the
+    /// ball.
     near: f32,
 }
 
@@ -54,7 +55,7 @@ impl Evidence {
     /// Finds the photons in a ball.
     ///
     /// # Errors
-    /// If the image is malformed.
+    /// If the card image is malformed.
     pub(super) fn find(&mut self, scene: &SceneImage, memory: Lines, ball: Ball) -> Result<(), Fault> {
         self.places.clear();
         self.stack.clear();
@@ -104,9 +105,9 @@ impl Evidence {
         }
     }
 
-    /// Chooses the photons on surfaces that face along the chords of a frame, and the distance within which
-    /// they are evidence: that of several photons on the measured photon's own surface, at most `most`
-    /// metres.
+    /// Chooses the photons whose normals are near the direction of a frame's chords, and the distance within
+    /// which they are evidence: that of the neighbour number [`SEVERAL`] of `photon` on its own surface, at
+    /// most `most` metres.
     pub(super) fn choose(&mut self, ball: Ball, frame: &ChordFrame, (photon, most): (Vec3, f32)) {
         self.along.clear();
         self.own.clear();
@@ -133,7 +134,7 @@ impl Evidence {
         self.near = near / (ball.radius * ball.radius);
     }
 
-    /// Adds the photons to `lights` as surface points whose areas are the photons' powers.
+    /// Replaces the points of `lights` by the photons, with their powers as areas.
     pub(super) fn powers(&self, ball: Ball, frame: &ChordFrame, lights: &mut OpenSurfaces) {
         lights.clear();
         for place in &self.places {

@@ -1,7 +1,7 @@
 //! Prepares the density estimate on the host.
 //!
-//! It computes two results from the image and the number of neighbours. `search` finds the distances of
-//! gathers from the density of the photons. `disc` computes the disc fraction of every photon: the area of
+//! Two results follow from the card image and the number of photons of a gather. `search` finds the distances
+//! of gathers from the density of the photons. `disc` computes the disc fraction of every photon: the area of
 //! surface within the radius of a gather, divided by the area of a flat disc.
 
 mod ball;

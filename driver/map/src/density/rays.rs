@@ -11,7 +11,7 @@ pub(super) struct Met {
     pub(super) distance: f32,
     /// Unit normal of the triangle's front.
     pub(super) normal: Vec3,
-    /// Index of the triangle in the image.
+    /// Index of the triangle in the card image.
     pub(super) triangle: u32,
 }
 

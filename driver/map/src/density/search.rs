@@ -13,12 +13,12 @@ use rayon::prelude::*;
 use crate::pack::CardImage;
 use crate::photon::Importons;
 
-/// Factor of a sample's squared distance that gives the first squared search radius in its node.
+/// Squared radius with which searches in a node start, divided by the squared distance of the node's sample.
 const MOST: f32 = 1.4;
 /// Fraction of the sampled photons whose k-th neighbour lies within the usual distance.
 const USUAL_SHARE: f64 = 0.95;
-/// Factor of the greatest sampled distance that gives the automatic maximum distance, because photons that
-/// are not sampled may have greater distances.
+/// Automatic maximum distance divided by the greatest sampled distance. It exceeds 1 because photons that are
+/// not sampled may have greater distances.
 const BEYOND_SAMPLES: f32 = 1.5;
 
 /// Search of the photon map, with its buffer.
@@ -72,7 +72,7 @@ struct Sample {
     node: usize,
     position: Vec3,
     normal: u8,
-    /// Distance, metres; [`UNLIMITED`] in a map with fewer photons.
+    /// Distance, metres; [`UNLIMITED`] in a map with at most k photons.
     distance: f32,
 }
 
@@ -80,10 +80,10 @@ struct Sample {
 const UNLIMITED: f32 = 1e18;
 
 impl SampledDistances {
-    /// Samples the photon map of an image for `k = neighbors`.
+    /// Samples the photon map of a card image for `k = neighbors`.
     ///
     /// # Errors
-    /// If the image is malformed.
+    /// If the card image is malformed.
     pub(crate) fn new(image: &CardImage, neighbors: u32) -> Result<Self, Fault> {
         let nodes = image.section(SectionKind::PhotonNodes);
         let samples: Result<Vec<Option<Sample>>, Fault> = nodes
@@ -101,7 +101,8 @@ impl SampledDistances {
         Ok(Self { neighbors, samples: samples?.into_iter().flatten().collect() })
     }
 
-    /// Writes the photon density into each node, so that gathers can narrow their searches.
+    /// Writes [`PhotonNode::photon_share`] into each node with a sample, so that gathers start with a small
+    /// radius.
     pub(crate) fn write_shares(&self, image: &mut CardImage) {
         let nodes = image.section_mut(SectionKind::PhotonNodes);
         for sample in self.samples.iter().filter(|sample| sample.distance < UNLIMITED) {
@@ -110,13 +111,15 @@ impl SampledDistances {
         }
     }
 
-    /// Distances of gathers. With importons, only photons near an importon count, if there are any.
+    /// Distances of gathers, from the samples near importons if there are importons, else from all. Without
+    /// samples it is the scene's diagonal.
     pub(crate) fn of_gathers(&self, image: &CardImage, importons: Option<&Importons>) -> GatherDistances {
         let is_used = |sample: &&Sample| {
             importons.is_none_or(|importons| importons.indirect.is_used(sample.position, sample.normal))
         };
         let used = self.samples.iter().filter(is_used).map(|sample| sample.distance);
-        // A map of fewer photons than neighbours has no such distances, nor has a photon without importons.
+        // `distances` is empty in a map with no more photons than neighbours, and if no sample is near an
+        // importon.
         let mut distances: Vec<f32> = used.filter(|&distance| distance < UNLIMITED).collect();
         distances.sort_by(f32::total_cmp);
         let within = |share: f64| {
@@ -130,7 +133,7 @@ impl SampledDistances {
 }
 
 impl Sample {
-    /// Samples a photon in a leaf below a node.
+    /// Measures the distance of the k-th neighbour of one photon in leaf `leaf`, a child of node `node`.
     fn new(searcher: &mut Searcher, image: &CardImage, node: usize, leaf: u32) -> Result<Self, Fault> {
         let fault = Fault { code: FaultCode::Record, detail: leaf };
         let line = image.section(SectionKind::PhotonLeaves).get(leaf as usize).ok_or(fault)?;

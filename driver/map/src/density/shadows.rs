@@ -55,12 +55,12 @@ impl Kernel for CrossAll<'_> {
 /// Sixteen triangles in the coordinates of a frame, and their projections along the chords.
 struct Shadows {
     corners: [LaneVector; 3],
-    /// Line equation of each edge, `x a + y b + c`, positive inside.
+    /// Coefficients `[a, b, c]` of the line of each edge: `a x + b y + c` is positive inside.
     edges: [LaneVector; 3],
-    /// Threshold of each edge's line equation for points inside. It assigns points exactly on a shared edge
-    /// to one of its two triangles.
+    /// Value that the line equation of each edge exceeds for points inside. It assigns points exactly on a
+    /// shared edge to one of its two triangles.
     bounds: [Lane; 3],
-    /// Equation of the triangle's plane: height `x a + y b + c`.
+    /// Coefficients `[a, b, c]` of each plane: its height at `(x, y)` is `a x + b y + c`.
     heights: LaneVector,
     slopes: Lane,
     /// 1 if the front faces up, else 0.
@@ -100,8 +100,8 @@ impl Shadows {
             let ([x, y, _], [p, q, _]) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
             let [a, b, c] = &mut self.edges[edge];
             for lane in 0..LANES {
-                // The lines of a shared edge are opposite to the last bit in its two triangles. So is the
-                // sign: both test one line.
+                // In the two triangles of a shared edge these coefficients are equal except for the sign, to
+                // the last bit: both test one line.
                 let sign = if self.is_front[lane] != 0.0 { 1.0 } else { -1.0 };
                 a[lane] = (y[lane] - q[lane]) * sign;
                 b[lane] = (p[lane] - x[lane]) * sign;

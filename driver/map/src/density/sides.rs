@@ -34,7 +34,7 @@ impl Sides {
     }
 }
 
-/// Sides of all triangles of an image.
+/// Sides of all triangles of a card image, by index.
 pub(super) struct SideTable {
     sides: Vec<Sides>,
     /// True if any triangle has cut-outs.
@@ -49,15 +49,15 @@ struct Finish {
     transmits: bool,
     emits: bool,
     is_double_sided: bool,
-    /// True with partial coverage. It is not a cut-out, because the photons stored there account for it.
+    /// True with partial coverage (`BLEND`), which is no cut-out: the powers of photons account for it.
     blends: bool,
 }
 
 impl SideTable {
-    /// Reads the sides from an image.
+    /// Reads the sides from a card image.
     ///
     /// # Errors
-    /// If the image is malformed.
+    /// If the card image is malformed.
     pub(super) fn new(image: &CardImage) -> Result<Self, Fault> {
         let (scene, mut memory) = image.view();
         let materials = scene.header.section(SectionKind::Materials).records;
@@ -104,16 +104,16 @@ impl SideTable {
         Ok(table)
     }
 
-    /// Sides of a triangle. Without such a triangle, the default, on which no photons are stored.
+    /// Sides of a triangle of the card image; for an index out of range, sides without photons.
     #[inline(always)]
     pub(super) fn of(&self, triangle: u32) -> Sides {
         self.sides.get(triangle as usize).copied().unwrap_or_default()
     }
 
     /// Marks double-sided triangles that form closed surfaces as solid, because no light enters, unless they
-    /// emit or transmit light. A surface is closed if each of its edges is shared with another triangle, in
-    /// the opposite direction. Where meshes touch and more than two triangles share an edge, neighbours by
-    /// angle, with no other solid between them, bound a solid together.
+    /// emit or transmit light. A surface is closed if each edge of its triangles is shared with one other
+    /// triangle, which has the edge in the opposite direction. Where meshes touch and more than two triangles
+    /// share an edge, neighbours by angle, with no other solid between them, bound a solid together.
     fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -141,7 +141,7 @@ impl SideTable {
         for along in edges.chunk_by(|(one, ..), (other, ..)| one == other) {
             match *along {
                 [(_, false, one), (_, true, other)] => meshes.join(one as usize, other as usize),
-                // Of a triangle with two corners in one place: it is its own opposite.
+                // An edge of length 0 is its own opposite.
                 [([from, to], ..)] if from == to => {}
                 [(edge, ..), ..] => {
                     let around = around_edge(
@@ -195,9 +195,9 @@ impl Sides {
     }
 }
 
-/// Pairs the triangles around an edge, by their angles, with the triangle that bounds a solid together with
-/// them; `None` if the back is open. Each item of `triangles` has a flag whether the triangle has the edge in
-/// its direction, the index, and the corners.
+/// Returns for each triangle at an edge its index, and the index of the next triangle by angle on its back
+/// side if the two can bound a solid; `None` if the back is open. Items of `triangles`: whether the triangle
+/// has the edge in its given direction, index, corners.
 fn around_edge(
     edge: [[u32; 3]; 2],
     triangles: impl Iterator<Item = (bool, usize, [[u32; 3]; 3])>,
@@ -213,8 +213,8 @@ fn around_edge(
             (libm::atan2(way.dot(y), way.dot(x)), is_forward, index)
         })
         .collect();
-    // A solid lies from a triangle against the edge's direction to one along it. At equal angles one ends
-    // before another begins.
+    // By ascending angle, a solid begins at a triangle with the reversed edge and ends at one with the edge.
+    // At equal angles one solid ends before another begins.
     around.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
     let count = around.len();
     let other = |index: usize| {

@@ -13,7 +13,7 @@ use super::lanes::Lane;
 /// Number of normal codes.
 const CODES: usize = 1 << u8::BITS;
 
-/// Table of normal codes that a gather counts as one surface.
+/// For each normal code, the codes that a gather counts as the same surface.
 pub(super) struct SameSurfaces([OnceLock<[bool; CODES]>; CODES]);
 
 impl SameSurfaces {
@@ -21,8 +21,8 @@ impl SameSurfaces {
         Self([const { OnceLock::new() }; CODES])
     }
 
-    /// For each code of a normal, true if a gather counts it as the surface of a photon whose normal has the
-    /// code `normal`.
+    /// Returns a flag per normal code: true if a gather at a photon of the code `normal` counts photons with
+    /// that code.
     fn of(&self, normal: u8) -> &[bool; CODES] {
         self.0[usize::from(normal)].get_or_init(|| {
             let (mut same, mut code) = (SameSurface::new(normal), 0_u8);
@@ -134,12 +134,12 @@ pub(super) struct Areas {
     /// Area within the photon's sphere that lies in its visible region, divided by the region's area in the
     /// plane.
     pub(super) of_region: f32,
-    /// Number of points within the larger sphere.
+    /// Number of points of the chosen surface within the larger sphere.
     pub(super) points: f32,
 }
 
-/// Visible region of a photon, in a ball's coordinates: axes, given along those of the chords' frame, and
-/// sectors.
+/// Visible region of a photon, in a ball's coordinates: its axes in the chords' frame, the sectors that are
+/// visible as a whole (`inner`) and those that contain all that is visible (`outer`).
 pub(super) struct SeenRegion {
     pub(super) axes: [[f32; 3]; 3],
     pub(super) inner: Sectors,
@@ -206,8 +206,8 @@ impl Kernel for AreasWithin<'_> {
 }
 
 impl SurfaceLanes {
-    /// Vectors from a position to the points. The grid can move a photon off its plane, so that heights
-    /// within that error count as 0 and a plane has the fraction 1.
+    /// Vectors from a position to the points. Heights up to `lift` count as 0: the photon grid can move a
+    /// photon off its plane, which must keep the fraction 1.
     #[inline(always)]
     fn ways(&self, from: Vec3, lift: f32) -> [Lane; 3] {
         let [p, q, r] = from.to_array();
@@ -235,7 +235,7 @@ fn share(part: f32, whole: f32, without: f32) -> f32 {
     if whole > 0.0 { part / whole } else { without }
 }
 
-/// 1 for points within a radius, given squared, else 0.
+/// Returns 1 for vectors whose squared length is at most `limit`, else 0.
 #[inline(always)]
 fn within([x, y, z]: &[Lane; 3], limit: f32) -> Lane {
     let mut within = [0.0; LANES];

@@ -45,7 +45,7 @@ impl Surroundings {
     /// then incomplete and must not be used.
     ///
     /// # Errors
-    /// If the image is malformed.
+    /// If the card image is malformed.
     pub(super) fn find(
         &mut self,
         scene: &SceneImage,
@@ -62,11 +62,11 @@ impl Surroundings {
         all
     }
 
-    /// Returns true if all triangles in a ball form one plain wall around its centre, which faces along the
-    /// wall's normal. The list of triangles does not change.
+    /// Returns whether the triangles in a ball are exactly one plain wall through its centre, with the normal
+    /// of `wall`. The list of triangles does not change.
     ///
     /// # Errors
-    /// If the image is malformed.
+    /// If the card image is malformed.
     pub(super) fn is_plain(
         &mut self,
         scene: &SceneImage,
@@ -154,7 +154,7 @@ pub(super) struct PlainWall<'a> {
 }
 
 impl PlainWall<'_> {
-    /// Returns true if all positions are in the plane.
+    /// Returns whether all positions are within `lift` of the plane through the ball's centre.
     fn holds(&self, ball: Ball, normal: Vec3) -> bool {
         self.places.iter().all(|place| (*place - ball.centre).dot(normal).abs() <= self.lift)
     }

@@ -14,7 +14,7 @@ use super::thresholds::thresholds;
 const MAX_COLUMNS: u32 = 128;
 /// Maximum number of rows of cells.
 const MAX_ROWS: u32 = 64;
-/// Fraction of the choices that is uniform over the sphere, so that cells with hardly any light are sampled
+/// Fraction of the samples that is uniform over the sphere, so that cells with hardly any light are sampled
 /// too.
 const EVEN: f64 = 1.0 / 64.0;
 /// Upper bound of the brightest texel after scaling. The format's maximum is 65408.
@@ -37,7 +37,8 @@ pub(crate) struct EnvironmentMap {
     pub(crate) brightest: f32,
 }
 
-/// A grid of cells of equal angles, weighted by the light that comes through each cell.
+/// Grid of equally large cells of the equirectangular map, weighted by the light that comes through each
+/// cell.
 #[derive(Clone, Debug)]
 pub(crate) struct Cells {
     pub(crate) columns: u32,
@@ -105,7 +106,7 @@ impl EnvironmentMap {
     }
 }
 
-/// Power of two by which texels are divided, so that the brightest is near the format's maximum.
+/// Power of two by which texels are divided, so that the brightest is between 2^14 and [`BRIGHTEST`].
 fn scale(brightest: f32) -> f32 {
     // A division by a power of two is exact unless its result is subnormal.
     let exponent = libm::ilogbf(brightest / BRIGHTEST).clamp(-126, 126) + 1;
@@ -147,8 +148,8 @@ impl Cells {
         Self { columns, rows, weights, divided }
     }
 
-    /// Thresholds of the rows, then of the cells in each row ([`thresholds`]), then of the parts of
-    /// subdivided cells.
+    /// Thresholds of the rows, then of the cells in each row ([`thresholds`]). If cells are subdivided, their
+    /// number, [`SIDE`], their indices and the thresholds of their parts follow.
     pub(super) fn thresholds(&self) -> Vec<u32> {
         let mut all = of_grid(&self.weights, self.columns);
         if !self.divided.is_empty() {

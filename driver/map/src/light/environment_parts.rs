@@ -15,7 +15,7 @@ const MAX_DIVIDED: usize = 16;
 const LEAST_VARIANCE: f64 = 1.0 / 16.0;
 /// Minimum contrast of a subdivided cell: the light of its brightest part divided by the mean of its parts.
 const LEAST_CONTRAST: f64 = 4.0;
-/// Fraction of the choices within a cell that is uniform, so that parts with hardly any light are sampled
+/// Fraction of the samples within a cell that is uniform, so that parts with hardly any light are sampled
 /// too.
 const EVEN: f64 = 1.0 / 64.0;
 
@@ -38,7 +38,7 @@ impl Parts {
         [columns, rows]: [u32; 2],
         weights: &[f64],
     ) -> Vec<Self> {
-        // Cells of one texel, or of few, are even enough.
+        // A cell of one texel needs no parts.
         if environment.width <= columns && environment.height <= rows {
             return Vec::new();
         }
@@ -69,7 +69,7 @@ impl Parts {
         let [row, column] = [cell / columns, cell % columns];
         let border = |row: u32| libm::cos(PI * f64::from(row) / f64::from(rows));
         let [upper, lower] = [border(row), border(row + 1)];
-        // Two samples per texel, as of the cells.
+        // Two samples per texel along each axis, as for whole cells.
         let samples = |texels: u32, cells: u32| (2 * texels.div_ceil(cells)).div_ceil(SIDE).max(2);
         let [across, down] = [samples(environment.width, columns), samples(environment.height, rows)];
         let (mut means, mut brightest) = (Vec::new(), Vec::new());

@@ -130,7 +130,7 @@ impl Lights {
         self.environment.as_ref().map_or(Vec::new(), |environment| environment.cells.thresholds())
     }
 
-    /// Lights in the header of the image. `texture` is the index of the environment's texture.
+    /// Lights of the card image's header. `texture` is the index of the environment's texture.
     pub(crate) fn header(&self, texture: u32) -> image::Lights {
         let environment = self.environment.as_ref();
         let cells = environment.map_or([1; 2], |map| [map.cells.columns, map.cells.rows]);
@@ -238,8 +238,8 @@ impl Spot {
     /// Integral of the falloff over all directions, sr.
     fn solid_angle(&self) -> f64 {
         let [scale, offset] = [self.scale, self.offset].map(f64::from);
-        // The root of the falloff rises linearly in the cosine, from 0 at the outer cone to `reached` at the
-        // inner cone or at the axis; it is 1 within the inner cone, whose `1 - cos` is `whole`.
+        // The square root of the falloff rises linearly in the cosine, from 0 at the outer cone to `reached`
+        // at the inner cone or at the axis; it is 1 within the inner cone, whose `1 - cos` is `whole`.
         let reached = (scale + offset).clamp(0.0, 1.0);
         let whole = (1.0 - (1.0 - offset) / scale).max(0.0);
         2.0 * PI * (reached * reached * reached / (3.0 * scale) + whole)

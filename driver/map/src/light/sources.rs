@@ -25,7 +25,7 @@ pub(crate) enum Source {
         /// Irradiance of a surface that faces the light, W/m^2.
         irradiance: Vec3,
     },
-    /// A cell of the environment. Columns and rows are counted from the upper left.
+    /// A cell of the environment, or a part of one.
     Cell {
         /// Left border and width of the cell as fractions of the map's width.
         across: [f32; 2],
@@ -44,14 +44,16 @@ pub(crate) struct Sources {
     /// Lower and upper corner of the box through which infinitely distant light enters: the part of the scene
     /// in which photons are stored, slightly enlarged.
     pub(crate) bounds: [Vec3; 2],
-    /// Distance from the box, metres, at which nothing of the scene hides it; 0 if it contains the scene.
+    /// Distance from the box, metres, beyond which nothing of the scene can hide the box; 0 if the box
+    /// contains the scene.
     pub(crate) beyond: f32,
     /// Targets at which photons are aimed; empty if photons are not aimed.
     pub(crate) targets: Targets,
     /// Power of all sources, watts, averaged over channels; 0 if photons can be aimed.
     pub(crate) power: f64,
     /// Maximum over the sources of the power in the strongest channel divided by the probability, watts. The
-    /// unit of photon powers is derived from it. If some photons are aimed, the others can be stronger.
+    /// unit of photon powers is derived from it. Beside aimed photons, those that are not aimed can be
+    /// stronger.
     pub(crate) strongest: f32,
 }
 
@@ -71,20 +73,20 @@ const MIN_AIMED_SHARE: f64 = 1e-3;
 const MARGIN: f32 = 1e-4;
 
 impl Sources {
-    /// Sources of a scene whose photons are emitted in all directions. `part` is the part of the scene in
-    /// which photons are stored; `None` if it is the whole scene.
+    /// Returns sources whose photons are emitted in all directions. `part` is the part of the scene in which
+    /// photons are stored; `None` if it is the whole scene.
     pub(crate) fn new(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Self {
         Self::towards(scene, lights, part, Targets::default())
     }
 
-    /// Sources of a scene whose photons are aimed at specular surfaces; `None` if there are no such surfaces.
+    /// Returns sources whose photons are aimed at the scene's specular surfaces; `None` if it has none.
     pub(crate) fn of_caustics(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Option<Self> {
         let targets = Targets::specular(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, part, targets))
     }
 
-    /// Sources of a scene most of whose photons are aimed at surfaces that are not lamps, because the lights
-    /// may be far from them; `None` if there are no such surfaces.
+    /// Returns sources most of whose photons are aimed at the scene's surfaces other than lamps, which may be
+    /// far from the lights; `None` if there are none.
     pub(crate) fn aimed(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Option<Self> {
         let targets = Targets::lit(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, part, targets))
@@ -183,8 +185,8 @@ impl AllSources {
         self.strongest.push(strongest);
     }
 
-    /// Adds the cells of the environment. `shown(direction)` is the area through which a cell's light passes;
-    /// `same` is this area if it is equal for all directions.
+    /// Adds the cells of the environment. `shown(direction)` is the area, m^2, through which a cell's light
+    /// passes; `same` is this area if it is equal for all directions.
     fn add_cells(&mut self, lights: &Lights, shown: impl Fn(DVec3) -> f64, same: Option<f64>, size: DVec3) {
         let Some(map) = lights.environment() else { return };
         let cells = &map.cells;
@@ -217,7 +219,7 @@ impl AllSources {
         }
     }
 
-    /// Adds the parts of a subdivided cell, like [`Self::add_cells`].
+    /// Adds the parts of a subdivided cell, as [`Self::add_cells`] adds cells.
     fn add_parts(
         &mut self,
         cells: &Cells,

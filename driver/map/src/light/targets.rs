@@ -2,8 +2,8 @@
 //!
 //! A sphere is chosen in proportion to its density times the solid angle that it subtends, and then a
 //! direction uniformly within this angle. Where spheres overlap, a direction can be chosen through any of
-//! them: its density is the sum of the densities of the spheres in this direction, divided by the sum of the
-//! products of all spheres.
+//! them: its density is the sum of the densities of the spheres in this direction, divided by the sum over
+//! all spheres of density times solid angle.
 
 use std::f32::consts::PI;
 
@@ -45,8 +45,8 @@ const BOX_SHARE: f32 = 0.5;
 const LAMP_SHARE: f32 = 0.01;
 /// Maximum number of spheres.
 const MAX_SPHERES: usize = 32;
-/// Margin of a sphere for rounding. It applies to the radius, relatively, and to the square of the radius,
-/// relative to the maximum coordinate.
+/// Margin `m` of a sphere for rounding: its radius is multiplied by `1 + m` and raised by `m^2` times the
+/// maximum coordinate.
 const MARGIN: f32 = 1e-3;
 
 impl Targets {
@@ -57,7 +57,7 @@ impl Targets {
     }
 
     /// Targets around all surfaces of a scene except lamps, whose reflection of other light is hardly
-    /// visible. Lamps are uniform emitters with at least [`LAMP_SHARE`] of the greatest emission.
+    /// visible. Lamps are uniform emitters with more than [`LAMP_SHARE`] of the greatest emission.
     pub(super) fn lit(scene: &Scene) -> Self {
         let emission = |material: &Material| material.emission.max_element();
         let greatest = scene.materials.iter().map(emission).fold(0.0, f32::max);

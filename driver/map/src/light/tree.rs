@@ -23,7 +23,7 @@ pub(super) struct Bounds {
     pub(super) power: f64,
 }
 
-/// A light tree in the records of a card.
+/// Light tree, encoded as a card's records.
 #[derive(Debug, Default)]
 pub(super) struct LightTree {
     /// Nodes, from the root; empty without emitters.
@@ -51,8 +51,8 @@ impl LightTree {
         tree
     }
 
-    /// Appends the node of the emitters in `order`, at a level, reached by a bit trail. Returns the node's
-    /// index.
+    /// Appends the node with the emitters `order`, on the level `level` and with the bit trail `trail`.
+    /// Returns the node's index.
     fn node(&mut self, emitters: &[Bounds], order: &mut [u32], level: usize, trail: u32) -> u32 {
         let index = self.nodes.len();
         self.nodes.push([0; LINE_BYTES]);

@@ -31,7 +31,7 @@ impl AsRef<[Line]> for CardImage {
 }
 
 impl CardImage {
-    /// Makes an image of lines read from a file.
+    /// Creates a card image from lines that were read from a file.
     ///
     /// # Errors
     /// If the lines do not begin with a header that states their number.
@@ -53,12 +53,12 @@ impl CardImage {
         &self.lines
     }
 
-    /// Size of the image, bytes.
+    /// Size of the card image, bytes.
     pub fn bytes(&self) -> u64 {
         self.lines.len() as u64 * LINE_BYTES as u64
     }
 
-    /// Views the image as a chip does.
+    /// Returns the card image as a chip reads it: header and lines.
     pub fn view(&self) -> (SceneImage, Lines<'_>) {
         (SceneImage { header: self.header }, Lines(&self.lines))
     }
@@ -74,15 +74,15 @@ impl CardImage {
         &mut self.lines[range]
     }
 
-    /// Range of a section's lines in the image.
+    /// Range of a section's lines in the card image.
     fn range(&self, kind: SectionKind) -> Range<usize> {
         let Section { first_line, records } = self.header.section(kind);
         let first = first_line as usize;
         first..first + records.div_ceil(kind.records_per_line()) as usize
     }
 
-    /// Copy of the image in which no surface and no environment emits, and there are no lights to sample.
-    /// Photons remain, so that a render shows only the light of the photon map.
+    /// Copy of the card image in which no surface and no environment emits, and there are no lights to
+    /// sample. Photons remain, so that a render shows only the light of the photon map.
     #[must_use]
     pub fn without_emission(&self) -> Self {
         let mut dark = self.clone();

@@ -8,7 +8,7 @@ use crate::light::Lights;
 
 /// Vertex attributes of the triangles in all leaves. Leaves without attributes have no records.
 pub(super) struct PackedCorners {
-    /// Entry of each leaf; empty if no leaf has attributes.
+    /// Encoded [`LeafAttributes`] of each leaf; empty if no leaf has attributes.
     pub(super) leaves: Vec<u32>,
     /// Records of the leaves with attributes.
     pub(super) records: Vec<[u8; layout::Attributes::BYTES]>,
@@ -33,7 +33,7 @@ impl PackedCorners {
         packed
     }
 
-    /// Appends the records of a leaf. Returns the leaf's entry.
+    /// Appends the records of a leaf. Returns its encoded [`LeafAttributes`].
     fn append(
         &mut self,
         scene: &Scene,
@@ -54,7 +54,8 @@ impl PackedCorners {
             let tangents: Vec<Tangents> = triangles().map(|triangle| tangents(scene, triangle)).collect();
             self.records.extend(Tangents::to_records(&tangents));
         }
-        // A record takes half a line, and lines are fewer than 2^32: the upper bit is free.
+        // At most 2^28 triangles have at most two records each, and two per leaf for tangents: the upper bit
+        // is free.
         let first = self.records.len() as u32;
         for &index in leaf {
             let triangle = &scene.triangles[index as usize];
@@ -68,7 +69,7 @@ impl PackedCorners {
     }
 }
 
-/// Tangents of a triangle; [`Tangents::NONE`] if it has no normal map.
+/// Tangents of a triangle; [`Tangents::NONE`] if its attributes have none.
 fn tangents(scene: &Scene, triangle: &Triangle) -> Tangents {
     let attributes = scene.attributes.get(triangle.attributes as usize);
     let tangents = attributes.and_then(|attributes| scene.tangents.get(attributes.tangents as usize));

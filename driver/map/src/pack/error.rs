@@ -21,11 +21,11 @@ pub enum PackError {
         /// Size of the memory, bytes.
         bytes: u64,
     },
-    /// The image has more lines than a line address can number.
+    /// The card image has more lines than a line address can number.
     #[error("the card image takes {bytes} bytes, more than a card's addresses reach")]
     #[diagnostic(help("lower `photons.count`, use smaller textures, or simplify the scene"))]
     TooLarge {
-        /// Size of the image, bytes.
+        /// Size of the card image, bytes.
         bytes: u64,
     },
     /// There are more textures than a material's record can index.
@@ -35,13 +35,13 @@ pub enum PackError {
         /// Number of textures of the scene.
         textures: usize,
     },
-    /// The image is larger than the card's memory.
+    /// The card image is larger than the card's memory.
     #[error(
         "the card image takes {needed} bytes ({photons} of them photons), the card's DRAM budget is {available} bytes"
     )]
     #[diagnostic(help("{remedy}"))]
     Dram {
-        /// Size of the image, bytes.
+        /// Size of the card image, bytes.
         needed: u64,
         /// Size of the photon map, bytes.
         photons: u64,

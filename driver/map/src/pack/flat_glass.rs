@@ -23,7 +23,7 @@ const EQUAL: f32 = 0.99;
 const EVEN: f32 = 0.02;
 /// Rounding error of a coordinate, relative to the greatest one.
 const ROUNDING: f32 = 1e-6;
-/// Number of steps per unit of the thickness's logarithm. Panes in one step share a record.
+/// Number of steps per unit of the thickness's natural logarithm. Panes in one step share a record.
 const THICKNESS_STEPS: f32 = 100.0;
 
 /// Material record that panes share.
@@ -75,7 +75,7 @@ impl<'a> Glazing<'a> {
         glazing
     }
 
-    /// Index in the image of a pane's material, which is added if it is new.
+    /// Index in the card image of a pane's material, which is added if it is new.
     fn material(&mut self, scene: &Scene, pane: Pane) -> u32 {
         let absorbs = transmission_of(&scene.materials[pane.material as usize])
             .is_some_and(|transmission| transmission.absorption != Vec3::ZERO);
@@ -87,7 +87,7 @@ impl<'a> Glazing<'a> {
         scene.materials.len() as u32 + index
     }
 
-    /// Material records of the image, given those of the scene's materials.
+    /// Material records of the card image, given those of the scene's materials.
     pub(super) fn records(&self, mut records: Vec<layout::Material>) -> Vec<layout::Material> {
         for pane in &self.panes {
             records.push(pane.record(records[pane.material as usize]));
@@ -95,13 +95,13 @@ impl<'a> Glazing<'a> {
         records
     }
 
-    /// Extends a property of the scene's materials to all materials of the image.
+    /// Extends a property of the scene's materials to all materials of the card image.
     pub(super) fn of_materials(&self, of_scene: &[bool]) -> Vec<bool> {
         let of_panes = self.panes.iter().map(|pane| of_scene[pane.material as usize]);
         of_scene.iter().copied().chain(of_panes).collect()
     }
 
-    /// Returns for each material of the image whether its surfaces are flat glass.
+    /// Returns for each material of the card image whether its surfaces are flat glass.
     pub(super) fn is_flat(&self, scene: &Scene) -> Vec<bool> {
         let of_scene = scene.materials.iter().map(|material| {
             let record = bare_record(material);

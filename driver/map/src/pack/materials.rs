@@ -36,11 +36,11 @@ pub(super) fn records(scene: &Scene, lights: &Lights, uncovered: &[bool]) -> Vec
 
 /// Record of a material without the flags that depend on its scene.
 pub(super) fn bare_record(material: &Material) -> layout::Material {
-    // Read again: the chip has some values in steps.
+    // Decoded from its bytes, because the record rounds some values.
     layout::Material::read(&record(material, 0, None).to_bytes())
 }
 
-/// Returns whether any triangle's material stores photons. The chip's code decides this from the image.
+/// Returns whether any triangle's material stores photons. The chip's code decides this from the card image.
 pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Lines)) -> bool {
     let mut is_used = vec![false; scene.materials.len()];
     for triangle in &scene.triangles {
@@ -51,7 +51,7 @@ pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Line
         let material = layout::Material::read(
             &record(material, HAS_ATTRIBUTES | lobe_flag(scene, material), None).to_bytes(),
         );
-        // The image was just packed. If it were malformed, tracing photons would report it.
+        // The card image was just packed. If it were malformed, tracing photons would report it.
         keeps_photons(&image, &mut memory, &material).unwrap_or(true)
     })
 }
@@ -61,9 +61,9 @@ fn lobe_flag(scene: &Scene, material: &Material) -> u32 {
     if scene.has_narrow_lobe(material) { NARROW_LOBE } else { 0 }
 }
 
-/// Record of a material. `flags` are the flags that depend on the scene: [`HAS_ATTRIBUTES`] if any of its
-/// triangles may have attributes, and [`NARROW_LOBE`]. `layers` is the index of its layers. All texture
-/// indices of the scene fit in `u16`.
+/// Record of a material. `flags` are those of [`HAS_ATTRIBUTES`], [`BLENDS`] and [`NARROW_LOBE`] that follow
+/// from the scene; `layers` is the index of the material's layers. All texture indices of the scene fit in
+/// `u16`.
 fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::Material {
     let transmission = transmission_of(material);
     flags |= if material.double_sided { DOUBLE_SIDED } else { 0 };
@@ -85,8 +85,8 @@ fn record(material: &Material, mut flags: u32, layers: Option<u32>) -> layout::M
     }
 }
 
-/// Maximum factor of diffuse transmission. Below 1 the base reflects diffusely, so that photons are stored on
-/// both sides.
+/// Maximum factor of diffuse transmission. A factor below 1 leaves the base a diffuse reflection, so that
+/// photons are stored on both sides.
 const MAX_DIFFUSE_TRANSMISSION: f32 = 63.0 / 64.0;
 
 fn texture(index: Option<u32>) -> u16 {
@@ -152,7 +152,8 @@ pub(super) fn transmission_of(material: &Material) -> Option<Transmission> {
     }
 }
 
-/// Ratio of a dielectric's specular reflectance, as stated, to that of its index of refraction.
+/// Ratio of a dielectric's reflectance at normal incidence, as stated, to that of its index of refraction n,
+/// `((n - 1) / (n + 1))^2`; at most 1.
 fn specular_share(dielectric: Vec3, ior: f32) -> f32 {
     let amplitude = (ior - 1.0) / (ior + 1.0);
     let of_index = amplitude * amplitude;

@@ -76,7 +76,7 @@ impl PackedScene {
         })
     }
 
-    /// Views the scene as a chip does, without photons.
+    /// Returns the scene, without photons, as a chip reads it: header and lines.
     pub fn view(&self) -> (SceneImage, Lines<'_>) {
         self.image.view()
     }
@@ -104,7 +104,7 @@ impl PackedScene {
         self.detailed_part.is_none_or(|[lower, upper]| position.clamp(lower, upper) == position)
     }
 
-    /// Units of the sums in pixels.
+    /// Units of radiance and depth in the sums of pixels.
     pub fn sum_scale(&self) -> SumScale {
         SumScale { depth: self.photon_grid().cell, ..self.view().0.header.sum_scale() }
     }
@@ -114,12 +114,13 @@ impl PackedScene {
         &self.sources
     }
 
-    /// Sources of photons that are aimed at surfaces; `None` if there are none.
+    /// Sources of photons that are aimed at surfaces other than lamps; `None` if there are no such surfaces.
     pub(crate) fn aimed_sources(&self) -> Option<&Sources> {
         self.aimed_sources.as_ref()
     }
 
-    /// Sources of caustic photons, which are aimed at specular surfaces; `None` if there are none.
+    /// Sources of caustic photons, which are aimed at specular surfaces; `None` if there are no such
+    /// surfaces.
     pub(crate) fn caustic_sources(&self) -> Option<&Sources> {
         self.caustic_sources.as_ref()
     }
@@ -129,8 +130,8 @@ impl PackedScene {
         self.keeps_photons
     }
 
-    /// Returns whether there are both narrow lobes and lights without an area. The caustic map brings the
-    /// light of the latter to the former.
+    /// Returns whether there are both narrow lobes and punctual lights, whose light the caustic map brings to
+    /// the lobes.
     pub(crate) fn has_lobes_under_punctual_lights(&self) -> bool {
         self.has_lobes_under_punctual_lights
     }

@@ -60,7 +60,7 @@ fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl 
         let [column, row] = [tile % across * TILE_WIDTH, tile / across * TILE_HEIGHT];
         let mut line = Line::ZERO;
         for (place, bytes) in (0..TEXELS_PER_LINE).zip(line.0.as_chunks_mut().0) {
-            // Tiles that extend beyond the borders repeat the last texels.
+            // A line that extends beyond the borders repeats the last texels.
             let x = (column + place % TILE_WIDTH).min(width - 1);
             let y = (row + place / TILE_WIDTH).min(height - 1);
             *bytes = texel(x, y);

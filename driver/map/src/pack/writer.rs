@@ -14,8 +14,8 @@ pub(crate) struct ImageWriter {
 }
 
 impl ImageWriter {
-    /// Creates a writer of an image without sections. `header` has the units and lights; the writer sets the
-    /// numbers of lines and the sections.
+    /// Creates a writer of a card image without sections. `header` has the units and lights; the writer sets
+    /// the numbers of lines and the sections.
     pub(super) fn new(header: Header) -> Self {
         Self { header, lines: vec![Line::ZERO; HEADER_LINES] }
     }
@@ -47,13 +47,13 @@ impl ImageWriter {
     ) -> Result<(), PackError> {
         let lines = records.len().div_ceil(LINE_BYTES / N);
         self.header.sections[kind as usize] = section(self.lines.len(), records.len(), lines)?;
-        // Reserves exactly: the image is most of the host's memory.
+        // Reserves exactly: the card image is most of the host's memory.
         self.lines.reserve_exact(lines);
         self.lines.extend(pack_lines(records));
         Ok(())
     }
 
-    /// Appends a section of whole lines. They are counted while they are appended.
+    /// Appends a section of whole lines, which need not be counted before.
     ///
     /// # Errors
     /// As [`Self::append`].
@@ -86,7 +86,7 @@ impl ImageWriter {
         Ok(&mut self.lines[first..])
     }
 
-    /// Removes sections. They must be the last of the image.
+    /// Removes sections, which must be the last of the card image.
     pub(crate) fn remove_last(&mut self, kinds: &[SectionKind]) {
         for &kind in kinds {
             let Section { first_line, records } = std::mem::take(&mut self.header.sections[kind as usize]);

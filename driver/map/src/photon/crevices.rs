@@ -11,7 +11,7 @@ use super::tracer::Traced;
 
 /// Number of photons whose neighbours are searched to measure the density.
 const SAMPLED: usize = 32;
-/// Number of the neighbour whose distance measures the density.
+/// Rank of the neighbour, from 1, whose distance measures the density.
 const NEIGHBOR: usize = 8;
 /// Fraction of the sampled photons whose density is at least the measured one. It is below 1/2 so that a wide
 /// ground does not dominate.
@@ -70,7 +70,8 @@ impl Spacing {
         Traced { photons, ends: merged_ends }
     }
 
-    /// Returns true if both photons were reflected and lie close together on one surface.
+    /// Returns whether two photons of a path lie close together on one surface, and neither came straight
+    /// from a light.
     fn is_one(self, kept: StoredPhoton, photon: StoredPhoton) -> bool {
         kept.distance_squared(photon) as f64 <= self.squared
             && !kept.is_direct()

@@ -104,7 +104,8 @@ fn unit_interval(bits: u32) -> f32 {
     (bits >> 8) as f32 / 16_777_216.0
 }
 
-/// Point by which a path's emission is sampled, and its weight. A guide warps it.
+/// Returns the point by which a path's emission is sampled, warped by the guide if there is one, and its
+/// weight.
 pub(super) fn emission_point(guide: Option<&Guide>, random: PathRandom) -> Warped {
     let point = random.emission();
     guide.map_or(Warped { point, weight: 1.0 }, |guide| guide.warp(point))
@@ -156,8 +157,8 @@ pub(super) fn emit(
     Ok(emission.map(|emission| Emission { power: emission.power * weight, ..emission }))
 }
 
-/// Applies Russian roulette if an emitter is darker than its mean, as in dark parts of an emissive texture,
-/// so that photons have equal power and less variance.
+/// Applies Russian roulette to an emission with less than the mean power, as from dark parts of an emissive
+/// texture, so that photons have equal power.
 fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emission> {
     let probability = (f64::from(emission.power.element_sum()) / (3.0 * mean_power)) as f32;
     // Differences by rounding are ignored.
@@ -186,7 +187,7 @@ impl Way<'_> {
         let [aimed, free] = densities(&emission.ray);
         let own = if self.is_aimed { aimed } else { free };
         let mixed = self.targets.mixed(aimed, free);
-        // By rounding, at the border of a sphere.
+        // The density can be 0 by rounding, at the border of a sphere.
         (mixed > 0.0).then(|| Emission { power: emission.power * (own / mixed), ..emission })
     }
 }
@@ -313,8 +314,8 @@ fn from_afar(
     let Some(emission) = emission.filter(|emission| meets_box(bounds, &emission.ray)) else {
         return Ok(None);
     };
-    // A ray begins out of the scene only if something lies there, because its precision falls with the
-    // distance.
+    // A ray begins outside the scene only if something lies before the box, because its precision falls with
+    // the distance.
     let origin = emission.ray.origin;
     let is_open = closest_hit(scene, memory, &Ray::new(origin, -direction))?.is_none();
     let origin = if is_open { origin } else { origin - direction * sources.beyond };

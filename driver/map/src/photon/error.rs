@@ -25,7 +25,7 @@ pub enum PhotonError {
     /// A packed scene is malformed.
     #[error("the packed scene is malformed: {0:?}")]
     Unsound(Fault),
-    /// The image with its photons is too large.
+    /// The card image with its photons is too large.
     #[error(transparent)]
     #[diagnostic(transparent)]
     Pack(#[from] PackError),

@@ -15,16 +15,16 @@ pub(super) type Point = [u64; DIMENSIONS];
 pub(super) const UNIFORM_SHARE: f64 = 0.25;
 /// Minimum number of useful samples per half, on average.
 const MIN_USEFUL: usize = 8;
-/// Number of samples of the enclosing box that are added to a box's own.
+/// Number of samples with the mean square of the enclosing box that are added to a box's own.
 const PRIOR_SAMPLES: f64 = 4.0;
 /// Maximum number of halvings along a dimension.
 const MAX_HALVINGS: u32 = 20;
 /// Number of values of a coordinate: 2^64.
 const ALL: f64 = 18_446_744_073_709_551_616.0;
-/// Upper bound of coordinates below 1.
+/// Largest `f64` below 1.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// Point of the hypercube, and the usefulness of the path that begins with it, without guiding.
+/// Point of the hypercube, and the uses of the path that it begins, as if the path were not guided.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
     pub(super) point: Point,
@@ -32,7 +32,7 @@ pub(super) struct Sample {
     pub(super) use_of_path: f64,
     /// Sum of the squared uses of the path's photons: their variance, because they lie in different places.
     pub(super) squares: f64,
-    /// Weight of the point.
+    /// Weight of the point under the guide that sampled it ([`Warped::weight`]).
     pub(super) weight: f32,
 }
 
@@ -134,9 +134,9 @@ impl Guide {
         self.boxes.iter().filter(|part| part.halves.is_none()).count()
     }
 
-    /// Warps a uniform point.
+    /// Maps a uniform random point to one with the guide's density; its weight is `1 / density`.
     pub(super) fn warp(&self, point: Point) -> Warped {
-        // Within the box, from 0 to 1.
+        // Coordinates within the current box, 0 to 1.
         let mut inner = point.map(|coordinate| (coordinate as f64 / ALL).min(BELOW_ONE));
         let mut lower = [0.0; DIMENSIONS];
         let mut sides = [1.0; DIMENSIONS];
@@ -172,7 +172,7 @@ struct Builder {
 
 impl Builder {
     /// Adds a box and splits it further. `halvings` counts the halvings along each dimension; `mean_square`
-    /// is that of the enclosing box. Returns the box's share.
+    /// is the mean square use of the enclosing box. Returns the box's share.
     fn divide(
         &mut self,
         samples: &mut [Sample],
@@ -240,7 +240,7 @@ mod tests {
 
     use super::*;
 
-    /// Uniform points: a rank-1 lattice.
+    /// Pseudo-random points, uniformly distributed.
     fn points(count: u32) -> impl Iterator<Item = Point> {
         let bits = |index: u32, dimension: u32| (hash(hash(index).wrapping_add(dimension)) as u64) << 32;
         (0..count).map(move |index| [0, 1, 2, 3].map(|dimension| bits(index, dimension)))

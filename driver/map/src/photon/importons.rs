@@ -22,7 +22,7 @@ const EYE_PATHS: u32 = 128;
 const FEW_EYE_PATHS: u32 = 32;
 /// Number of gather rays per eye path.
 const GATHER_RAYS: u32 = 4;
-/// Difference between the seeds of eye paths and of photon paths, so that their random numbers differ.
+/// Seed of the eye paths, unlike usual seeds of photon paths, so that their random numbers differ.
 const SEED: u32 = 0x1b56_c4e9;
 
 /// Importon: a position, and the weight of its light in the picture.
@@ -36,8 +36,8 @@ struct Importon {
 
 /// Importons of the photon map and of the caustic map.
 pub(crate) struct Importons {
-    /// Importons at the ends of gather rays and of eye paths. An eye path has as many as one of its gather
-    /// rays.
+    /// Importons at the ends of gather rays and of eye paths. The end of an eye path counts as that of one
+    /// gather ray.
     pub(crate) indirect: ImportonGrid,
     /// Importons at the ends of eye paths.
     pub(crate) caustic: ImportonGrid,
@@ -48,7 +48,7 @@ impl Importons {
     /// the caustic map are gathered, as fractions of the surface that the picture uses.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     pub(crate) fn new(packed: &PackedScene, camera: &Camera, areas: [f32; 2]) -> Result<Self, Fault> {
         Self::of(packed, camera, EYE_PATHS, areas)
     }
@@ -108,15 +108,15 @@ struct Walk<'a, M> {
     scene: &'a SceneImage,
     memory: &'a mut M,
     random: PathRandom,
-    /// Number of the path's next random numbers.
+    /// Index of the next random numbers ([`PathRandom::bounce`]).
     bounce: u32,
-    /// Side of an eye path's part of the picture, as a fraction of the picture's.
+    /// Side of an eye path's cell of the picture, as a fraction of the picture's side.
     side: f32,
 }
 
 impl<M: MemoryPort> Walk<'_, M> {
     /// Adds the importons of an eye path and of its gather rays. `left` and `above` are the corner of its
-    /// part of the picture.
+    /// cell, as fractions of the picture's sides.
     fn look(
         &mut self,
         camera: &Camera,
@@ -145,8 +145,8 @@ impl<M: MemoryPort> Walk<'_, M> {
         Ok(())
     }
 
-    /// Surface at which a path ends, and the path's throughput; `None` if the path leaves the scene or is
-    /// lost.
+    /// Surface at which a path ends, and the path's throughput; `None` if the path leaves the scene, is lost
+    /// or is absorbed.
     fn follow(&mut self, ray: Ray, passes: Passes) -> Result<Option<(Surface, Vec3)>, Fault> {
         let mut path = SpecularPath::new(ray, Carried::Radiance, passes);
         let mut surface = Surface::NOWHERE;
@@ -233,7 +233,7 @@ impl ImportonGrid {
         let normal = Vec3::from(decode_normal(normal));
         let axis = normal.abs().max_position();
         let side = 2 * axis as u8 + u8::from(normal[axis] < 0.0);
-        // Beyond the range of integers cells are the outermost ones.
+        // Positions beyond the range of `i32` are in the outermost cells.
         ((position / self.side).floor().to_array().map(|coordinate| coordinate as i32), side)
     }
 }

@@ -32,26 +32,26 @@ pub struct Guiding {
 const AIM_TASKS: u64 = 4;
 /// Number of tasks of each pilot that measures the share of caustics.
 const SHARE_TASKS: u64 = 8;
-/// Number of lower bits of a grid coordinate that a cell in these pilots spans, such that the longest side of
-/// the grid has 32 to 64 cells.
+/// Number of lower bits of a grid coordinate that a cell of [`CellPowers`] spans, such that the longest side
+/// of the grid has 32 to 64 cells.
 const CELL_BITS: u32 = GRID_BITS - 6;
 /// Minimum ratio of the effective numbers of photons of aimed and unaimed paths, at which paths are aimed. It
 /// is 2 so that noise does not decide in rooms, where both are about equal.
 const MIN_GAIN_BY_AIM: f64 = 2.0;
-/// Difference between the seeds of a map and of the first pilot round for its guide.
+/// Number from which the seed of a pilot round is made: the map's seed XOR `hash(GUIDE_SEED + round)`.
 const GUIDE_SEED: u32 = 0x7feb_352d;
 /// Number of pilot rounds for a guide. Each round is guided by all before it, because paths through a small
 /// window are rare in the first round.
 const GUIDE_ROUNDS: u32 = 4;
 /// Number of photons of the map per path of a pilot round.
 const PHOTONS_PER_GUIDE_PATH: u64 = 8;
-/// Minimum number of tasks of a round. The pilots that compare paths with and without aim have as many.
+/// Minimum number of tasks of a round, and number of tasks of each pilot of [`more_useful`].
 const MIN_GUIDE_TASKS: u64 = 32;
 /// Maximum number of tasks of a round.
 const MAX_GUIDE_TASKS: u64 = 128;
 
-/// Tracer of the photon map that stores more photons: with unaimed paths, or with aimed paths if far more of
-/// these hit a surface.
+/// Returns the tracer of the photon map with aimed paths if their effective number of photons is more than
+/// [`MIN_GAIN_BY_AIM`] times that of unaimed paths, else the tracer with unaimed paths.
 pub(super) fn tracer_of_more_photons(packed: &PackedScene, seed: u32) -> Result<Tracer<'_>, Fault> {
     let unaimed = Tracer::new(packed, packed.sources(), seed, Purpose::Indirect);
     let Some(sources) = packed.aimed_sources() else { return Ok(unaimed) };
@@ -114,7 +114,8 @@ impl CellPowers {
         self.0.values().map(|cell| cell.power).sum()
     }
 
-    /// Mean fraction of all light that this light has where it occurs; at least its fraction of the whole.
+    /// Mean share that these powers have of all power in their cells, weighted by these powers; at least
+    /// their share of the total.
     fn share_of(&self, all: &Self) -> f64 {
         let (own, whole) = (self.power(), all.power());
         // Pairs of photons alone: a photon with itself would make any light of few photons seem focused.
@@ -134,7 +135,7 @@ fn effective_number(weights: impl Iterator<Item = f64>) -> f64 {
     if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }
 
-/// Chooses the tracer the use of whose guided paths spreads less.
+/// Returns the tracer whose guided paths have the smaller [`Guide::spread`], in watts.
 pub(super) fn more_useful<'s>(
     tracers: [Tracer<'s>; 2],
     packed: &PackedScene,
@@ -150,8 +151,8 @@ pub(super) fn more_useful<'s>(
     Ok(if of_second < of_first { second } else { first })
 }
 
-/// Guides a tracer's paths towards importons, for a number of photons; `None` if no path of the pilot is
-/// useful.
+/// Builds a guide of a tracer's paths towards importons, for a map of `photons` photons; `None` if no path of
+/// the pilot is useful.
 pub(super) fn guide(
     tracer: &Tracer,
     packed: &PackedScene,

@@ -98,11 +98,11 @@ impl StoredPhoton {
     #[must_use]
     pub(crate) fn with_power_of(self, other: Self) -> Self {
         let sum = Vec3::from(self.colour()) + Vec3::from(other.colour());
-        // Random bits that neither power depends on.
+        // Random bits that do not depend on the powers.
         self.with_colour(sum, hash(self.place as u32 ^ hash(other.place as u32)))
     }
 
-    /// The photon with another power, in the map's units. `dither` is random.
+    /// The photon with another power, in the map's units. `dither` has the random bits of its rounding.
     #[must_use]
     pub(crate) fn with_colour(self, colour: Vec3, dither: u32) -> Self {
         let mut content = self.content();
@@ -145,8 +145,8 @@ impl Photons {
         Self { list, grid, power_unit }
     }
 
-    /// Replaces the fraction `share` of these photons by the first photons of `others`. Paths are numbered
-    /// and independent, so that this equals tracing the paths with the first numbers anew.
+    /// Replaces the first photons, the fraction `share` of all, by those of `others`. Paths are numbered and
+    /// independent, so that this equals tracing the paths with the first numbers anew.
     #[must_use]
     pub fn with_replaced(&self, others: &Self, share: f64) -> Self {
         let count = ((share * self.len() as f64) as usize).min(self.len()).min(others.len());

@@ -70,7 +70,7 @@ pub(crate) fn trace_for(
     if !is_fruitless(stored, traced.paths) {
         return Err(PhotonError::Stopped);
     }
-    // The fewer photons are all that there is to gather: light passes the surfaces by, or ends on them.
+    // These photons are all that there is to gather: other light misses the surfaces, or ends on them.
     Ok(traced)
 }
 
@@ -159,7 +159,7 @@ fn trace_while(
             })
             .collect();
         let round = round.map_err(PhotonError::Unsound)?;
-        // Caustics are as sharp as their photons.
+        // Photons of caustics are not merged, which would blur them.
         if purpose == Purpose::Indirect && spacing.is_none() {
             spacing = Some(Spacing::new(&round, count));
         }

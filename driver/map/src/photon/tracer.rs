@@ -47,7 +47,7 @@ pub(super) enum Purpose {
     Caustics,
 }
 
-/// Parameters of all paths of a tracer.
+/// Sources, guide and units of the paths of one map.
 pub(super) struct Tracer<'s> {
     packed: &'s PackedScene,
     scene: SceneImage,
@@ -175,8 +175,8 @@ impl<'s> Tracer<'s> {
     }
 }
 
-/// Returns whether photons of a light are stored for a surface. Rays of a narrow lobe hit lights with an
-/// area, so that such a lobe needs photons only of other lights.
+/// Returns whether a surface needs photons of a light. A narrow lobe needs them only of lights without
+/// extent, which its rays cannot hit.
 fn is_lit(surface: &Surface, has_extent: bool) -> bool {
     let reflection = surface.reflection;
     !if has_extent { reflection.without_narrow_lobe() } else { reflection }.is_black()

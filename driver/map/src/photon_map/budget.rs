@@ -1,4 +1,4 @@
-//! Checks whether an image fits a card's memory, and names the setting to lower if it does not.
+//! Checks whether a card image fits a card's memory, and names the setting to lower if it does not.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::Budget;
@@ -13,8 +13,8 @@ use crate::pack::{CardImage, PackError, PackedScene};
 /// Approximate number of photons per line, including the lines of inner nodes.
 const PHOTONS_OF_A_LEAF: usize = 9;
 
-/// Checks whether the image of a packed scene, with a photon map of these settings, can fit a card's memory.
-/// The number of leaf lines is estimated; [`check_image`] counts them.
+/// Checks whether the card image of a packed scene, with a photon map of these settings, can fit a card's
+/// memory. The number of leaf lines is estimated; [`check_image`] counts them.
 ///
 /// # Errors
 /// [`PackError::Dram`], with the setting to lower.
@@ -53,7 +53,7 @@ pub fn check_packed(
     Err(PackError::Dram { needed, photons: photon_bytes, available, remedy })
 }
 
-/// Checks that an image fits a card's memory.
+/// Checks that a card image fits a card's memory.
 ///
 /// # Errors
 /// [`PackError::Dram`], with the setting to lower.
@@ -79,7 +79,7 @@ fn is_most(part: u64, all: u64) -> bool {
     part > all / 2
 }
 
-/// Remedy if photons do not fit. It concerns texels if they take most of the image.
+/// Remedy if photons do not fit. It names textures too if texels take most of the card image.
 fn lower(photons: &str, texels: u64, needed: u64) -> String {
     let textures = if is_most(texels, needed) { ", use smaller textures" } else { "" };
     format!("{photons}{textures}, or use a card with more memory")

@@ -1,9 +1,9 @@
 //! Precomputed irradiance (Christensen 1999, *Faster photon map global illumination*). The chip's density
-//! estimate for a white diffuser is computed at every photon and stored in the image. A gather then takes the
-//! irradiance of the nearest point on its surface.
+//! estimate for a white diffuser is computed at every photon and stored in the card image. A gather then
+//! takes the irradiance of the nearest point on its surface.
 //!
-//! At a photon the density estimate is too high by one photon, the photon itself. On the other hand, the
-//! nearest point to a given position is known to have no other point between them, which lowers the estimate
+//! At a photon the density estimate is too high by one photon, the photon itself. On the other hand, no
+//! photon lies between a given position and the point nearest to it, which lowers the estimate at that point
 //! by one photon. For photons in random positions the two errors cancel on average.
 
 use glam::Vec3;
@@ -29,12 +29,12 @@ const POINTS_OF_A_TASK: usize = 256;
 /// Grid point, and code of a surface normal.
 type SurfacePoint = ([u32; 3], u8);
 
-/// Adds irradiance points to an image with photons, for gathers of `neighbors` photons within `max_distance`,
-/// metres. The points depend only on the photons, not on the layout of the photon map. `go_on` is called
-/// before each task.
+/// Adds to a card image the irradiance at each photon's position, estimated from the `neighbors` nearest
+/// photons within `max_distance` metres. The points depend only on the photons, not on the layout of the
+/// photon map. `go_on` is called before each task.
 ///
 /// # Errors
-/// If the image is malformed or grows too large, or `go_on` returns false.
+/// If the card image is malformed or grows too large, or `go_on` returns false.
 pub fn precompute_irradiance(
     image: CardImage,
     neighbors: u32,

@@ -10,7 +10,7 @@ use crate::photon::StoredPhoton;
 /// Number of photons below which a subtree is built by one thread.
 const SEQUENTIAL: usize = 4096;
 
-/// Moves the photons of an image from leaves into a kd-tree, and removes irradiance points and caustic
+/// Moves the photons of a card image from leaves into a kd-tree, and removes irradiance points and caustic
 /// photons. Searches find the same photons in both layouts.
 ///
 /// # Errors

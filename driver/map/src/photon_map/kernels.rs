@@ -22,14 +22,14 @@ const AREA: f32 = 4.0 / 3.0;
 const MAX_SHARE_OF_DIAGONAL: f32 = 0.1;
 /// Minimum radius, cells of the photon grid.
 const MIN_CELLS: f32 = 4.0;
-/// Ratio of the area of a photon's disc to that of its code at which the code changes: the geometric mean of
-/// two powers of two.
+/// Factor of a disc's area before its code rounds it up to a power of two, so that the power nearest by ratio
+/// is taken.
 const ROUNDING: f32 = std::f32::consts::FRAC_1_SQRT_2;
-/// Number of cells by which a photon's reach is rounded up.
+/// Number of cells added to a photon's reach, for rounding of positions.
 const MARGIN_CELLS: u32 = 2;
 
 /// Sets the radius code of each photon, such that about `neighbors` photons of its light lie within the
-/// radius, and changes the photons' order. Returns the radius of the last code, metres.
+/// radius, and changes the photons' order. Returns the radius of the greatest code, metres.
 pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f32 {
     let grid = photons.grid();
     arrange(photons.stored_mut());
@@ -48,8 +48,8 @@ pub(super) fn spread(photons: &mut Photons, neighbors: u32, diagonal: f32) -> f3
     greatest * grid.cell
 }
 
-/// Number of cells that a photon's disc extends from its position. `greatest` is the radius of the last code,
-/// metres.
+/// Number of cells that a photon's disc extends from its position. `greatest` is the radius of the greatest
+/// code, cells.
 pub(super) fn reach(photon: &StoredPhoton, greatest: f32) -> u32 {
     (greatest * kernel_share(photon.disc()).sqrt()).ceil() as u32 + MARGIN_CELLS
 }
@@ -90,8 +90,8 @@ mod tests {
         (0..count).map(move |index| Vec3::new(number(2 * index), 0.0, number(2 * index + 1)) * side)
     }
 
-    /// A thousand photons on a square metre are mixed with ten thousand photons of another light. Each must
-    /// get the radius of its own light.
+    /// A thousand photons on a square metre are mixed with a hundred thousand photons of another light. Each
+    /// must get the radius of its own light.
     #[test]
     fn a_radius_follows_the_density_of_the_photons_own_light() {
         let sun = square(1.0, 100_000).map(|place| photon(place, Vec3::Y));

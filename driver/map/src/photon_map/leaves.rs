@@ -30,7 +30,7 @@ const MIN_INTERVALS: usize = 8;
 const SAMPLED: usize = 4096;
 /// Number of photons above which a box is assumed to contain several surfaces.
 const MANY: usize = 64;
-/// Depth of the binary tree below which subtrees are split at the median.
+/// Depth of the binary tree from which subtrees are split at the median.
 const MAX_SKEWED: usize = 40;
 /// Maximum coordinate of a grid point.
 const LAST_POINT: u32 = (1 << GRID_BITS) - 1;
@@ -49,14 +49,14 @@ pub(super) struct PhotonTree<'a> {
 }
 
 impl<'a> PhotonTree<'a> {
-    /// Builds a tree of photons for searches with a radius of about `radius` cells. It does not depend on
-    /// threads. `None` without photons.
+    /// Builds a tree of photons for searches with a radius of about `radius` cells. The tree does not depend
+    /// on threads. `None` without photons.
     pub(super) fn new(photons: &'a mut [StoredPhoton], radius: f64) -> Option<Self> {
         Self::of(photons, &Searches { radius, reach: None })
     }
 
-    /// Builds a tree of photons for searches at a point. Its boxes contain all points within the reach of
-    /// each photon, cells. Its nodes have the classes of normals.
+    /// Builds the tree of a caustic map, which is searched at a point: boxes contain all points within the
+    /// reach of each photon, and nodes state the classes of the normals below them.
     pub(super) fn of_discs(photons: &'a mut [StoredPhoton], reach: Reach) -> Option<Self> {
         Self::of(photons, &Searches { radius: 0.0, reach: Some(reach) })
     }
@@ -103,7 +103,8 @@ type Reach<'r> = &'r (dyn Fn(&StoredPhoton) -> u32 + Sync);
 struct Searches<'r> {
     /// Radius of a typical search, cells.
     radius: f64,
-    /// Distance by which a photon's box is enlarged, in a caustic map, whose groups have radii of their own.
+    /// Enlargement of photons' boxes in a caustic map, whose groups have radii of their own; `None` in a
+    /// photon map.
     reach: Option<Reach<'r>>,
 }
 
@@ -141,11 +142,11 @@ fn join(mut parts: Vec<Tree<Run, Extent>>) -> Option<Tree<Run, Extent>> {
     let parts = [join(parts)?, join(above)?];
     let [below, above] = parts.each_ref().map(Tree::bounds);
     let both = below.union(above);
-    // The boxes contain the reach of their photons.
+    // Boxes contain the reach of their photons, so that the search radius is 0.
     Some(Tree::node(parts, both, both.chance(0.0) as f32, None))
 }
 
-/// Builds the tree of photons. The first has the index `first`. `None` without photons.
+/// Builds the tree of the photons with the indices from `first` on. `None` without photons.
 fn build(
     photons: &mut [StoredPhoton],
     first: u32,
@@ -234,8 +235,8 @@ impl Extent {
         leaf_capacity(if photons > MANY { axes.min(2) } else { axes })
     }
 
-    /// Axis of the split, and number of photons below the plane. It is a whole number of leaves if there is
-    /// more than one.
+    /// Axis of the split, and number of photons below the plane. These fill whole leaves if there is more
+    /// than one leaf.
     fn split(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let (axis, below) = self.cheapest(photons, radius);
         let count = photons.len();

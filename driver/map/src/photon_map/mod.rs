@@ -1,8 +1,8 @@
 //! Photon map: writes photons, the trees above them, caustics and irradiance points as sections of the card
 //! image.
 //!
-//! It uses [`crate::pack`], which writes sections, [`crate::photon`], which traces photons, and `density`,
-//! which measures the maximum distance of gathers and the disc fractions.
+//! This module uses [`crate::pack`], which writes sections, [`crate::photon`], which traces photons, and
+//! `density`, which measures the maximum distance of gathers and the disc fractions.
 
 mod budget;
 mod irradiance;
@@ -74,7 +74,7 @@ pub struct PhotonTimes {
 /// number of photons stored, also while the map is measured, and returns whether to continue.
 ///
 /// # Errors
-/// If the scene is too wide, the image grows too large, or `progress` returns false.
+/// If the scene is too wide, the card image grows too large, or `progress` returns false.
 pub fn map_photons(
     packed: PackedScene,
     settings: &PhotonSettings,
@@ -90,7 +90,7 @@ pub fn map_photons(
 
 /// Photons of both maps of a scene.
 pub struct TracedPhotons {
-    /// The photons.
+    /// Photons of the photon map.
     pub photons: Photons,
     /// Number of paths traced from the lights.
     pub(crate) paths: u64,
@@ -126,7 +126,7 @@ impl TracedPhotons {
     /// Fraction of the photons that the picture of a camera can use, estimated by few eye paths.
     ///
     /// # Errors
-    /// If the image is invalid.
+    /// If the card image is invalid.
     pub fn used_share(&self, packed: &PackedScene, camera: &Camera) -> Result<f64, PhotonError> {
         let used = Importons::few(packed, camera)?.indirect;
         let is_used = |photon: &Photon| used.is_used(photon.position.into(), photon.normal);
@@ -135,7 +135,8 @@ impl TracedPhotons {
     }
 }
 
-/// Adds the photon map to the image of a packed scene whose photons were traced, as [`map_photons`] does.
+/// Adds the photon map to the card image of a packed scene whose photons were traced, as [`map_photons`]
+/// does.
 pub fn map_traced(
     packed: PackedScene,
     traced: TracedPhotons,
@@ -193,7 +194,7 @@ pub fn map_traced(
 
 /// Importons of the camera for which photons are traced; `None` for any camera.
 fn importons(packed: &PackedScene, settings: &PhotonSettings) -> Result<Option<Importons>, PhotonError> {
-    // Disc of a gather over the surface, if photons are everywhere as dense.
+    // Area of a gather's disc divided by that of the surface, if photons are equally dense everywhere.
     let share = |neighbors: u32, photons: usize| neighbors as f32 / photons.max(1) as f32;
     let shares = [
         share(settings.neighbors, settings.photons),

@@ -13,7 +13,8 @@ const MIN_DIRECTION_COSINE: f32 = 0.8;
 const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
 /// Number of photons in a leaf.
 pub(super) const LEAF: usize = 12;
-/// Fraction of a distance within which the photons of a leaf share it.
+/// A photon reuses the distance `d` of a like photon in its leaf if they are at most this fraction of `d`
+/// apart.
 const SHARED_SHARE: f32 = 0.3;
 
 /// Position of a photon, cells of the photon grid, and the unit vectors by which neighbours are compared.
@@ -101,9 +102,9 @@ impl Places {
         self.places[first].is_like(&self.places[second])
     }
 
-    /// Distance of each photon's neighbour number `number`, counted from 1, among photons of its surface and
-    /// light; `limit` if there are fewer within it. A photon can have the distance of a nearby photon: if two
-    /// photons are [`SHARED_SHARE`] of such a distance apart, the distances differ by at most that fraction.
+    /// Returns each photon's distance to its neighbour number `number`, counted from 1, among photons of its
+    /// surface and light, cells; `limit` if there are fewer within it. A photon can reuse the distance of a
+    /// nearby one ([`SHARED_SHARE`]).
     pub(super) fn distances(&self, number: usize, limit: f32) -> Vec<f32> {
         let leaves = self.places.par_chunks(LEAF).enumerate();
         leaves.flat_map_iter(|(leaf, places)| self.distances_of_leaf(leaf, places, number, limit)).collect()
@@ -134,14 +135,14 @@ impl Places {
         nearest.get(number - 1).map_or(limit, |(squared, _)| squared.sqrt())
     }
 
-    /// Nearest photons of a photon's surface and light, `number` at most and nearer than `limit`: squared
-    /// distances in ascending order, and indices.
+    /// Returns the nearest photons of a photon's surface and light, at most `number` and nearer than `limit`:
+    /// squared distances in ascending order, and indices.
     pub(super) fn nearest(&self, index: usize, number: usize, limit: f32) -> Vec<(f32, usize)> {
         let own = &self.places[index];
         let mut limit = limit * limit;
         // Bits of the least squared distances, the greatest on top: they are ordered as the distances.
         let mut nearest = BinaryHeap::with_capacity(number);
-        // Distances of boxes, with their levels and numbers.
+        // Squared distances of boxes, with their levels and indices.
         let mut waiting = vec![(0.0, self.levels.len() - 1, 0)];
         while let Some((distance, level, node)) = waiting.pop() {
             if distance >= limit {

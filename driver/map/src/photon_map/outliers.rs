@@ -23,7 +23,7 @@ const MAX_GAIN: f64 = 0.25;
 const NUMBERS: [usize; 5] = [32, 128, 512, 2048, 8192];
 /// Distance of a line of sight from the surfaces at its ends, relative to its length.
 const LIFT: f32 = 0.02;
-/// Minimum of that distance, cells of the photon grid.
+/// Minimum distance of a line of sight from the surfaces at its ends, cells of the photon grid.
 const MIN_LIFT_CELLS: f32 = 2.0;
 
 /// Power that a photon gives to its neighbours.
@@ -37,7 +37,7 @@ struct Gift {
 /// Spreads the power of photons that are much stronger than their neighbours, and changes the photons' order.
 ///
 /// # Errors
-/// A [`Fault`] if the image is invalid.
+/// A [`Fault`] if the card image is invalid.
 pub(super) fn spread(photons: &mut Photons, packed: &PackedScene) -> Result<(), Fault> {
     arrange(photons.stored_mut());
     let mut colours: Vec<DVec3> =
@@ -78,7 +78,7 @@ impl<'a> Map<'a> {
         let place = |photon: &StoredPhoton| Place {
             position: Vec3::from_array(photon.point().map(|coordinate| coordinate as f32)),
             normal: photon.normal(),
-            // Light of all directions is alike.
+            // Equal for all photons: neighbours are compared by normal alone.
             direction: Vec3::Y,
         };
         let stored = photons.stored();
@@ -115,7 +115,7 @@ impl<'a> Map<'a> {
             let sum: f64 = to.iter().map(|(_, weight)| weight).sum();
             let mean = to.iter().map(|(other, _)| self.power(*other)).sum::<f64>() / to.len() as f64;
             let given = (own - mean).min(MAX_GAIN * sum);
-            // 0 if it sees none of them.
+            // `given` is 0 if the photon sees none of them.
             if given > 0.0 {
                 to.iter_mut().for_each(|(_, weight)| *weight /= sum);
                 gift = Some(Gift { from: photon, power: self.colours[photon] * (given / own), to });
@@ -160,10 +160,10 @@ mod tests {
 
     use super::*;
 
-    /// Place of the wall on the floor, metres.
+    /// The wall's coordinate x, metres.
     const WALL: f32 = 0.05;
 
-    /// Floor of 2 m, and a sheet on it.
+    /// Floor of 2 m, and a vertical sheet on it.
     fn floor_and_wall() -> PackedScene {
         let quad = |[a, b, c, d]: [Vec3; 4]| [[a, b, c], [a, c, d]].map(|corners| Triangle::new(corners, 0));
         let floor = [[-1., -1.], [-1., 1.], [1., 1.], [1., -1.]].map(|[x, z]| Vec3::new(x, 0., z));

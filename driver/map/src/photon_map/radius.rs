@@ -11,11 +11,12 @@ const SAMPLED_NEIGHBORS: usize = 1 << 16;
 /// Minimum number of neighbours within the subset, unless the subset has at least `1 / MIN_STEP` of the
 /// photons.
 const MIN_NEIGHBORS: usize = 4;
-/// Inverse of the fraction of the photons that suffices, however few neighbours it contains.
+/// Inverse of the fraction of the photons that is enough for the subset, however few neighbours it contains.
 const MIN_STEP: usize = 32;
 
-/// Radius of a typical search for `neighbors` photons, in cells of the photon grid. As there is no tree to
-/// search yet, it is estimated in a subset of the photons, for a proportionally smaller number of neighbours.
+/// Radius of a typical search for `neighbors` photons, in cells of the photon grid. There is no tree to
+/// search yet, so that the radius is estimated in a subset of the photons, for a proportionally smaller
+/// number of neighbours.
 pub(super) fn typical_radius(photons: &Photons, neighbors: u32) -> f64 {
     let all = photons.stored();
     let neighbors = neighbors as usize;

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 pub struct PhotonSettings {
     /// Seed of the photon paths.
     pub seed: u32,
-    /// Camera whose picture uses the photons; they are guided towards what it uses. `None` if photons are for
-    /// any camera.
+    /// Camera whose picture uses the photons, which are guided towards what the picture uses. `None` if
+    /// photons are for any camera.
     pub camera: Option<Camera>,
     /// Number of photons to store.
     pub photons: usize,
@@ -24,7 +24,7 @@ pub struct PhotonSettings {
     pub caustic_neighbors: u32,
     /// Layout of the map in card memory.
     pub layout: PhotonLayout,
-    /// Source of the reflected radiance. [`Radiance::Precomputed`] adds irradiance points to the image.
+    /// Source of the reflected radiance. [`Radiance::Precomputed`] adds irradiance points to the card image.
     pub radiance: Radiance,
 }
 
@@ -34,7 +34,7 @@ pub enum PhotonsFor {
     /// Any camera. Photons depend only on the scene.
     #[default]
     Scene,
-    /// The picture's camera. Photons are guided towards what it uses, without bias.
+    /// The picture's camera. Photons are guided towards what its picture uses, without bias.
     Camera,
     /// The picture's camera if a pilot measures that guiding helps, otherwise any camera.
     Auto,

@@ -1,4 +1,4 @@
-//! Size of the photon map in an image.
+//! Size of the photon map in a card image.
 
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
@@ -17,7 +17,7 @@ pub struct PhotonMapSize {
 }
 
 impl PhotonMapSize {
-    /// Measures the photon map of an image, in either layout.
+    /// Measures the photon map of a card image, in either layout.
     pub fn of(image: &CardImage) -> Self {
         let (scene, _) = image.view();
         let lines = |kind| image.section(kind).len();

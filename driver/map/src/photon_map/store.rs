@@ -8,7 +8,7 @@ use super::radius::typical_radius;
 use crate::pack::{CardImage, ImageWriter, PackError, PackedScene};
 use crate::photon::Photons;
 
-/// Sections of the photon map, including irradiance points. They are the last sections of an image.
+/// Sections of the photon map, including irradiance points. They are the last sections of a card image.
 pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
     SectionKind::Photons,
     SectionKind::PhotonNodes,
@@ -21,7 +21,7 @@ pub(super) const PHOTON_SECTIONS: [SectionKind; 7] = [
 
 pub(super) const CAUSTIC_SECTIONS: [SectionKind; 2] = [SectionKind::CausticNodes, SectionKind::CausticLeaves];
 
-/// Adds photons to the image of a scene, in leaves, for searches of about `neighbors` photons.
+/// Adds photons to the card image of a scene, in leaves, for searches of about `neighbors` photons.
 ///
 /// # Errors
 /// [`PackError::TooLarge`] if there are more lines than an address can number.
@@ -39,8 +39,8 @@ pub fn store_photons(
     Ok(image.finish())
 }
 
-/// Adds a caustic map to an image. `photons` have the codes of their radii; the last code's radius is
-/// `greatest`, metres.
+/// Adds a caustic map to a card image. `photons` have the codes of their radii; the greatest code stands for
+/// the radius `greatest`, metres.
 ///
 /// # Errors
 /// As [`store_photons`].
@@ -58,7 +58,7 @@ pub(super) fn store_caustics(
     Ok(image.finish())
 }
 
-/// Adds irradiance points to an image.
+/// Adds irradiance points to a card image.
 ///
 /// # Errors
 /// As [`store_photons`].

@@ -12,7 +12,7 @@ use exr::meta::BlockDescription;
 use exr::meta::header::Header;
 use exr::prelude::Compression;
 
-/// Uncompressed size up to which a picture is read, however small its file is, bytes.
+/// Uncompressed size, bytes, up to which a picture with DWA compression is read, however short its file is.
 pub(super) const PLAIN_BYTES: u64 = 4 << 20;
 
 /// Number of samples in a block of the discrete cosine transform.
@@ -21,7 +21,7 @@ const SAMPLES: u64 = 64;
 /// Side of a block of the discrete cosine transform, pixels.
 const SIDE: usize = 8;
 
-/// Number of 64-bit counters at the beginning of a block of pixels.
+/// Number of 64-bit counters at the beginning of a block of pixels with DWA compression.
 const COUNTERS: usize = 11;
 
 pub(super) fn is_dwa(compression: Compression) -> bool {
@@ -34,11 +34,11 @@ pub(super) fn transform_bytes(header: &Header) -> u64 {
     width.saturating_mul(height).saturating_mul(3 * size_of::<f32>() as u64)
 }
 
-/// Returns whether all blocks of pixels state possible sizes.
+/// Returns whether the sizes that the blocks of a file with DWA compression state are possible.
 pub(super) fn states_possible_sizes(bytes: &[u8]) -> Result<bool> {
     let reader = exr::block::read(Cursor::new(bytes), false)?;
     let headers = reader.headers().to_vec();
-    // By the offsets of the file, as the decoder finds the blocks.
+    // Blocks are found by the file's offset tables, as the decoder finds them.
     for chunk in reader.filter_chunks(false, |_, _, _| true)? {
         let chunk = chunk?;
         let Some(header) = headers.get(chunk.layer_index).filter(|header| is_dwa(header.compression)) else {
@@ -57,8 +57,8 @@ pub(super) fn states_possible_sizes(bytes: &[u8]) -> Result<bool> {
     Ok(true)
 }
 
-/// Returns whether the sizes that a block of pixels states are at most what its pixels take. Blocks that lack
-/// some counters are not decoded.
+/// Returns whether the sizes in a block's counters are at most those that its pixels can have. Counters
+/// beyond the end of the block count as 0: such blocks are not decoded.
 fn is_possible(header: &Header, pixels: &[u8]) -> bool {
     let mut counters = [0; COUNTERS];
     for (counter, bytes) in counters.iter_mut().zip(pixels.as_chunks().0) {
@@ -68,7 +68,7 @@ fn is_possible(header: &Header, pixels: &[u8]) -> bool {
     let block = header.max_block_byte_size() as u64;
     let [width, height] = padded(header);
     let samples = width.saturating_mul(height).saturating_mul(header.channels.list.len() as u64);
-    // Runs of one byte take two, and literals a byte for 127 of them.
+    // A run-length code takes at most two bytes for a run of one, and one byte more for 127 literals.
     let longest = block.saturating_mul(2);
     unknown <= block
         && raw <= block

@@ -143,7 +143,7 @@ pub enum ExrError {
 /// Contents of an EXR file.
 #[derive(Clone, Copy)]
 pub struct Content<'a> {
-    /// Film of the radiance, and of the layers.
+    /// Film with the radiance and the layers.
     pub film: &'a Film,
     /// Layers besides radiance.
     pub layers: &'a Layers,
@@ -248,14 +248,14 @@ fn any_channel(
     AnyChannel::new(name, samples)
 }
 
-/// Nearest half. Finite values beyond its range become plus or minus 65504.
+/// Nearest half. Finite values beyond the range of halves become plus or minus 65504.
 fn to_half(value: f32) -> f16 {
     let half = f16::from_f32(value);
     if half.is_infinite() && value.is_finite() { f16::MAX.copysign(half) } else { half }
 }
 
-/// Escapes every character beyond ASCII in JSON. The attribute is ASCII, and in JSON only strings contain
-/// other characters.
+/// Escapes every character beyond ASCII as `\u` in JSON, where only strings contain such characters. The
+/// attribute is ASCII.
 pub(crate) fn ascii(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {
@@ -278,7 +278,8 @@ pub(crate) fn ascii(json: &str) -> String {
 pub enum Shown {
     /// The channels `R G B` of the unnamed layer.
     Rendered,
-    /// The layer [`Content::denoised`], or else as [`Self::Rendered`]: what a tone-mapped picture shows.
+    /// The layer [`Content::denoised`], or [`Self::Rendered`] in a file without it: what a tone-mapped
+    /// picture shows.
     Denoised,
 }
 
@@ -286,7 +287,7 @@ pub enum Shown {
 ///
 /// # Errors
 /// If the file cannot be read, is malformed, lacks the channels, or has more than [`MAX_READ_PIXELS`]. A file
-/// whose stated size its length cannot hold is refused before anything is allocated.
+/// too short for the size that it states is refused before memory for its pixels is allocated.
 pub fn read(path: &Path, shown: Shown) -> Result<RgbImage, ExrError> {
     let unreadable = |source| ExrError::Unreadable { path: path.to_owned(), source };
     let found = std::fs::metadata(path).map_err(unreadable)?;
@@ -411,13 +412,13 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
         });
     };
     let held = length.saturating_mul(most);
-    // A picture of one colour is smaller than any that shows something.
+    // A picture of one colour exceeds the ratio, so that small pictures with DWA are read at any ratio.
     let held = if dwa::is_dwa(header.compression) { held.max(dwa::PLAIN_BYTES) } else { held };
     let stated = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
     if stated > held {
         return contradiction(format!("{width} x {height} pixels do not fit into {length} bytes"));
     }
-    // The picture, and one block while it is unpacked and reordered.
+    // Memory of the picture, and of one block while it is unpacked and reordered.
     let block = stated.min(header.max_block_byte_size() as u64);
     let transform = if dwa::is_dwa(header.compression) { dwa::transform_bytes(header) } else { 0 };
     let unpacked = transform.saturating_add(3 * block);
@@ -439,7 +440,7 @@ fn most_compressed(compression: Compression) -> Option<u64> {
         // Deflate reaches 1032 to 1; the others stay below.
         Compression::ZIP1 | Compression::ZIP16 | Compression::PXR24 => Some(1100),
         Compression::PIZ | Compression::B44 | Compression::B44A => Some(1100),
-        // A code of a bit or more for 64 samples of two bytes, but for runs of equal codes.
+        // 64 samples of two bytes take at least one bit, 1024 to 1, except runs of equal codes.
         Compression::DWAA(_) | Compression::DWAB(_) => Some(1100),
         _ => None,
     }

@@ -5,7 +5,7 @@ use super::{Machine, Symbols};
 /// Method by which data reach all chips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Distribution {
-    /// The host sends the data to each chip separately, so that they pass its link once per chip.
+    /// The host sends the data to each chip separately, so that the data pass the host's link once per chip.
     Separate,
     /// The data pass a tree of switches between host and chips (dissertation, figure 7.1). They pass the
     /// host's link once. Each switch forwards a frame to all its links as soon as it has received it, at the
@@ -14,7 +14,8 @@ pub enum Distribution {
 }
 
 impl Distribution {
-    /// Levels of switches between the host and `chips` chips, `ceil(log_f N)`; 0 for one chip.
+    /// Number of levels of switches with the fan-out `f` between the host and `N = chips` chips,
+    /// `ceil(log_f N)`; 0 for one chip.
     pub fn levels(chips: u64, symbols: &Symbols) -> u32 {
         let mut reached = 1.0;
         let mut levels = 0;
@@ -25,8 +26,8 @@ impl Distribution {
         levels
     }
 
-    /// Seconds until all chips have received `bytes` bytes `I`: `N I / B` separately,
-    /// `I / B + ceil(log_f N) S_F / B` by a tree; 0 without data.
+    /// Seconds until all `N = chips` chips have received `I = bytes` bytes over a link of `B` bytes/s:
+    /// `N I / B` separately, `I / B + ceil(log_f N) S_F / B` by a tree; 0 without data.
     pub fn seconds(self, bytes: f64, chips: u64, symbols: &Symbols, machine: &Machine) -> f64 {
         match self {
             _ if bytes <= 0.0 => 0.0,
@@ -35,7 +36,7 @@ impl Distribution {
         }
     }
 
-    /// Maximum number of bytes that all chips can receive in a given time.
+    /// Maximum number of bytes that every chip can receive in the given time.
     pub fn bytes_within(self, seconds: f64, chips: u64, symbols: &Symbols, machine: &Machine) -> f64 {
         let carried = seconds * machine.link;
         match self {

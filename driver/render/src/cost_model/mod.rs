@@ -3,9 +3,9 @@
 //!
 //! [`Symbols`] are the parameters of Table 7.1. A [`Workload`] counts the rays, gathers and bytes of one
 //! frame. A [`Cost`] is the FLOPs and bytes that they need in each unit of the chip, and a [`Prediction`] is
-//! the speed of a [`Machine`] at that cost. [`Flops`] are the operations of work that chips counted, at the
-//! table's cost of each piece; [`arithmetic`] counts the operations of this firmware. A [`Distribution`]
-//! gives the time of an upload to all chips. `docs/scaling.md` has the formulas.
+//! the speed of a [`Machine`] at that cost. [`Flops`] are the operations of a run's counters by the constants
+//! of Table 7.1; [`arithmetic`] counts the operations of this firmware. A [`Distribution`] gives the time of
+//! an upload to all chips. `docs/scaling.md` has the formulas.
 
 pub mod arithmetic;
 mod distribution;

@@ -46,7 +46,7 @@ pub enum Resource {
     Bandwidth,
     /// Arithmetic of the chips.
     Computation,
-    /// Bandwidth of the host's link. More chips do not help then.
+    /// Bandwidth of the host's link, which more chips do not increase.
     HostLink,
 }
 
@@ -108,8 +108,8 @@ impl Prediction {
         self.chips_frames_per_second(chips).min(self.link_frames_per_second)
     }
 
-    /// Resource that limits `chips` chips. If the chips and the link have equal limits, it is a resource of
-    /// the chips, because more chips would help; if bandwidth and arithmetic have, it is bandwidth.
+    /// Resource that limits `chips` chips. Of equal limits, those of the chips precede that of the link,
+    /// because more chips would help, and bandwidth precedes arithmetic.
     pub fn binding(&self, chips: u64) -> Resource {
         if self.link_frames_per_second < self.chips_frames_per_second(chips) {
             Resource::HostLink

@@ -98,7 +98,7 @@ impl Symbols {
         reflection_bytes: 13.0,
         photon_bytes: Photon::BYTES as f64,
         line_bytes: LINE_BYTES as f64,
-        // 24 GB a frame, and 11 TB/s at 30 frames/s, each over the 512 x 512 x 100 gathers of a frame.
+        // 24 GB a frame, and 11 TB/s at 30 frames/s, divided by the 512 x 512 x 100 gathers of a frame.
         gather_dram: 24e9 / GATHERS,
         naive_gather_dram: 11e12 / 30.0 / GATHERS,
         // 1 GB/s for 100 M rays/s.
@@ -215,7 +215,7 @@ pub struct Symbol {
 const ANY: [f64; 2] = [0.0, 1e15];
 /// Range of a count that is at least one.
 const SOME: [f64; 2] = [1.0, 1e15];
-/// Range of the children of a node.
+/// Range of the fan-out of a switch.
 const FAN_OUT: [f64; 2] = [2.0, 1e15];
 /// Range of a share of a whole.
 const RATIO: [f64; 2] = [0.0, 1.0];

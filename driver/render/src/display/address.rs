@@ -1,4 +1,4 @@
-//! Address of a display server, the argument of `--display-server`, and errors of the server.
+//! Address of a display server, and errors of showing a picture there.
 
 use std::str::FromStr;
 use std::{fmt, io};
@@ -71,9 +71,9 @@ pub enum DisplayError {
     /// The server did not take all packets in time.
     #[error("the display server at {address} takes no more: {packets} packets of the picture are not shown")]
     Slow {
-        /// Number of packets that the server did not take.
+        /// Address of the server.
         address: DisplayAddress,
-        /// Packets that the server has not taken.
+        /// Number of packets that the server did not take.
         packets: usize,
     },
 }

@@ -29,7 +29,7 @@ pub(super) struct PacketQueue {
 }
 
 impl PacketQueue {
-    /// Returns whether packets are still being sent.
+    /// Returns whether packets can still be sent: the display was not dropped and has not failed.
     pub(super) fn is_open(&self) -> bool {
         !self.is_closed && !self.has_failed
     }
@@ -44,8 +44,8 @@ impl PacketQueue {
         self.packets.len() + usize::from(self.is_sending) + self.missed.len()
     }
 
-    /// Returns whether a packet of `bytes` bytes may be queued, if all queued packets may have `most` bytes.
-    /// An empty queue accepts any packet.
+    /// Returns whether a packet of `bytes` bytes fits into a queue of at most `most` bytes. An empty queue
+    /// accepts any packet.
     pub(super) fn has_room(&self, bytes: usize, most: usize) -> bool {
         self.waiting == 0 || self.waiting + bytes <= most
     }
@@ -117,7 +117,8 @@ impl SharedQueue {
         }
     }
 
-    /// Counts bytes of the current packet as sent. Returns whether to continue.
+    /// Counts bytes of the current packet as sent; `is_last` ends the packet. Returns whether to go on
+    /// sending.
     pub(super) fn advance(&self, bytes: usize, is_last: bool) -> bool {
         self.change(|queue| {
             queue.sent += bytes as u64;

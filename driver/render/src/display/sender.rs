@@ -36,9 +36,9 @@ pub struct DisplaySettings {
     pub image: String,
 }
 
-/// A picture on a display server, the crop window of a film.
+/// Picture of a film's crop window on a display server.
 ///
-/// Dropping it ends its thread, even if packets are still to be sent.
+/// Dropping the display ends its thread, even if packets are still to be sent.
 pub struct Display {
     settings: DisplaySettings,
     window: Window,
@@ -94,7 +94,8 @@ impl Display {
         update_image(&self.settings.image, &shown, &self.names(), values)
     }
 
-    /// Ends the display because it is too slow. The waiting packets, and up to `missed` tiles, are not shown.
+    /// Ends the display because the server is too slow. The waiting packets, and up to `missed` tiles, are
+    /// not shown.
     fn give_up(&self, missed: usize) {
         let packets = self.queue.lock().left() + missed;
         self.fail(DisplayError::Slow { address: self.settings.address.clone(), packets });

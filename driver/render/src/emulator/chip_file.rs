@@ -22,7 +22,7 @@ use super::memory_model::CacheSpec;
 
 /// Maximum size of a file, bytes.
 const MAX_BYTES: u64 = 1 << 16;
-/// Maximum of on-chip memory, of which each chip takes as much from the host.
+/// Maximum on-chip memory of a kind, bytes. Each emulated chip takes as much host memory.
 const MAX_SRAM: u32 = 16 << 20;
 
 /// Capacities in a file, with the ranges that the chip's indices and the host's searches allow. A capacity
@@ -77,9 +77,9 @@ pub enum ChipError {
     Contradictory {
         /// Name of the capacity.
         name: &'static str,
-        /// Its value.
+        /// Value of the capacity.
         value: u32,
-        /// Values that would do.
+        /// Description of the values that are possible.
         rule: String,
     },
 }
@@ -95,7 +95,8 @@ impl Emulated {
         Self::from_json(&text)
     }
 
-    /// Kind with the capacities of a JSON object. Those that it does not state are the reference chip's.
+    /// Reads a kind from a JSON object of capacities. Capacities that the object does not state are the
+    /// reference chip's.
     ///
     /// # Errors
     /// The first capacity that is unknown, out of its range or contradicts others.
@@ -168,8 +169,9 @@ impl Emulated {
         TechniqueMemory { reordering, irradiance_cache, importance_sampling }
     }
 
-    /// Sizes of a board's card with these capacities and of its techniques, bytes. Buffers grow linearly with
-    /// their entries, and so does the chip with its tiles in flight.
+    /// Sizes, bytes, of a board's card with these capacities, and of its reordering, irradiance cache and
+    /// importance sampling. They are extrapolated: buffers are linear in their entries, and the chip in its
+    /// tiles in flight.
     fn sizes(&self) -> [usize; 4] {
         let Budget { tile_pixels, neighbors, gather_queue, irradiance_records, in_flight, .. } = self.budget;
         let [pixels, queue, records, flights] =
@@ -185,10 +187,11 @@ impl Emulated {
 
 /// Alignment of the chip's buffers, bytes.
 const ALIGNMENT: usize = 8;
-/// Entries of each buffer of the smallest probe; another probe has twice as many of one.
+/// Number of entries of each buffer of the smallest probe. Each other probe has twice as many in one buffer.
 const PROBED: usize = 64;
 
-/// Sizes with other numbers of entries, by those of the smallest probe and of one probe for each buffer.
+/// Extrapolates sizes to other numbers of entries, from those of the smallest probe and of one probe for each
+/// buffer.
 fn extrapolated(entries: &[usize; 5], [base, doubled @ ..]: &[[usize; 4]; 6]) -> [i64; 4] {
     std::array::from_fn(|i| {
         let size = |sizes: &[usize; 4]| sizes[i] as i64;
@@ -217,8 +220,8 @@ const fn sizes_of<K: FixedKind>() -> [usize; 4] {
     [size_of::<Card<K, Dram<'static>>>(), reordering, irradiance_cache, importance_sampling]
 }
 
-/// Kind whose chip is measured and never built: the numbers of entries are pixels, candidates, gathers,
-/// records and points.
+/// Kind whose chip is measured by `size_of` and never built. The parameters are the numbers of pixels,
+/// candidates, gathers, irradiance records, gather points and tiles in flight.
 struct Probe<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize>;
 
 impl<const T: usize, const C: usize, const G: usize, const R: usize, const P: usize, const F: usize> ChipKind

@@ -17,13 +17,13 @@ use serde::{Deserialize, Serialize};
 pub struct Contents {
     /// Number of nodes of the bounding volume hierarchy.
     pub nodes: u64,
-    /// Number of boxes in these nodes.
+    /// Number of boxes in nodes of the bounding volume hierarchy.
     pub boxes: u64,
     /// Number of leaves of the hierarchy, without those read again for one triangle of a surface.
     pub leaves: u64,
-    /// Number of vertices in these leaves.
+    /// Number of vertices in leaves of the hierarchy.
     pub vertices: u64,
-    /// Number of triangles in these leaves.
+    /// Number of triangles in leaves of the hierarchy.
     pub triangles: u64,
     /// Number of material records.
     pub materials: u64,
@@ -31,13 +31,13 @@ pub struct Contents {
     pub lights: u64,
     /// Number of inner nodes of photon maps and above irradiance points.
     pub photon_nodes: u64,
-    /// Number of boxes in these nodes.
+    /// Number of boxes in inner nodes of photon maps and above irradiance points.
     pub photon_boxes: u64,
     /// Number of leaves of photons and irradiance points.
     pub photon_leaves: u64,
-    /// Number of photons and irradiance points in these leaves.
+    /// Number of photons and irradiance points in leaves.
     pub photons: u64,
-    /// Number of photons of Jensen's kd-tree. Each is a node.
+    /// Number of photons of Jensen's kd-tree, each of which is a node.
     pub tree_photons: u64,
 }
 

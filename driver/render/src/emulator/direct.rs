@@ -21,8 +21,8 @@ use super::{EmulatedChip, EmulatedKind};
 
 /// A rendered tile, with the work and memory traffic of rendering it.
 pub struct RenderedTile {
-    /// Sums of the light of the pixels, row by row, in the image's radiance units: one per pixel, or with
-    /// layers [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
+    /// Sums of the light of the pixels, row by row, in the card image's radiance units: one per pixel, or
+    /// with layers [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
     pub sums: Vec<ColourSum>,
     /// Albedo, normal and depth of the pixels, row by row.
     pub views: Vec<PixelView>,
@@ -52,7 +52,7 @@ impl RenderedTile {
 /// Error of [`render_tiles_apart`].
 #[derive(Debug, thiserror::Error)]
 pub enum DirectError {
-    /// The image is malformed, or a tile is too large.
+    /// The card image is malformed, or the chip has no room for a tile.
     #[error("{0}")]
     Fault(Fault),
     /// The caller stopped the work.
@@ -66,11 +66,12 @@ impl From<Fault> for DirectError {
     }
 }
 
-/// Renders tiles on chips of a kind, one per thread of `pool`. With `caches` the memory of each tile is
-/// modelled, and its caches are empty at first. `is_stopped` is polled before each tile.
+/// Renders tiles on chips of a kind, one chip per thread of `pool` and one tile at a time. With `caches`,
+/// memory is modelled for each tile anew, with caches that are empty at first. `is_stopped` is polled before
+/// each tile.
 ///
 /// # Errors
-/// If the card image is malformed, or the work is stopped.
+/// If the card image is malformed, a chip has no room for a tile, or the work is stopped.
 pub fn render_tiles_apart(
     pool: &ThreadPool,
     kind: EmulatedKind,
@@ -110,7 +111,7 @@ pub fn render_tiles_in_flight(
     Ok(memory.traffic())
 }
 
-/// [`render_tile`] of an image, in memory that is modelled if there are `caches`.
+/// Renders a tile from a card image, like [`render_tile`]. With `caches`, memory is modelled.
 ///
 /// # Errors
 /// As [`render_tile`].
@@ -130,7 +131,7 @@ pub fn render_tile_of(
 }
 
 /// Renders a tile on a chip with a memory of its own. With an `outlet`, the gathers of pixels are passed to
-/// it; the caller must then do them and add the results to the sums.
+/// the outlet; the caller must then do them and add the results to the sums.
 ///
 /// # Errors
 /// If the card image is malformed, or the chip has no room for the tile.

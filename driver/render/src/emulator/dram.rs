@@ -1,7 +1,7 @@
 //! DRAM of an emulated card, copy-on-write over the host's card image.
 //!
-//! A host and its emulated cards are in one process, and the DRAM of each card contains the same image. A
-//! card can get the image by reference before its first line is written, and checks it like a received one;
+//! A host and its emulated cards are in one process, and the DRAM of each card contains the same card image.
+//! A card can get the image by reference before its first line is written, and checks it like a received one;
 //! or it receives the image line by line over its link. As long as the received lines equal the lines of the
 //! host's image at the same addresses, the card stores no copy and reads the host's lines. Lines beyond the
 //! image are the card's own. At the first line of the image that differs, the card switches to lines of its
@@ -21,7 +21,7 @@ use super::memory_model::{MeasuredMemory, MemoryTraffic};
 #[derive(Clone, Default)]
 pub(crate) struct SharedImage(Arc<OnceLock<Given>>);
 
-/// An image, and its checksum if that is already known.
+/// A card image, and its checksum if already known.
 struct Given {
     image: Arc<CardImage>,
     checksum: Option<u64>,
@@ -41,14 +41,14 @@ pub(super) struct EmulatedDram<'a> {
     lines: Stored<'a>,
     limit: u32,
     shared: SharedImage,
-    /// Image that the memory contains if no line was written, once it is given.
+    /// Card image that the memory contains while no line is written; empty until it is given.
     held: SharedImage,
 }
 
 /// Lines from the first to the last written one.
 enum Stored<'a> {
     Own(Vec<Line>),
-    /// Lines that the card has only read.
+    /// Lines of a card image that is borrowed until the first write.
     Lent(&'a [Line]),
     /// The first `written` lines of an image, by reference, and lines after the whole image.
     Shared {
@@ -59,7 +59,7 @@ enum Stored<'a> {
 }
 
 impl<'a> EmulatedDram<'a> {
-    /// Memory that consists of `lines`, which it copies when it is written.
+    /// Creates a memory with the contents `lines`, which the first write copies.
     pub(super) fn lent(Lines(lines): Lines<'a>) -> Self {
         let limit = u32::try_from(lines.len()).unwrap_or(u32::MAX);
         let (shared, held) = (SharedImage::default(), SharedImage::default());
@@ -75,7 +75,7 @@ impl<'a> EmulatedDram<'a> {
         self.held.0.get().filter(|_| matches!(&self.lines, Stored::Own(own) if own.is_empty()))
     }
 
-    /// Takes over the lines of an image that the memory contains by reference.
+    /// Turns the held card image into written lines, by reference, if no line was written.
     #[cold]
     fn adopt(&mut self) {
         if let Some(Given { image, .. }) = self.held() {
@@ -109,8 +109,8 @@ impl<'a> EmulatedDram<'a> {
         }
     }
 
-    /// Stores lines by reference if they equal the shared image's and follow the lines stored so far. Returns
-    /// whether it did so.
+    /// Stores lines by reference if they equal those of the shared image and leave no gap after the lines
+    /// written so far. Returns whether the lines are stored.
     fn share(&mut self, first: usize, lines: &[[u8; LINE_BYTES]]) -> bool {
         if matches!(&self.lines, Stored::Own(own) if own.is_empty())
             && let Some(Given { image, .. }) = self.shared.0.get()
@@ -127,8 +127,8 @@ impl<'a> EmulatedDram<'a> {
         shares
     }
 
-    /// The card's own lines, and the index of line `first` in them. If `first` is in a shared image, all
-    /// lines are copied before.
+    /// Returns the card's own lines, and the index of line `first` in them. If `first` is in a shared image,
+    /// all lines are copied before.
     fn own_from(&mut self, first: usize) -> (&mut Vec<Line>, usize) {
         if let Stored::Shared { image, written, beyond } = &self.lines
             && first < image.lines().len()
@@ -235,7 +235,7 @@ mod tests {
             let line = LineAddress(line);
             let read = |dram: &mut EmulatedDram| dram.read(Structure::Header, line, 0..1).copied();
             assert!(read(shared) == read(own));
-            // No image has lines beyond the shared one.
+            // `stored` has no lines beyond the shared image.
             if (line.0 as usize) < shared.all().len() - 1 {
                 assert!(shared.stored(line, 2) == own.stored(line, 2));
             }

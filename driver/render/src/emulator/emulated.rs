@@ -1,4 +1,5 @@
-//! The kind of emulated chips: capacities are values, so that one copy of the chip's code serves all of them.
+//! The kind of emulated chips. Its capacities are values, so that one copy of the chip's code serves chips of
+//! all capacities.
 
 use std::collections::HashMap;
 use std::hash::{BuildHasher, Hash, Hasher};
@@ -12,23 +13,24 @@ use photoncard_shared::budget::Budget;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Emulated {
     pub(super) budget: Budget,
-    /// Gather points whose rays are cast together.
+    /// Number of gather points whose rays are cast together.
     pub(super) points: usize,
 }
 
 impl Emulated {
-    /// Kind of the capacities of `K`.
+    /// Kind with the capacities of the kind `K`.
     pub fn like<K: FixedKind>() -> Self {
         Self { budget: K::BUDGET, points: K::Points::ENTRIES }
     }
 
-    /// Kind with another budget, within the ranges of a chip's indices, and equal gather points.
+    /// Replaces the budget, which must be within the ranges of a chip's indices. The number of gather points
+    /// stays.
     #[must_use]
     pub fn with_budget(self, budget: Budget) -> Self {
         Self { budget, ..self }
     }
 
-    /// A chip of this kind.
+    /// Creates a chip of this kind.
     pub fn chip(self) -> EmulatedChip {
         Chip::sized(self, self.points)
     }
@@ -50,7 +52,7 @@ impl ChipKind for Emulated {
     }
 }
 
-/// Family of containers on the heap.
+/// Family of containers on the heap, whose capacities are values.
 #[derive(Clone, Copy, Debug)]
 pub enum Heap {}
 
@@ -206,7 +208,7 @@ impl<K: Copy + Eq + Hash, V> Map<K, V> for HeapMap<K, V> {
     }
 }
 
-/// The hash function FNV-1a, of 64 bits, as that of the maps on boards.
+/// The hash function FNV-1a, with 64 bits. Maps on boards are hashed by FNV-1a too.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fnv;
 
@@ -237,7 +239,7 @@ impl Hasher for FnvState {
     }
 }
 
-/// Storage of candidates of a photon search.
+/// Squared distances and contents of the candidates of a photon search.
 #[derive(Debug)]
 pub struct HeapCandidates {
     distances: Vec<u32>,

@@ -1,4 +1,4 @@
-//! A measured memory of any kind, called through a function table.
+//! A measured memory of any kind, as a trait object.
 
 use std::ops::Range;
 

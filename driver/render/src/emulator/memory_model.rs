@@ -12,7 +12,7 @@ use photoncard_shared::address::{LINE_BYTES, Line, Structure};
 use super::contents::{Contents, Inspected};
 use super::trace::TraceFile;
 
-/// Caches between a chip and its DRAM, as in the argument of `--cache`.
+/// Caches between a chip and its DRAM.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CacheSettings {
     /// Separate caches for the photon map and for the scene.
@@ -26,7 +26,7 @@ pub enum CacheSettings {
     Unified(CacheSpec),
 }
 
-/// Shape of a cache: `SIZE/LINE/WAYS` of `--cache`, and the mapping to sets.
+/// Shape of a cache, in text `SIZE/LINE/WAYS`, and its mapping of addresses to sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CacheSpec {
     /// Capacity, bytes.
@@ -56,7 +56,7 @@ impl CacheSpec {
     }
 
     fn cache(&self) -> LineCache<Vec<CacheEntry>, Vec<Line>> {
-        // Only `FromStr` and the constants make shapes, and they make valid ones.
+        // Parsed texts, the constants and checked budgets are valid shapes.
         let shape = self.shape().unwrap_or_else(|error| unreachable!("{self}: {error:?}"));
         let entries = vec![CacheEntry::EMPTY; shape.entries()];
         let lines = vec![Line::ZERO; shape.lines()];
@@ -264,7 +264,7 @@ where
     }
 
     fn take_trace(&mut self) -> Option<TraceFile> {
-        // Below the caches: what counts contents, requests, the caches themselves, and what counts fetches.
+        // Below `Inspected`, `Counted` of requests, the caches, and `Counted` of fetches.
         self.below_mut().below_mut().below_mut().below_mut().take_trace()
     }
 }

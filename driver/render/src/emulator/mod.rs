@@ -102,7 +102,7 @@ impl EmulatedKind {
         }
     }
 
-    /// The kind of the emulator's chips that has these capacities.
+    /// Capacities of this kind, as values.
     pub fn emulated(self) -> Emulated {
         match self {
             Self::Reference => Emulated::like::<Reference>(),
@@ -160,7 +160,8 @@ pub(crate) struct EmulatedCard {
     port: Option<LoopbackPort>,
     trace_has_failed: Option<Arc<AtomicBool>>,
     tile_lines: TileLines,
-    /// Image that the memory contains by reference as long as nothing was loaded.
+    /// Handle that gives a card image to the empty memory by reference; `None` once taken, and for a modelled
+    /// memory.
     held: Option<SharedImage>,
 }
 
@@ -190,8 +191,8 @@ impl EmulatedCard {
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
     }
 
-    /// Takes the empty memory of a card into which nothing was loaded, so that an image can be given to it by
-    /// reference; `None` from the second call on, and for a modelled memory.
+    /// Takes the handle that gives a card image by reference to a memory into which nothing was loaded;
+    /// `None` from the second call on, and for a modelled memory.
     pub(crate) fn take_empty_memory(&mut self) -> Option<SharedImage> {
         self.held.take()
     }

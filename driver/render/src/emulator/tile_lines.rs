@@ -1,5 +1,5 @@
-//! Number of lines that a chip read from its DRAM for each tile. It is passed beside the link, because card
-//! and host are in one process.
+//! Number of lines that a chip read from its DRAM for each tile. The number is passed beside the link,
+//! because card and host are in one process.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -28,11 +28,11 @@ impl TileLines {
     }
 }
 
-/// Memory that records the number of lines of each tile when the tile ends.
+/// Memory that records the number of DRAM lines read for each tile when the tile ends.
 pub(super) struct TileMeter<M> {
     memory: M,
     notes: TileLines,
-    /// Number of lines of all tiles so far.
+    /// Number of DRAM lines read for all tiles so far.
     counted: u64,
 }
 

@@ -32,8 +32,8 @@ pub struct PartialSettings {
 }
 
 impl PartialSettings {
-    /// Reads the settings of the samples that a render resumes from, by option names; `None` if it does not
-    /// resume or there are no samples.
+    /// Reads the settings of the samples that a render resumes from, by option names; `None` without
+    /// `resume`, or if the file does not exist or ends within its head.
     ///
     /// # Errors
     /// If the file is not a partial render of this version, its settings are damaged, or it is in use by
@@ -46,11 +46,10 @@ impl PartialSettings {
         Ok(read_head(&mut BufReader::new(&file), &self.path)?.map(|head| head.settings))
     }
 
-    /// Checks that the file may be written: it has no tiles, or the render resumes from them.
+    /// Checks that a render may write the file: without `resume`, it must have no tiles.
     ///
     /// # Errors
-    /// [`PartialError::Unfinished`] if tiles would be lost; or if the file is not a partial render of this
-    /// version, its settings are damaged, or it is in use by another render or unreadable.
+    /// If the file is in use or unreadable; without `resume`, also if it has tiles, is foreign or damaged.
     pub fn check_free(&self) -> Result<(), PartialError> {
         let file = file::open(&self.path, false)?;
         file.filter(|_| !self.resume).map_or(Ok(()), |file| check_empty(&file, &self.path))
@@ -83,7 +82,7 @@ pub(super) fn read_head(reader: &mut impl BufRead, path: &Path) -> Result<Option
     Ok(Some(Head { settings, bytes: (bytes.len() + sum.len()) as u64, checksum }))
 }
 
-/// Encodes a head. Returns it and the checksum of title and settings.
+/// Encodes a head. Returns its bytes, and the checksum of title and settings.
 pub(super) fn encode(settings: &Value) -> (Vec<u8>, u32) {
     let mut bytes = format!("{}{settings}\n", title()).into_bytes();
     let sum = checksum(&bytes);
@@ -113,7 +112,7 @@ pub(super) fn title() -> String {
     format!("{FAMILY}{VERSION}\n")
 }
 
-/// Descriptions of the settings that differ.
+/// Describes the settings that differ between a file and the render.
 pub(super) fn differences(found: &Map<String, Value>, asked: &Value) -> Vec<String> {
     let empty = Map::new();
     let asked = asked.as_object().unwrap_or(&empty);

@@ -1,5 +1,5 @@
-//! Partial renders: finished tiles are appended to a file beside the picture, so that `--resume` can continue
-//! from them.
+//! Partial renders: finished tiles are appended to a file beside the picture, so that a later render can
+//! resume from them.
 //!
 //! ```text
 //! photoncard partial render 4\n
@@ -54,7 +54,7 @@ pub struct PartialRender {
     kept: Mutex<KeptTiles>,
 }
 
-/// Open file, and its tiles.
+/// State of the file of finished tiles.
 #[derive(Default)]
 struct KeptTiles {
     /// The file, locked; `None` until it is created.
@@ -137,8 +137,8 @@ impl PartialRender {
         Ok(base)
     }
 
-    /// Checks that a file that was read still has its settings. Records of another picture have valid
-    /// checksums too.
+    /// Checks that a file still has the head that was read first. A file with another head is another
+    /// picture's, and must not be truncated.
     fn check_unchanged(&self, reader: &mut BufReader<&File>, head: &Head) -> Result<(), PartialError> {
         reader.rewind().map_err(|error| self.error(error))?;
         let is_same = read_head(reader, &self.path)?.is_some_and(|again| again.checksum == head.checksum);
@@ -146,7 +146,7 @@ impl PartialRender {
     }
 
     /// Checks that a file being written still has this render's settings, whose checksum is `head`. Tiles
-    /// after those of another picture would be lost.
+    /// appended to the file of another picture would be lost.
     fn check_own(&self, mut file: &File, head: u32) -> Result<(), PartialError> {
         file.rewind().map_err(|error| self.error(error))?;
         let found = read_head(&mut BufReader::new(file), &self.path)?;
@@ -182,7 +182,7 @@ impl PartialRender {
         Ok(())
     }
 
-    /// Invalidates the record of a tile by overwriting its magic number, so that readers skip it.
+    /// Invalidates the record of a tile by overwriting the record's head with zeros, so that readers skip it.
     fn strike_out(&self, kept: &mut KeptTiles, tile: &Tile) -> Result<(), PartialError> {
         let start = kept.records.remove(&tile.id);
         let (Some(start), Some(file)) = (start, &mut kept.file) else { return Ok(()) };
@@ -225,7 +225,7 @@ impl PartialRender {
     /// # Errors
     /// If a write failed.
     pub(crate) fn check(&self) -> Result<(), PartialError> {
-        // Another thread holds the lock to write, and its failure is found by the next call.
+        // If another thread holds the lock, it is writing a tile: the next call finds its failure.
         let Ok(mut kept) = self.kept.try_lock() else { return Ok(()) };
         kept.failed.take().map_or(Ok(()), Err)
     }
@@ -234,7 +234,7 @@ impl PartialRender {
     /// render, and stays.
     ///
     /// # Errors
-    /// If it cannot be removed.
+    /// If the file cannot be removed.
     pub fn remove(self) -> Result<(), PartialError> {
         match &self.lock().file {
             Some(file) => file::remove(file, &self.path).map_err(|error| self.error(error)),

@@ -26,11 +26,11 @@ pub(super) const HEAD_BYTES: usize = MAGIC.len() + 24;
 pub(super) const CHECKSUM_BYTES: usize = 4;
 /// Maximum number of pixels of a tile, over all kinds of chips.
 const MAX_PIXELS: u64 = REFERENCE.tile_pixels as u64;
-/// Maximum number of bytes that a reader may spend on invalid tiles, in addition to the file's size: some
+/// Maximum number of bytes that a reader may read in invalid tiles, in addition to the file's size: some
 /// hundred of the largest tiles. Without a limit, a hostile file would take hours.
 const MAX_IN_VAIN: u64 = 32 << 20;
 
-/// Encodes the record of a finished tile. Its samples begin with number `first_sample`; `file` is the
+/// Encodes the record of a finished tile. The tile's samples begin with number `first_sample`; `file` is the
 /// checksum of the file's head.
 pub(crate) fn record(finished: &FinishedTile, first_sample: u32, file: u32) -> Vec<u8> {
     let mut bytes = head(finished.tile(), first_sample, finished.format().samples);
@@ -129,8 +129,8 @@ fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     }
 }
 
-/// Reads a tile after its magic number, at most `available` bytes. Returns the number of bytes read; `None`
-/// if the tile is invalid.
+/// Reads the record behind a magic number, at most `available` bytes, and writes its pixels into the film of
+/// its samples. Returns the number of bytes read; `None` if the record is invalid.
 fn read_tile(
     reader: &mut impl Read,
     file: u32,

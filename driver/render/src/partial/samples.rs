@@ -18,7 +18,7 @@ pub(super) struct KeptSamples<'a> {
     /// Empty film of the picture.
     empty: &'a Film,
     ranges: Vec<(SampleRange, Film)>,
-    /// End of the highest range of samples in any record.
+    /// Greatest end of a range of samples in any record.
     most: u32,
 }
 
@@ -45,8 +45,8 @@ impl<'a> KeptSamples<'a> {
         self.empty.window()
     }
 
-    /// Film of a range of samples; `None` if the picture does not have them, or there is no memory for
-    /// another film.
+    /// Film of a range of samples; `None` if the picture does not have them, or there are too many ranges or
+    /// too little memory for another film.
     pub(super) fn film_of(&mut self, samples: SampleRange) -> Option<&mut Film> {
         let end = samples.first.saturating_add(samples.count);
         self.most = self.most.max(end);
@@ -65,11 +65,10 @@ impl<'a> KeptSamples<'a> {
         self.ranges.get_mut(index).map(|(_, film)| film)
     }
 
-    /// Divides the samples that the picture takes over.
+    /// Divides the kept samples into a complete film of the first ones and a film of the remaining ones.
     ///
     /// # Errors
-    /// The greatest number of samples in the file, if all samples are of pictures with other numbers of
-    /// samples.
+    /// The greatest number of samples in the file, if the picture can take over none of the samples.
     pub(super) fn split(mut self) -> Result<Split, u32> {
         let samples = self.format().samples;
         let mut base: Option<Film> = None;

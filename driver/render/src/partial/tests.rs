@@ -215,7 +215,7 @@ fn a_partial_file_is_locked_by_one_render() {
     begin(false, &mut three).unwrap();
 }
 
-/// Every tile of this file is the head of a largest tile, which is read and summed in vain.
+/// The appended records are heads of the largest tiles without pixels. Reading and summing each is in vain.
 #[test]
 fn a_hostile_file_is_read_quickly() {
     let folder = tempfile::tempdir().unwrap();
@@ -309,7 +309,7 @@ fn a_foreign_file_is_refused_and_unchanged() {
         }
         assert_eq!(fs::read(&path).unwrap(), foreign.as_bytes());
     }
-    // Neither written nor removed, if it appears later.
+    // A foreign file that appears after the beginning is neither written nor removed.
     fs::remove_file(&path).unwrap();
     let film = &mut film();
     let begun = begin_render(&partial(&folder, false), json!({}), film).unwrap();
@@ -318,7 +318,7 @@ fn a_foreign_file_is_refused_and_unchanged() {
     assert!(matches!(begun.check(), Err(PartialError::Foreign { .. })));
     begun.remove().unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"notes");
-    // Nor if it replaces a file that was begun.
+    // Nor is one that replaces a file that was begun.
     fs::remove_file(&path).unwrap();
     let begun = begin_render(&partial(&folder, false), json!({}), film).unwrap();
     begun.put(&blank(&tile(0)));
@@ -359,7 +359,7 @@ fn finished_tiles_are_not_lost_without_resume() {
     }
 }
 
-/// Records of another picture have valid checksums too. A file that replaces one being read must be refused.
+/// A file that replaces one being read is another picture's, and must be refused.
 #[test]
 fn a_file_that_changes_while_it_is_read_is_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -459,7 +459,7 @@ fn links_and_pipes_are_refused_and_unchanged() {
     let folder = tempfile::tempdir().unwrap();
     let path = partial(&folder, false).path;
     let own = folder.path().join("own");
-    // Even if the link's target is a partial render.
+    // Links are refused even if the target is a partial render.
     let bytes = written(&folder);
     fs::rename(&path, &own).unwrap();
     let make_pipe = || Ok(rustix::fs::mkfifoat(rustix::fs::CWD, &path, rustix::fs::Mode::RWXU)?);

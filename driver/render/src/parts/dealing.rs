@@ -52,7 +52,7 @@ impl Part {
         self.count
     }
 
-    /// Patches of the part, along the curve. The patches of all parts cover the window exactly once.
+    /// Patches of the part, along the Hilbert curve. The patches of all parts cover the window exactly once.
     pub fn patches(self, window: Window) -> Vec<Tile> {
         deal(window, self.count).filter(|(part, _)| *part == self).map(|(_, patch)| patch).collect()
     }
@@ -84,7 +84,7 @@ impl FromStr for Part {
     }
 }
 
-/// Patches of a window along the curve, with their parts out of `count`.
+/// Patches of a window along the Hilbert curve, each with its part, one of `count`.
 pub(super) fn deal(window: Window, count: u32) -> impl Iterator<Item = (Part, Tile)> {
     let side = patch_side(window, count);
     let mut patches = tiles(window, side, GatherOrder::Tiled);
@@ -109,7 +109,8 @@ fn patch_side(window: Window, count: u32) -> u32 {
     std::iter::successors(Some(WIDEST_PATCH), narrower).last().unwrap_or(WIDEST_PATCH)
 }
 
-/// Index of a point on the Hilbert curve through a quarter of the plane. Its coordinates are below 2^16.
+/// Index of a point on the Hilbert curve through a quarter of the plane. The point's coordinates are below
+/// 2^16.
 fn hilbert([mut x, mut y]: [u32; 2]) -> u64 {
     let mut place = 0;
     for level in (0..16).rev() {

@@ -67,7 +67,7 @@ pub enum PartError {
         /// The missing parts.
         missing: Vec<Part>,
     },
-    /// The picture is not possible.
+    /// The film of the picture is not possible.
     #[error(transparent)]
     Film(#[from] FilmError),
     /// A part cannot be read.

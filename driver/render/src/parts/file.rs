@@ -17,7 +17,7 @@ use crate::partial::records::{decode, record, record_bytes};
 /// Kind and version of the file.
 const KIND: Kind = Kind { name: "photoncard part", version: VERSION };
 
-/// Writes the part stated in the head from a film that has its pixels, whole or not at all.
+/// Writes the file of the part `head.part`, whole or not at all. `film` has the pixels of the part.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -69,10 +69,10 @@ impl PartFile {
         Ok(Self { path: path.to_owned(), head, picture, checksum, bytes })
     }
 
-    /// Checks that the file has the length that the `patches` of the part take.
+    /// Checks that the file is as long as its head and the records of `patches`, the part's patches.
     ///
     /// # Errors
-    /// If it has not.
+    /// If the file has another length.
     pub(super) fn check_length(&self, patches: &[Tile]) -> Result<(), PartError> {
         let records: u64 = patches.iter().map(|patch| record_bytes(patch, &self.picture.format)).sum();
         let [head, whole] = self.bytes;
@@ -87,7 +87,7 @@ impl PartFile {
     /// file is detected.
     ///
     /// # Errors
-    /// If the file is damaged, unreadable, or has another head now; and the errors of `put`.
+    /// If the file is damaged, unreadable, or has changed since it was opened; and the errors of `put`.
     pub(super) fn read(
         &self,
         patches: &[Tile],

@@ -18,11 +18,11 @@ pub struct PartHead {
     pub part: Part,
     /// Provenance of the picture: everything that its pixels depend on, by option names.
     pub settings: Map<String, Value>,
-    /// Layers of the picture, in the form of the argument of `--aov`.
+    /// Layers of the picture besides radiance, in the text form of [`Layers`].
     pub layers: String,
     /// Arguments of the command that made the part.
     pub command: Vec<String>,
-    /// Units of the sums of radiance and depth, as bits of `f32`.
+    /// `f32::to_bits` of the units of the sums: radiance, W/(sr m^2), and depth, metres.
     pub units: [u32; 2],
 }
 
@@ -61,7 +61,7 @@ impl PartHead {
         is_possible.then_some(PartPicture { size: [width, height], window, format, layers })
     }
 
-    /// Descriptions of the settings in which two heads differ, by name.
+    /// Describes the settings in which two heads differ. `own` and `others` are the names of the heads.
     pub(super) fn differences(&self, other: &Self, [own, others]: [&str; 2]) -> Vec<String> {
         let say = |value: Option<&Value>| value.map_or("nothing".to_owned(), Value::to_string);
         let names = self
@@ -98,7 +98,7 @@ impl PartPicture {
     /// Creates an empty film of the picture.
     ///
     /// # Errors
-    /// If it does not fit in memory.
+    /// If the film does not fit in memory.
     pub(super) fn film(&self) -> Result<Film, FilmError> {
         let [width, height] = self.size;
         Film::new(width, height, self.window, self.format)

@@ -24,7 +24,7 @@ pub struct Parts {
 pub struct Merged {
     /// Pixels of the picture.
     pub film: Film,
-    /// Layers of the picture, in the form of the argument of `--aov`.
+    /// Layers of the picture besides radiance.
     pub layers: Layers,
     /// Provenance of the picture: everything that its pixels depend on.
     pub provenance: Map<String, Value>,
@@ -69,7 +69,7 @@ impl Parts {
         self.patches.keys().filter(|part| !found.contains(part)).copied().collect()
     }
 
-    /// Head of one of the files.
+    /// Head of the first file; `None` without files.
     pub fn any(&self) -> Option<&PartHead> {
         self.files.first().map(|file| &file.head)
     }
@@ -93,7 +93,7 @@ impl Parts {
         let Some(PartFile { picture, head, .. }) = first else {
             return Err(PartError::Missing { count: self.patches.len() as u32, missing });
         };
-        // All files are as long as their parts: a film of their pixels is no larger than they are.
+        // Every file is as long as its part: the film takes about as much memory as the files are long.
         let mut film = picture.film()?;
         let mut done: BTreeMap<Part, &PartFile> = BTreeMap::new();
         for file in &self.files {

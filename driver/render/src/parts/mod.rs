@@ -5,8 +5,8 @@
 //! the picture's file has, except for the pixels of other parts:
 //!
 //! ```text
-//! photoncard part 1\n
-//! { part, settings, command and units as JSON }\n
+//! photoncard part 2\n
+//! { part, settings, layers, command and units as JSON }\n
 //! CRC-32C of all bytes before: u32
 //! records of patches, as in a partial render
 //! ```

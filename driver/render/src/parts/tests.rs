@@ -53,7 +53,7 @@ fn refused(paths: &[PathBuf]) -> PartError {
     }
 }
 
-/// A file with other settings replaces one whose head was read. Its pixels have valid checksums too.
+/// A file with other settings, which is valid by itself, replaces one whose head was read.
 #[test]
 fn a_part_that_changes_after_its_head_was_read_is_refused() {
     let folder = tempfile::tempdir().unwrap();

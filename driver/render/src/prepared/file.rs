@@ -33,7 +33,7 @@ impl PreparedScene {
         write(self, path)
     }
 
-    /// Opens a prepared scene.
+    /// Reads a prepared scene into memory, and checks it.
     ///
     /// # Errors
     /// If the file is not a prepared scene, of another version of format or program, damaged, or unreadable.

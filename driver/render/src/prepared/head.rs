@@ -66,10 +66,10 @@ impl Head {
         }
     }
 
-    /// Combines the head with an image to the prepared scene.
+    /// Combines the head with the card image to the prepared scene.
     ///
     /// # Errors
-    /// If a camera or a distance is not possible, or the photons are for one camera.
+    /// If a camera, a distance or the offset is not possible, or the photons are for one camera.
     pub(super) fn into_scene(self, image: CardImage) -> Result<PreparedScene, &'static str> {
         let Self {
             cameras, offset, photons, integrator, max_distance, caustics, paths, frames, notes, ..

@@ -2,7 +2,7 @@
 //! read a glTF file, run a pilot or trace photons.
 //!
 //! ```text
-//! photoncard prepared scene 3\n
+//! photoncard prepared scene 4\n
 //! { cameras, those of frames, checksums, settings, parameters of the photon map and notes as JSON }\n
 //! CRC-32C of all bytes before: u32
 //! zeros up to a multiple of 4096 bytes

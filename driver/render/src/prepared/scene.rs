@@ -16,7 +16,7 @@ use crate::{Integrator, Observer, PhotonMaps, RenderError, RenderSettings};
 
 /// A scene with its photon map, as a card image, and the settings that the image depends on.
 pub struct PreparedScene {
-    /// Cameras of the scene, and known properties of the rest.
+    /// Stand-in for the scene: cameras, offset, checksums, and whether the scene is specular.
     pub(super) scene: Scene,
     pub(super) photons: PhotonMaps,
     pub(super) integrator: Integrator,
@@ -34,7 +34,7 @@ pub(super) struct View {
 
 impl PreparedScene {
     /// Prepares a scene: packs it, lets `choose` determine photons and integrator, and traces photons. The
-    /// image must fit cards with `budgets`. `notes` are the caller's, such as names of inputs.
+    /// card image must fit cards with `budgets`. `notes` are the caller's, such as names of inputs.
     ///
     /// # Errors
     /// As [`Renderer::render_chosen`].
@@ -82,7 +82,7 @@ impl PreparedScene {
         self.frames.keys().copied()
     }
 
-    /// Cameras of a frame, like [`Self::scene`]; `None` if there is no such frame.
+    /// Stand-in for the scene of a frame, with the frame's cameras; `None` if there is no such frame.
     pub fn frame(&self, number: u32) -> Option<Scene> {
         let View { cameras, checksum } = self.frames.get(&number)?;
         let checksums = [checksum, self.scene.checksum_without_cameras()].map(str::to_owned);
@@ -90,12 +90,12 @@ impl PreparedScene {
         Some(Scene::of_cameras(cameras.clone(), offset, checksums, self.scene.is_specular()))
     }
 
-    /// Cameras of the scene, without its other contents.
+    /// Stand-in for the scene: its cameras, without triangles and other contents.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// Notes that the caller of [`Self::new`] passed.
+    /// JSON given to [`Self::new`], such as names of inputs; stored unchanged.
     pub fn notes(&self) -> &Map<String, Value> {
         &self.notes
     }
@@ -112,8 +112,8 @@ impl PreparedScene {
         RenderSettings { photons, integrator, ..settings }
     }
 
-    /// Creates a renderer that has the card image. [`Renderer::render`] renders [`Self::scene`] and
-    /// [`Self::frame`] with it, with settings from [`Self::settings`].
+    /// Creates a renderer with the card image. [`Renderer::render`] takes [`Self::scene`] or [`Self::frame`],
+    /// with settings from [`Self::settings`].
     pub fn renderer(&self) -> Renderer {
         Renderer::with_image(self.kept.clone())
     }
@@ -132,7 +132,7 @@ fn check_cameras(photons_for: PhotonsFor) -> Result<(), RenderError> {
     }
 }
 
-/// Returns whether a camera is valid: finite, with a positive field of view.
+/// Returns whether a camera is valid: finite, with a field of view above 0 and below pi.
 pub(super) fn is_camera(camera: &Camera) -> bool {
     let Camera { name: _, origin, right, up, forward, vertical_fov, aspect } = camera;
     let is_length = |length: f32| length.is_normal() && length > 0.0;

@@ -126,7 +126,7 @@ fn a_damaged_prepared_scene_is_refused_and_named() {
         assert!(error.is_some_and(|error| error.to_string().contains("scene.card")), "{case}");
     };
     for number in 0..200 {
-        // Half of them in the head.
+        // Half of the damage is in the head.
         let most = if number % 2 == 0 { bytes.len() } else { 4096 };
         let place = hash(number) as usize % most;
         let mut damaged = bytes.clone();
@@ -179,7 +179,7 @@ fn a_hostile_prepared_scene_is_refused() {
     let mut hostile = head.clone();
     hostile["cameras"][0]["vertical_fov"] = json!(4.0);
     assert!(refused(&hostile, lines).is_some());
-    // An image of which a section, its length or its layout is wrong, under a checksum that is right.
+    // Card images with a wrong section, length or layout, and a right checksum.
     for (place, value) in [(8, 99), (12, 1), (70, 255), (0, 0)] {
         let mut image = lines.to_vec();
         image[place] = value;

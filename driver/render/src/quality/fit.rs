@@ -29,14 +29,15 @@ pub struct Fit {
     pub interpolates: bool,
     /// Maximum error of interpolated irradiance; infinite if the quality's own error bound is small enough.
     pub max_irradiance_error: f32,
-    /// Adaptive threshold of the cost model for a sample of unit cost, W^(1/2)/(sr^(1/2) m).
+    /// Adaptive threshold of the cost model for one sample of unit cost: `sqrt(M) / w`, W^(1/2)/(sr^(1/2) m),
+    /// with the median radiance `M` and the worth of accuracy `w`.
     pub unit_threshold: f64,
-    /// Adaptive threshold that gives the pilot's pixels 1.1 paths per sample, W^(1/2)/(sr^(1/2) m); `None` if
-    /// these paths do not at least halve the variance of direct light.
+    /// Adaptive threshold at which the pilot's pixels have 1.1 paths per sample after the probes,
+    /// W^(1/2)/(sr^(1/2) m); `None` if these paths do not at least halve the variance of direct light.
     pub spent_threshold: Option<f64>,
     /// Numbers that the scene would need beyond the limits of the quality.
     pub beyond: Beyond,
-    /// Measured noise of the pilot, from which the settings follow.
+    /// Noise and errors that the pilot measured, from which the settings follow.
     pub measured: Measured,
 }
 
@@ -84,28 +85,28 @@ impl Stated {
     }
 }
 
-/// Relative standard deviations of samples in a pilot render, and their costs.
+/// Noise and map errors that pilot renders measured, and the gather rays that a pixel costs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
-    /// Deviation caused by the position of a sample in its pixel.
+    /// Relative standard deviation of a sample caused by its position in the pixel.
     pub place: f64,
-    /// Deviation caused by one shadow ray.
+    /// Relative standard deviation of a sample caused by one shadow ray.
     pub shadow_ray: f64,
-    /// Deviation caused by one gather ray.
+    /// Relative standard deviation of a sample caused by one gather ray.
     pub gather_ray: f64,
-    /// Error of 4x4 pixels caused by a map of a million photons.
+    /// Relative root mean square error of means over 4x4 pixels with a map of a million photons.
     pub million_photons: f64,
     /// Ratio of the squared errors of a map for the camera and of one for any camera; `None` if the camera
     /// uses most photons anyway, or the user stated for which cameras photons are.
     pub photons_for_camera: Option<f64>,
-    /// Number of gather rays that a pixel costs per gather ray setting, including rays of irradiance records
-    /// and of samples without interpolation.
+    /// Gather rays cast per pixel, divided by the setting `gather_rays`: rays of irradiance records, and of
+    /// samples without interpolation.
     pub gather_rays_per_ray: f64,
 }
 
 impl Measured {
-    /// Ratio of a sample's deviations with `shadow_rays` shadow rays and with the pilot's number, considering
-    /// its position and these rays; 1 without noise.
+    /// Ratio of a sample's standard deviation with `shadow_rays` shadow rays to that with the pilot's number,
+    /// caused by position and shadow rays alone; 1 without noise.
     fn deviation_by(&self, shadow_rays: u32) -> f64 {
         let of_rays = |rays: u32| if rays == 0 { 0.0 } else { self.shadow_ray.powi(2) / f64::from(rays) };
         let variance = |rays: u32| self.place.powi(2) + of_rays(rays);
@@ -123,9 +124,9 @@ const FEW_LAMBERTIAN: f64 = 0.05;
 const SHADOW_RAYS: RangeInclusive<u32> = 1..=16;
 /// CPU time of a shadow ray relative to a sample without its rays to lights, as measured in rooms and halls.
 const COST_OF_SHADOW_RAY: f64 = 0.4;
-/// CPU time of a gather ray with its gather, relative to the same.
+/// CPU time of a gather ray with its gather, in the unit of [`COST_OF_SHADOW_RAY`].
 const COST_OF_GATHER_RAY: f64 = 1.2;
-/// CPU time of tracing and storing a photon, relative to the same.
+/// CPU time of tracing and storing a photon, in the unit of [`COST_OF_SHADOW_RAY`].
 const COST_OF_PHOTON: f64 = 2.5;
 /// Minimum and maximum of the threshold of adaptive sampling, relative to that of the cost model.
 const FACTORS_OF_THRESHOLD: [f64; 2] = [0.5, 8.0];
@@ -137,11 +138,11 @@ const WEIGHT_OF_RECORDS: f64 = 0.5;
 /// pixels but a blotch.
 const WEIGHT_OF_MAP: f64 = 6.0;
 /// [`WEIGHT_OF_MAP`] for a map that is guided to the camera. Few parts of the scene then have most of the
-/// photons, and each brings light to a large part of the picture: blotches are wide, and the pilot's few
-/// photons, which are guided less, show a third of their square.
+/// photons, and each brings light to a large part of the picture: blotches are wide, and the pilot's map of
+/// few photons, which is guided less, shows a third of their squared error.
 const WEIGHT_OF_GUIDED_MAP: f64 = 8.0 * WEIGHT_OF_MAP;
-/// Minimum number of photons for each triangle, up to [`MOST_FOR_TRIANGLES`]. Photons that are farther apart
-/// than things are large make furnished rooms too dark, of which the pilot's noise tells nothing.
+/// Minimum number of photons per triangle, up to [`MOST_FOR_TRIANGLES`] in all. A map whose photons are
+/// farther apart than furniture is large makes a room too dark, a bias that the pilot does not measure.
 const PHOTONS_OF_TRIANGLE: usize = 8;
 const MOST_FOR_TRIANGLES: usize = 1_000_000;
 /// Allowed error of 4x4 pixels by the photon map, relative to the aimed noise of the picture. The error of
@@ -215,8 +216,9 @@ impl Fit {
 
     /// Threshold of adaptive sampling: [`Self::spent_threshold`] for the picture's shadow rays, within
     /// [`FACTORS_OF_THRESHOLD`] of the cost model's threshold. The model gives each pixel
-    /// `n = w s sqrt(1 / c)` samples, where `s` is its deviation relative to the square root of its radiance.
-    /// `None` if all samples are probes, or noise is uniform.
+    /// `n = w s sqrt(1 / c)` paths, where `w` is the worth of accuracy, `s` the pixel's standard deviation
+    /// over the square root of its radiance, and `c` the cost of a path. `None` if all samples are probes, or
+    /// noise is too uniform for a gain.
     fn adaptive_threshold(&self, integrator: &Integrator) -> Option<f32> {
         let samples = integrator.planned();
         let cost = 1.0 + COST_OF_SHADOW_RAY * f64::from(integrator.shadow_rays);
@@ -232,7 +234,7 @@ impl Fit {
 impl Quality {
     /// Chooses settings of this quality, for a picture with this finish, by pilot renders of a scene with the
     /// view, filter and sampling in `settings`; `None` if no setting of the quality depends on the scene.
-    /// Seed, cards, threads and crop window have no effect.
+    /// Seed, cards, threads and crop window have no effect on the result.
     ///
     /// # Errors
     /// As [`render`](crate::render).
@@ -279,7 +281,7 @@ impl Level {
             for_camera,
             ..
         } = *variances;
-        // NaN without errors, and then no gain.
+        // The ratio is NaN if no map has errors: there is no gain then.
         let gaining = for_camera.filter(|maps| maps.ratio < MAX_RATIO_FOR_CAMERA);
         let photon = gaining.map_or(of_scene, |maps| maps.photon);
         let number = |variance: f64, cost: f64| self.worth * (variance / cost).sqrt();
@@ -390,7 +392,7 @@ mod tests {
             let mut other = chosen;
             other[index] *= factor;
             if index == 0 {
-                // The shadow rays of a pixel, not of a sample.
+                // The shadow rays of a pixel stay, not those of a sample.
                 other[1] /= factor;
             }
             assert!(loss(&VARIANCES, other) > loss(&VARIANCES, chosen), "{index} {factor}");

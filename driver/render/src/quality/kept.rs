@@ -9,9 +9,9 @@ use crate::{NamedSettings, RenderSettings};
 
 impl Stated {
     /// Copies into `settings` the values that a quality may have chosen for the kept samples of a picture,
-    /// and their planned number, except for stated settings. `kept` has them by option names. A value that is
-    /// not a valid setting is ignored, because a render compares all settings with those of the samples
-    /// anyway.
+    /// and the planned number of samples, except for stated settings. `kept` has them by option names. A
+    /// value that is not a valid setting is ignored, because a render compares all settings with those of the
+    /// samples anyway.
     pub fn take_over(self, settings: &mut RenderSettings, kept: &NamedSettings) {
         let number = |name: &str| kept.get(name).and_then(Value::as_u64);
         let rays = |name: &str| number(name).and_then(|rays| u32::try_from(rays).ok());

@@ -20,7 +20,7 @@ pub enum Quality {
     Paper,
 }
 
-/// Finish of a picture after its render, for which a quality chooses settings.
+/// Finish of a picture: whether a denoiser follows the render, for which a quality has other settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Finish {
     /// The picture is shown as it is.
@@ -32,7 +32,7 @@ pub enum Finish {
 }
 
 impl Finish {
-    /// Finish of a picture with or without a denoiser.
+    /// Returns [`Self::Denoised`] if `is_denoised`, otherwise [`Self::Rendered`].
     pub fn new(is_denoised: bool) -> Self {
         if is_denoised { Self::Denoised } else { Self::Rendered }
     }
@@ -68,8 +68,8 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Level of a picture that is denoised: half of the accuracy and of the samples, an eighth of a pixel's
-    /// gather rays.
+    /// Level of a picture that is denoised: half the worth of accuracy and half the samples, an eighth of a
+    /// pixel's gather rays, and no interpolation.
     fn denoised(self) -> Self {
         let share = |range: RangeInclusive<u32>, divisor| range.start() / divisor..=range.end() / divisor;
         Self {
@@ -118,13 +118,13 @@ impl Quality {
         })
     }
 
-    /// Settings of this quality for an unknown scene. Where [`Self::fit`] would choose, it has the fewest
-    /// samples, and medium numbers of rays and photons.
+    /// Settings of this quality for an unknown scene. In place of what [`Self::fit`] chooses, they have the
+    /// fewest samples, four shadow rays, and middle numbers of gather rays and photons.
     pub fn settings(self) -> RenderSettings {
         self.settings_for(Finish::Rendered)
     }
 
-    /// [`Self::settings`] for a picture that is finished in another way.
+    /// [`Self::settings`] for a picture with the finish `finish`.
     pub fn settings_for(self, finish: Finish) -> RenderSettings {
         let Some(level) = self.level(finish) else { return RenderSettings::default() };
         let samples = *level.samples.start();

@@ -2,10 +2,10 @@
 
 use photoncard_shared::message::MAX_PATHS;
 
-/// Mean number of additional paths per later sample that adaptive sampling is tuned to. It about minimises
-/// time times variance in rooms, halls and single objects. With two to three times as many, this product is
-/// 1.2 times as large in halls and Cornell boxes, and a fifth smaller in pictures where few pixels have
-/// nearly all noise.
+/// Mean number of paths beyond one, per sample after the probes, to which adaptive sampling is tuned. It
+/// about minimises time times variance in rooms, halls and single objects. With two to three times as many,
+/// this product is 1.2 times as large in halls and Cornell boxes, and a fifth smaller in pictures where few
+/// pixels have nearly all noise.
 const EXTRA_PATHS: f64 = 0.1;
 /// Minimum gain, [`Deviations::gain`], at which adaptive sampling is on. Deviations estimated from two
 /// samples make even uniform noise seem uneven, with a gain of 1.3 to 1.5. The gain is 1.5 to 2.2 in Cornell
@@ -39,7 +39,7 @@ impl Deviations {
         Self(pixels.into_iter().map(of_pixel).collect())
     }
 
-    /// Mean number of additional paths per later sample at a threshold.
+    /// Mean number of paths beyond one, per sample after the probes, at a threshold.
     fn extra_paths(&self, threshold: f64) -> f64 {
         let extra = |deviation: &f64| paths(*deviation, threshold) - 1.0;
         self.0.iter().map(extra).sum::<f64>() / self.0.len().max(1) as f64
@@ -55,14 +55,15 @@ impl Deviations {
         if gain.is_finite() { gain } else { 1.0 }
     }
 
-    /// Threshold at which later samples have [`EXTRA_PATHS`] additional paths; `None` if the gain is below
-    /// [`MIN_GAIN`].
+    /// Threshold at which samples after the probes have [`EXTRA_PATHS`] paths beyond one; `None` if the gain
+    /// is below [`MIN_GAIN`].
     pub(super) fn worthy_threshold(&self) -> Option<f64> {
         let threshold = self.threshold();
         (self.gain(threshold) >= MIN_GAIN).then_some(threshold)
     }
 
-    /// Threshold at which later samples have [`EXTRA_PATHS`] additional paths, limited to [`THRESHOLDS`].
+    /// Threshold at which samples after the probes have [`EXTRA_PATHS`] paths beyond one, limited to
+    /// [`THRESHOLDS`].
     fn threshold(&self) -> f64 {
         let [mut low, mut high] = THRESHOLDS;
         for _ in 0..STEPS {
@@ -77,7 +78,7 @@ impl Deviations {
     }
 }
 
-/// Number of paths per later sample of a pixel.
+/// Number of paths per sample after the probes of a pixel with this deviation.
 fn paths(deviation: f64, threshold: f64) -> f64 {
     (deviation / threshold).round().clamp(1.0, MAX_PATHS.into())
 }
@@ -88,7 +89,7 @@ mod tests {
 
     use super::*;
 
-    /// One pixel of a hundred has 900 times the variance of the others.
+    /// Deviations of which one in a hundred has 900 times the variance of the others.
     fn spots() -> Deviations {
         let light = |pixel| if pixel % 100 == 0 { [1.0, 7.0] } else { [3.9, 4.1] };
         Deviations::new((0..1000).map(|pixel| (light(pixel), 4.0)))

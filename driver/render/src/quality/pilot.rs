@@ -28,8 +28,8 @@ const MAX_USED_SHARE: f64 = 0.3;
 /// Number of photons of the smaller map. The larger map has four times as many.
 const FEW_PHOTONS: usize = 16_384;
 const MORE: usize = 4;
-/// Seeds of a pair of renders and of their photons. They differ from the picture's seed, so that the settings
-/// do not depend on that.
+/// Seeds of a pair of renders and of their photons. They differ from the picture's seed, on which settings
+/// must not depend.
 const SEEDS: [u32; 2] = [0x5eed_0001, 0x5eed_0002];
 const PHOTON_SEED: u32 = 0x5eed_0003;
 /// Minimum side of the picture, pixels. In a smaller picture tiles would overlap.
@@ -50,22 +50,22 @@ pub(super) struct Variances {
     pub(super) gather_ray: f64,
     /// Mean squared error in the light of 4x4 pixels, extrapolated to a map of one photon by the law `1 / N`.
     pub(super) photon: f64,
-    /// Errors of maps for the camera; `None` if the camera uses most photons anyway, or the user stated for
-    /// which cameras photons are.
+    /// Errors of photon maps for the camera; `None` if the camera uses most photons anyway, or the user
+    /// stated for which cameras photons are.
     pub(super) for_camera: Option<ForCamera>,
     /// Fraction of the samples that see a surface with a Lambertian part.
     pub(super) lambertian: f64,
-    /// Number of gather rays that a pixel costs per gather ray setting: rays of irradiance records, and of
+    /// Gather rays cast per pixel, divided by the setting `gather_rays`: rays of irradiance records, and of
     /// samples without interpolation.
     pub(super) gather_rays_per_ray: f64,
-    /// Radiance of the median pixel, W/(sr m^2); 1 in a black picture.
+    /// Median radiance of the lit pixels, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
     /// Deviations of the direct light of a sample with the greater numbers of [`SHADOW_RAYS`] and
     /// [`GATHER_RAYS`].
     pub(super) deviations: Deviations,
 }
 
-/// Errors of maps for the camera.
+/// Errors of photon maps that are guided to the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ForCamera {
     /// [`Variances::photon`] of a map for the camera.
@@ -87,7 +87,7 @@ impl ForCamera {
     }
 }
 
-/// Renders the pilots of a picture.
+/// Renders the pilots of a picture. Returns the variances that they show.
 ///
 /// # Errors
 /// If photons cannot be traced, the settings have no valid camera, or the observer stops the render.
@@ -100,7 +100,7 @@ pub(super) fn measure(
     let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
     let pool = threads.build().map_err(RenderError::Chips)?;
     let settings = &enlarged(settings);
-    // Of the whole picture: a part of it has equal pixels.
+    // Tiles are spread over the whole picture, so that a crop has the same settings and pixels.
     let window = Window::full(settings.picture.width, settings.picture.height);
     let tiles = SPREAD.tiles(window);
     let pilot = |photons| Pilot::new(scene, packed, settings, photons, &pool, observer);
@@ -118,11 +118,12 @@ pub(super) fn measure(
     };
     let [few_shadow_rays, shadow_rays] = SHADOW_RAYS;
     let [few_gather_rays, gather_rays] = GATHER_RAYS;
-    // Light by both kinds of rays has the noise of both: each is varied where there are more of the other.
+    // Light has the noise of both kinds of rays: the number of each is varied with the greater number of the
+    // other.
     let by_few_shadow_rays = pair(few_shadow_rays, gather_rays)?;
     let by_few_gather_rays = pair(shadow_rays, few_gather_rays)?;
     let best = pair(shadow_rays, gather_rays)?;
-    // Rays of equal directions in both maps: what differs is the map.
+    // Rays have equal directions with both maps: only the maps differ.
     let by_map = settings.clone().with(|settings| {
         settings.integrator.shadow_rays = 0;
         settings.integrator.gather_rays = gather_rays;
@@ -230,7 +231,8 @@ struct Pilot<'a> {
     observer: &'a dyn Observer,
     /// True if the picture has a caustic map, which replaces the caustics of gather rays.
     has_caustics: bool,
-    /// Fraction of the photons that the picture can use; `None` if it is not needed.
+    /// Fraction of the photons that the picture can use; `None` if the user stated for which cameras photons
+    /// are.
     used_share: Option<f64>,
 }
 
@@ -245,7 +247,7 @@ impl<'a> Pilot<'a> {
     ) -> Result<Self, RenderError> {
         observer.progress(Phase::Pilot, 0, 1);
         let of_picture = settings.photon_settings(scene);
-        // Caustics add no noise: gathers find an empty map instead of one of its own.
+        // Caustics add no noise: their gathers find no map.
         let photons = PhotonSettings { photons, seed: PHOTON_SEED, caustic_photons: 0, ..of_picture };
         let go_on = |_| !observer.is_stopped();
         let traced = TracedPhotons::new(packed, &photons, &go_on)?;
@@ -257,7 +259,8 @@ impl<'a> Pilot<'a> {
         Ok(Self { scene, mapped, pool, observer, has_caustics, used_share })
     }
 
-    /// Number of gather rays of tiles with the irradiance cache, per gather ray setting of a pixel.
+    /// Number of gather rays per pixel of the tiles, with the irradiance cache and the setting `gather_rays`
+    /// 1.
     fn gather_rays_per_ray(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<f64, RenderError> {
         let mut frame = self.frame(settings)?;
         (frame.samples, frame.planned_samples, frame.shadow_rays, frame.gather_rays, frame.seed) =

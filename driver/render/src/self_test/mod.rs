@@ -58,7 +58,7 @@ pub fn card_self_test(address: &CardAddress, observer: &dyn Observer) -> Result<
     self_test_on(&mut open(address)?, &address.name_of(0), observer)
 }
 
-/// Tests the card at the other end of a port, like [`card_self_test`]. `card` is its name in errors.
+/// Tests the card at the other end of a port, like [`card_self_test`]. `card` is the card's name in errors.
 ///
 /// # Errors
 /// As [`card_self_test`].

@@ -31,8 +31,8 @@ impl RenderSettings {
         self.that_change(Changes::Pixels)
     }
 
-    /// Settings that a chip's work and memory traffic depend on, but no pixel, without the kind of chip and
-    /// its caches. They describe a picture that is not part of a series.
+    /// Settings that a chip's work and memory traffic depend on, but no pixel. The kind of chip, its caches
+    /// and [`Schedule::keep_records`](super::Schedule::keep_records) are left out.
     pub fn of_work(&self) -> NamedSettings {
         self.that_change(Changes::Work)
     }

@@ -62,7 +62,7 @@ impl Picture {
         let size = (Some(json!([width, height])), Some(format!("{width}x{height}")));
         let Window { x0, x1, y0, y1 } = self.window();
         let window = [x0, x1, y0, y1];
-        // The layers of the host are in the identity of no tile.
+        // The identity of a picture has only the layers that chips send on request.
         let aov = (Some(json!(layers.of_chip().to_string())), Some(layers.to_string()));
         vec![
             setting(Pixels, "picture.width", "size", size),
@@ -178,14 +178,14 @@ pub struct Integrator {
     pub sampling: Sampling,
     /// Error bound of interpolated irradiance, relative; `None` to interpolate none.
     pub irradiance_error: Option<f32>,
-    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m); `None` for one path per sample. Later samples of
-    /// a pixel are means of several paths if the standard deviation of its first samples, divided by the
-    /// square root of their mean, exceeds it.
+    /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m); `None` for one path per sample. Samples after a
+    /// pixel's probes are means of several paths if the standard deviation of the probes, divided by the
+    /// square root of their mean, exceeds the threshold.
     pub adaptive_threshold: Option<f32>,
 }
 
 impl Integrator {
-    /// Number of samples per pixel among which rays are divided.
+    /// Planned number of samples per pixel, among which rays are divided.
     pub fn planned(&self) -> u32 {
         self.planned_samples.unwrap_or(self.samples)
     }
@@ -252,14 +252,15 @@ pub struct Schedule {
     pub queue: Option<u32>,
     /// Maximum number of tiles in flight on a chip; `None` for the chip's capacity.
     pub in_flight: Option<u32>,
-    /// Pixel near which tiles are rendered first; `None` to spread tiles over the picture. It has no effect
-    /// with modelled memory.
+    /// Pixel near which tiles are rendered first; `None` to spread tiles over the picture. The setting has no
+    /// effect with modelled memory.
     pub focus: Option<[u32; 2]>,
     /// Part of the picture to render; `None` for the whole picture.
     pub part: Option<Part>,
     /// True if the picture is one of several whose samples are added
     /// ([`Renderer::refine`](crate::Renderer::refine)). Cards then keep irradiance records between pictures,
-    /// in their memory beyond the image. It has no effect with `verify`, which compares the work of cards.
+    /// in their memory beyond the card image. The setting has no effect with `verify`, which compares the
+    /// work of cards.
     pub keep_records: bool,
 }
 
@@ -287,8 +288,8 @@ pub struct CardSet {
     pub verify: Option<f64>,
     /// Caches of the memory model; `None` for no model, which has no cost.
     pub caches: Option<CacheSettings>,
-    /// Trace of every read of the chip. It requires a single chip. Without `caches` the default caches are
-    /// modelled.
+    /// Trace of every read of the chip, which must be the only one. Without `caches`, the caches of the kind
+    /// of chip are modelled.
     pub trace: Option<TraceSettings>,
 }
 
@@ -327,7 +328,7 @@ impl CardSet {
         each_card.enumerate().map(|(index, address)| address.name_of(index)).collect()
     }
 
-    /// Caches of the first emulated card's kind.
+    /// Caches of the first emulated card's kind, or of the reference chip if no card is emulated.
     pub fn own_caches(&self) -> CacheSettings {
         let kind = self.addresses.iter().find_map(|address| match address {
             CardAddress::Emulated { kind, .. } => Some(*kind),

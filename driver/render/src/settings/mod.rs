@@ -22,7 +22,7 @@ use photoncard_picture::film::{Film, FilmError, Window};
 use photoncard_picture::sums::SumFormat;
 use photoncard_scene::{Camera, Scene};
 
-/// Settings of a render, in groups. Each field is an option of the command line.
+/// Settings of a render, in groups.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RenderSettings {
     /// Picture, and the camera that sees it.
@@ -67,8 +67,8 @@ impl RenderSettings {
     }
 
     /// Side of the tiles on cards with `budgets`, pixels. It is [`Schedule::tile`] if stated; otherwise the
-    /// widest for which each card has room, because wide tiles read the least memory. For several cards it is
-    /// halved, down to 16 pixels, while the window has fewer than four tiles per card.
+    /// widest for which each card has room, because wide tiles read the least memory. For several cards the
+    /// side is halved, down to 16 pixels, while the window has fewer than four tiles per card.
     pub fn tile_side(&self, budgets: &[Budget]) -> u32 {
         if let Some(side) = self.schedule.tile {
             return side;

@@ -27,7 +27,7 @@ pub struct Setting {
     pub field: &'static str,
     /// Name of the option, such as `spp`. Provenance has the value by this name.
     pub option: &'static str,
-    /// Value for provenance; `None` if it has no influence, or if another row has it.
+    /// Value for provenance; `None` if no result depends on it, or if another row has it.
     pub value: Option<Value>,
     /// Argument with which the option states the value; `None` to leave the option out.
     pub argument: Option<String>,
@@ -36,10 +36,10 @@ pub struct Setting {
 /// Value of a setting for provenance, and as an argument.
 type Stated = (Option<Value>, Option<String>);
 
-/// No value: an error names the field, and nothing depends on it, or another row has its value.
+/// Neither value nor argument: errors name the field, but nothing depends on it, or another row has its
+/// value.
 pub(super) const UNSTATED: Stated = (None, None);
 
-/// Row of a setting.
 pub(super) fn setting(
     changes: Changes,
     field: &'static str,
@@ -66,7 +66,7 @@ pub(super) fn place(place: Option<[f64; 3]>) -> Stated {
     (Some(json!(place)), place.map(|place| list(&place)))
 }
 
-/// Numbers with commas between them. They parse to the same bits.
+/// Writes numbers with commas between them. The text parses to the same bits.
 pub(super) fn list<T: ToString>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(",")
 }

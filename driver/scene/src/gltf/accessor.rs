@@ -1,7 +1,7 @@
 //! Elements of accessors, read in place after every bound is checked.
 //!
-//! Nothing is allocated in proportion to an accessor's count, because it need not be backed by bytes (glTF
-//! fills with zeros).
+//! Nothing is allocated in proportion to an accessor's count, because no bytes need to back the count:
+//! elements without a buffer view are zeros.
 
 use std::borrow::Cow;
 use std::cell::{Cell, RefCell};
@@ -21,13 +21,13 @@ const REMEDY: &str = "export the scene again; the accessor, its buffer view and 
 pub(super) struct Source<'a> {
     pub(super) document: &'a Document,
     buffers: &'a Buffers<'a>,
-    /// Accessors whose sparse indices are known to increase, because many primitives may share one.
+    /// Indices of accessors whose sparse indices were checked to increase: an accessor that many primitives
+    /// share is checked once.
     increasing: RefCell<BTreeSet<usize>>,
-    /// Totals of all decompressed primitives.
     pub(super) decompressed: Decompressed,
 }
 
-/// Totals of decompressed primitives.
+/// Sums over all primitives that were decompressed.
 #[derive(Default)]
 pub(super) struct Decompressed {
     pub(super) triangles: Cell<u64>,
@@ -35,7 +35,7 @@ pub(super) struct Decompressed {
     pub(super) bytes: Cell<u64>,
 }
 
-/// Component types and element types that a use of an accessor allows.
+/// Element and component types that an accessor may have in one use of it, such as for texture coordinates.
 pub(super) struct Format {
     pub(super) types: &'static [Type],
     pub(super) components: &'static [ComponentType],
@@ -47,7 +47,7 @@ pub(super) struct Format {
 pub(super) enum Integers {
     /// Integers as they are.
     Whole,
-    /// The range 0 to 1, or -1 to 1 if signed.
+    /// Integers mapped to 0 to 1, or to -1 to 1 if signed.
     Normalized,
     /// Normalised or not, according to the accessor's `normalized`.
     AsStated,
@@ -111,7 +111,8 @@ impl Sparse<'_> {
     }
 }
 
-/// Decodes a component.
+/// Converts a little-endian component to `f32`; normalised integers are mapped to 0 to 1, or to -1 to 1 if
+/// signed.
 fn number(component: ComponentType, is_normalized: bool, bytes: &[u8]) -> f32 {
     let scaled = |value: f32, whole: f32| if is_normalized { (value / whole).max(-1.0) } else { value };
     match (component, bytes) {
@@ -130,7 +131,8 @@ fn unsigned(bytes: &[u8]) -> u64 {
 }
 
 impl Header {
-    /// Header of accessor `index`, which must have a valid format. `item` is the JSON path that refers to it.
+    /// Reads the header of accessor `index`, whose types `format` must allow. `item` is the JSON path that
+    /// refers to the accessor.
     fn of(
         document: &Document,
         index: usize,
@@ -168,8 +170,8 @@ impl Header {
 }
 
 impl<'a> Elements<'a> {
-    /// Elements of accessor `index`, which must have a valid format. `item` is the JSON path that refers to
-    /// it.
+    /// Reads the elements of accessor `index`, whose types `format` must allow. `item` is the JSON path that
+    /// refers to the accessor.
     pub(super) fn new(
         source: &Source<'a>,
         index: usize,
@@ -210,7 +212,7 @@ impl<'a> Elements<'a> {
         Ok(Self { count, component, components: kind.multiplicity(), is_normalized, base, sparse })
     }
 
-    /// Elements of decompressed indices, which need no accessor.
+    /// Elements of the indices of a decompressed primitive, which need no accessor.
     pub(super) fn indices(indices: impl Iterator<Item = u32>) -> Self {
         let bytes: Vec<u8> = indices.flat_map(u32::to_le_bytes).collect();
         let size = size_of::<u32>();
@@ -358,7 +360,7 @@ impl<'a> Source<'a> {
             size,
             &format!("{item}.values"),
         )?;
-        // The elements have bytes, so the count fits `usize`.
+        // `strided` has found bytes for every element, so `count` fits `usize`.
         let count = usize::try_from(count).map_err(|_| fault(".count", "it is too large"))?;
         let sparse = Sparse { count, indices, values };
         if !self.increasing.borrow_mut().insert(accessor) {

@@ -28,7 +28,7 @@ const REMEDY: &str = "export the animation again; its channels and samplers do n
 /// Animations that play, and the time at which they are evaluated.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Moment {
-    /// Names of the animations that play. All of the file play if the list is empty.
+    /// Names of the animations that play; an empty list plays all animations of the file.
     pub animations: Vec<String>,
     /// Time since the start of the animations, seconds.
     pub seconds: f64,
@@ -65,7 +65,7 @@ pub(super) fn name(index: usize, animation: &json::Animation) -> String {
 /// Indices of the animations with these names; of all if `names` is empty.
 ///
 /// # Errors
-/// If no animation has a name; the error lists the names.
+/// If `names` has a name that no animation has; the error lists the animations' names.
 pub(super) fn playing(document: &Document, names: &[String]) -> Result<Vec<usize>, SceneError> {
     let all: Vec<_> = document.root.animations.iter().enumerate().map(|(i, clip)| name(i, clip)).collect();
     if let Some(unknown) = names.iter().find(|name| !all.contains(name)) {
@@ -101,12 +101,12 @@ pub(super) fn extent(source: &Source<'_>, index: usize) -> Result<[f64; 2], Scen
     Ok(extent.unwrap_or_default())
 }
 
-/// Nodes that an animation moves.
+/// Indices of the nodes that an animation moves.
 pub(super) fn targets(animation: &json::Animation) -> impl Iterator<Item = usize> {
     animation.channels.iter().map(|channel| channel.target.node.value())
 }
 
-/// Channel whose sampler was checked.
+/// Channel of an animation, with its sampler, which was checked.
 struct Channel<'a> {
     source: &'a Source<'a>,
     /// JSON path of the channel.
@@ -158,7 +158,7 @@ impl<'a> Channel<'a> {
         Ok(Self { source, item, node, property, keyframes, values, elements })
     }
 
-    /// Evaluates the channel at a time and adds the value to the pose of its node.
+    /// Evaluates the channel at a time and sets the property in the pose of its node.
     fn apply(&self, seconds: f64, poses: &mut Poses) -> Result<(), SceneError> {
         let pose = poses.entry(self.node).or_default();
         let place = self.keyframes.at(seconds);
@@ -191,14 +191,15 @@ impl<'a> Channel<'a> {
         self.source.document.invalid(&self.item, reason, remedy)
     }
 
-    /// Element of a keyframe. `kind` selects the in-tangent, the value or the out-tangent of a cubic spline.
+    /// Element of a keyframe's value. With a cubic spline `kind` selects the in-tangent (0), the value (1) or
+    /// the out-tangent (2); otherwise it is 0.
     fn key(&self, keyframe: u64, kind: u64, element: u64) -> DVec4 {
         let of_each = self.keyframes.values_of_each();
         let index = (keyframe * of_each + kind) * self.elements + element;
         DVec4::from_array(self.values.floats(index, [0.0; 4]).map(f64::from))
     }
 
-    /// Value of an element, interpolated component by component.
+    /// Value of an element at `place`, interpolated component by component.
     fn value(&self, place: Place, element: u64) -> DVec4 {
         let Place { keyframe, share, interval } = place;
         match self.keyframes.interpolation {
@@ -220,7 +221,8 @@ impl<'a> Channel<'a> {
         }
     }
 
-    /// Evaluates a rotation: linear interpolation along the shorter arc. Its length is 1 unless it is zero.
+    /// Evaluates a rotation; `LINEAR` is spherical, along the shorter arc. The quaternion has length 1, or 0
+    /// if the file's quaternions are zero.
     fn rotation(&self, place: Place) -> DQuat {
         let unit = |value: DVec4| DQuat::from_vec4(value.normalize_or_zero());
         let Place { keyframe, share, .. } = place;

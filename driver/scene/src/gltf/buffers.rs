@@ -13,8 +13,8 @@ use crate::error::SceneError;
 
 const EXPORT_AGAIN: &str = "export the scene again; the buffer and its description do not fit";
 
-/// Bytes of the buffers and of the compressed buffer views that were read. A buffer is read when a view needs
-/// it, because an unused one may be missing or belong to an extension.
+/// Bytes of the buffers that were read and of the buffer views that were decoded. A buffer is read when a
+/// view needs it, because an unused one may be missing or belong to an extension.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
     /// Bytes of each buffer, at least `byteLength` long; empty for placeholders of compressed views, `None`
@@ -24,7 +24,7 @@ pub(super) struct Buffers<'a> {
 }
 
 impl<'a> Buffers<'a> {
-    /// Buffers of a document, which are not read yet.
+    /// Creates the buffers of a document without reading any.
     pub(super) fn of(document: &'a Document) -> Self {
         let Document { root, .. } = document;
         let bytes = root.buffers.iter().map(|_| OnceCell::new()).collect();
@@ -41,7 +41,7 @@ impl<'a> Buffers<'a> {
         self.part(view.buffer.value(), (offset, view.byte_length.0))
     }
 
-    /// Bytes of a buffer at an offset; `None` if they exceed the buffer.
+    /// Returns `length` bytes of a buffer from `offset` on; `None` if the buffer does not have them.
     fn part(&self, buffer: usize, (offset, length): (u64, u64)) -> Result<Option<&[u8]>, SceneError> {
         let Some(cell) = self.bytes.get(buffer) else { return Ok(None) };
         let bytes = match cell.get() {
@@ -57,7 +57,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// Reads a buffer; `None` for the BIN chunk.
+/// Reads a buffer; returns `None` for the BIN chunk.
 fn load_one(document: &Document, index: usize) -> Result<Option<Bytes<'static>>, SceneError> {
     let buffer = &document.root.buffers[index];
     let fault = |field: &str, reason: String, remedy| SceneError::Buffer {

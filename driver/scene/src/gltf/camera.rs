@@ -12,7 +12,7 @@ use super::notices::Notices;
 use crate::error::SceneError;
 use crate::{Camera, FRAMED, Scene};
 
-/// Width of the default camera's view, in widths of the scene.
+/// Width of the default camera's view, in units of the scene's width or height, whichever is larger.
 const MARGIN: f32 = 1.05;
 
 /// Tangent of half the default camera's field of view of 45 degrees.
@@ -21,7 +21,7 @@ const HALF_VIEW_TANGENT: f32 = std::f32::consts::SQRT_2 - 1.0;
 /// Vertical field of view of a default camera inside a room: 65 degrees, in radians.
 const WIDE_VIEW: f32 = 65.0 / 180.0 * std::f32::consts::PI;
 
-/// Converts the file's cameras to the scene's.
+/// Converts the file's cameras to those of the scene, under unique names.
 pub(super) struct CameraPlacer<'a> {
     document: &'a Document,
     names: BTreeSet<String>,

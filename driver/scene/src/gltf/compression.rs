@@ -38,7 +38,7 @@ pub(super) struct Compressed {
 }
 
 impl Compressed {
-    /// Compressed form of a buffer view, if it has one.
+    /// Parses the extension of a buffer view, if it has one.
     pub(super) fn of(
         document: &Document,
         index: usize,

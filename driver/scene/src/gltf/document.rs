@@ -1,4 +1,4 @@
-//! Chunks of a GLB, parsed JSON, and its validation.
+//! Splitting of a GLB into chunks, parsing of the JSON, and its validation.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -64,7 +64,7 @@ impl Document {
         let (text, blob) =
             if bytes.starts_with(GLB_MAGIC) { split_glb(path, &bytes)? } else { (0..bytes.len(), None) };
         let parsed = parse(path, &bytes[text.clone()]);
-        // Whatever its name, a file is what can be read.
+        // The file's name matters only if its JSON cannot be parsed: glTF of any name is read.
         let (mut root, mut shortened) =
             parsed.map_err(|error| other_kinds::refused_file(path, &bytes).unwrap_or(error))?;
         let removed = schema::remove_unknown_paths(&mut root);
@@ -185,7 +185,7 @@ impl Document {
             Fault::Oversize => "the size is beyond this machine's limits",
             Fault::Unsupported => "it is not supported",
         };
-        // The crate names the extension's fields by their types; the file has other names.
+        // The `gltf` crate's paths have `khrLightsPunctual` for the name of the extension.
         let item = path.as_str().replace("khrLightsPunctual", "KHR_lights_punctual");
         Err(self.invalid(item, reason, "export the scene again, or correct this item of the file"))
     }
@@ -198,15 +198,15 @@ impl Document {
                 return;
             }
             let path = path();
-            // `min` and `max` are not used: files without them are accepted.
+            // The loader does not use `min` and `max` of accessors: files without them are accepted.
             let is_bound = path.as_str().ends_with(".min") || path.as_str().ends_with(".max");
             // An accessor without a buffer view is all zeros: exporters write such morph targets.
             let is_zeros = fault == Fault::Missing && is_accessors_view(path.as_str());
-            // Primitives without positions and attributes of unknown names are not rendered.
+            // Primitives without positions are not rendered, and attributes of unknown names are not read.
             let is_attribute = ["POSITION", "<invalid semantic name>"]
                 .iter()
                 .any(|name| ends_in_attribute(path.as_str(), name));
-            // `extensionsRequired` was checked before.
+            // `Fault::Unsupported` is of `extensionsRequired`, which was checked before.
             let is_taken = is_bound || is_zeros || is_attribute && fault != Fault::IndexOutOfBounds;
             if !is_taken && fault != Fault::Unsupported {
                 first = Some((path, fault));
@@ -288,7 +288,7 @@ fn split_glb(path: &Path, bytes: &[u8]) -> Result<(Range<usize>, Option<Range<us
     text.map(|text| (text, blob)).ok_or_else(|| not_gltf("the GLB has no JSON chunk"))
 }
 
-/// Parses the JSON. Returns it with the animations from which channels were removed.
+/// Parses the JSON. Returns the document, and the animations from which channels were removed.
 fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneError> {
     let not_gltf = |reason: &str| SceneError::NotGltf { file: path.to_owned(), reason: reason.to_owned() };
     let text = str::from_utf8(bytes).map_err(|_| not_gltf("it is neither a GLB nor UTF-8 text"))?;
@@ -320,7 +320,7 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
     match strict {
         Ok(root) => Ok((root, Shortened::default())),
         Err(error) if error.is_data() => {
-            // The document as values, and as the crate's types.
+            // `parse_amended` holds the document twice: as JSON values, and as types of the `gltf` crate.
             check(bytes.saturating_mul(2))?;
             foreign::decode(|| Ok(parse_amended(path, text, &extras)), || not_gltf(CONTRADICTION))?
         }
@@ -334,7 +334,7 @@ fn parse_amended(
     text: &str,
     extras: &[Range<usize>],
 ) -> Result<(json::Root, Shortened), SceneError> {
-    // Contents of `extras` may be what no value holds, such as 1e999.
+    // `extras` may contain what `serde_json::Value` cannot hold, such as 1e999.
     let document = serde_json::from_str(text);
     let document = document.or_else(|error| serde_json::from_str(&without(text, extras)).map_err(|_| error));
     let mut document = document.map_err(|error| json_error(path, text, &error))?;
@@ -350,7 +350,7 @@ fn parse_amended(
     Ok((root, shortened))
 }
 
-/// Text with `null` in place of some values, whose ranges are in ascending order.
+/// Returns `text` with `null` in place of the values at these byte ranges, which are in ascending order.
 fn without(text: &str, values: &[Range<usize>]) -> String {
     let mut rest = 0;
     let mut kept = String::with_capacity(text.len());
@@ -364,7 +364,7 @@ fn without(text: &str, values: &[Range<usize>]) -> String {
 
 const CONTRADICTION: &str = "its structure contradicts itself";
 
-/// Text of bytes in UTF-8; empty for invalid ones.
+/// Text of UTF-8 bytes without padding; empty if the bytes are not UTF-8.
 fn json_text(bytes: &[u8]) -> &str {
     str::from_utf8(bytes).map_or("", without_padding)
 }
@@ -374,7 +374,8 @@ fn without_padding(text: &str) -> &str {
     text.strip_prefix('\u{feff}').unwrap_or(text).trim_end_matches('\0')
 }
 
-/// Syntax error with an excerpt, because a line of glTF may contain a whole buffer in base64.
+/// Error of invalid JSON with an excerpt of the line, because a line of glTF may contain a whole buffer in
+/// base64.
 fn json_error(path: &Path, text: &str, error: &serde_json::Error) -> SceneError {
     const CONTEXT: usize = 100;
     let above = error.line().saturating_sub(1);

@@ -1,8 +1,8 @@
 //! Compressed primitives (`KHR_draco_mesh_compression`), decoded by the crate `draco-core`.
 //!
 //! The length of a stream does not bound its contents: equal values may take no bytes. The decoder therefore
-//! checks its counts against those of the primitive's accessors before it allocates, and they are checked
-//! again after decoding.
+//! compares the stream's counts with those of the primitive's accessors before it allocates, and they are
+//! compared again after decoding.
 
 use std::collections::BTreeMap;
 
@@ -22,13 +22,14 @@ use super::limits::MAX_TRIANGLES;
 use super::topology::Topology;
 use crate::error::SceneError;
 
-/// Memory of the decoder per triangle, bytes. It takes 110 without seams of attributes, and more with them.
+/// Assumed memory of the decoder per triangle, bytes. Without seams of attributes it takes 110, with seams
+/// more.
 const TRIANGLE_BYTES: u64 = 256;
 
 /// Size of a triangle's indices, bytes.
 const INDICES_BYTES: u64 = 3 * size_of::<u32>() as u64;
 
-/// Maximum size per vertex of attributes that are in the stream but not named by the extension, bytes.
+/// Maximum size per vertex of attributes that are in the stream but that the extension does not name, bytes.
 const UNNAMED_BYTES: u64 = 64;
 
 const REMEDY: &str =
@@ -164,8 +165,8 @@ impl Counts {
         attributes.saturating_add(self.triangles.saturating_mul(INDICES_BYTES))
     }
 
-    /// Checks that the total of decompressed primitives stays within bounds, and that the process can have
-    /// the memory for this one.
+    /// Checks that the sums over all decompressed primitives stay within bounds, and that the process can
+    /// have the memory for the present one.
     fn check_memory(&self, source: &Source<'_>, item: &str) -> Result<(), SceneError> {
         let (document, sums) = (source.document, &source.decompressed);
         let triangles = sums.triangles.get().saturating_add(self.triangles);
@@ -187,10 +188,10 @@ impl Counts {
             .map_err(|error| SceneError::memory(&document.path, "decompressing its primitives", error))
     }
 
-    /// Checks the triangles of a decoded stream.
+    /// Checks the number of triangles of a decoded stream.
     fn check(&self, topology: Topology, mesh: &Mesh) -> Result<(), String> {
         let found = mesh.num_faces() as u64;
-        // Of a strip, triangles of zero area are not compressed.
+        // A strip's triangles of zero area are not in the stream.
         if found == self.triangles || topology == Topology::Strip && found < self.triangles {
             return Ok(());
         }
@@ -214,7 +215,7 @@ fn decode(stream: &[u8], counts: &Counts) -> Result<Mesh, String> {
     )
 }
 
-/// Component type of glTF for a data type of Draco.
+/// Component type of glTF that equals a data type of Draco, if there is one.
 fn component(kind: DataType) -> Option<ComponentType> {
     match kind {
         DataType::Int8 => Some(ComponentType::I8),
@@ -227,7 +228,7 @@ fn component(kind: DataType) -> Option<ComponentType> {
     }
 }
 
-/// Bytes of an attribute's value at a point.
+/// Bytes of an attribute's value at a point, which is Draco's word for a vertex.
 fn value(attribute: &PointAttribute, point: usize, size: usize) -> Option<&[u8]> {
     let index = attribute.mapped_index(PointIndex(point as u32)).0 as usize;
     let stride = usize::try_from(attribute.byte_stride()).ok()?;

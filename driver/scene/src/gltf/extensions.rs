@@ -17,7 +17,7 @@ pub(super) const SUPPORTED_EXTENSIONS: [&str; 20] = [
     "KHR_materials_sheen",
     "KHR_materials_specular",
     "KHR_materials_transmission",
-    // Rendered with lighting nevertheless, which a notice reports.
+    // Unlit materials are rendered with lighting, which a notice reports.
     "KHR_materials_unlit",
     "KHR_materials_variants",
     "KHR_materials_volume",

@@ -1,4 +1,4 @@
-//! Computes the offset of the scene's origin from the file's, from the bounds of the scene at rest.
+//! Offset of the scene's origin from the file's, computed from the bounds of the scene at rest.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ use super::stated_places;
 use crate::Scene;
 use crate::error::SceneError;
 
-/// Offset of the scene's origin, with the stated translations of nodes that it is subtracted from.
+/// Offset of the scene's origin from the file's, and the nodes' translations from which it is subtracted.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Anchor {
     pub(super) offset: DVec3,
-    /// Translation of every node in double precision; empty if the offset is zero.
+    /// Translation of each node as the file states it, in double precision; empty if the offset is zero.
     stated: Vec<Option<DVec3>>,
 }
 
@@ -47,7 +47,7 @@ impl Anchor {
     }
 
     /// Converts a node's local transform from the file's origin to the scene's. `is_posed` is true if an
-    /// animation states its translation.
+    /// animation states the node's translation.
     pub(super) fn placed(&self, node: usize, mut local: DMat4, is_posed: bool, is_root: bool) -> DMat4 {
         if self.offset != DVec3::ZERO {
             let stated = self.stated.get(node).copied().flatten().filter(|_| !is_posed);
@@ -66,7 +66,8 @@ struct Extent<'e, 's, 'a> {
     locals: BTreeMap<usize, Local>,
 }
 
-/// Bounds of those primitives of a mesh that have triangles, in the mesh's space, and their number.
+/// Bounds, in the mesh's space, of the mesh's primitives that have triangles, and the number of these
+/// triangles.
 #[derive(Clone, Default)]
 struct Local {
     bounds: Vec<Bounds>,
@@ -99,10 +100,10 @@ impl Extent<'_, '_, '_> {
             };
             placed = placed.saturating_add(triangles.saturating_mul(instances.count));
             if placed > MAX_TRIANGLES as u64 {
-                // No scene is so large: the loader says so.
+                // The loader refuses a scene of so many triangles.
                 break;
             }
-            // The loader names an instance without a sound transform.
+            // An instance without a valid transform is skipped here, and the loader reports it.
             let transforms =
                 (0..instances.count).filter_map(|index| instances.transform(self.source, index).ok());
             transforms.for_each(|transform| add(&(world * transform)));

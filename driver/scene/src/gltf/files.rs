@@ -32,7 +32,7 @@ impl Deref for Bytes<'_> {
 pub(super) struct Files(RefCell<BTreeMap<PathBuf, Arc<Vec<u8>>>>);
 
 impl Files {
-    /// Contents of a file.
+    /// Returns the contents of a file, which is read at the first call.
     pub(super) fn read(&self, path: &Path) -> io::Result<Bytes<'static>> {
         let canonical = fs::canonicalize(path)?;
         if let Some(bytes) = self.0.borrow().get(&canonical) {

@@ -18,7 +18,7 @@ use crate::{Encoding, Image};
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
 const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
 
-/// Maximum total size of all image files, bytes. In every format a texel takes at most eight.
+/// Maximum total size of all image files, bytes. In every format a texel takes at most eight bytes.
 const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
 
 /// Image that a texture requests, with its encoding.
@@ -27,7 +27,8 @@ pub(super) struct Wanted {
     pub(super) origin: Origin,
     /// Encoding of an image of 8 bits per channel.
     pub(super) encoding: Encoding,
-    /// Encoding of an image of 16 bits per channel that keeps more than 8; `None` to reduce it to 8 bits.
+    /// Encoding that keeps more than 8 bits of an image of 16 bits per channel; `None` to reduce the image to
+    /// 8 bits.
     pub(super) deep: Option<Deep>,
 }
 

@@ -5,25 +5,26 @@ use rayon::prelude::*;
 
 use crate::{PunctualKind, Scene, Triangle};
 
-/// Number of rays in which visibility is tested from a point.
+/// Number of test rays from a point, spread evenly over the sphere.
 const DIRECTIONS: u32 = 96;
 
 /// Maximum number of rays that may leave a closed room, through cracks between its walls.
 const MAX_OPEN: usize = 3;
 
-/// Maximum number of triangles for which rays are cast without an acceleration structure.
+/// Maximum number of triangles of a scene that is tested, because each ray is tested against every triangle.
 const MAX_TRIANGLES: usize = 4_000_000;
 
 /// Number of lamps that are tested, the brightest first.
 const LAMPS: usize = 4;
 
-/// Position of the camera, as a fraction of the distance to the wall behind it.
+/// Position of the camera between the tested point, 0, and the wall behind it, 1.
 const BEFORE_WALL: f32 = 0.92;
 
 /// Offset of the test rays' origin from the lamp's surface, as a fraction of the scene's diagonal.
 const CLEARANCE: f32 = 1e-4;
 
-/// Offsets of tested points from the middle of the scene's bounding box, as fractions of its sides.
+/// Offsets in x and z of tested points from the middle of the scene's bounding box, as fractions of the box's
+/// sides.
 const STEPS: [f32; 3] = [0.0, 0.2, -0.2];
 
 /// Kind of the default view of a scene without cameras.
@@ -47,7 +48,7 @@ pub(super) fn view(scene: &Scene) -> Option<(Vec3, Vec3)> {
     let place = places.find(|place| is_enclosed(scene, (*place, None)))?;
     let lengths = [Vec3::Z, Vec3::X, Vec3::NEG_Z, Vec3::NEG_X]
         .map(|back| (back, distance(scene, place, back).unwrap_or(0.0)));
-    // Of equal lengths the first: a camera of glTF looks along -z.
+    // Of equal lengths the first is taken, a view along -z like that of a camera of glTF.
     let (back, length) = lengths.into_iter().reduce(|a, b| if b.1 > a.1 { b } else { a })?;
     Some((place + back * (BEFORE_WALL * length), -back))
 }
@@ -81,8 +82,8 @@ fn lamps(scene: &Scene) -> Vec<Lamp> {
     lamps.into_iter().take(LAMPS).map(|(_, lamp)| lamp).collect()
 }
 
-/// Returns whether rays from a lamp meet surfaces in nearly all directions, and mostly not the backs of
-/// one-sided ones.
+/// Returns whether nearly all rays from a lamp meet surfaces, and less than half of them the back of a
+/// one-sided surface.
 fn is_enclosed(scene: &Scene, (place, side): Lamp) -> bool {
     let directions = (0..DIRECTIONS).map(direction);
     let directions: Vec<Vec3> =

@@ -20,7 +20,7 @@ use gltf::json;
 use super::specular_glossiness::Conversion;
 use crate::{Camera, Material};
 
-/// Maximum number of bytes of memory per byte of JSON.
+/// Maximum number of bytes of memory per byte of JSON, beyond [`BYTES_OF_ANY`].
 pub(super) const BYTES_OF_A_BYTE: u64 = 32;
 
 /// Memory that the parsed form of any JSON may take, however short, bytes.
@@ -44,7 +44,7 @@ pub(super) struct Scanned {
     pub(super) bytes: u64,
     /// JSON path of the first repeated key of an object. Keys in `extras` may repeat.
     pub(super) repeated_key: Option<String>,
-    /// Byte ranges of the values of `extras`, except those inside others.
+    /// Byte ranges of the values of `extras`, without `extras` inside of other `extras`.
     pub(super) extras: Vec<Range<usize>>,
 }
 
@@ -86,7 +86,8 @@ pub(super) fn scan(text: &str) -> Option<Scanned> {
     Some(Scanned { bytes, repeated_key, extras })
 }
 
-/// Index of the quotation mark that ends a string, or the length of the text without one.
+/// Index of the quotation mark that ends the string whose text begins at `at`, or the length of the whole
+/// text without one.
 fn end_of_string(bytes: &[u8], mut at: usize) -> usize {
     while let Some(byte) = bytes.get(at) {
         match byte {
@@ -156,7 +157,8 @@ struct Scan<'t> {
     frames: Vec<Frame>,
     /// Keys of the objects that enclose the current position, the outermost first.
     keys: Vec<Cow<'t, str>>,
-    /// Start of the outermost enclosing `extras`, and the number of frames around it; `None` outside.
+    /// Byte index of the value of the outermost enclosing `extras`, and the number of frames around it;
+    /// `None` outside of `extras`.
     free: Option<(usize, usize)>,
     repeated_key: Option<String>,
     extras: Vec<Range<usize>>,
@@ -183,7 +185,8 @@ impl<'t> Scan<'t> {
         }
     }
 
-    /// Processes a string, a key or a value, between its quotation marks.
+    /// Processes a string, which is a key or a value. Its opening quotation mark is byte `start`; its closing
+    /// one is the byte before `end`.
     fn string(&mut self, text: &'t str, start: usize, end: usize) {
         match self.frames.last_mut().filter(|frame| frame.expects_key) {
             Some(frame) => {
@@ -201,7 +204,7 @@ impl<'t> Scan<'t> {
         }
     }
 
-    /// Counts a value and returns its position.
+    /// Counts a value that begins at byte `start`, and returns its position in the document.
     fn begin_value(&mut self, start: usize) -> Kind {
         let depth = self.frames.len();
         let Some(frame) = self.frames.last_mut() else { return Kind::Root };
@@ -241,7 +244,7 @@ impl<'t> Scan<'t> {
     /// JSON path of a key of the object that was closed last, whose first key has the index `first`.
     fn path_to(&self, key: &str, first: usize) -> String {
         let mut path = String::new();
-        // The present key of an object precedes the keys of the object in it.
+        // In `keys` the last key of each open object precedes the first key of the next inner object.
         let mut ends = self.frames.iter().filter_map(|frame| frame.first_key).skip(1).chain([first]);
         for frame in &self.frames {
             if frame.first_key.is_none() {

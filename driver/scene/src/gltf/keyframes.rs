@@ -20,12 +20,12 @@ pub(super) struct Keyframes<'a> {
 /// Position of a time between two keyframes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
-    /// Last keyframe at or before the time, or the first keyframe.
+    /// Index of the last keyframe at or before the time; 0 if the time precedes all keyframes.
     pub(super) keyframe: u64,
     /// Fraction of the interval to the next keyframe that has passed, 0 to 1. It is 0 before the first
     /// keyframe and after the last.
     pub(super) share: f64,
-    /// Time between the two keyframes, seconds.
+    /// Time between the two keyframes, seconds; 0 if the time is not between two.
     pub(super) interval: f64,
 }
 
@@ -78,7 +78,8 @@ impl<'a> Keyframes<'a> {
     pub(super) fn at(&self, seconds: f64) -> Place {
         let last = self.count().saturating_sub(1);
         let (mut low, mut high) = (0, last);
-        // The last keyframe at or before the time lies within low..=high, or is the first.
+        // The last keyframe at or before `seconds` lies within `low..=high`; if there is none, the first
+        // does.
         while low < high {
             let middle = high - (high - low) / 2;
             if self.time(middle) <= seconds {

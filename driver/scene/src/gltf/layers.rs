@@ -149,7 +149,7 @@ impl Reader<'_, '_> {
     fn normal(&mut self) -> Result<Option<NormalMap>, SceneError> {
         let Some(texture) = &self.source.normal_texture else { return Ok(None) };
         let place = format!("materials[{}].normalTexture", self.index);
-        // The glTF library keeps its transform among unknown extensions.
+        // The `gltf` crate keeps the transform of a normal texture among unknown extensions.
         let source = serde_json::to_value(texture).and_then(serde_json::from_value::<NormalSource>);
         let source = source.map_err(|error| {
             self.document.invalid(place.as_str(), error.to_string(), "write it as glTF 2.0 says")
@@ -164,7 +164,8 @@ impl Reader<'_, '_> {
             return Ok(());
         };
         let name = "KHR_materials_specular";
-        // Alpha is linear in either encoding: both textures are often of one image.
+        // The factor is in alpha, which is linear in sRGB too: the two textures, often of one image, share an
+        // encoding.
         let [factor, colour] = [&specular.specular_texture, &specular.specular_color_texture];
         layers.specular_texture = self.texture(name, "specularTexture", factor.as_ref(), Use::Colour)?;
         layers.specular_colour_texture =

@@ -63,7 +63,7 @@ impl<'a> LightPlacer<'a> {
         Ok(())
     }
 
-    /// Colour times intensity, in the scene's units.
+    /// Colour times intensity per linear RGB channel, W/sr, or W/m^2 of a directional light.
     fn intensity(&self, index: usize) -> Result<Vec3, SceneError> {
         let light = &self.document.lights()[index];
         let divisor = match light.type_ {
@@ -124,13 +124,13 @@ fn spot(light: &Light) -> Option<&Spot> {
     light.spot.as_ref().filter(|_| matches!(light.type_, Checked::Valid(Type::Spot)))
 }
 
-/// Half angles of a spot light's cones, radians: `0 <= inner <= outer <= pi / 2`. A light without `outer`
+/// Half angles of a spot light's cones, radians: `0 <= inner <= outer <= pi / 2`. With `outer` 0 the light
 /// illuminates nothing.
 #[derive(Default)]
 struct Cone {
     inner: f32,
     outer: f32,
-    /// True if the file's angles differ from these by more than rounding.
+    /// True if the file's angles differ from `inner` and `outer` by more than rounding.
     is_clamped: bool,
 }
 

@@ -74,7 +74,7 @@ fn load_one(
     let is_gltf = matches!(material.reflection, Reflection::MetallicRoughness { .. });
     let base = (unlimited_f0(source), is_gltf);
     material.layers = layers::load(document, index, source, textures, base)?;
-    // Light that comes through a leaf has reached its back.
+    // Diffuse transmission makes a surface double-sided: the transmitted light has arrived at the back.
     let transmits_diffusely =
         material.layers.as_ref().is_some_and(|layers| layers.diffuse_transmission.is_some());
     material.double_sided |= transmits_diffusely;
@@ -240,7 +240,7 @@ fn read_phong(
         return Ok(None);
     }
     let extras: Extras = serde_json::from_str(extras.get()).map_err(|error| {
-        // Line and column refer to the extract, not to the file.
+        // The message's line and column refer to `extras`, not to the file, and are cut off.
         let message = error.to_string();
         let message = message.split(" at line ").next().unwrap_or_default();
         SceneError::Material {

@@ -25,9 +25,9 @@ pub(super) struct MeshPlacer<'a> {
     placed: BTreeMap<usize, u64>,
     /// Number of triangles and primitives to convert, including triangles of zero area.
     work: u64,
-    /// Meshes with attributes that are not finite.
+    /// Indices of meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
-    /// Meshes whose last vertices form no whole triangle.
+    /// Indices of meshes with a primitive whose last vertices form no whole triangle.
     pub(super) incomplete: BTreeSet<usize>,
 }
 
@@ -43,7 +43,7 @@ impl<'a> MeshPlacer<'a> {
         }
     }
 
-    /// Counts the triangles of `instances` instances of mesh `index`.
+    /// Counts the triangles of `instances` instances of mesh `index`, at most [`MAX_TRIANGLES`] in all.
     pub(super) fn count(
         &mut self,
         index: usize,
@@ -105,7 +105,7 @@ impl<'a> MeshPlacer<'a> {
         Ok(!self.primitives(index, scene)?.is_empty())
     }
 
-    /// Primitives of triangles of mesh `index`.
+    /// Primitives of mesh `index` that consist of triangles.
     pub(super) fn primitives(
         &mut self,
         index: usize,

@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use bevy_mikktspace::{Geometry, Ops, TangentSpace, generate_tangents};
 use glam::{Vec2, Vec3, Vec4};
 
-/// Maximum number of triangles that share a vertex.
+/// Maximum number of triangles at a vertex whose tangents are averaged.
 const FAN: u32 = 128;
 
 /// Memory that [`tangents`] takes per triangle, including argument and result, bytes.
@@ -43,14 +43,14 @@ pub(super) fn tangents(triangles: &[[Corner; 3]]) -> Vec<[Vec4; 3]> {
     }
     let is_shared = |(_, corners): &(usize, &[Corner; 3])| {
         let [a, b, c] = corners.map(|corner| corner.position);
-        // Triangles whose corners coincide affect no other.
+        // A triangle with coinciding corners does not affect its neighbours.
         a != b && b != c && c != a && corners.iter().all(|corner| fans[&corner.vertex()] <= FAN)
     };
     let faces = triangles.iter().enumerate().filter(is_shared).map(|(index, _)| index).collect();
     drop(fans);
     let own = triangles.iter().map(own_tangents).collect();
     let mut mesh = Mesh { triangles, faces, tangents: own };
-    // The error has no variants.
+    // The error type has no variants: the call cannot fail.
     let _ = generate_tangents(&mut mesh);
     mesh.tangents
 }
@@ -60,7 +60,7 @@ fn own_tangents(corners: &[Corner; 3]) -> [Vec4; 3] {
     let [a, b, c] = corners;
     let [[s, t], [q, r]] = [b, c].map(|corner| (corner.coordinates - a.coordinates).to_array());
     let area = s * r - t * q;
-    // v upwards, of which glTF's bitangent is the direction.
+    // glTF's bitangent points upwards in the texture, against v: its sign is opposite to the area's.
     let sign = if area < 0.0 { 1.0 } else { -1.0 };
     let along = ((b.position - a.position) * r - (c.position - a.position) * t) * -sign;
     corners.map(|Corner { normal, .. }| {
@@ -69,7 +69,7 @@ fn own_tangents(corners: &[Corner; 3]) -> [Vec4; 3] {
     })
 }
 
-/// Input and output of the `MikkTSpace` crate.
+/// Input and output of the crate `bevy_mikktspace`.
 struct Mesh<'t> {
     triangles: &'t [[Corner; 3]],
     /// Indices of the triangles that the crate reads.
@@ -83,7 +83,7 @@ impl Mesh<'_> {
     }
 }
 
-/// Adds zero to remove the sign of zeros, by which the crate would distinguish vertices.
+/// Adds zero to components, because the crate would distinguish -0 and 0 as different vertices.
 impl Geometry<Libm> for Mesh<'_> {
     fn num_faces(&self) -> usize {
         self.faces.len()
@@ -101,7 +101,7 @@ impl Geometry<Libm> for Mesh<'_> {
         (self.corner(face, corner).normal + 0.0).to_array()
     }
 
-    /// Returns coordinates with 1 - v, because v increases upwards in the algorithm.
+    /// Returns coordinates with `-v`, because v increases upwards in the algorithm.
     fn tex_coord(&self, face: usize, corner: usize) -> [f32; 2] {
         let Vec2 { x, y } = self.corner(face, corner).coordinates;
         [x + 0.0, 0.0 - y]
@@ -135,7 +135,8 @@ mod tests {
         Corner { position: position.into(), normal: Vec3::Z, coordinates: coordinates.into() }
     }
 
-    /// Disc of `count` triangles around the origin, with planar texture coordinates.
+    /// Fan of `count` triangles around the origin, with planar texture coordinates. The corners of its rim
+    /// are 0, 1 and 2 times `height` above the origin by turns.
     fn fan(count: u32, height: f32) -> Vec<[Corner; 3]> {
         let rim = |step: u32| {
             let (y, x) = (std::f32::consts::TAU * (step % count) as f32 / count as f32).sin_cos();
@@ -181,8 +182,8 @@ mod tests {
         assert_eq!(tangents(&[triangle])[0].map(Vec4::truncate), [Vec3::ZERO; 3]);
     }
 
-    /// Compares triangles without neighbours, because the whole fan would exceed the stack and the time of a
-    /// test.
+    /// The fans have the tangents of triangles without neighbours, because averaging would exceed the stack
+    /// and the time of a test.
     #[test]
     fn wide_fans_have_their_own_tangents() {
         let mut wide = fan(200_000, 0.0);
@@ -193,7 +194,7 @@ mod tests {
                 .flatten()
                 .all(|tangent| tangent.distance(Vec4::new(1.0, 0.0, 0.0, 1.0)) < 1e-2)
         );
-        // Up to the limit they are averaged.
+        // Up to `FAN` triangles the tangents at a vertex are averaged.
         let apex =
             |count: u32| tangents(&fan(count, 0.5)).iter().map(|corners| corners[0]).collect::<Vec<_>>();
         let is_one = |tangents: &[Vec4]| tangents.iter().all(|tangent| *tangent == tangents[0]);

@@ -1,8 +1,8 @@
 //! Scenes from glTF 2.0 files, `.gltf` and `.glb`.
 //!
-//! The `gltf` crate supplies the types of the JSON and its validation. Its readers of binary data trust the
-//! file and panic on malformed ones, so the bytes are read here: every offset, stride and count is checked
-//! before use, and nothing is allocated for a count alone.
+//! The `gltf` crate supplies the types of the JSON and its validation. Its readers of binary data panic on
+//! malformed files, so the bytes are read here: every offset, stride and count is checked before use, and
+//! nothing is allocated for a count alone.
 
 mod accessor;
 mod animation;
@@ -89,8 +89,8 @@ pub fn load(path: &Path) -> Result<Scene, SceneError> {
 ///
 /// # Errors
 /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, exceeds the cards' memory,
-/// or has no triangle with an area; or if there is no such variant. The error names the location in the file
-/// and the remedy. [`Scene::check_light`] checks for light.
+/// or has no triangle with an area; or if it lacks the variant of `settings`. The error names the location in
+/// the file and the remedy. [`Scene::check_light`] checks for light.
 pub fn load_with(path: &Path, settings: &LoadSettings) -> Result<Scene, SceneError> {
     SceneFile::open(path, settings)?.into_rest()
 }

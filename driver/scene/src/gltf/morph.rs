@@ -19,7 +19,7 @@ const DISPLACEMENTS: Format = Format {
     integers: Integers::AsStated,
 };
 
-/// Maximum number of morph targets of a primitive. A target of a few bytes displaces all vertices.
+/// Maximum number of morph targets of a primitive: each costs time for all vertices, even one of a few bytes.
 const MAX_TARGETS: usize = 1024;
 
 /// Accessors of one morph target's displacements, each with as many elements as the primitive has vertices.

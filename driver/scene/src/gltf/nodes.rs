@@ -24,8 +24,8 @@ use crate::{Camera, LightUnits, Scene};
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Adds the meshes, lights and cameras of the scene's nodes in their poses. Lights are in `units`. `anchor`
-/// caches the origin's offset, which follows from the scene at rest.
+/// Adds the meshes, lights and cameras of the scene's nodes: animated nodes in `poses`, lights in `units`.
+/// `anchor` caches the offset of the scene's origin, which follows from the scene at rest.
 ///
 /// All triangles are counted before the first is added.
 pub(super) fn place(
@@ -87,11 +87,11 @@ struct Placer<'a> {
 }
 
 impl<'a> Placer<'a> {
-    /// Counts the triangles of a node.
+    /// Counts the triangles of all instances of a node's mesh.
     fn count(&mut self, index: usize, scene: &mut Scene) -> Result<(), SceneError> {
         let node = &self.source.document.root.nodes[index];
         let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
-        // Instances are limited by their triangles and primitives; an empty mesh would have no limit.
+        // The limit is on the instances' triangles and primitives, of which an empty mesh has none.
         if !self.meshes.has_triangles(mesh, scene)? {
             return Ok(());
         }
@@ -102,7 +102,7 @@ impl<'a> Placer<'a> {
         self.meshes.count(mesh, instances.map_or(1, |instances| instances.count), scene)
     }
 
-    /// Offset of the origin, computed on first use from the scene at rest.
+    /// Offset of the scene's origin, computed on first use from the scene at rest.
     fn anchor<'o>(
         &mut self,
         found: &'o OnceLock<Anchor>,
@@ -142,7 +142,7 @@ impl<'a> Placer<'a> {
         Ok(())
     }
 
-    /// Weights of the morph targets of a node's mesh.
+    /// Weights of the morph targets of a node's mesh: those of the pose, else of the node, else of the mesh.
     fn weights(&self, node: usize, mesh: usize) -> &'a [f32] {
         let root = &self.source.document.root;
         let posed = self.poses.get(&node).and_then(|pose| pose.weights.as_ref());
@@ -185,8 +185,8 @@ impl<'a> Placer<'a> {
     }
 }
 
-/// Nodes of the default scene, or of the first one, parents before children, with their world transforms.
-/// These are relative to the anchor's origin, or to the file's without an anchor.
+/// Nodes of the default scene, or of the first one, parents before children, with their world transforms. The
+/// transforms are relative to the scene's origin, or to the file's without an anchor.
 fn walk(
     document: &Document,
     poses: &Poses,

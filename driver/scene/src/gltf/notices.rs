@@ -30,7 +30,8 @@ pub(super) struct Notices {
     pub(super) glass: Resolved,
     /// Names of solid glass materials with coinciding faces.
     pub(super) touching_glass: Vec<String>,
-    /// Units of lights that were chosen because of Blender's exporter, unless radiometric.
+    /// Units of the lights that follow from Blender's name in `asset.generator`; `None` if the settings state
+    /// them.
     pub(super) blender_units: Option<LightUnits>,
     /// Names of Blender's spot lights with a penumbra.
     pub(super) blender_spots: Vec<String>,
@@ -42,9 +43,9 @@ pub(super) struct Notices {
     pub(super) unreadable: Vec<String>,
     /// Kind of the default camera, in a file without cameras.
     pub(super) framed: Option<Framed>,
-    /// Meshes with attributes that are not finite.
+    /// Indices of meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
-    /// Meshes whose last vertices form no whole triangle.
+    /// Indices of meshes with a primitive whose last vertices form no whole triangle.
     pub(super) incomplete: BTreeSet<usize>,
 }
 
@@ -63,7 +64,7 @@ fn several(items: &[String]) -> String {
     format!("{}{more}", listed.join(", "))
 }
 
-/// Names of the items for which `holds` is true.
+/// Names of the items for which `holds` is true; `KIND N` for item N without a name.
 fn names<'a, T: 'a>(
     kind: &str,
     items: &'a [T],
@@ -93,7 +94,7 @@ pub(super) struct Sentences {
     pub(super) remarks: Vec<String>,
 }
 
-/// Adds a sentence with names, if there are any.
+/// Adds `SENTENCE: KIND 'a', 'b'` if there are names.
 fn note(sentences: &mut Vec<String>, sentence: &str, kind: &str, names: &[String]) {
     if !names.is_empty() {
         sentences.push(format!("{sentence}: {}", list(kind, names)));
@@ -279,7 +280,7 @@ fn of_units(units: LightUnits) -> Option<&'static str> {
     }
 }
 
-/// Notices on unused features of materials.
+/// Adds notices on features of materials that are ignored.
 fn note_materials(root: &json::Root, sentences: &mut Vec<String>) {
     let mut note = |sentence: &str, kind: &str, names: &[String]| note(sentences, sentence, kind, names);
     let occluded = materials(root, |material| material.occlusion_texture.is_some());

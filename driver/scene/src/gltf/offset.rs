@@ -9,11 +9,11 @@ use glam::{DMat4, DVec3};
 
 use super::vertex::MAX_COORDINATE;
 
-/// Distance from the origin up to which a scene is not moved, in sizes of the scene.
+/// Distance of a scene's centre from the origin beyond which the scene is moved, in sizes of the scene.
 const NEAR: f64 = 16.0;
 
-/// Distance beyond which a scene is moved unless it extends to the origin, metres. Single precision is
-/// coarser than 60 um there.
+/// Distance of a scene's centre from the origin beyond which the scene is moved unless it is larger than
+/// that, metres. Single precision is coarser than 60 um there.
 const FAR: f64 = 1000.0;
 
 /// Least exponent of a power of two to which the offset is rounded: 2^-10 m.
@@ -49,7 +49,8 @@ impl Bounds {
     }
 
     /// Offset of a scene with these bounds, metres. It is 0 along axes on which the scene is near the origin.
-    /// `stated` are integral translations of nodes that contain the whole scene; they are preferred.
+    /// `stated` are translations of nodes that contain the whole scene; one that is integral, and at most the
+    /// scene's size from its centre, is preferred.
     pub(super) fn offset(&self, stated: &[DVec3]) -> DVec3 {
         let size = (self.high - self.low).max_element();
         let furthest = self.low.abs().max(self.high.abs()).max_element();
@@ -70,8 +71,8 @@ impl Bounds {
     }
 }
 
-/// Number with the fewest digits from `low` to `high`, which have one sign, nearest to the middle. A binary
-/// digit costs about half a decimal one.
+/// Returns the number from `low` to `high`, which have one sign, that has the fewest digits: the nearest to
+/// the middle of several. A decimal digit counts as two binary ones.
 fn roundest(low: f64, high: f64) -> f64 {
     let middle = 0.5 * (low + high);
     let magnitude = |base: f64| libm::floor(libm::log2(low.abs().max(high.abs())) / libm::log2(base)) as i32;
@@ -88,8 +89,8 @@ fn roundest(low: f64, high: f64) -> f64 {
     found.min_by(is_better).map_or(0.0, |(_, number)| number)
 }
 
-/// Multiple of a power of `base` in `range` that is nearest to `middle`, with the power. It takes the first
-/// of `powers` that has a multiple in the range.
+/// Returns the multiple of a power of `base` in `range` that is nearest to `middle`, with the exponent: the
+/// first of `powers` that has a multiple in the range.
 fn multiple(
     base: f64,
     mut powers: impl Iterator<Item = i32>,
@@ -103,9 +104,9 @@ fn multiple(
     })
 }
 
-/// Translation of a node relative to the scene's origin. `stated` is in double precision; small values are
-/// rounded to single precision, as in a scene without an offset. The offset is subtracted from nodes without
-/// a parent.
+/// Translation of a node relative to the scene's origin; `stated` is that of the file in double precision.
+/// Components below half the greatest of the offset are rounded to single precision, as in a scene without an
+/// offset. The offset is subtracted from nodes without a parent.
 pub(super) fn translation(stated: DVec3, offset: DVec3, is_root: bool) -> DVec3 {
     let moved = if is_root { stated - offset } else { stated };
     let limit = 0.5 * offset.abs().max_element();

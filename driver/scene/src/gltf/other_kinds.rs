@@ -13,7 +13,7 @@ const BY_HAND: &str =
 /// First bytes of files, and suffixes of their names.
 type Signs = (&'static [&'static [u8]], &'static [&'static str]);
 
-/// Formats other than glTF with their signs.
+/// Formats other than glTF, with the signs by which they are recognised.
 const KINDS: [(Signs, Kind); 15] = [
     ((&[b"photoncard partial render "], &[]), Kind::Partial),
     ((&[b"photoncard part "], &[]), Kind::Part),
@@ -51,9 +51,9 @@ enum Kind {
     Imported(&'static str, &'static str),
     Zip,
     ByHand(&'static str),
-    /// Finished tiles of a render.
+    /// Partial file of a render.
     Partial,
-    /// Part of a picture.
+    /// Part file of a picture.
     Part,
     Prepared,
     Picture,
@@ -164,7 +164,7 @@ fn export(file: &str, import: &str, made: &str) -> String {
     format!("convert it by Blender: blender -b {file}--python-expr {}", shell_word(&code))
 }
 
-/// Python string literal.
+/// Text as a Python string literal.
 fn python(text: &str) -> String {
     format!("\"{}\"", text.replace('\\', "\\\\").replace('"', "\\\""))
 }

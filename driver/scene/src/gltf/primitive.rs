@@ -38,7 +38,7 @@ const JOINTS: Format = Format {
 const WEIGHTS: Format =
     Format { types: &[Type::Vec4], components: FRACTIONS, integers: Integers::Normalized };
 
-// Formats with `KHR_mesh_quantization`, and without it.
+// Formats of vertex attributes, with `KHR_mesh_quantization` or without it.
 
 const fn positions(is_quantized: bool) -> Format {
     let components = if is_quantized { QUANTIZED } else { FLOATS };
@@ -74,7 +74,7 @@ pub(super) struct Primitive<'a> {
     pub(super) index: usize,
     /// Number of triangles.
     pub(super) triangles: u64,
-    /// True if its last vertices form no whole triangle.
+    /// True if the primitive's last vertices form no whole triangle.
     pub(super) has_incomplete: bool,
     topology: Topology,
     pub(super) positions: Elements<'a>,
@@ -82,14 +82,15 @@ pub(super) struct Primitive<'a> {
     pub(super) normals: Option<Elements<'a>>,
     /// Stated tangents, if the material has a normal map.
     pub(super) tangents: Option<Elements<'a>>,
-    /// Set of texture coordinates along which tangents point, if the material has a normal map.
+    /// Index of the set of texture coordinates along whose u the tangents point, if the material has a normal
+    /// map.
     pub(super) tangent_set: Option<usize>,
-    /// Checked or computed tangents, once the first instance is placed.
+    /// Stated tangents once they are checked, or computed ones; empty before the first instance is placed.
     pub(super) known_tangents: OnceCell<Tangents>,
     /// Texture coordinates of the sets that the material uses.
     pub(super) coordinates: [Option<Elements<'a>>; 2],
     pub(super) colours: Option<Elements<'a>>,
-    /// Pairs of accessors of joints and weights; each pair has four of each.
+    /// `JOINTS_n` and `WEIGHTS_n` for each n: four joints of a vertex and their weights.
     pub(super) influences: Vec<(Elements<'a>, Elements<'a>)>,
     /// Morph targets, in the mesh's order.
     pub(super) targets: Vec<MorphTarget<'a>>,
@@ -164,7 +165,7 @@ impl<'a> Primitive<'a> {
         let primitive = &document.root.meshes[mesh].primitives[index];
         let item = format!("meshes[{mesh}].primitives[{index}]");
         let decoded = Decoded::of(source, mesh, index, topology)?;
-        // Whatever a compressed primitive was made of, its stream holds a list.
+        // The stream of a compressed primitive is a list of triangles, whatever the primitive's mode.
         let topology = if decoded.is_some() { Topology::List } else { topology };
         let attributes = AttributeReader { source, item: item.clone(), primitive, decoded };
         let is_quantized = document.is_quantized();
@@ -245,7 +246,8 @@ impl<'a> Primitive<'a> {
         Ok(places.len() as u64)
     }
 
-    /// Elements of the index list that form a triangle; vertex numbers without such a list.
+    /// Positions in the index list of a triangle's corners; vertex numbers if the primitive has no index
+    /// list.
     pub(super) fn corners(&self, triangle: u64) -> [u64; 3] {
         self.topology.vertices(triangle)
     }

@@ -14,7 +14,7 @@ use photoncard_shared::layout::{
 
 use crate::error::SceneError;
 
-/// Memory of a card, and the part that is in use.
+/// Memory of a card and the part that is in use, bytes.
 #[derive(Clone)]
 pub(super) struct Room {
     file: PathBuf,
@@ -31,20 +31,20 @@ impl Room {
         self.take((count * Material::BYTES) as u64, || format!("{count} materials"))
     }
 
-    /// Adds the texels of an image.
+    /// Adds the card memory of an image's texels.
     pub(super) fn texels(&mut self, [width, height]: [u32; 2]) -> Result<(), SceneError> {
         let tiles = u64::from(width.div_ceil(TILE_WIDTH)) * u64::from(height.div_ceil(TILE_HEIGHT));
         self.take(tiles * LINE_BYTES as u64, || "images and materials".to_owned())
     }
 
-    /// Returns whether `triangles` triangles fit even if they share no vertices.
+    /// Returns whether `triangles` triangles fit whatever vertices they share and attributes they have.
     pub(super) fn fits_any(&self, triangles: u64) -> bool {
         let corners = triangles.saturating_mul(3);
         self.available - self.taken
             >= Self::geometry(triangles, corners).saturating_add(attributes(triangles, 2, true))
     }
 
-    /// Adds all triangles of a scene. `bytes` is the size of their leaves, nodes and attributes.
+    /// Adds the card memory of all triangles of a scene, `bytes`, with their nodes and attributes.
     pub(super) fn triangles(&mut self, triangles: u64, bytes: u64) -> Result<(), SceneError> {
         self.take(bytes, || format!("{triangles} triangles, images and materials"))
     }

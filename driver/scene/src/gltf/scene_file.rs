@@ -41,7 +41,7 @@ use crate::{Camera, LightUnits, Scene, SceneContents};
 pub struct SceneFile {
     document: Document,
     light_units: LightUnits,
-    /// Scene without nodes' meshes, lights and cameras.
+    /// Scene without the meshes, lights and cameras of its nodes.
     bare: Scene,
     room: Room,
     /// Images that cannot be read, each with its reason.
@@ -57,8 +57,8 @@ impl SceneFile {
     ///
     /// # Errors
     /// If the file, or a file it refers to, cannot be read, violates a rule of glTF, or its materials and
-    /// images exceed the cards' memory; or if there is no such variant. The error names the location in the
-    /// file and the remedy.
+    /// images exceed the cards' memory; or if it lacks the variant of `settings`. The error names the
+    /// location in the file and the remedy.
     pub fn open(path: &Path, settings: &LoadSettings) -> Result<Self, SceneError> {
         let LoadSettings { dram_bytes, variant, light_units } = settings;
         let mut document = Document::read(path)?;
@@ -144,7 +144,7 @@ impl SceneFile {
     /// empty list stands for all animations.
     ///
     /// # Errors
-    /// If no animation has a name.
+    /// If `names` has a name that no animation has.
     pub fn only_cameras_move(&self, names: &[String]) -> Result<bool, SceneError> {
         let playing = animation::playing(&self.document, names)?;
         Ok(playing.into_iter().all(|index| self.moves_only_cameras(index)))
@@ -171,7 +171,7 @@ impl SceneFile {
         true
     }
 
-    /// Completes a scene, which has all but its nodes' contents, at a moment or at rest.
+    /// Adds the contents of the nodes, at a moment or at rest, to a scene that has everything else.
     fn placed(&self, mut scene: Scene, moment: Option<&Moment>) -> Result<Scene, SceneError> {
         let Self { document, light_units, bare: _, room, unreadable, framed: _, anchor } = self;
         let buffers = Buffers::of(document);

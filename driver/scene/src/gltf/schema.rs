@@ -44,13 +44,13 @@ pub(super) fn is_of_version_1(document: &Value) -> bool {
 /// Animations from which channels without a target node were removed.
 #[derive(Default)]
 pub(super) struct Shortened {
-    /// Animations with channels whose target an extension defines.
+    /// Indices of animations with channels whose target an extension defines.
     pub(super) by_extensions: BTreeSet<usize>,
-    /// Animations with channels that have no target at all.
+    /// Indices of animations with channels that have no target at all.
     pub(super) without_target: BTreeSet<usize>,
 }
 
-/// Amends a document for the crate's types. Returns the animations from which channels were removed.
+/// Amends a document for the `gltf` crate's types. Returns the animations from which channels were removed.
 pub(super) fn amend(document: &mut Value) -> Shortened {
     simplify(document);
     let mut shortened = Shortened::default();
@@ -166,15 +166,15 @@ fn simplify(value: &mut Value) {
     }
 }
 
-/// Reason why `value` cannot be parsed as `T`. It is parsed as text, because the types of the `gltf` crate
-/// are compiled once per input format.
+/// Reason why `value` cannot be parsed as `T`. It is parsed as text, because another input format would
+/// compile the types of the `gltf` crate a second time.
 fn fault<T: DeserializeOwned>(value: &Value) -> Option<String> {
     let error = serde_json::from_str::<T>(&value.to_string()).err()?.to_string();
     let end = error.rfind(" at line ").unwrap_or(error.len());
     Some(error[..end].to_owned())
 }
 
-/// Fault of a member of the root that should be a list.
+/// Fault of a member of the root that is not a list; `None` if there is none.
 fn fault_of_member(name: &str, value: &Value) -> Option<String> {
     match name {
         "asset" => fault::<json::Asset>(value),
@@ -185,7 +185,7 @@ fn fault_of_member(name: &str, value: &Value) -> Option<String> {
     }
 }
 
-/// Fault of an element of a list of the root.
+/// Fault of an element of a list of the root; `None` if there is none.
 fn fault_of(list: &str, element: &Value) -> Option<String> {
     match list {
         "accessors" => fault::<json::Accessor>(element),

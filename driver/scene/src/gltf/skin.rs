@@ -19,7 +19,8 @@ pub(super) struct Skin {
 }
 
 impl Skin {
-    /// Skin `index`, which exists, with the world transforms of the scene's nodes.
+    /// Computes the joint matrices of skin `index`, which exists, from the world transforms of all nodes;
+    /// `None` stands for a node outside the scene.
     pub(super) fn new(
         source: &Source<'_>,
         index: usize,

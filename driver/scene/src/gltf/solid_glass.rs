@@ -16,11 +16,11 @@ use crate::{Material, Reflection, Scene, Transmission, Triangle, parts};
 
 /// Memory per edge of a triangle while edges are matched, bytes.
 const BYTES_OF_AN_EDGE: u64 = 64;
-/// Maximum ratio of stated thickness to extent of a sheet. A water surface exceeds it, because its thickness
+/// Maximum ratio of stated thickness to extent of a sheet. Water surfaces exceed it, because their thickness
 /// is the depth of the water.
 const THIN: f32 = 0.1;
-/// Tolerances of flatness: maximum distance from the plane as a fraction of the extent, and of the greatest
-/// coordinate.
+/// Tolerances of flatness: the maximum distance from the plane is the first times the extent plus the second
+/// times the greatest coordinate.
 const UNEVEN: [f32; 2] = [1e-4, 1e-6];
 
 /// Names of materials, by the change of their surfaces.
@@ -34,7 +34,7 @@ pub(super) struct Resolved {
     pub(super) open: Vec<String>,
 }
 
-/// Triangles by material and by form.
+/// Indices of triangles by material and by form.
 type Surfaces = BTreeMap<u32, BTreeMap<Form, Vec<u32>>>;
 
 /// Form of a part of a glass surface.
@@ -43,7 +43,7 @@ enum Form {
     AsStated,
     Solid,
     Wall,
-    /// Unchanged, although it bounds no solid.
+    /// Stated as a volume although it is open, and left unchanged.
     Open,
 }
 
@@ -73,7 +73,7 @@ pub(super) fn resolve(document: &Document, scene: &mut Scene) -> Result<Resolved
     let mut surfaces = Surfaces::default();
     for part in parts(&corners) {
         let triangles = || part.triangles.iter().map(|&index| &corners[index as usize]);
-        // Two sheets back to back are closed, and hold nothing.
+        // Two sheets back to back are closed, but enclose no volume.
         let is_flat = is_flat(&triangles());
         let is_closed = part.is_closed && !is_flat;
         let extent = extent(triangles());
@@ -119,7 +119,8 @@ fn change(scene: &mut Scene, surfaces: &Surfaces, thicknesses: &[f32]) {
     }
 }
 
-/// Copy of a glass material in another form.
+/// Copy of a glass material in another form. The base colour of a wall includes the absorption over
+/// `thickness` metres.
 fn of_form(material: &Material, form: Form, thickness: f32) -> Material {
     let mut material = material.clone();
     if let Reflection::MetallicRoughness { base_colour, transmission: Some(transmission), .. } =

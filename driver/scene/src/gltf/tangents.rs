@@ -26,7 +26,7 @@ impl VertexReader<'_, '_> {
         Ok(Some(known.get_or_init(|| tangents)))
     }
 
-    /// Returns whether the stated tangents of all triangles are non-zero vectors with a sign.
+    /// Returns whether the stated tangents of all triangles are finite and not zero, with a w other than 0.
     fn are_stated_sound(&self) -> Result<bool, SceneError> {
         for triangle in 0..self.primitive.triangles {
             let corners = self.indices(triangle)?;
@@ -97,7 +97,7 @@ impl VertexReader<'_, '_> {
 }
 
 /// Transforms a tangent to world space, perpendicular to the corner's normal. A mirroring transform inverts
-/// the cross product of the two.
+/// the sign of the bitangent in w.
 fn world(local: Vec4, transform: &Transform, normal: DVec3) -> Vec4 {
     let along = transform.tangent(local.truncate());
     let tangent = (along - normal * normal.dot(along)).normalize_or_zero();

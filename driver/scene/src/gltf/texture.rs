@@ -16,7 +16,7 @@ use crate::error::SceneError;
 use crate::raster::Deep;
 use crate::{Encoding, Material, Scene, Texture, Wrap};
 
-/// Maximum absolute value in a texture transform: beyond it single precision cannot resolve texels.
+/// Maximum absolute value in a texture transform. With greater ones single precision cannot resolve texels.
 const MAX_TRANSFORM: f32 = 1e6;
 
 /// Channels of a texture that a material uses.
@@ -41,7 +41,7 @@ impl Use {
     }
 }
 
-/// Image with the channels that are used.
+/// Image in one encoding, with the uses that textures make of it.
 struct Taken {
     origin: Origin,
     encoding: Encoding,
@@ -92,7 +92,7 @@ impl<'a> Textures<'a> {
     ) -> Result<u32, SceneError> {
         let document = self.document;
         let index = info.index.value();
-        // The glTF library has not checked textures of extensions that it does not know.
+        // The `gltf` crate has not checked textures of extensions that it does not know.
         let Some(texture) = document.root.textures.get(index) else {
             let reason =
                 format!("there is no texture {index}: the file has {}", document.root.textures.len());

@@ -23,7 +23,7 @@ impl Topology {
         }
     }
 
-    /// Topology of a primitive that is rendered. It consists of triangles and has positions.
+    /// Topology of a primitive that is rendered, which consists of triangles and has positions.
     pub(super) fn of_rendered(primitive: &json::mesh::Primitive) -> Option<Self> {
         Self::of(primitive).filter(|_| has_positions(primitive))
     }
@@ -47,7 +47,7 @@ impl Topology {
     }
 }
 
-/// Returns whether a primitive has positions. Without them, its meaning is up to extensions.
+/// Returns whether a primitive has positions. The meaning of one without is up to extensions.
 pub(super) fn has_positions(primitive: &json::mesh::Primitive) -> bool {
     primitive.attributes.contains_key(&Checked::Valid(Semantic::Positions))
 }

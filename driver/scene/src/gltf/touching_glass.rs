@@ -11,9 +11,9 @@ use crate::{Material, Reflection, Scene, Transmission};
 /// Result of joining two coinciding faces.
 #[derive(Clone, Debug, PartialEq)]
 enum Touch {
-    /// Both are removed, because the medium is the same on both sides.
+    /// Both faces are removed, because the medium is the same on both sides.
     None,
-    /// The first becomes the interface of the two media, with this material.
+    /// One face becomes the interface of the two media, with this material, and the other is removed.
     Interface(Box<Material>),
 }
 

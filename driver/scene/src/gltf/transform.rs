@@ -34,13 +34,14 @@ impl Transform {
         self.matrix.transform_vector3(local.as_dvec3())
     }
 
-    /// Unit normal in world space; `None` if it is degenerate.
+    /// Unit normal in world space; `None` if its length is zero or not finite.
     pub(super) fn normal(&self, local: Vec3) -> Option<Vec3> {
         (self.normals * local.as_dvec3()).try_normalize().map(DVec3::as_vec3)
     }
 }
 
-/// Local transform of a node in a pose; `None` if it is not affine. A node with a matrix ignores the pose.
+/// Local transform of a node in a pose; `None` if it is not affine or not finite. A node with a matrix
+/// ignores the pose.
 pub(super) fn local(node: &json::Node, pose: Option<&NodePose>) -> Option<DMat4> {
     let transform = if let Some(columns) = node.matrix {
         DMat4::from_cols_array(&columns.map(f64::from))
@@ -55,7 +56,7 @@ pub(super) fn local(node: &json::Node, pose: Option<&NodePose>) -> Option<DMat4>
     (transform.is_finite() && transform.row(3).to_array() == [0.0, 0.0, 0.0, 1.0]).then_some(transform)
 }
 
-/// Translation times rotation times scale; `None` if the quaternion is not a rotation.
+/// Translation times rotation times scale; `None` if the quaternion's length is zero or not finite.
 pub(super) fn composed(translation: DVec3, rotation: DQuat, scale: DVec3) -> Option<DMat4> {
     let length = rotation.length();
     let rotation = (length > 0.0 && length.is_finite()).then(|| rotation / length)?;

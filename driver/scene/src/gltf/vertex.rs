@@ -15,10 +15,11 @@ use super::transform::Transform;
 use crate::error::SceneError;
 use crate::{Triangle, VertexAttributes};
 
-/// Maximum coordinate, metres. The product of three is far below the maximum of single precision.
+/// Maximum magnitude of a coordinate, metres. The product of three is far below the maximum of single
+/// precision.
 pub(super) const MAX_COORDINATE: f32 = 1e8;
 
-/// Maximum texture coordinate. Beyond it single precision cannot resolve texels.
+/// Maximum magnitude of a texture coordinate. There, `f32` steps are 1/16 of the image.
 const MAX_TEXTURE_COORDINATE: f32 = 1e6;
 
 /// Maximum distance between a unit vertex normal and the triangle's unit normal at which they count as equal:
@@ -28,7 +29,7 @@ const FLAT_DISTANCE: f64 = 0.001_745;
 /// Corners of a triangle with their transforms.
 pub(super) struct Corners<'p> {
     pub(super) vertices: [u64; 3],
-    /// Order of the corners, as indices into the file's triangle. It is reversed by a mirroring transform.
+    /// Indices of the corners in the file's triangle: 0, 1, 2, or 0, 2, 1 with a mirroring transform.
     pub(super) order: [usize; 3],
     pub(super) transforms: [Cow<'p, Transform>; 3],
     /// Weights of morph targets.

@@ -100,7 +100,7 @@ fn read_narrow(stream: &mut &[u8], width: u32, group: &mut [u8]) -> Option<()> {
 }
 
 /// Adds the differences at `index` of each lane to the last element, which becomes the next one. `channels`
-/// is empty in version 0.
+/// has the mode of each four bytes; it is empty in version 0.
 fn add(lanes: &[u8], lane_bytes: usize, index: usize, channels: &[u8], last: &mut [u8]) -> Option<()> {
     for (channel, word) in last.as_chunks_mut::<4>().0.iter_mut().enumerate() {
         let difference = [0, 1, 2, 3].map(|byte| lanes[(4 * channel + byte) * lane_bytes + index]);
@@ -125,7 +125,7 @@ fn add(lanes: &[u8], lane_bytes: usize, index: usize, channels: &[u8], last: &mu
     Some(())
 }
 
-/// Decodes the zigzag code of a difference.
+/// Decodes the zigzag code of a signed byte, in two's complement.
 fn signed_byte(code: u8) -> u8 {
     (code >> 1) ^ (code & 1).wrapping_neg()
 }

@@ -12,7 +12,8 @@ const PADDING: usize = 4;
 /// Maximum size of an integer of variable length, bytes.
 const MAX_VARIABLE: u32 = 5;
 
-/// Ring of the last sixteen values. The initial ones are no index of a vertex.
+/// Ring of the last sixteen values, with the number of values pushed. Its initial values are no index of a
+/// vertex.
 struct Recent<T>([T; 16], usize);
 
 impl<T: Copy> Recent<T> {
@@ -29,11 +30,11 @@ impl<T: Copy> Recent<T> {
 
 /// State of the decoder of triangles.
 struct Triangles<'a> {
-    /// Bytes of codes that need more than one byte.
+    /// Rest of the stream: codes of triangles that need a second byte, and differences of indices.
     data: &'a [u8],
     edges: Recent<[u32; 2]>,
     vertices: Recent<u32>,
-    /// Next index that has not occurred yet.
+    /// Index of the next vertex that is coded as new.
     next: u32,
     /// Last index that was coded as a difference.
     last: u32,
@@ -85,13 +86,14 @@ impl Triangles<'_> {
         Some([a, b, c])
     }
 
-    /// Decodes a triangle whose first index is a new one. `code` holds two digits for the others.
+    /// Decodes a triangle whose first index is a new one. `code` has four bits for each of the other two.
     fn fresh(&mut self, code: u8) -> Option<[u32; 3]> {
         let a = self.fresh_index();
         self.complete(a, code)
     }
 
-    /// Decodes a triangle whose code is in the data.
+    /// Decodes a triangle whose code is the next byte of the data; with `is_stated` the difference of its
+    /// first index follows.
     fn stated(&mut self, is_stated: bool) -> Option<[u32; 3]> {
         let code = *self.data.split_off_first()?;
         if code == 0 {

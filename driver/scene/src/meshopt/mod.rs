@@ -1,6 +1,6 @@
 //! Decoder of buffer views compressed by meshopt (`EXT_meshopt_compression`, `KHR_meshopt_compression`).
 //!
-//! Sizes are checked against the maximum that a stream of its length can hold before memory is allocated. A
+//! The decoded size is checked against the maximum for the stream's length before memory is allocated. A
 //! damaged stream gives an error or wrong bytes; readers of accessors check the bytes as those of any buffer.
 
 mod attributes;
@@ -45,8 +45,8 @@ pub(super) struct Layout {
 /// Error of a stream.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// Clause on a damaged stream, or on a combination of sizes, mode and filter that the extension does not
-    /// allow.
+    /// Damage of the stream, or a combination of sizes, mode and filter that the extension does not allow,
+    /// described as a clause.
     Invalid(String),
     /// Memory that the process cannot have.
     Memory(OutOfMemory),

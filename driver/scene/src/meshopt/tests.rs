@@ -29,7 +29,7 @@ fn the_example_of_the_specification_is_decoded() {
 
 #[test]
 fn integers_of_variable_length_are_those_of_the_specification() {
-    // Zigzag codes of one baseline: each is four times the difference.
+    // Zigzag codes on the first baseline: `4 d` for a difference `d >= 0`, `-4 d - 2` for `d < 0`.
     let stream = [0xd1, 0x04, 0x84, 0x08, 0x06, 0, 0, 0, 0];
     let indices = decode(&stream, &layout(Mode::Indices, Filter::None, 3, 2)).unwrap();
     assert_eq!(indices, [1, 0, 2, 1, 0, 1]);

@@ -91,7 +91,7 @@ mod tests {
             let codes = [x, y, z].map(|channel: f32| ((channel + 1.0) * 32_767.5).round() as u16);
             let found = Vec3::from(decoded(Deep::Normal, codes)) * 2.0 - 1.0;
             let direction = Vec3::new(x, y, z).normalize();
-            // Codes of the short normal are ten steps coarser than its own.
+            // The short normal magnifies the rounding error of its codes eight times.
             assert!(found.distance(direction) < 3e-4 && found.is_normalized(), "{found} {direction}");
         }
         for codes in [[0x8000, 0x8000, 0], [0; 3], [u16::MAX; 3]] {

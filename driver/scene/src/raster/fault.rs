@@ -25,7 +25,7 @@ impl Fault {
         }
     }
 
-    /// Error of an image that no process can read.
+    /// Error of an image that is damaged or unsupported, not too large.
     pub(crate) fn unreadable(reason: impl Into<String>, remedy: &'static str) -> Self {
         Self { reason: reason.into(), remedy, is_limit: false }
     }

@@ -26,11 +26,11 @@ fn decoder(bytes: &[u8]) -> Result<WebPDecoder<Cursor<&[u8]>>, Fault> {
     Ok(decoder)
 }
 
-/// Width and height, and the maximum number of texels in a file of this length. There is none, because texels
-/// of one colour may take no bits.
+/// Width and height, and the maximum number of texels in a file of this length. There is no such maximum,
+/// because texels of one colour may take no bits.
 pub(super) fn size(bytes: &[u8]) -> Result<([u32; 2], u64), Fault> {
     let size = decoder(bytes)?.dimensions().into();
-    // The decoder allocates by the header of the codec before it compares that with the file's.
+    // The decoder allocates by the size in the codec's header before it compares that size with the file's.
     if frame_size(bytes) != Some(size) {
         return Err(Fault::damaged("its headers contradict each other"));
     }

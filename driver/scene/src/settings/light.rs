@@ -19,7 +19,7 @@ pub(super) enum LightProperty {
     Position,
 }
 
-/// Range of a light's coordinates, metres: that of positions in a scene's file.
+/// Range of a light's coordinates relative to the scene's origin, metres.
 const PLACES: RangeInclusive<f32> = -1e15..=1e15;
 
 impl LightProperty {
@@ -28,7 +28,8 @@ impl LightProperty {
 }
 
 impl PunctualLight {
-    /// Colour whose greatest channel is 1, and the intensity of that channel. A dark light is white.
+    /// Colour whose greatest channel is 1, and the intensity of that channel. A light of intensity 0 counts
+    /// as white.
     pub fn colour(&self) -> (Vec3, f32) {
         let greatest = self.intensity.max_element();
         if greatest > 0.0 { (self.intensity / greatest, greatest) } else { (Vec3::ONE, 0.0) }

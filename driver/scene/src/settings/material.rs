@@ -151,7 +151,8 @@ impl Material {
 }
 
 impl Reflection {
-    /// Index of refraction: the stated one, or that of the reflectance. `None` without a dielectric part.
+    /// Index of refraction: that of the transmission or, without one, the one that F0 implies. `None` for a
+    /// Phong reflection.
     pub fn ior(&self) -> Option<f32> {
         match *self {
             Self::Phong { .. } => None,

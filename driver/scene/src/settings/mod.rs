@@ -48,7 +48,7 @@ struct Assignment<'a> {
     name: &'a str,
     property: Property,
     values: Vec<f32>,
-    /// Values in double precision.
+    /// `values` in double precision.
     precise: Vec<f64>,
 }
 

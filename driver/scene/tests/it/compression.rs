@@ -119,7 +119,8 @@ fn impossible_streams_are_refused() {
     for (file, name) in FILES {
         for (part, change) in &cases {
             let (mut json, bytes) = parts(file);
-            // Another stride or mode is refused by the extension, before the buffer view's own.
+            // The view's own stride is removed, because it would be refused before another stride or mode of
+            // the extension.
             json["bufferViews"][0].as_object_mut().unwrap().remove("byteStride");
             change(&mut json, name);
             let Err(error) = load_parts(&(json, bytes)) else { panic!("{part} was loaded") };

@@ -98,7 +98,7 @@ fn vertices_are_those_of_the_wave_within_the_quantisation() {
 fn strips_are_compressed_as_their_triangles() {
     for [file, _] in FILES {
         let expected = load_parts(&parts(file)).unwrap().checksum().to_owned();
-        // Two triangles of zero area were left out.
+        // The second count has two triangles of zero area, which the stream does not have.
         for corners in [TRIANGLES + 2, TRIANGLES + 4] {
             let (mut json, bytes) = parts(file);
             primitive(&mut json)["mode"] = json!(5);
@@ -126,7 +126,7 @@ fn attributes_beside_the_stream_are_read() {
         for name in ["COLOR_0", "NORMAL"] {
             extension(&mut json)["attributes"].as_object_mut().unwrap().remove(name);
         }
-        // Bytes of the uncompressed positions, which are not read.
+        // The uncompressed positions are changed, because they are not read.
         let positions = accessor(&mut json, "POSITION")["bufferView"].as_u64().unwrap() as usize;
         let start = json["bufferViews"][positions]["byteOffset"].as_u64().unwrap() as usize;
         bytes[start..start + 12].fill(0x55);

@@ -156,7 +156,7 @@ fn accessors_beyond_their_buffer_are_refused() {
             json["bufferViews"][1]["byteLength"] = json!(8);
         }),
         (&["more than", "triangles"], |json| {
-            // Zeros without bytes.
+            // All positions but a sparse one are zeros without bytes.
             json["accessors"][0].as_object_mut().unwrap().remove("bufferView");
             json["accessors"][0]["count"] = json!(3u64 << 50);
             json["accessors"][0]["sparse"] = json!({

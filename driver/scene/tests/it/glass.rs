@@ -1,4 +1,5 @@
-//! Glass in glTF files is solid or thin-walled by the shape of each mesh, whatever else has its material.
+//! Glass in glTF files is solid or thin-walled by the shape of each mesh, whatever other meshes have its
+//! material.
 
 use photoncard_scene::{Reflection, Scene, Transmission};
 use serde_json::{Value, json};

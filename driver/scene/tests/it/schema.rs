@@ -78,7 +78,7 @@ fn channels_of_extensions_are_left_out_and_the_others_stay() {
     });
     let said = scene.notices.join("; ");
     assert!(said.contains("'glow', 'both'") && said.contains("KHR_animation_pointer"), "{said}");
-    // A picture of the scene as it stands plays none.
+    // A picture of the scene at rest plays no animation.
     assert_eq!(scene.notices_on(|concern| concern != Concern::Animations), Vec::<&str>::new());
     let sky = loaded(|json| json["extensionsUsed"] = json!(["EXT_lights_image_based", "EXT_other"]));
     let alone = sky.notices_on(|concern| concern != Concern::Environment);
@@ -93,7 +93,7 @@ fn channels_of_extensions_are_left_out_and_the_others_stay() {
     let said = mistaken.notices.join("; ");
     let parts = ["none of glTF 2.0", "'rotaton' of node 'lid' (animations[0].channels[1])", "'animation 0'"];
     assert!(mistaken.notices.len() == 2 && parts.iter().all(|part| said.contains(part)), "{said}");
-    // So is a target that is no node and of no extension.
+    // A target without a node and without an extension is a mistake, too.
     let aimless = loaded(|json| {
         let channel = json!({"sampler": 0, "target": {"path": "translation"}});
         let samplers = json!([{"input": 0, "output": 0}]);
@@ -244,7 +244,7 @@ fn load_text(text: &str) -> Result<Scene, SceneError> {
     photoncard_scene::gltf::load(&folder.path().join("scene.gltf"))
 }
 
-/// JSON that no value holds, and that a parser skips, is that of `extras`, whatever else has to be amended.
+/// `extras` may contain JSON that `serde_json::Value` cannot hold, in files that are amended, too.
 #[test]
 fn contents_of_extras_are_free() {
     let deep = "[".repeat(200) + &"]".repeat(200);

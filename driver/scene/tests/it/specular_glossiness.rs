@@ -86,7 +86,7 @@ fn factors_are_converted() {
             json!({"diffuseFactor": [0.5, 0.5, 0.5, 1], "specularFactor": [0, 0, 0], "glossinessFactor": 0}),
             [0.520_833, 0.520_833, 0.520_833, 0.0, 1.0],
         ),
-        // Between.
+        // Between a dielectric and a metal.
         (
             json!({"diffuseFactor": [0.3, 0.2, 0.1, 1], "specularFactor": [0.3, 0.25, 0.2], "glossinessFactor": 0.5}),
             [0.518_684, 0.372_418, 0.226_152, 0.596_741, 0.5],

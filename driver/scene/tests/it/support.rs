@@ -131,7 +131,8 @@ impl Extended {
     }
 }
 
-/// File of the triangle with texture coordinates. Its base colour is texture 0 with image 0.
+/// File of the triangle with texture coordinates. Its base colour texture is texture 0, with `image` as image
+/// 0.
 #[allow(dead_code, reason = "not every test file has textures")]
 pub(crate) fn textured(image: &Value) -> Extended {
     let mut scene = Extended::new();

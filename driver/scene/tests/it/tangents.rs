@@ -67,7 +67,7 @@ fn stated_and_computed_tangents_are_alike() {
             assert_eq!(scene.notices, Vec::<String>::new());
         }
     }
-    // The file's word counts, not its texture coordinates.
+    // Stated tangents count, not the texture coordinates.
     let other = with_tangents(mapped(UPRIGHT, Some(FRONT)), [[0.0, 2.0, 0.0, -0.5]; 3]);
     close(tangents(&other.load().unwrap()), Vec4::new(0.0, 1.0, 0.0, -1.0));
 }

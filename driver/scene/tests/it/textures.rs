@@ -129,7 +129,7 @@ fn webps_that_contradict_themselves_or_move_are_left_out() {
         bytes[at] = value;
         embedded(&bytes, "image/webp").load().unwrap()
     };
-    // The canvas of the extended header, and its mark of an animation.
+    // Other width of the canvas in the extended header (`VP8X`), and its flag of an animation.
     check_left_out(&changed(ALPHA_WEBP, 24, 24), &["contradict"]);
     check_left_out(&changed(ALPHA_WEBP, 20, 0x12), &["cannot be decoded"]);
     check_left_out(&embedded(&LOSSY_WEBP[..100], "image/webp").load().unwrap(), &["cannot be decoded"]);
@@ -299,7 +299,7 @@ fn sizes_are_refused_by_the_header() {
         bytes[29..33].copy_from_slice(&(!crc).to_be_bytes());
         bytes
     };
-    // As many missing bytes as an image of one bit per texel may have: the sum is rejected first.
+    // The length allows this size by the bound of Deflate: the sum of the images is refused first.
     let mut large = header(16_384, 16_384);
     large.resize(1 << 16, 0);
     let mut two = embedded(&large, "image/png");
@@ -309,7 +309,7 @@ fn sizes_are_refused_by_the_header() {
     two.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
     let words = ["images and materials take 1073741888 bytes", "the card has 536870912"];
     check(&two.load().unwrap_err(), &words);
-    // A card of maximum memory has room for them.
+    // A card of maximum memory has room for both images, whose texels exceed the limit.
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.glb");
     fs::write(&path, glb(two.json, &two.bytes)).unwrap();
@@ -432,7 +432,7 @@ fn emission_keeps_more_than_eight_bits() {
     assert_eq!(encoding, Encoding::SharedExponent);
     let [red, green, blue, _] = decode_texel(TexelFormat::SharedExponent, texel);
     assert!((red / 0.214_05 - 1.0).abs() < 1e-3 && green == red && blue == red, "{red}");
-    // An image of the base colour as well has one form.
+    // An image that is also the base colour is stored in one encoding, of 8 bits.
     assert_eq!(loaded(&deep(0x8000), true), (Encoding::Srgb, [128, 128, 128, 255]));
     assert_eq!(loaded(TEXEL, false).0, Encoding::Srgb);
 }
@@ -471,7 +471,7 @@ fn normals_and_data_keep_sixteen_bits() {
     let (encoding, [_, roughness, metallic, _]) =
         loaded(&["metallicRoughnessTexture", "clearcoatRoughnessTexture"]);
     assert!(encoding == Encoding::LinearPair && near(roughness, exact[1]) && near(metallic, exact[2]));
-    // Three channels have no room of 16 bits each, and neither have normals beside data.
+    // Four bytes have no room for three channels of 16 bits, nor for a normal beside data.
     for both in ["clearcoatTexture", "normalTexture"] {
         assert_eq!(loaded(&["metallicRoughnessTexture", both]).0, Encoding::Linear);
     }

@@ -102,7 +102,7 @@ fn colours_of_every_format_are_linear_rgba() {
     add(&|scene| scene.floats("VEC3", &[[0.5, 0.25, 1.0]; 3]), [0.5, 0.25, 1.0, 1.0]);
     add(&|scene| scene.floats("VEC4", &[[2.0, -1.0, 1e9, 0.5]; 3]), [1.0, 0.0, 1.0, 0.5]);
     add(&|scene| scene.accessor("VEC4", 5121, 3, &[255, 0, 51, 102].repeat(3)), [1.0, 0.0, 0.2, 0.4]);
-    // Elements of six bytes are not padded to a multiple of four: the stride states the distance.
+    // Elements of six bytes without a stride are tightly packed, not padded to a multiple of four.
     add(&|scene| scene.accessor("VEC3", 5123, 3, &shorts), [1.0, 0.0, 0.2, 1.0]);
     for (mut scene, accessor, expected) in cases {
         scene.primitive()["attributes"]["COLOR_0"] = json!(accessor);
@@ -156,8 +156,8 @@ fn instances_are_placed_by_translation_rotation_and_scale() {
     assert_eq!(scene.notices, Vec::<String>::new());
 }
 
-/// Many nodes may share a list of instances at almost no cost in bytes, so that the list is not traversed
-/// without triangles. The zero rotations of this one would be an error.
+/// Many nodes may share a list of instances at almost no cost in bytes, so that a list without triangles is
+/// not traversed. Traversing this one would be an error, because its rotations are zero.
 #[test]
 fn instances_of_points_are_not_traversed() {
     let mut scene = Extended::new();

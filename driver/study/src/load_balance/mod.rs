@@ -64,7 +64,7 @@ pub(crate) enum LoadBalanceError {
 /// Maximum time of a tile or a message, seconds. With it, sums of nanoseconds stay exact.
 pub(crate) const MAX_SECONDS: f64 = 1e9;
 
-/// Result of a simulation. Times are seconds since the host began to assign tiles.
+/// Result of a simulation that begins at time 0, when the host assigns the first tile.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Balance {
     /// Time when the host has the last result, seconds.
@@ -136,7 +136,7 @@ pub(crate) fn simulate(costs: &[f64], order: TileOrder, setup: &Setup) -> Result
 struct Chip {
     /// Number of tiles that are assigned and unanswered.
     tiles: usize,
-    /// Time when the chip is done with its tiles.
+    /// Time when the chip is done with its tiles, nanoseconds.
     done: u128,
 }
 
@@ -228,7 +228,7 @@ fn seconds(nanoseconds: u128) -> f64 {
 /// Order in which tiles are assigned to chips.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum TileOrder {
-    /// Row by row, as the driver assigns them.
+    /// Row by row, as the driver assigns tiles with modelled memory.
     #[default]
     Picture,
     /// Random permutation with this seed.

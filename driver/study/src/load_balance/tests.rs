@@ -63,7 +63,7 @@ fn a_second_credit_hides_the_latency_of_the_link() {
     let [one, two, four] = [1, 2, 4].map(|credits| balance(&costs, TileOrder::Picture, 4, credits, link));
     // A tile is as long as the way to the host and back: with one credit half of the time is waiting.
     assert!((one.idle_share() - 0.5).abs() < 0.01, "{}", one.idle_share());
-    // But for the last tiles, of which each chip has one.
+    // A second credit hides the latency but for each chip's last tile.
     assert!(two.idle_share() < 0.05, "{}", two.idle_share());
     assert!(four.idle_share() <= two.idle_share() + ROUNDING);
 }

@@ -223,7 +223,8 @@ impl Table {
     }
 }
 
-/// CSV of records. Writing to memory does not fail, and the records have one length.
+/// Encodes records as CSV. Writing to memory does not fail, and the records have one length: the result is
+/// never `None`.
 fn csv_of(records: &[Vec<String>]) -> Option<String> {
     let mut csv = csv::WriterBuilder::new().terminator(csv::Terminator::CRLF).from_writer(Vec::new());
     records.iter().try_for_each(|record| csv.write_record(record)).ok()?;

@@ -13,7 +13,7 @@ use super::super::report::{Block, Table};
 use super::super::scale::Scale;
 use super::present::{GIGA, SCENES, columns, table, text};
 
-/// A chip, and the number of tiles that it has in flight.
+/// A kind of chip, its number of tiles in flight, and its scene cache.
 #[derive(Clone, Copy)]
 pub(super) struct Setup {
     chip: EmulatedKind,
@@ -33,7 +33,7 @@ const ON_LARGE: Setup = Setup { in_flight: 1, ..LARGE_IN_FLIGHT };
 const SETUPS: [Setup; 3] = [ON_REFERENCE, ON_LARGE, LARGE_IN_FLIGHT];
 
 impl Setup {
-    /// Point that renders the whole frame on one chip.
+    /// Point that renders all tiles of the frame with this setup.
     pub(super) fn point(self, scale: &Scale, scene: &str, settings: RenderSettings) -> Point {
         let settings = settings.with(|s| s.schedule.in_flight = Some(self.in_flight));
         let scene_cache = CacheSpec { bytes: self.scene_cache, ..CacheSpec::SCENE };

@@ -43,9 +43,9 @@ struct Frame {
 struct Errors {
     rays: f64,
     gathers: f64,
-    /// Half-width of the scene's bytes from DRAM.
+    /// Half-width of the confidence interval of the scene bytes read from DRAM.
     scene: f64,
-    /// Half-width of the photon map's bytes from DRAM.
+    /// Half-width of the confidence interval of the photon map's bytes read from DRAM.
     photon_map: f64,
 }
 

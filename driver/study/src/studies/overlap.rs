@@ -24,7 +24,7 @@ type Line = (GatherOrder, PhotonLayout);
 /// The line whose queue is varied.
 const SORT_LINES: Line = (GatherOrder::Sort, PhotonLayout::Lines);
 
-/// Sizes of the queue whose halves are measured too.
+/// Sizes of the queue for which times are compared; half of each is measured, too.
 fn queues(scale: &Scale) -> Vec<u32> {
     scale.pick(&[512, 1024, 2048, 4096, 8192, 16_384], &[2048, 8192])
 }
@@ -61,7 +61,7 @@ fn times(scale: &Scale, results: &Results, line: Line, queue: Option<u32>) -> [F
     [whole.as_built(), halves.overlapped(halves.shares()), halves.overlapped(table_shares())]
 }
 
-/// Blocks on the frames of some lines.
+/// Blocks of the report on the frames of `lines`.
 pub(super) fn blocks(scale: &Scale, results: &Results, lines: &[Line]) -> Vec<Block> {
     let all: Vec<_> = lines.iter().map(|&line| (line, times(scale, results, line, None))).collect();
     let queues: Vec<_> = queues(scale)

@@ -19,7 +19,7 @@ use super::present::{
 };
 use super::times::{self, TimedFrame};
 
-/// Order of a row: one of a chip's, or none for all gathers of the frame along one curve.
+/// Order of a row: that of a chip, or `None` for all gathers of the frame along one curve.
 type Order = Option<GatherOrder>;
 
 fn name(order: Order) -> &'static str {

@@ -18,15 +18,16 @@ const FEWER_TASKS: [u32; 2] = [1, 16];
 pub(super) struct TimedFrame {
     load: FrameLoad,
     machine: Machine,
-    /// Mean number of gathers at the beginning of a drain. It is the counted number or, if the order has no
-    /// queue, the number of places that the chip has. Gathers of such an order also wait for the gather unit,
-    /// and are done in the order of arrival.
+    /// Mean number of gathers at the beginning of a drain: the counted number or, if the order has no queue,
+    /// the number of places in the chip's queue. Gathers of such an order also wait for the gather unit, and
+    /// are done in the order of arrival.
     drained: u64,
     has_queue: bool,
 }
 
 impl TimedFrame {
-    /// Rays and their reads of the scene, and gathers and their reads of the photon map, in a point's frame.
+    /// Sums up the rays with their reads of the scene, and the gathers with their reads of the photon map, in
+    /// a point's frame.
     pub(super) fn new(point: &Point, measured: &Measurement, machine: &Machine) -> Self {
         let arithmetic = arithmetic::of_frame(measured, &workload::symbols(&point.settings));
         let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
@@ -77,7 +78,7 @@ impl TimedFrame {
         self.load.times(&TimedChip { machine, queue, policy }, LINE_BYTES as f64)
     }
 
-    /// Shares of the arithmetic in proportion to the frame's.
+    /// Shares of the units in a chip's arithmetic, in proportion to their FLOPs in the frame.
     pub(super) fn shares(&self) -> Shares {
         let FrameLoad { rays, controller_flops, gathers } = self.load;
         let mut cost = Cost::default();
@@ -94,7 +95,8 @@ fn rays(counters: &Counters) -> u64 {
     eye_rays + shadow_rays + gather_rays + survey_rays + specular_rays
 }
 
-/// Shares of the arithmetic in proportion to that of Table 7.1's frame with all techniques.
+/// Shares of the units in a chip's arithmetic, in proportion to their FLOPs in Table 7.1's frame with all
+/// techniques.
 pub(super) fn table_shares() -> Shares {
     Shares::of(&Cost::new(&Workload::nominal(&Symbols::NOMINAL), &Symbols::NOMINAL))
 }

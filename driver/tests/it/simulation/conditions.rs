@@ -18,10 +18,9 @@ pub(crate) struct Run<'a> {
     pub(crate) stopped: usize,
     /// Tiles at which every card crashes.
     pub(crate) poison: Vec<u32>,
-    /// Wrong pixels that cards send, and the share of tiles concerned: one of this number.
+    /// Lies of cards. The number is `n` if a card falsifies one of `n` tiles.
     pub(crate) liars: HashMap<CardNumber, (Lie, u32)>,
-    /// Slowdown of cards: a card does one of this number of steps of its work on tiles; `None` if it does
-    /// none.
+    /// Slowdown of cards: `n` if a card does one of `n` steps of its work on tiles; `None` if it does none.
     pub(crate) lazy: HashMap<CardNumber, Option<usize>>,
     /// Share of the tiles that is verified.
     pub(crate) verify: Option<f64>,

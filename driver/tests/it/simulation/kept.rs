@@ -12,7 +12,7 @@ use super::station::Station;
 use super::world::Fixture;
 use super::{complete_alone, seeds, with_room_for_a_card};
 
-/// Runs, each of several frames on one card.
+/// Seeds of the runs, each of which renders several frames on one card.
 const SEEDS: u32 = 24;
 const FRAMES: usize = 5;
 
@@ -33,13 +33,13 @@ enum Between {
 const ALL: [Between; 5] =
     [Between::Nothing, Between::Interruption, Between::Reset, Between::Damage, Between::BadLine];
 
-/// Indices of lines that the first image has, and of those in which the second differs.
+/// Indices of the lines of the second image that the first has too, and of those that differ.
 fn lines(before: &Fixture, after: &Fixture) -> [Vec<usize>; 2] {
     let [before, after] = [before, after].map(|fixture| fixture.upload.lines());
     (0..after.len()).partition::<Vec<_>, _>(|&line| before.get(line) == after.get(line)).into()
 }
 
-/// Steps the card a while at a frame.
+/// Begins a frame: steps the card a random number of times.
 fn begin(station: &mut Station, run: &Run, random: &mut Random) {
     station.started = false;
     let film = Mutex::new(run.fixture.film());
@@ -104,7 +104,7 @@ fn a_kept_card_renders_what_a_new_one_does_and_receives_the_changed_lines() {
     });
 }
 
-/// Passes on one card, in whose memory not all irradiance records have room, now and then of another camera.
+/// Passes on one card whose memory has no room for all irradiance records, now and then with another camera.
 #[test]
 fn passes_on_a_kept_card_are_those_on_a_new_one() {
     with_room_for_a_card(|| {

@@ -13,7 +13,7 @@ pub(crate) enum Lie {
     Impossible(fn(&mut PixelSums)),
     /// Red increased by a factor.
     Brighter(f32),
-    /// Green of a value.
+    /// Green replaced by a sum.
     Dazzling(i64),
 }
 
@@ -39,7 +39,8 @@ impl Lie {
     fn apply(self, pixel: &mut [u8]) {
         let mut sums = PixelSums::read(pixel).unwrap();
         match self {
-            // Nothing is impossible about the normals of no surface.
+            // Some lies are possible sums of a pixel without surfaces: the number of surfaces is falsified
+            // then.
             Self::Impossible(lie) => {
                 lie(&mut sums);
                 sums.surfaces += u32::from(sums.surfaces == 0 && sums.depth == 0) * u32::MAX;
@@ -59,7 +60,7 @@ impl Lie {
 /// Filter of a card's output, which parses its frames and forwards them.
 pub(crate) struct Voice {
     reader: FrameReader,
-    /// Falsification, and the share of tiles concerned: one of this number.
+    /// Falsification, and `n` if it concerns one of `n` tiles.
     pub(crate) lie: Option<(Lie, u32)>,
     /// Bytes of whole frames to be sent.
     pub(crate) said: Vec<u8>,

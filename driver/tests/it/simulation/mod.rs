@@ -2,8 +2,8 @@
 //! Real sessions and cards run in one thread and in virtual time, over links whose every step and fault is
 //! determined by a seed.
 //!
-//! `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --test simulation` repeats the run of a failing
-//! seed alone, `PHOTONCARD_SEEDS=1..10000` runs many.
+//! `PHOTONCARD_SEEDS=SEED cargo test -p photoncard-driver --features study --test it simulation` repeats the
+//! run of a failing seed alone, `PHOTONCARD_SEEDS=1..10000` runs many.
 
 mod conditions;
 mod kept;
@@ -172,7 +172,7 @@ fn queues_that_fill_within_a_tile_end_in_the_same_picture() {
     });
 }
 
-/// Steps a card on its own until the picture is complete. Returns its pixels.
+/// Steps a card on its own until the picture is complete. Returns the pixels, and the counters of the tiles.
 fn complete_alone(run: &Run, station: &mut Station, random: &mut Random) -> (Vec<PixelValue>, Counters) {
     let film = Mutex::new(run.fixture.film());
     let dispatcher = Dispatcher::new(run.fixture.scheduler(1, None, 0), vec![&film]);
@@ -242,7 +242,7 @@ fn tiles_at_which_every_card_crashes_are_named_when_all_others_are_done() {
     });
 }
 
-/// The card holds a session of another host, of the number that this one draws.
+/// The card holds a session of another host with the session number that this host draws.
 #[test]
 fn a_session_number_that_the_card_holds_is_another_after_a_while() {
     with_room_for_a_card(|| {

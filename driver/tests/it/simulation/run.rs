@@ -35,7 +35,7 @@ pub(crate) struct Outcome {
     pub(crate) pixels: Option<Vec<PixelValue>>,
     /// Tiles in the sinks.
     pub(crate) tiles: HashMap<u32, FinishedTile>,
-    /// Counters of the picture's tiles: [`work`].
+    /// Counters of the picture's tiles that do not depend on tiles in flight: [`work`].
     pub(crate) counters: Counters,
     pub(crate) counts: TileCounts,
     pub(crate) bytes: LinkBytes,

@@ -35,18 +35,18 @@ pub(crate) struct Station {
     pub(crate) number: CardNumber,
     pub(crate) card: Box<Card<Emulated, Memory>>,
     pub(crate) session: Session,
-    /// True after the card was silent for too long, until it is loaded again.
+    /// True from the loss of the card until it is loaded again.
     pub(crate) is_lost: bool,
     /// Error for which the card was given up.
     pub(crate) given_up: Option<SessionError>,
     pub(crate) health: Health,
     pub(crate) started: bool,
-    /// The card does one of this number of steps of its work on tiles; `None` if it does none.
+    /// `n` if the card does one of `n` steps of its work on tiles; `None` if it does none.
     pub(crate) diligence: Option<usize>,
     pub(crate) voice: Voice,
     /// Parser of commands that reach the card.
     commands: FrameReader,
-    /// Tiles that the card has received and not completed, the first first.
+    /// Tiles that the card has received and not completed, the oldest first.
     tiles: Vec<u32>,
     to_card: Queue,
     to_host: Queue,

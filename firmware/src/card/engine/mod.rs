@@ -1,4 +1,4 @@
-//! State of a card that commands change, and the work that they start.
+//! The part of a card's state that commands change, and the work that commands start.
 
 #[cfg(test)]
 mod tests;
@@ -37,7 +37,7 @@ pub(super) struct Engine<K: ChipKind> {
     frame: Option<FrameParameters>,
     /// Tiles that the chip has not begun.
     tiles: Deque<Tile, MAX_TILES>,
-    /// Number of tiles that the chip has begun and whose end was not sent yet.
+    /// Number of tiles that the chip has begun and whose [`Reply::TileDone`] was not sent yet.
     begun: usize,
     /// A tile whose pixels were sent, with its counters.
     finished: Option<(u32, Counters)>,
@@ -45,9 +45,9 @@ pub(super) struct Engine<K: ChipKind> {
     is_flushed: bool,
     /// True if tiles are in flight, but the chip can do nothing for them before the next command.
     waits: bool,
-    /// Tile of the pixels in `data`, and the index of the first of them.
+    /// Tile of the pixels in `data`, and the row-major index in this tile of the first of them.
     first: (u32, u32),
-    /// Data to be sent: consecutive pixels of a tile, checksums, or results of a computation.
+    /// Data of the next reply: consecutive pixels of a tile, checksums, or results of a computation.
     data: heapless::Vec<u8, DATA_BYTES>,
 }
 
@@ -139,7 +139,7 @@ impl<K: ChipKind> Engine<K> {
         }
     }
 
-    /// Computes the results of triples of operands.
+    /// Computes the self-test's results for triples of operands.
     fn compute(&mut self, operands: &[u8]) -> Result<Reply<'_>, Fault> {
         if self.is_at_work() {
             return Err(OUT_OF_ORDER);
@@ -150,7 +150,8 @@ impl<K: ChipKind> Engine<K> {
         }
         self.data.clear();
         for case in cases {
-            // No test can break this: it is asserted above that the results of all cases fit.
+            // Never full: the assertion above proves that the results of all cases fit. No test can show the
+            // fault.
             self.data.extend_from_slice(&compute_bytes(case)).map_err(|_| Invariant::Reply.fault())?;
         }
         Ok(Reply::Computed { results: &self.data })
@@ -214,7 +215,7 @@ impl<K: ChipKind> Engine<K> {
         self.tiles.push_back(tile).map_err(|_| too_many)
     }
 
-    /// Does the next piece of work. A fault ends the tiles that the chip has begun.
+    /// Does the next piece of work. If rendering fails, the tiles that the chip has begun are dropped.
     ///
     /// # Errors
     /// The fault to be sent.
@@ -254,7 +255,7 @@ impl<K: ChipKind> Engine<K> {
         result
     }
 
-    /// Checks the next lines of a received image.
+    /// Checks the next lines of a received card image.
     fn check(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
         let ImageState::Checking(check) = &mut self.image else { return Ok(()) };
         let result = check.step(memory);
@@ -263,7 +264,7 @@ impl<K: ChipKind> Engine<K> {
         }
         self.image = ImageState::None;
         if let Some(scene) = result? {
-            // A memory may hold lines that were never sent to the card.
+            // An emulated card's memory may hold lines that were never sent to the card.
             self.written = self.written.max(scene.header.lines);
             self.image = ImageState::Ready(scene);
             send(transport, &Reply::ImageAccepted);
@@ -284,7 +285,7 @@ impl<K: ChipKind> Engine<K> {
         Ok(())
     }
 
-    /// Does the next piece of the chip's work; at most one reply is sent.
+    /// Does the next piece of the chip's work. Sends at most one reply.
     fn render(&mut self, memory: &mut impl CardMemory, transport: &mut Transport) -> Result<(), Fault> {
         let (Some(scene), Some(frame)) = (self.image.scene(), self.frame.as_ref()) else { return Ok(()) };
         if let Some((tile, counters)) = self.finished.take() {
@@ -335,14 +336,14 @@ impl<K: ChipKind> Engine<K> {
         if self.data.is_empty() {
             self.first = (tile, index);
         }
-        // A full reply has been sent.
+        // There is room: a full buffer is sent at once, below.
         let mut has_room = true;
         sums.write(&mut |bytes| has_room &= self.data.extend_from_slice(bytes).is_ok());
         if !has_room {
             return Err(Invariant::Reply.fault());
         }
-        // A reply has room for several pixels: the first of a new one does not fill it, so that one reply is
-        // sent at most.
+        // A buffer has room for several pixels, so that the first pixel of a new reply does not fill it: this
+        // call sends at most one reply.
         if self.data.len() + bytes > self.data.capacity() {
             self.send_pixels(transport);
         }
@@ -372,6 +373,6 @@ fn hello(budget: &Budget, written_lines: u32, memory_use: Option<MemoryUse>) -> 
 
 /// Sends a reply. The transport's window must have room for it.
 pub(super) fn send(transport: &mut Transport, reply: &Reply) {
-    // Every reply fits a frame, as tests of the longest show.
+    // Every reply fits a frame, as tests of the longest replies show.
     transport.send(|bytes| message::encode(reply, bytes));
 }

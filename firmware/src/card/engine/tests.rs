@@ -1,4 +1,5 @@
-//! Replies that were filled on purpose: the engine reports a fault and loses neither pixels nor checksums.
+//! Reply buffers that tests fill beforehand: the engine reports a fault instead of losing pixels or
+//! checksums.
 
 use std::boxed::Box;
 use std::vec;

@@ -15,7 +15,7 @@ pub struct Fraction {
     dither: u32,
 }
 
-/// Resolution of a random number before the first choice: 2^-24.
+/// Step of a random number before the first choice: 2^-24.
 const STEP: f32 = 1.0 / 16_777_216.0;
 /// Maximum value of a fraction.
 const BELOW_ONE: f32 = 1.0 - STEP;
@@ -33,7 +33,7 @@ impl Fraction {
         self.value
     }
 
-    /// Rescales the interval `lower..lower + width`, which contains the value, to [0, 1).
+    /// Maps the interval `lower..lower + width`, which contains the value, to [0, 1).
     #[inline(always)]
     #[must_use]
     pub fn within(self, lower: f32, width: f32) -> Self {
@@ -50,7 +50,7 @@ pub(super) struct Chosen {
     pub(super) rest: Fraction,
 }
 
-/// Denominator of the thresholds: 2^32.
+/// Number of units in 1 of the thresholds of a cumulative distribution function: 2^32.
 const ALL: f32 = 4_294_967_296.0;
 
 /// Chooses one of `count` items by a cumulative distribution function. `threshold` returns the function's
@@ -84,13 +84,14 @@ pub(super) fn probability(
     share(index, &mut threshold).map(|(_, width)| width)
 }
 
-/// Lower end, in units of 2^-32, and width, 0 to 1, of the interval of item `index`.
+/// Lower end, in units of 2^-32, and width, 0 to 1, of item `index`'s interval in the cumulative distribution
+/// function.
 fn share(index: u32, threshold: &mut impl FnMut(u32) -> Result<u32, Fault>) -> Result<(u32, f32), Fault> {
     let lower = match index.checked_sub(1) {
         Some(before) => threshold(before)?,
         None => 0,
     };
-    // An unsound image may hold a descending table.
+    // An unsound card image may hold a descending table.
     let width = threshold(index)?.saturating_sub(lower).max(1);
     Ok((lower, width as f32 * (1.0 / ALL)))
 }
@@ -101,8 +102,8 @@ mod tests {
 
     #[test]
     fn the_remainder_of_a_fraction_keeps_its_resolution() {
-        // A share of ten steps of the initial number: the rescaled fraction takes more than ten values,
-        // uniformly.
+        // The interval has ten steps of the initial number, but the rescaled fraction takes more than ten
+        // values, uniformly.
         let (lower, width) = (0.5, 10.0 * STEP);
         let mut sums = [0.0_f64; 2];
         for step in 0..10 {

@@ -12,8 +12,8 @@ use crate::scene::SceneImage;
 
 const LIGHTS_PER_LINE: u32 = DistantLight::PER_LINE as u32;
 
-/// Samples a distant light by the fraction `across`. `share` is the probability of choosing distant lights at
-/// all.
+/// Samples a distant light by the fraction `across`. `share` is the probability with which the light sample
+/// is one of the distant lights.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

@@ -25,7 +25,7 @@ pub struct EmitterPoint {
     pub position: Vec3,
     /// Unit normal of the front.
     pub normal: Vec3,
-    /// Radiance that leaves the point, W/(sr m^2).
+    /// Radiance that the point emits, W/(sr m^2).
     pub emission: Vec3,
     /// Maximum magnitude of the triangle's coordinates, metres.
     pub magnitude: f32,
@@ -34,7 +34,7 @@ pub struct EmitterPoint {
 /// Reads emitter `index`.
 ///
 /// # Errors
-/// If there is none.
+/// If there is no such emitter.
 pub fn read_emitter(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32) -> Result<Emitter, Fault> {
     let kind = SectionKind::Emitters;
     let bytes = scene.record::<{ Emitter::BYTES }, EMITTERS_PER_LINE>(memory, kind, index)?;
@@ -45,7 +45,7 @@ pub fn read_emitter(scene: &SceneImage, memory: &mut impl MemoryPort, index: u32
 /// emitter is not a triangle.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn emitter_point(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -71,8 +71,8 @@ pub fn emitter_point(
     }))
 }
 
-/// Emitted radiance of a triangle with an emissive texture or cut-outs at the point with barycentric
-/// `weights`, W/(sr m^2).
+/// Radiance that a triangle with an emissive texture, cut-outs or partial coverage emits at the point with
+/// barycentric `weights`, W/(sr m^2).
 fn emission_at(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -94,11 +94,12 @@ fn emission_at(
     Ok(emission * Vec3::new(red, green, blue))
 }
 
-/// Probability density, 1/sr, of a light sample in a direction that hits an emissive triangle. `distance`,
-/// metres, is that of the hit, `cosine` that of the angle to the triangle's normal.
+/// Probability density, 1/sr, of a light sample in a direction that hits the emissive triangle `emitter` at
+/// `distance`, metres. `cosine` is that of the angle between the direction to the receiver and the triangle's
+/// normal.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn emitter_density(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -113,8 +114,8 @@ pub fn emitter_density(
     Ok(probability * (distance * distance / (cosine * area(vertices))))
 }
 
-/// Samples an emitter by the fractions `across` and `down`. `share` is the probability of choosing emitters
-/// at all.
+/// Samples the emitters by the fractions `across` and `down`. `share` is the probability with which the light
+/// sample is one of the emitters.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -145,7 +146,8 @@ pub(super) fn sample(
     }
 }
 
-/// Angular attenuation of a spot light, 0 to 1, at a cosine to its axis (`KHR_lights_punctual`).
+/// Angular attenuation of a spot light, 0 to 1, at the cosine `cosine` of the angle to the light's axis
+/// (`KHR_lights_punctual`).
 #[inline(always)]
 pub fn falloff(cosine: f32, scale: f32, offset: f32) -> f32 {
     let linear = min(max(cosine * scale + offset, 0.0), 1.0);
@@ -153,7 +155,7 @@ pub fn falloff(cosine: f32, scale: f32, offset: f32) -> f32 {
 }
 
 /// Light sample from a point of a triangle that was chosen with the density `density`, 1/m^2; `None` if the
-/// receiver is on its dark side.
+/// receiver is on the side of the triangle that does not emit.
 fn from_area(
     receiver: &Receiver,
     target: &EmitterPoint,
@@ -180,7 +182,8 @@ fn from_area(
     })
 }
 
-/// Light sample from a point light. `intensity` is a function of the direction towards the light, W/sr.
+/// Light sample from a point or spot light that was chosen with the probability `probability`. `intensity`
+/// maps the direction towards the light to the light's intensity, W/sr; `None` at distance 0.
 fn from_point(
     receiver: &Receiver,
     position: Vec3,

@@ -15,8 +15,8 @@ use crate::memory::MemoryPort;
 use crate::scene::{SceneImage, read_texture, sample_texture};
 use crate::vector::{max, min};
 
-/// Coordinates of a direction on the map, from the left and from the top, 0 to 1. The map's centre is -z, its
-/// top +y.
+/// Coordinates of a direction on the equirectangular map, from the left and from the top, 0 to 1. The centre
+/// of the map is the direction -z, the top +y.
 pub fn environment_coordinates(direction: Vec3) -> [f32; 2] {
     let Vec3 { x, y, z } = direction;
     let across = libm::atan2f(x, -z) * (0.5 * FRAC_1_PI) + 0.5;
@@ -35,7 +35,7 @@ pub fn environment_direction(across: f32, cosine: f32) -> Vec3 {
 /// Radiance of the environment from a direction, W/(sr m^2); zero without an environment.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn environment_radiance(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -50,7 +50,7 @@ pub fn environment_radiance(
 /// Probability density of a light sample in a direction of the environment, 1/sr.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn environment_density(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -73,7 +73,8 @@ pub fn environment_density(
     Ok(density * parts.density(scene, memory, place)?)
 }
 
-/// Samples a direction of the environment. `share` is the probability of choosing the environment at all.
+/// Samples a direction of the environment. `share` is the probability with which the light sample is one of
+/// the environment.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -102,12 +103,12 @@ pub(super) fn sample(
     })
 }
 
-/// Index of the cell that contains a coordinate, 0 to 1.
+/// Index of the one of `cells` equal intervals of [0, 1] that contains a coordinate.
 fn cell_at(coordinate: f32, cells: u32) -> u32 {
     ((coordinate * cells as f32) as u32).min(cells - 1)
 }
 
-/// The grid of cells, with the positions of its thresholds.
+/// Grid of cells, with the indices of the cells' thresholds in [`SectionKind::EnvironmentCells`].
 struct Cells {
     columns: u32,
     rows: u32,
@@ -124,22 +125,24 @@ impl Cells {
         self.rows.wrapping_add(row.wrapping_mul(self.columns))
     }
 
-    /// Cosine of the angle to +y below which the fraction `share` of a row's solid angle lies, counted from
-    /// the row's upper border.
+    /// Cosine of the angle to +y of the directions above which the fraction `share` of a row's solid angle
+    /// lies.
     fn cosine(&self, row: u32, share: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
         min(max(upper + (lower - upper) * share, -1.0), 1.0)
     }
 
-    /// Fraction of a row's solid angle above the direction with this cosine: the inverse of [`Self::cosine`].
+    /// Fraction of a row's solid angle above directions with the cosine `cosine` to +y: the inverse of
+    /// [`Self::cosine`].
     fn share(&self, row: u32, cosine: f32) -> f32 {
         let border = |row: u32| libm::cosf(PI * row as f32 / self.rows as f32);
         let [upper, lower] = [border(row), border(row + 1)];
         (upper - cosine) / (upper - lower)
     }
 
-    /// Density, 1/sr, of a direction in a cell that is chosen with the probability `probability`.
+    /// Density, 1/sr, of a direction in a cell of row `row`, if the environment is chosen with the
+    /// probability `share` and the cell then with the probability `probability`.
     fn density(&self, share: f32, row: u32, probability: f32) -> f32 {
         // cos(upper border) - cos(lower border), as a product: no cancellation.
         let half = 0.5 * PI / self.rows as f32;
@@ -149,7 +152,7 @@ impl Cells {
     }
 }
 
-/// Parts of a subdivided cell. There are as many rows as columns, and all parts have equal solid angle.
+/// Parts of a subdivided cell: `side` rows of `side` parts, all of equal solid angle.
 struct Parts {
     /// Index of the first threshold: the thresholds of the rows, then of the parts in each row.
     first: u32,
@@ -192,8 +195,8 @@ impl Parts {
         self.first.wrapping_add(self.side.wrapping_mul(row.wrapping_add(1)))
     }
 
-    /// Samples a position in the cell: its coordinates along rows and columns, 0 to 1, and its density
-    /// relative to a uniform choice.
+    /// Samples a position in the cell. Returns its coordinates, 0 to 1 downwards and 0 to 1 across, and its
+    /// density relative to that of a uniform choice.
     fn sample(
         &self,
         scene: &SceneImage,
@@ -209,7 +212,7 @@ impl Parts {
         Ok((place, row.probability * column.probability * (side * side)))
     }
 
-    /// Density of [`Self::sample`] at a position in the cell, relative to a uniform choice.
+    /// Density of [`Self::sample`] at a position in the cell, relative to that of a uniform choice.
     fn density(
         &self,
         scene: &SceneImage,

@@ -1,10 +1,10 @@
 //! Light sampling for shadow rays: choice of a light and of a point on it, with the probability density.
 //!
 //! Emissive triangles, point lights and spot lights are leaves of the light tree (module `tree`). Distant
-//! lights and the environment have no distance and are chosen beside it; the image header contains the
-//! probabilities of the three. One point of the unit square makes all choices: each choice uses a part of a
-//! coordinate and rescales the remainder ([`Fraction`]). Neighbouring points therefore map to neighbouring
-//! points of one light, and a stratified pattern stratifies the lights.
+//! lights and the environment are infinitely far and not in the tree; the header of the card image has the
+//! probabilities of the three kinds. One point of the unit square makes all choices: each choice uses a part
+//! of a coordinate and rescales the remainder ([`Fraction`]). Neighbouring points therefore map to
+//! neighbouring points of one light, and a stratified pattern stratifies the lights.
 //!
 //! Sampling and density use equal operations. The weights of a shadow ray and of a gather ray that hits the
 //! light therefore differ only by the rounding of the gather ray's hit.
@@ -31,10 +31,10 @@ use super::SceneImage;
 use crate::memory::MemoryPort;
 
 /// Samples a light for the receiver of `choices` by a point `(u, v)` of the unit square and 32 random bits;
-/// `None` if the sample has no light.
+/// `None` if the chosen light does not reach the receiver, or there is no light.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn sample_light(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

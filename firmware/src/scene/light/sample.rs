@@ -23,15 +23,15 @@ impl Receiver {
     }
 }
 
-/// Sample of the light from all lights: one direction and its density.
+/// Sample of the light from all lights: one direction and the density of that direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSample {
     /// Unit vector towards the light.
     pub direction: Vec3,
     /// Distance of the light, metres; infinite for the environment and for distant lights.
     pub distance: f32,
-    /// Irradiance on a surface that faces the light, divided by the probability of the sample, W/m^2. Its
-    /// expectation is the irradiance from all lights.
+    /// Irradiance on a surface that faces the light, divided by the probability of the sample, W/m^2. The
+    /// expectation of this estimate is the irradiance from all lights.
     pub irradiance: Vec3,
     /// Probability density of the direction, 1/sr; `None` for lights without an area, which no gather ray
     /// hits.

@@ -5,8 +5,8 @@
 //! At each node one of up to four children is chosen by an estimate of its light: power times the cosines at
 //! receiver and emitter, divided by the squared distance to the centre of the child's bounding sphere, which
 //! is at least the squared radius. Each cosine is a weighted mean of the cosine at the centre and the
-//! greatest cosine that the sphere and the cone of normals allow. The papers use the greatest cosine only;
-//! for a large lamp or a sky it is attained at few points, and would draw rays from emitters that contribute
+//! greatest cosine that the sphere and the cone of normals allow. The papers use the greatest cosine only; a
+//! large lamp or a sky attains this cosine at few points, and would take rays from emitters that contribute
 //! more. A fraction [`EVEN`] of the choices is uniform, so that emitters with a low estimate are still
 //! sampled. A child whose greatest cosine is negative cannot light the receiver and is excluded.
 
@@ -28,15 +28,15 @@ const EMITTERS_PER_LINE: u32 = Emitter::PER_LINE as u32;
 const TRAIL_BITS: usize = 2;
 const _: () = assert!(1 << TRAIL_BITS == LIGHT_CHILDREN && TRAIL_BITS * LIGHT_TREE_LEVELS <= 32);
 
-/// Fraction of the choices at a node that are uniform.
+/// Fraction of the choices at a node that are uniform among the children not excluded.
 const EVEN: f32 = 1.0 / 64.0;
-/// Weight of the greatest cosine in the mean cosine of an emitter, whose light comes from all of its surface.
-/// This value gives the least noise in the atrium and the room.
+/// Weight of the greatest cosine in [`mean_cosine`] for a child that is an emitter, whose light comes from
+/// all of its surface. This value gives the least noise in the scenes `atrium` and `room`.
 const EMITTER_BOUND: f32 = 1.0 / 8.0;
-/// Weight of the greatest cosine in the mean cosine of a node, whose nearest emitters can be anywhere in it.
-/// This value gives the least noise with 10,000 emitters.
+/// Weight of the greatest cosine in [`mean_cosine`] for a child that is a node, in which the nearest emitters
+/// can be anywhere. This value gives the least noise with 10,000 emitters.
 const NODE_BOUND: f32 = 1.0 / 2.0;
-/// Upper bound of a cosine below which a child is excluded. It is below 0 by more than the rounding error of
+/// Limit of the greatest cosine, below which a child is excluded: below 0 by more than the rounding error of
 /// cone axes.
 const BELOW_HORIZON: f32 = -1e-3;
 
@@ -51,10 +51,10 @@ pub struct Selection {
     pub rest: Fraction,
 }
 
-/// Selects an emitter for a receiver; `None` if none can light it.
+/// Selects an emitter for a receiver; `None` if no emitter can light the receiver.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn select_emitter(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -81,7 +81,7 @@ pub fn select_emitter(
 /// Probability with which [`select_emitter`] selects `emitter`; 0 if the emitter cannot light the receiver.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn selection_probability(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -127,8 +127,8 @@ const KEPT_CHOICES: usize = 4;
 /// nodes.
 pub struct LightChoices {
     pub(super) receiver: Receiver,
-    /// Cached choices with the numbers of their nodes. The position is the node's number modulo the array's
-    /// length.
+    /// Cached choices, each with the number of its node. A node's place is its number modulo the length of
+    /// the array.
     kept: [(u32, Choice); KEPT_CHOICES],
 }
 
@@ -175,7 +175,8 @@ impl Choice {
         for (estimate, child) in estimates.iter_mut().zip(children) {
             *estimate = child.as_ref().and_then(|child| Estimate::new(child, receiver));
         }
-        // Relative to the nearest child: squared distances may overflow or underflow.
+        // Weights are relative to the nearest child, because reciprocals of squared distances may overflow or
+        // underflow.
         let nearest = estimates.iter().flatten().map(|estimate| estimate.distance_squared);
         let nearest = nearest.fold(f32::INFINITY, crate::vector::min);
         let mut weights = [0.0; LIGHT_CHILDREN];
@@ -188,10 +189,10 @@ impl Choice {
         for ((option, child), (estimate, weight)) in
             options.iter_mut().zip(children).zip(estimates.iter().zip(weights))
         {
-            // A node may have fewer children, and a child that lights nothing here has no estimate.
+            // A node may have fewer children, and a child that cannot light the receiver has no estimate.
             let (Some(child), Some(_)) = (child, estimate) else { continue };
             let even = 1.0 / count;
-            // Not `<= 0`: in an unsound image the sum may be NaN.
+            // Not `<= 0`: in an unsound card image the sum may be NaN.
             let probability = if total > 0.0 { weight / total * (1.0 - EVEN) + even * EVEN } else { even };
             *option = Some(Weighted { link: child.link, probability });
         }
@@ -202,7 +203,8 @@ impl Choice {
         self.options.get(index).copied().flatten()
     }
 
-    /// Chosen child and lower end of its interval; `None` if there are no children.
+    /// Returns the child that a fraction chooses, and the lower end of the child's interval of fractions;
+    /// `None` if no child can light the receiver.
     fn choose(&self, fraction: Fraction) -> Option<(Weighted, f32)> {
         let mut chosen = None;
         let mut lower = 0.0;
@@ -227,7 +229,7 @@ struct Estimate {
 }
 
 impl Estimate {
-    /// Estimates the light of a child; `None` if it cannot light the receiver.
+    /// Estimates the light of a child; `None` if the child cannot light the receiver.
     fn new(child: &LightChild, receiver: &Receiver) -> Option<Self> {
         let way = Vec3::from_array(child.centre) - receiver.position;
         let towards = unit(way);
@@ -236,7 +238,7 @@ impl Estimate {
         let emitted = if shines_everywhere { 1.0 } else { -unit(child.axis.into()).dot(towards) };
         let (squared, radius_squared) = (way.length_squared(), child.radius * child.radius);
         let (mut greatest_received, mut greatest_emitted) = (1.0, 1.0);
-        // From within the sphere, a point of it may be in any direction.
+        // Inside the bounding sphere, emitters may lie in any direction.
         if squared > radius_squared {
             let sphere = Angle::of_sine_squared(radius_squared / squared);
             greatest_received = Angle::of_cosine(received).less(sphere).cosine;
@@ -264,8 +266,7 @@ impl Estimate {
     }
 }
 
-/// Weighted mean of the cosine at a child's centre and the greatest cosine. The latter has the weight
-/// `bound`.
+/// Weighted mean of the cosine at a child's centre and of the greatest cosine, which has the weight `bound`.
 fn mean_cosine(centre: f32, greatest: f32, bound: f32) -> f32 {
     (1.0 - bound) * max(centre, 0.0) + bound * max(greatest, 0.0)
 }
@@ -284,12 +285,12 @@ impl Angle {
         Self { cosine, sine: libm::sqrtf(max(1.0 - cosine * cosine, 0.0)) }
     }
 
-    /// Angle of at most pi / 2 with this squared sine.
+    /// Angle from 0 to pi / 2 whose sine has the square `squared`.
     fn of_sine_squared(squared: f32) -> Self {
         Self { cosine: libm::sqrtf(max(1.0 - squared, 0.0)), sine: libm::sqrtf(squared) }
     }
 
-    /// Difference of two angles, at least 0.
+    /// Difference of two angles; 0 if `other` is greater.
     fn less(self, other: Self) -> Self {
         if self.cosine >= other.cosine {
             return Self::ZERO;

@@ -19,16 +19,16 @@ use glam::Vec3;
 use super::ggx_albedo::albedo_shares;
 use crate::vector::{about, max, max_component, min, mirror, unit};
 
-/// Minimum of `a`. Its lobe has a width of 0.06 degrees, in which `f32` still resolves the half vector.
+/// Minimum of `a`: a lobe 0.06 degrees wide, in which `f32` still resolves the half vector.
 pub(super) const MIN_ALPHA: f32 = 1e-3;
 
-/// Minimum of `a` for [`GgxLobe::gathers_caustics`]. At this value half of the light is within 3.4 degrees.
+/// Minimum of `a` for [`GgxLobe::gathers_caustics`], at which half of the light is within 3.4 degrees.
 const MIN_CAUSTIC_ALPHA: f32 = 0.03;
 
 /// Minimum albedo that energy compensation divides by.
 const MIN_ALBEDO: f32 = 0.1;
 
-/// A lobe, seen from one direction.
+/// A GGX lobe for one outgoing direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct GgxLobe {
     /// `F0`: the reflectance at normal incidence.
@@ -39,7 +39,7 @@ pub(super) struct GgxLobe {
     alpha: f32,
     /// Albedo, 0 to 1, for the outgoing direction.
     pub(super) albedo: Vec3,
-    /// Coefficients of `F0` and `F90` in the albedo.
+    /// Coefficients of `F0` and `F90` in the albedo `E = F0 A + F90 B`: `[A, B]`.
     shares: [f32; 2],
     /// Method that estimates the light reflected by the lobe at the end of a ray.
     pub(super) estimate: Estimate,
@@ -51,15 +51,19 @@ pub(super) struct GgxLobe {
 pub(super) enum Estimate {
     /// Photons are gathered for the lobe.
     Photons,
-    /// A ray follows the lobe. Photons of lights without an area are stored and gathered for it.
+    /// A ray follows the lobe. Caustic photons of lights without an area are stored and gathered for the
+    /// lobe.
     Ray,
-    /// As [`Self::Ray`], but photons are stored for the Lambertian part beside the lobe.
+    /// As [`Self::Ray`], but no photons are stored for the lobe: the gathered ones are those of the
+    /// Lambertian part beside the lobe.
     RayBesideBase,
-    /// A ray follows the lobe. It is the lobe of a layer above the base, and photons are stored for the base.
+    /// A ray follows the lobe, which takes no light from photons: the lobe of a coat or of rough
+    /// transmission.
     RayAlone,
 }
 
-/// Normal and directions, reduced to the quantities that the lobe depends on.
+/// Quantities of normal and directions that a lobe depends on; `incident` and `outgoing` are the cosines
+/// `n.i` and `n.o`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Geometry {
     pub(super) incident: f32,
@@ -71,14 +75,14 @@ pub(super) struct Geometry {
 }
 
 impl Geometry {
-    /// Geometry of unit vectors. Both directions are on the normal's side.
+    /// Computes the quantities from unit vectors. Both directions are on the normal's side.
     #[inline(always)]
     pub(super) fn new(normal: Vec3, outgoing: Vec3, incident: Vec3) -> Self {
         let half = unit(outgoing + incident);
         Self {
             incident: max(normal.dot(incident), 0.0),
             outgoing: max(normal.dot(outgoing), f32::MIN_POSITIVE),
-            // By the cross product: near the lobe's peak 1 - (n.h)^2 would cancel.
+            // Computed by the cross product: near the lobe's peak the digits of 1 - (n.h)^2 would cancel.
             sine_squared: normal.cross(half).length_squared(),
             along: min(max(outgoing.dot(half), 0.0), 1.0),
         }
@@ -86,7 +90,7 @@ impl Geometry {
 }
 
 impl GgxLobe {
-    /// Creates the lobe of a roughness, 0 to 1, seen at a cosine to the normal.
+    /// Creates the lobe for a roughness, 0 to 1, and an outgoing direction at `cosine` to the normal.
     pub(super) fn new(f0: Vec3, f90: Vec3, roughness: f32, cosine: f32) -> Self {
         let shares = albedo_shares(roughness, cosine);
         let [of_f0, of_f90] = shares;
@@ -101,7 +105,7 @@ impl GgxLobe {
         }
     }
 
-    /// Marks the lobe as that of a layer above the base, which rays follow.
+    /// Marks the lobe as [`Estimate::RayAlone`].
     pub(super) fn as_layer(self) -> Self {
         Self { estimate: Estimate::RayAlone, ..self }
     }
@@ -127,9 +131,9 @@ impl GgxLobe {
         Self { f0: self.f0 * colour, f90: self.f90 * colour, albedo: self.albedo * colour, ..self }
     }
 
-    /// Returns true if photons of lights without an area, in the caustic map, resolve the lobe. It must be
-    /// wider than the resolution of photon directions, and wider than a photon's disc appears from the
-    /// objects that reflect it.
+    /// Returns true if the lobe takes light from the caustic map: from photons of lights without an area. The
+    /// lobe must be wider than the rounding of photon directions, and than a photon's disc appears from the
+    /// object that the lobe reflects.
     pub(super) fn gathers_caustics(&self) -> bool {
         self.alpha >= MIN_CAUSTIC_ALPHA && self.estimate != Estimate::RayAlone
     }
@@ -189,7 +193,7 @@ impl GgxLobe {
         self.f0 + (self.f90 - self.f0) * (squared * squared * rest)
     }
 
-    /// Samples a direction with density `p` by a point of the unit square. It can lie below the surface.
+    /// Maps a point of the unit square to a direction with density `p`, which can lie below the surface.
     #[inline(always)]
     pub(super) fn direction(&self, normal: Vec3, outgoing: Vec3, point: [f32; 2]) -> Vec3 {
         mirror(outgoing, visible_normal(normal, outgoing, self.alpha, point))
@@ -202,7 +206,7 @@ impl GgxLobe {
     }
 }
 
-/// Samples the normal of a microfacet, with the density of visible normals, by a point of the unit square.
+/// Maps a point of the unit square to the normal of a microfacet, with the density of visible normals.
 #[inline(always)]
 fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) -> Vec3 {
     let height = normal.dot(outgoing);
@@ -217,7 +221,8 @@ fn visible_normal(normal: Vec3, outgoing: Vec3, alpha: f32, [u, v]: [f32; 2]) ->
     unit((cap - normal * cap_height) * alpha + normal * max(cap_height, 0.0))
 }
 
-/// Samples the normal of a visible microfacet of a roughness by a point of the unit square.
+/// Maps a point of the unit square to the normal of a microfacet at a roughness, with the density of visible
+/// normals.
 pub(super) fn microfacet(normal: Vec3, outgoing: Vec3, roughness: f32, point: [f32; 2]) -> Vec3 {
     visible_normal(normal, outgoing, max(roughness * roughness, MIN_ALPHA), point)
 }
@@ -240,7 +245,7 @@ pub(super) fn distribution(alpha: f32, geometry: &Geometry) -> f32 {
 /// Minimum of the denominator of `V`, so that `D V` stays finite.
 const MIN_VISIBILITY_SUM: f32 = 1e-12;
 
-/// Visibility `V`.
+/// Visibility `V` of the module's formula, dimensionless.
 #[inline(always)]
 pub(super) fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
     let Geometry { incident, outgoing, .. } = *geometry;
@@ -248,7 +253,7 @@ pub(super) fn visibility(alpha: f32, geometry: &Geometry) -> f32 {
     0.5 / max(sum, MIN_VISIBILITY_SUM)
 }
 
-/// Length `L`.
+/// `L(c) = sqrt(a^2 + (1 - a^2) c^2)` of the masking, at the cosine `c`.
 #[inline(always)]
 fn length(alpha: f32, cosine: f32) -> f32 {
     let squared = alpha * alpha;
@@ -259,7 +264,7 @@ fn length(alpha: f32, cosine: f32) -> f32 {
 mod tests {
     use super::*;
 
-    /// Unit vector at a cosine to the y axis and an azimuth.
+    /// Unit vector at the angle `acos(cosine)` to the y axis, with an azimuth.
     fn at(cosine: f32, azimuth: f32) -> Vec3 {
         let sine = (1.0 - cosine * cosine).sqrt();
         Vec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin())

@@ -1,9 +1,10 @@
 //! Directional albedo of the GGX lobe, `E = F0 A + F90 B`. `A` and `B` are in tables over roughness and
 //! cosine.
 //!
-//! They are the integrals of `f cos` for a lobe with `F = 1 - s` and with `F = s`, where `s = (1 - cos)^5` is
-//! Schlick's factor, computed by quasi-Monte Carlo with 2^17 directions from visible normals. Interpolation
-//! between the entries is accurate to 0.004 for cosines above 0.2, to 0.02 below.
+//! `A` is the integral of `f cos` for a lobe with `F = 1 - s`, `B` for a lobe with `F = s`, where `s = (1 -
+//! h.o)^5` is Schlick's factor. The entries were computed by quasi-Monte Carlo with 2^17 directions from
+//! visible normals. Interpolation between the entries is accurate to 0.004 for cosines above 0.2, to 0.02
+//! below.
 
 /// Number of entries on each axis: roughness 0 to 1, and square root of the cosine 0 to 1.
 pub(super) const SIDE: usize = 16;
@@ -26,8 +27,8 @@ pub(super) fn interpolated(table: &[[u8; SIDE]; SIDE], roughness: f32, cosine: f
     (between(row) * (1.0 - down) + between(row + 1) * down) * (1.0 / 255.0)
 }
 
-/// Index of the table entry before a coordinate, and the fraction of the step to the next, 0 to 1. NaN counts
-/// as 0.
+/// Index of the table entry at or before a coordinate in [0, 1], and the coordinate's fraction of the step to
+/// the next entry, 0 to 1. NaN counts as 0.
 #[inline(always)]
 fn cell(coordinate: f32) -> (usize, f32) {
     let scaled = if coordinate > 0.0 { coordinate } else { 0.0 } * (SIDE - 1) as f32;

@@ -1,4 +1,4 @@
-//! GGX lobe of a waiting gather, as a factor of photon power.
+//! GGX lobe of a waiting gather, evaluated as a factor of each photon's power.
 
 use core::f32::consts::PI;
 
@@ -16,11 +16,11 @@ pub struct Kernel {
     alpha: f32,
 }
 
-/// Minimum cosine of a kernel's outgoing direction.
+/// Minimum of `n.o` in a kernel, so that the bound of `D V` stays finite.
 const MIN_KERNEL_COSINE: f32 = 0.02;
 
 impl Kernel {
-    /// Kernel of unit vectors.
+    /// Creates the kernel of a lobe. `normal` and `outgoing` are unit vectors.
     pub(super) fn new(normal: Vec3, outgoing: Vec3, roughness: f32) -> Self {
         Self { normal, outgoing, alpha: max(roughness * roughness, MIN_ALPHA) }
     }
@@ -54,7 +54,7 @@ mod tests {
     use super::super::ggx::GgxLobe;
     use super::*;
 
-    /// Unit vector at a cosine to the y axis and an azimuth.
+    /// Unit vector at the angle `acos(cosine)` to the y axis, with an azimuth.
     fn at(cosine: f32, azimuth: f32) -> Vec3 {
         let sine = (1.0 - cosine * cosine).sqrt();
         Vec3::new(sine * azimuth.cos(), cosine, sine * azimuth.sin())

@@ -1,10 +1,10 @@
-//! Surfaces of several layers: coat, sheen, base, and the reflection of the other side, which diffuse or
-//! rough transmission shows.
+//! Surfaces of several layers: coat, sheen, base, and the reflection of the far side, which is seen through
+//! the surface by diffuse or rough transmission.
 //!
 //! A path takes one layer at random, in proportion to its share of the light; the reflection of that layer is
-//! divided by the probability. The samples of a pixel cover all layers. A surface therefore has one lobe
-//! whatever its layers, in registers and in the record of a waiting gather. Light that reaches a layer is
-//! attenuated by the directional albedo of the layers above it. Rays follow coat, sheen and transmission;
+//! divided by the probability. The samples of a pixel cover all layers. A surface therefore needs only one
+//! lobe, in registers and in the record of a waiting gather, whatever its layers. Light that reaches a layer
+//! is attenuated by the directional albedo of the layers above it. Rays follow coat, sheen and transmission;
 //! photons light only the base.
 
 use glam::Vec3;
@@ -53,13 +53,13 @@ impl LayerTexel {
     };
 }
 
-/// A layer, with the fraction of light that reaches it.
+/// Kind of layer that a path can take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::scene) enum Layer {
     Base,
     Coat,
     Sheen,
-    /// The reflection of the other side, seen through the surface.
+    /// The reflection of the far side, seen through the surface.
     Behind,
 }
 
@@ -72,11 +72,11 @@ pub(in crate::scene) struct Taken {
     /// Shading normal of the layer.
     pub(in crate::scene) normal: Vec3,
     pub(in crate::scene) probability: f32,
-    /// Probability that a layer of this side is chosen.
+    /// Probability that a layer of the viewer's side is chosen: any but [`Layer::Behind`].
     pub(in crate::scene) of_front: f32,
 }
 
-/// All layers of a material at a point.
+/// All layers of a material at a point, each attenuated by the layers above.
 struct Stack {
     base: Scattering,
     behind: Reflection,
@@ -85,8 +85,8 @@ struct Stack {
 }
 
 /// Chooses a layer of a material at a point. `coat_normal` is the coat's shading normal. `random` returns
-/// numbers in [0, 1): number 0 chooses the layer, 1 and 2 choose the microfacet of rough glass. The lowest
-/// value of number 0 selects the base.
+/// numbers in [0, 1): number 0 chooses the layer, 1 and 2 choose the microfacet of rough glass. The value 0
+/// of number 0 chooses the base.
 #[inline(never)]
 pub(in crate::scene) fn take(
     (material, layers): (&Material, &Layers),
@@ -151,7 +151,7 @@ impl Stack {
             Layer::Sheen => (Scattering::of_lobe(Lobe::Sheen(self.sheen)), normal),
             Layer::Behind => (Scattering { reflection: self.behind, ..Scattering::BLACK }, -normal),
         };
-        // Whichever layer the light goes to, it has come through the glass.
+        // A ray inside glass has come through the glass, whichever layer it continues by.
         let scattering = Scattering { absorption: self.base.absorption, ..scattering };
         let mut scattering = dimmed(scattering, Vec3::splat(1.0 / probability));
         scattering.specular.straight *= probability;
@@ -159,7 +159,7 @@ impl Stack {
     }
 }
 
-/// Applies the textures of reflectance and transmission to a material.
+/// Multiplies the specular and transmission factors of a material by the values of their textures.
 fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material {
     let mut material = *material;
     match &mut material.reflectance {
@@ -178,8 +178,8 @@ fn varied(material: &Material, layers: &Layers, texel: &LayerTexel) -> Material 
     material
 }
 
-/// Lobe of the coat, or its mirror at roughness 0, seen at a cosine; and `F(n.o)`, by which glTF attenuates
-/// everything below the coat.
+/// Scattering of the coat, a lobe or at roughness 0 a mirror, for an outgoing direction at `cosine` to the
+/// coat's normal; and `F(n.o)`, by which glTF attenuates everything below the coat.
 fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
     let factor = layers.coat * texel.coat;
     if factor <= 0.0 {
@@ -208,14 +208,14 @@ fn coat(layers: &Layers, texel: &LayerTexel, cosine: f32) -> (Scattering, f32) {
     }
 }
 
-/// Reflection of the base without its narrow lobe, which photons light.
+/// The part of a material's reflection that photons light: the base without its narrow lobe.
 pub(super) fn lit_by_photons(material: &Material, texel: &Texel, view: &View) -> Reflection {
     let none = LayerTexel::WHITE;
     let (base, _) = base(material, (&Layers::NONE, &none), texel, view, &|_| 0.0);
     base.reflection.without_narrow_lobe()
 }
 
-/// Scattering of the base, and the reflection of the other side that it shows.
+/// Scattering of the base, and the reflection of the far side that is seen through the base.
 fn base(
     material: &Material,
     layers: (&Layers, &LayerTexel),
@@ -247,9 +247,9 @@ fn base(
     (base, Reflection::lambertian(white.reflection.diffuse * colour * share))
 }
 
-/// Scattering of rough glass. A thin wall shows the reflection of its other side through the lobe of its
-/// microfacets. The surface of a volume is perfectly specular at a microfacet sampled by visible normals
-/// (Walter et al. 2007), except for the reflection outside, which is a lobe.
+/// Scattering of rough glass. The far side of a thin wall is seen through a GGX lobe. The surface of a volume
+/// is perfectly specular at a microfacet sampled by visible normals (Walter et al. 2007), except for the
+/// reflection outside, which is a lobe.
 fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2]) -> (Scattering, Reflection) {
     let View { outgoing, normals, is_front } = *view;
     let [normal, geometric_normal] = normals;
@@ -285,7 +285,7 @@ fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2])
     let absorption = Vec3::from(absorption);
     let glass = Glass { base: tint, absorption, transmission, ior, specular, bounds: Bounds::Solid };
     let (_, refracted) = glass.at(outgoing, [microfacet, geometric_normal], !is_front);
-    // Of sampled visible normals, G2 / G1 = G1 of the direction of incidence remains.
+    // The weight of a sampled visible normal is G2 / G1, which is the G1 of the direction of incidence.
     let mirrored = Specular::reflected_direction(outgoing, microfacet, geometric_normal);
     let [beside, behind] = [normal.dot(mirrored), -normal.dot(refracted.behind)]
         .map(|cosine| masking(roughness, cosine) * (1.0 - metallic));
@@ -301,7 +301,8 @@ fn rough_glass(material: &Material, texel: &Texel, view: &View, point: [f32; 2])
     (Scattering { reflection, specular, absorption }, Reflection::BLACK)
 }
 
-/// Maximum albedo over all continuations of a path at a point.
+/// Sum of the albedos of all continuations of a path at a point, by maximum channel: Lambertian part, lobe,
+/// specular reflection, transmission.
 fn albedo(Scattering { reflection, specular, .. }: &Scattering) -> f32 {
     let Reflection { diffuse, lobe } = reflection;
     [*diffuse, lobe.albedo(), specular.reflected, specular.transmitted].into_iter().map(max_component).sum()

@@ -7,14 +7,14 @@ use super::ggx::GgxLobe;
 use super::phong::PhongLobe;
 use super::sheen::SheenLobe;
 
-/// A lobe of one of the models.
+/// Phong, GGX or sheen lobe of a surface's reflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Lobe {
     /// Phong lobe of the dissertation and of `extras.photoncard.phong`.
     Phong(PhongLobe),
     /// GGX lobe of glTF's metallic-roughness model.
     Ggx(GgxLobe),
-    /// Sheen lobe of `KHR_materials_sheen`. Rays always follow it.
+    /// Sheen lobe of `KHR_materials_sheen`, always followed by rays instead of being estimated from photons.
     Sheen(SheenLobe),
 }
 
@@ -22,7 +22,6 @@ impl Lobe {
     /// A lobe that reflects nothing.
     pub(super) const BLACK: Self = Self::Phong(PhongLobe::BLACK);
 
-    /// Returns true if the lobe reflects any light.
     #[inline(always)]
     pub(super) fn reflects(&self) -> bool {
         match self {
@@ -32,7 +31,8 @@ impl Lobe {
         }
     }
 
-    /// Albedo: of a Phong lobe at normal incidence, of other lobes for their outgoing direction.
+    /// Albedo of a Phong lobe at normal incidence, or of another lobe for the outgoing direction that the
+    /// lobe is made for.
     #[inline(always)]
     pub(super) fn albedo(&self) -> Vec3 {
         match self {

@@ -1,5 +1,5 @@
-//! Converts materials to reflections seen from one direction. The factors of the material's record are
-//! multiplied by those of textures and vertices.
+//! Converts materials to the scattering towards one direction. The factors of a material's record are
+//! multiplied by those of textures and vertex colours.
 
 use glam::Vec3;
 use photoncard_shared::layout::{COMPENSATED, Material, NARROW_LOBE, Reflectance};
@@ -23,7 +23,7 @@ impl Texel {
     pub(in crate::scene) const WHITE: Self = Self { colour: Vec3::ONE, roughness: 1.0, metallic: 1.0 };
 }
 
-/// Geometry of the view of a point.
+/// Direction from which a point is seen, with the normals on the viewer's side.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct View {
     /// Unit direction to the viewer.
@@ -34,8 +34,8 @@ pub(in crate::scene) struct View {
 }
 
 impl View {
-    /// Cosine between the view and the normal by which a lobe or a mirror reflects, the [`bent`] shading
-    /// normal.
+    /// Cosine between the direction to the viewer and the [`bent`] shading normal, by which lobes and mirrors
+    /// reflect.
     #[inline(always)]
     pub(super) fn glossy_cosine(&self) -> f32 {
         let [normal, geometric_normal] = self.normals;
@@ -47,14 +47,13 @@ impl View {
 #[derive(Clone, Copy, Debug)]
 pub(in crate::scene) struct Scattering {
     pub(in crate::scene) reflection: Reflection,
-    /// The perfectly specular part.
     pub(in crate::scene) specular: Specular,
     /// Absorption coefficient on the viewer's side, 1/m.
     pub(in crate::scene) absorption: Vec3,
 }
 
 impl Scattering {
-    /// Absence of scattering.
+    /// Value for a surface that neither reflects nor transmits.
     pub(super) const BLACK: Self =
         Self { reflection: Reflection::BLACK, specular: Specular::NONE, absorption: Vec3::ZERO };
 

@@ -1,8 +1,7 @@
 //! glTF's metallic-roughness model (glTF 2.0, appendix B): a GGX lobe over a Lambertian base.
 //!
-//! - The lobe is a [`GgxLobe`]. `F0` mixes the dielectric's, with the weight `1 - metallic`, and the base
-//!   colour, with the weight `metallic`. `F90` mixes the factor of `KHR_materials_specular` and 1 with the
-//!   same weights.
+//! - The lobe is a [`GgxLobe`]. With `m = metallic`, `F0` is `(1 - m)` times the dielectric's F0 plus `m`
+//!   times the base colour; `F90` is `(1 - m)` times `specularFactor` (`KHR_materials_specular`) plus `m`.
 //! - The Lambertian albedo is `base (1 - metallic) (1 - max(F, E))`. `F` is the mean over uniform light of
 //!   the dielectric's `F(h.o)`, by which appendix B weights the base. `E` is the maximum channel of the
 //!   lobe's albedo towards `o`, which exceeds `F` at grazing views.
@@ -33,7 +32,7 @@ pub(super) struct MetallicRoughness {
 }
 
 impl MetallicRoughness {
-    /// Reflection without its perfectly specular part, seen at a cosine to the normal.
+    /// Reflection at a roughness above 0, for an outgoing direction at `cosine` to the normal.
     pub(super) fn reflection(&self, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
         let lobe = self.lobe(f0, f90, cosine);
@@ -42,7 +41,7 @@ impl MetallicRoughness {
         Reflection { diffuse, lobe: Lobe::Ggx(lobe) }
     }
 
-    /// The lobe times `share`, beside a Lambertian part with the albedo `diffuse`.
+    /// Reflection that consists of the lobe times `share` and a Lambertian part with the albedo `diffuse`.
     pub(super) fn lobe_beside(&self, diffuse: Vec3, share: f32, cosine: f32) -> Reflection {
         let [f0, f90] = self.mixed();
         let lobe = self.lobe(f0 * share, f90 * share, cosine);
@@ -57,7 +56,8 @@ impl MetallicRoughness {
         if self.is_compensated { lobe.compensated() } else { lobe }
     }
 
-    /// Lambertian and perfectly specular part at roughness 0, seen at a cosine to the normal.
+    /// Lambertian and perfectly specular part at roughness 0, for an outgoing direction at `cosine` to the
+    /// normal.
     pub(super) fn smooth(&self, cosine: f32) -> (Reflection, Specular) {
         let rest = 1.0 - cosine;
         let squared = rest * rest;
@@ -85,13 +85,13 @@ impl MetallicRoughness {
 }
 
 /// Mean of `(1 - h.o)^5` over the directions `i` of uniform light, where `h` is the half vector of `i` and
-/// `o`, for the cosine of `o`. It is a fit with an error of 0.0001.
+/// `o`, and `cosine` is `n.o`: a fit with an error of 0.0001.
 fn mean_schlick(cosine: f32) -> f32 {
     let rest = 1.0 - min(max(cosine, 0.0), 1.0);
     rest * (0.0045 + rest * (rest * 0.0257 - 0.0021))
 }
 
-/// Linear interpolation from `from`, at share 0, to `to`.
+/// Linear interpolation from `from`, at share 0, to `to`, at share 1.
 fn towards(from: Vec3, to: Vec3, share: f32) -> Vec3 {
     from * (1.0 - share) + to * share
 }

@@ -40,7 +40,7 @@ use ggx::Estimate;
 use lobe::Lobe;
 use phong::PhongLobe;
 
-/// Maximum `a = roughness^2` of a sharp lobe. Cycles's denoising features have the same limit.
+/// Maximum `a = roughness^2` of a sharp lobe, as for the denoising features of Cycles.
 const MAX_SHARP_ALPHA: f32 = 0.075;
 
 /// Parameters of a reflection function `f`: a Lambertian part and a lobe.
@@ -52,7 +52,7 @@ pub struct Reflection {
 }
 
 impl Reflection {
-    /// No reflection.
+    /// Reflection of a black surface: `f = 0`.
     pub const BLACK: Self = Self::lambertian(Vec3::ZERO);
 
     /// Lambertian reflection with this albedo, 0 to 1.
@@ -73,21 +73,21 @@ impl Reflection {
         !self.has_lambertian() && self.is_lambertian()
     }
 
-    /// Returns true if there is a Lambertian part, whose reflected light follows from the irradiance.
+    /// Returns true if the Lambertian albedo is above 0.
     #[inline(always)]
     pub fn has_lambertian(&self) -> bool {
         max_component(self.diffuse) > 0.0
     }
 
-    /// Returns true if there is no lobe.
+    /// Returns true if no lobe reflects light.
     #[inline(always)]
     pub fn is_lambertian(&self) -> bool {
         !self.lobe.reflects()
     }
 
-    /// Returns true if there is a lobe that photons cannot resolve, because only a few of the k nearest, or
-    /// none, would be in it. A ray follows such a lobe, as it follows perfectly specular surfaces, except
-    /// where the eye sees the lobe.
+    /// Returns true if there is a narrow lobe: photons cannot resolve it, because few or none of the k
+    /// nearest arrive within it. Gather rays and photons follow a narrow lobe as they follow perfectly
+    /// specular surfaces; an eye path ends there, and gather rays are cast.
     #[inline(always)]
     pub fn has_narrow_lobe(&self) -> bool {
         match &self.lobe {
@@ -103,7 +103,7 @@ impl Reflection {
         if is_sharp { self.glossy_share() } else { 0.0 }
     }
 
-    /// Fraction of the albedo that a GGX lobe has; 0 without one.
+    /// Fraction of the albedo that a GGX lobe has; 0 without a GGX lobe.
     #[inline(always)]
     pub(super) fn glossy_share(&self) -> f32 {
         match &self.lobe {
@@ -115,15 +115,15 @@ impl Reflection {
         }
     }
 
-    /// Removes a narrow lobe; photons estimate what remains.
+    /// Removes a narrow lobe. The rest of the reflection is estimated from photons.
     #[inline(always)]
     #[must_use]
     pub fn without_narrow_lobe(self) -> Self {
         if self.has_narrow_lobe() { Self::lambertian(self.diffuse) } else { self }
     }
 
-    /// Returns true if there is a narrow lobe that the caustic map lights with photons of lights without an
-    /// area. A gather ray of the lobe would rarely hit their highlights.
+    /// Returns true if there is a narrow lobe that takes light from the caustic map: from photons of lights
+    /// without an area, whose caustics a gather ray of the lobe would rarely find.
     #[inline(always)]
     pub fn gathers_caustics(&self) -> bool {
         match &self.lobe {
@@ -132,15 +132,16 @@ impl Reflection {
         }
     }
 
-    /// Returns true if there is a narrow lobe for which the caustic map stores photons of lights without an
-    /// area.
+    /// Returns true if photons of lights without an area are stored in the caustic map for the sake of a
+    /// narrow lobe.
     #[inline(always)]
     pub fn keeps_caustics(&self) -> bool {
         self.gathers_caustics()
             && !matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.estimate == Estimate::RayBesideBase)
     }
 
-    /// Only the narrow lobe, marked as a part beside the Lambertian one, for which photons are stored.
+    /// Reduces the reflection to the narrow lobe, marked as [`Estimate::RayBesideBase`]: photons are stored
+    /// for the Lambertian part beside the lobe.
     #[must_use]
     pub(in crate::scene) fn narrow_lobe_beside_base(self) -> Self {
         let mut part = self.narrow_lobe();
@@ -152,13 +153,13 @@ impl Reflection {
         part
     }
 
-    /// Only the narrow lobe; black if there is none.
+    /// Reduces the reflection to the narrow lobe; black if there is none.
     #[must_use]
     pub fn narrow_lobe(self) -> Self {
         if self.has_narrow_lobe() { self.without_lambertian() } else { Self::BLACK }
     }
 
-    /// Only the lobe.
+    /// Reduces the reflection to the lobe, narrow or wide.
     #[inline(always)]
     #[must_use]
     pub fn without_lambertian(self) -> Self {

@@ -26,7 +26,7 @@ impl PhongLobe {
         max_component(self.albedo) > 0.0
     }
 
-    /// `max(0, cos alpha)^n` for two unit vectors.
+    /// `max(0, cos alpha)^n`, with the angle alpha between two unit vectors.
     #[inline(always)]
     pub(super) fn power(&self, mirror: Vec3, direction: Vec3) -> f32 {
         power(mirror.dot(direction), self.exponent)
@@ -66,7 +66,7 @@ impl PhongLobe {
     }
 }
 
-/// `max(0, cosine)^exponent`. It is 0 at and below the lobe's horizon for every exponent, including 0.
+/// `max(0, cosine)^exponent`. For every exponent, including 0, the result is 0 if the cosine is not positive.
 #[inline(always)]
 pub(super) fn power(cosine: f32, exponent: f32) -> f32 {
     if cosine > 0.0 { libm::powf(cosine, exponent) } else { 0.0 }

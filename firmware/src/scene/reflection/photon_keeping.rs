@@ -14,14 +14,14 @@ use crate::scene::texture::{channel_ranges, read_texture};
 /// besides a narrow lobe.
 ///
 /// # Errors
-/// If the image is invalid.
+/// If the card image is invalid.
 pub fn keeps_photons(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     material: &Material,
 ) -> Result<bool, Fault> {
     let [_, texture, _] = material.textures;
-    // A texture of metalness is read where it decides.
+    // The texture of metalness is read only if the result depends on metalness.
     if texture == NO_TEXTURE || keeps(material, 0.0) == keeps(material, 1.0) {
         return Ok(keeps(material, 1.0));
     }
@@ -30,9 +30,9 @@ pub fn keeps_photons(
     Ok(metallic.into_iter().any(|metallic| keeps(material, metallic)))
 }
 
-/// Returns true if photons are stored at a white texel of this metalness, because its reflection without a
-/// narrow lobe is not black. Light is assumed along the normal, where smooth coats reflect least. If any
-/// value in a range of metalness keeps photons, one of the range's ends does.
+/// Returns true if photons are stored where textures have the value 1, except for the metalness `metallic`:
+/// the reflection without a narrow lobe is not black, seen along the normal, where smooth coats reflect
+/// least. If photons are stored at some metalness in a range, they are stored at one of the range's ends.
 fn keeps(material: &Material, metallic: f32) -> bool {
     let texel = Texel { metallic, ..Texel::WHITE };
     let view = View { outgoing: Vec3::Y, normals: [Vec3::Y; 2], is_front: true };
@@ -87,7 +87,7 @@ mod tests {
         })
     }
 
-    /// Texels of every colour and roughness with one metalness, and views of both sides.
+    /// Texels with colours and roughnesses of 0, 1/2 and 1 and one metalness, each with views of both sides.
     fn sights(metallic: f32) -> Vec<(Texel, View)> {
         let mut sights = Vec::new();
         for index in 0..81 {

@@ -1,4 +1,4 @@
-//! Reflection in the record of a waiting gather, and its sums over photons.
+//! Reflection function in the record of a waiting gather, and its evaluation for photons.
 
 use glam::Vec3;
 use photoncard_shared::layout::{Rgbe, decode_direction, encode_direction, encode_normal};
@@ -14,9 +14,9 @@ use crate::vector::{from_upper_half, max, mirror, unit, upper_half};
 /// A reflection function, evaluated as far as it does not depend on a photon: 13 bytes, the dissertation's
 /// `S_B` (section 7.4).
 ///
-/// Stage one, [`Self::encode`], is done once per query: albedos, weight, units and the lobe's factor become
-/// two colours. Stage two, [`Self::lobe_factor`], is done once per photon. Colours are rounded to a shared
-/// exponent, in the same way for every order of gathers.
+/// Stage one, [`Self::encode`], is done once per gather: albedos, weight, units and the lobe's constant
+/// factor become two colours. Stage two, [`Self::lobe_factor`], is done once per photon. Colours are rounded
+/// to a shared exponent, in the same way for every order of gathers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PartialReflection {
     diffuse: Rgbe,
@@ -42,7 +42,7 @@ impl PartialReflection {
                 let shape = Shape::ggx(reflector, lobe);
                 (shape, lobe.colour(), shape.kernel().bound())
             }
-            // Followed by rays: no photon is gathered for it.
+            // Rays follow the sheen lobe: no photon is gathered for it.
             Lobe::Sheen(_) => (Shape([0; 4]), Vec3::ZERO, 0.0),
         };
         Self {
@@ -53,7 +53,8 @@ impl PartialReflection {
         }
     }
 
-    /// Encodes a reflection that does not wait. Also returns its lobe; a GGX lobe has unrounded directions.
+    /// Encodes a reflection that is evaluated at once, without the gather queue. Also returns its lobe,
+    /// unrounded if GGX.
     pub fn encode_present(reflector: &Reflector, weight: Vec3, dither: u32) -> (Self, DecodedLobe) {
         let record = Self::encode(reflector, weight, dither);
         let Lobe::Ggx(lobe) = &reflector.reflection.lobe else { return (record, record.decode_lobe()) };
@@ -63,13 +64,13 @@ impl PartialReflection {
         (Self { lobe, ..record }, DecodedLobe::Ggx(kernel))
     }
 
-    /// Replaces the code of the surface normal by that of other photons.
+    /// Replaces the code of the surface normal, by which photons of the surface are recognised.
     #[must_use]
     pub fn among(self, normal: u8) -> Self {
         Self { normal, ..self }
     }
 
-    /// Encodes a white diffuser with factor 1, whose result is the irradiance. `normal` is the code of its
+    /// Encodes `f = 1`, for which the reflected radiance is the irradiance. `normal` is the code of the
     /// surface normal.
     pub fn diffuser(normal: u8) -> Self {
         // 1 is a power of two: nothing is rounded.
@@ -77,26 +78,27 @@ impl PartialReflection {
         Self { diffuse, lobe: Rgbe::default(), shape: Shape([0; 4]), normal }
     }
 
-    /// Returns true if there is no lobe, so that irradiance suffices, whatever the directions of photons.
+    /// Returns true if there is no lobe, so that the reflected radiance does not depend on the directions of
+    /// photons.
     #[inline(always)]
     pub fn is_lambertian(&self) -> bool {
         self.lobe == Rgbe::default()
     }
 
-    /// Returns true if the lobe, if any, is of a microfacet model.
+    /// Returns true if the record has a GGX lobe, even a black one.
     #[inline(always)]
     pub fn is_of_microfacets(&self) -> bool {
         let Shape([_, _, third, _]) = self.shape;
         third & GGX != 0
     }
 
-    /// Factor of photon power in the Lambertian part.
+    /// Factor by which the Lambertian part multiplies photon power.
     #[inline(always)]
     pub fn lambertian(&self) -> Vec3 {
         self.diffuse.decode().into()
     }
 
-    /// Decodes the lobe. This is done once for all photons of a gather.
+    /// Decodes the lobe, once for all photons of a gather.
     #[inline(always)]
     pub fn decode_lobe(&self) -> DecodedLobe {
         if self.is_lambertian() {
@@ -105,8 +107,8 @@ impl PartialReflection {
         self.shape.decode()
     }
 
-    /// Factor of a photon's power in the lobe's sum. `direction` is the code of the direction from which the
-    /// photon came.
+    /// Factor of a photon's power in the sum over photons for the lobe. `direction` is the code of the
+    /// direction from which the photon came.
     #[inline(always)]
     pub fn lobe_factor(lobe: &DecodedLobe, direction: [u8; 2]) -> Vec3 {
         let incident = unit(decode_direction(direction).into());
@@ -116,7 +118,8 @@ impl PartialReflection {
         })
     }
 
-    /// Reflected power of photons, in the units of `weight`, from the sum of their powers and the lobe's sum.
+    /// Reflected power of photons, times the weight of [`Self::encode`]: `power` is the sum of the photons'
+    /// powers, `lobe` the sum of powers times [`Self::lobe_factor`].
     #[inline(always)]
     pub fn reflected(&self, power: &ColourSum, lobe: &ColourSum) -> Vec3 {
         self.lambertian() * power.value() + Vec3::from_array(self.lobe.decode()) * lobe.value()
@@ -143,12 +146,13 @@ pub enum DecodedLobe {
     Ggx(Kernel),
 }
 
-/// Parameters of a lobe except its colour. The first bit of the third byte selects the model.
+/// Parameters of a lobe except its colour. The highest bit of the third byte selects the model.
 ///
-/// - Phong, bit 0: two bytes of the mirror direction, and a bfloat16 of the exponent, which is not negative.
-/// - GGX, bit 1: 12 bits of the outgoing direction, 12 of the normal, 7 of the roughness. Narrow lobes are
-///   not gathered ([`super::Reflection::has_narrow_lobe`]), so that a lobe here is ten times as wide as the
-///   steps of the directions.
+/// - Phong, if the bit is clear: two bytes of the mirror direction, and a bfloat16 of the exponent, which is
+///   not negative.
+/// - GGX, if the bit is set: 12 bits of the outgoing direction, 12 of the normal, 7 of the roughness. Narrow
+///   lobes are not gathered ([`super::Reflection::has_narrow_lobe`]), so that an encoded lobe is ten times as
+///   wide as the steps of the directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Shape([u8; 4]);
 
@@ -167,8 +171,8 @@ impl Shape {
     fn ggx(reflector: &Reflector, lobe: &GgxLobe) -> Self {
         let [a, b] = encode_direction(reflector.outgoing.to_array()).map(coarse);
         let [c, d] = encode_direction(reflector.normal.to_array()).map(coarse);
-        // The third byte has the roughness; two bits of each of the others' have the fourth direction
-        // coordinate.
+        // The third byte holds bit and roughness. Each other byte holds a coordinate of six bits and two bits
+        // of the fourth coordinate.
         let roughness = (lobe.roughness() * ROUGHNESS_STEPS + 0.5) as u8;
         Self([a | d >> 4 << 6, b | (d >> 2 & 3) << 6, GGX | roughness, c | (d & 3) << 6])
     }
@@ -199,7 +203,7 @@ impl Shape {
     }
 }
 
-/// Number of steps of a direction's coordinate, in a byte and in six bits.
+/// Number of steps of a direction's octahedral coordinate, in a byte and in six bits.
 const STEPS: [u32; 2] = [254, 62];
 
 /// Rounds a direction's coordinate from a byte to six bits.

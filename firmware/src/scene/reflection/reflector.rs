@@ -24,12 +24,12 @@ use super::phong::PhongLobe;
 use super::sheen::SheenLobe;
 use crate::vector::{from_frame, max, max_component, mirror};
 
-/// A sampled direction of reflection, and its weight.
+/// A sampled direction of reflection, and the weight of the sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReflectedDirection {
     /// Unit vector away from the surface.
     pub direction: Vec3,
-    /// Factor `f cos(theta) / p`, dimensionless, of the light that arrived.
+    /// Weight `f cos(theta) / p` of the sample, dimensionless.
     pub weight: Vec3,
 }
 
@@ -60,7 +60,7 @@ impl Reflector {
         self.lambertian() + value
     }
 
-    /// `f` of the lobe by the shading normal alone, 1/sr.
+    /// `f` of the lobe about the shading normal, 1/sr, without the part that [`Self::raised`] mirrors.
     #[inline(always)]
     fn lobe_value(&self, incident: Vec3) -> Vec3 {
         match &self.reflection.lobe {
@@ -71,7 +71,8 @@ impl Reflector {
     }
 
     /// For a direction above the triangle: the direction below it whose part of the lobe is mirrored to
-    /// `direction`, and the ratio of their cosines to the shading normal, 0 to 1; `None` if no part is.
+    /// `direction`, and the ratio of the two directions' cosines to the shading normal, 0 to 1; `None` if no
+    /// part of the lobe is mirrored to `direction`.
     #[inline(always)]
     fn mirrored_part(&self, direction: Vec3) -> Option<(Vec3, f32)> {
         if self.normal == self.geometric_normal {
@@ -82,7 +83,8 @@ impl Reflector {
         (cosine_below > 0.0 && cosine > cosine_below).then(|| (below, cosine_below / cosine))
     }
 
-    /// Mirrors a direction of the lobe in the triangle if it lies below it, and above the shading horizon.
+    /// Mirrors a direction of the lobe in the triangle if the direction lies below the triangle and above the
+    /// shading horizon.
     #[inline(always)]
     fn raised(&self, direction: Vec3) -> Vec3 {
         let is_below = self.normal != self.geometric_normal
@@ -115,22 +117,22 @@ impl Reflector {
         [max_component(self.reflection.diffuse), max_component(self.reflection.lobe.albedo())]
     }
 
-    /// Fraction of the sum of [`Self::albedos`] that the Lambertian part has; 1 without a lobe.
+    /// The Lambertian part's fraction of the sum of [`Self::albedos`]; 1 without a lobe.
     #[inline(always)]
     pub fn diffuse_share(&self) -> f32 {
         let [diffuse, lobe] = self.albedos();
         if lobe <= 0.0 { 1.0 } else { diffuse / (diffuse + lobe) }
     }
 
-    /// Fraction of the sum of [`Self::albedos`] that the lobe has; 0 without a lobe.
+    /// The lobe's fraction of the sum of [`Self::albedos`]; 0 without a lobe.
     #[inline(always)]
     pub fn lobe_share(&self) -> f32 {
         let [diffuse, lobe] = self.albedos();
         if lobe > 0.0 { lobe / (diffuse + lobe) } else { 0.0 }
     }
 
-    /// Sharpness of the lobe: the exponent `n` of a lobe `cos^n alpha` with the same width. It is
-    /// `1 / (2 a^2)` for a GGX lobe (Walter et al. 2007).
+    /// Sharpness of the lobe: the exponent `n` of a lobe `cos^n alpha` with the same width. For a GGX lobe
+    /// the exponent is `1 / (2 a^2)` (Walter et al. 2007).
     #[inline(always)]
     pub fn lobe_sharpness(&self) -> f32 {
         match &self.reflection.lobe {
@@ -140,14 +142,15 @@ impl Reflector {
         }
     }
 
-    /// Samples a direction of the lobe by a point of the unit square.
+    /// Maps a point of the unit square to a direction of the lobe, with the density [`Self::lobe_density`].
     #[inline(always)]
     pub fn sample_lobe(&self, point: [f32; 2]) -> Vec3 {
         self.raised(self.lobe_direction(point))
     }
 
-    /// Samples the lobe alone by a point of the unit square. The weight is zero, and the direction anywhere,
-    /// if the sampled direction lies below the shading horizon.
+    /// Samples the lobe alone by a point of the unit square, with the weight `f cos(theta) / p` of the lobe.
+    /// The weight is zero, and the direction meaningless, if the sampled direction lies below the shading
+    /// horizon.
     pub fn sample_lobe_alone(&self, point: [f32; 2]) -> ReflectedDirection {
         let direction = self.lobe_direction(point);
         ReflectedDirection { direction: self.raised(direction), weight: self.lobe_weight(direction) }
@@ -166,7 +169,8 @@ impl Reflector {
         (from, ReflectedDirection { direction, weight: lobe.lobe_weight(direction) * of_two })
     }
 
-    /// Samples a direction of the lobe by the shading normal alone.
+    /// Maps a point of the unit square to a direction of the lobe about the shading normal, not yet
+    /// [`Self::raised`].
     #[inline(always)]
     fn lobe_direction(&self, point: [f32; 2]) -> Vec3 {
         match &self.reflection.lobe {
@@ -176,7 +180,7 @@ impl Reflector {
         }
     }
 
-    /// Weight `f cos(theta) / p` of the lobe by the shading normal alone, dimensionless; zero below the
+    /// Weight `f cos(theta) / p` of a direction from [`Self::lobe_direction`], dimensionless; zero below the
     /// shading horizon.
     fn lobe_weight(&self, direction: Vec3) -> Vec3 {
         match &self.reflection.lobe {
@@ -189,8 +193,8 @@ impl Reflector {
         }
     }
 
-    /// Ratio `f / p` of the lobe by the shading normal alone, divided by its albedo, dimensionless, for a
-    /// direction above the surface.
+    /// Ratio `f / (albedo p)` of the lobe about the shading normal, without the part mirrored in the
+    /// triangle, dimensionless, for a direction above the surface.
     #[inline(always)]
     pub fn lobe_gain(&self, direction: Vec3) -> f32 {
         match &self.reflection.lobe {
@@ -233,7 +237,7 @@ impl Reflector {
         (self.lambertian() + value, density)
     }
 
-    /// `f` of the lobe and its density by the shading normal alone, both 1/sr.
+    /// `f` of the lobe about the shading normal, and the density of [`Self::lobe_direction`], both 1/sr.
     #[inline(always)]
     fn lobe_sampled(&self, direction: Vec3) -> (Vec3, f32) {
         match &self.reflection.lobe {
@@ -249,7 +253,8 @@ impl Reflector {
         }
     }
 
-    /// Samples a direction by a point of the unit square; `None` below the surface, where the weight is zero.
+    /// Samples Lambertian part and lobe by a point of the unit square; `None` if the direction lies below the
+    /// surface, where the weight is zero.
     pub fn sample(&self, [u, v]: [f32; 2]) -> Option<ReflectedDirection> {
         let Self { normal, reflection, .. } = *self;
         let diffuse_share = self.diffuse_share();
@@ -288,8 +293,8 @@ impl Reflector {
     }
 }
 
-/// Samples a direction with density `cos(theta) / pi`: the square is mapped to the disc (Shirley, Chiu 1997),
-/// and the disc is projected up to the hemisphere.
+/// Maps a point of the unit square to a direction with density `cos(theta) / pi`: the square is mapped to the
+/// disc (Shirley, Chiu 1997), and the disc is projected up to the hemisphere.
 #[inline(always)]
 fn cosine_direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
     let [a, b] = [2.0 * u - 1.0, 2.0 * v - 1.0];

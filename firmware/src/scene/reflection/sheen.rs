@@ -2,7 +2,7 @@
 //! *Production friendly microfacet sheen BRDF*), with `a = roughness^2`:
 //!
 //! - `D = (2 + 1/a) sin^(1/a)(n, h) / (2 pi)`;
-//! - `G = 1 / (1 + l(n.o) + l(n.i))`, where `l` is that paper's fit.
+//! - `G = 1 / (1 + l(n.o) + l(n.i))`, where `l` is the fit of Estevez and Kulla.
 //!
 //! Directions are sampled uniformly over the hemisphere, because the lobe is wide, and strongest at grazing
 //! angles. `E`, the directional albedo of a white lobe, is in a table. A roughness below 0.25 is replaced by
@@ -17,10 +17,10 @@ use crate::vector::{about, max, max_component, unit};
 
 /// Minimum roughness. A smaller roughness would reflect more light than arrives at grazing angles.
 const MIN_ROUGHNESS: f32 = 0.25;
-/// Density of sampled directions, 1/sr.
+/// Density of sampled directions, 1/sr: uniform over the hemisphere.
 const DENSITY: f32 = 0.5 / PI;
 
-/// A sheen lobe, seen from one direction.
+/// A sheen lobe for one outgoing direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct SheenLobe {
     colour: Vec3,
@@ -30,14 +30,13 @@ pub(super) struct SheenLobe {
 }
 
 impl SheenLobe {
-    /// Creates the lobe of a roughness, 0 to 1, seen at a cosine to the normal.
+    /// Creates the lobe for a roughness, 0 to 1, and an outgoing direction at `cosine` to the normal.
     pub(super) fn new(colour: Vec3, roughness: f32, cosine: f32) -> Self {
         let roughness = max(roughness, MIN_ROUGHNESS);
         let of_white = interpolated(&ALBEDOS, roughness, cosine);
         Self { colour, alpha: roughness * roughness, of_white }
     }
 
-    /// Returns true if the lobe reflects any light.
     pub(super) fn reflects(&self) -> bool {
         max_component(self.colour) > 0.0
     }
@@ -79,20 +78,20 @@ impl SheenLobe {
         white.evaluate(normal, outgoing, incident).x / (DENSITY * albedo)
     }
 
-    /// Samples a direction above the surface by a point of the unit square.
+    /// Maps a point of the unit square to a direction above the surface, uniformly in solid angle.
     pub(super) fn direction(normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let sine = libm::sqrtf(max(1.0 - v * v, 0.0));
         about(normal, 2.0 * PI * u, sine, v)
     }
 }
 
-/// Shadowing fit `l` at a cosine.
+/// Fit `l` of the shadowing at a cosine to the normal.
 fn shadowing(cosine: f32, alpha: f32) -> f32 {
     let fit = |cosine| logarithm(cosine, alpha);
     libm::expf(if cosine < 0.5 { fit(cosine) } else { 2.0 * fit(0.5) - fit(1.0 - cosine) })
 }
 
-/// Logarithm of `l` below a cosine of 0.5: `a / (1 + b x^c) + d x + e`. Its coefficients are interpolated
+/// Logarithm of `l` below a cosine of 0.5: `a / (1 + b x^c) + d x + e`. The coefficients are interpolated
 /// between those for `alpha` 0 and 1.
 fn logarithm(x: f32, alpha: f32) -> f32 {
     const ROUGH: [f32; 5] = [21.5473, 3.829_87, 0.198_23, -1.977_6, -4.320_54];

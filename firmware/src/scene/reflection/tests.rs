@@ -26,7 +26,7 @@ fn ggx(roughness: f32, cosine: f32) -> Lobe {
     Lobe::Ggx(GgxLobe::new(Vec3::new(1.0, 0.5, 0.0), Vec3::ONE, roughness, cosine))
 }
 
-/// Lobes of every model, seen at a high angle and at grazing angles.
+/// Lobes of every model, seen from near the normal, at 60 degrees and at a grazing angle.
 fn reflectors() -> Vec<Reflector> {
     [0.95, 0.5, 0.15]
         .into_iter()
@@ -70,9 +70,9 @@ fn probabilities(reflector: &Reflector) -> Vec<f64> {
     sums
 }
 
-/// Pearson's chi-squared test. For `n` cells with at least 8 expected samples, the sum of
-/// `(found - expected)^2 / expected` has the mean `n` and the variance `2 n`. Density and samples are single
-/// precision.
+/// Pearson's chi-squared test. For `n` cells with at least 8 expected samples, the sum of `(found -
+/// expected)^2 / expected` has the mean `n` and the variance `2 n`. Density and samples are computed in
+/// single precision.
 #[test]
 fn samples_follow_their_density() {
     const SAMPLES: u32 = 40_000;
@@ -159,8 +159,8 @@ fn a_lobe_loses_no_light_below_a_triangle_that_its_normal_is_not_of() {
     }
 }
 
-/// Powers from all directions above a triangle to all others, weighted by a function of both: by the lobe's
-/// samples for eye rays, and by those for photons.
+/// Compares the power that a lobe transports, weighted by a function of both directions, between samples for
+/// eye rays and samples for photons.
 #[test]
 fn photons_of_a_lobe_transport_the_power_that_eye_rays_find() {
     let triangle = Vec3::Y;

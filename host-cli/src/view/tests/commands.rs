@@ -12,7 +12,7 @@ use crate::view::command_line::{quoted, words};
 use crate::view::request::Setting;
 use crate::view::wish::Wish;
 
-/// Parses the command line of a view.
+/// Parses the arguments of `photoncard view`.
 pub(super) fn view_options(arguments: &[String]) -> ViewOptions {
     let command = ["photoncard".to_owned(), "view".to_owned()];
     let parsed = Arguments::try_parse_from(command.iter().chain(arguments));
@@ -23,7 +23,7 @@ pub(super) fn view_options(arguments: &[String]) -> ViewOptions {
     }
 }
 
-/// Splits a shell command line whose only quotes are single ones, with backslashes between them.
+/// Splits a shell command line of words with single quotes and, outside of them, backslashes.
 fn split(line: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let (mut is_quoted, mut is_escaped) = (false, false);
@@ -94,7 +94,7 @@ fn options(random: &mut Random) -> Vec<String> {
     named
 }
 
-/// Wish after random messages from a page.
+/// Wish of a view after random changes by a page.
 fn wish(options: &ViewOptions, random: &mut Random) -> Wish {
     let mut wish = Wish::new(options.settings(), options.stated(), options.scene.assignments.clone());
     for _ in 0..random.below(6) {
@@ -138,7 +138,7 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
         assert_eq!(settings.schedule.order, wish.settings.schedule.order, "{line}");
         assert_eq!(settings.schedule.tile, wish.settings.schedule.tile, "{line}");
         assert_eq!(settings.picture.layers, wish.settings.picture.layers, "{line}");
-        // Nothing is left to a pilot render.
+        // The command line states every setting that a quality could choose.
         assert_eq!(render.stated(), Stated::ALL, "{line}");
         assert_eq!(render.scene.assignments, wish.assignments(), "{line}");
         assert_eq!(render.scene.variant, view.scene.variant, "{line}");

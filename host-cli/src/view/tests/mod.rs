@@ -1,4 +1,4 @@
-//! Tests of a view's state with random actions.
+//! Tests of a view's state and command line with random actions.
 
 mod commands;
 mod random;

@@ -18,7 +18,7 @@ impl Random {
         list[self.below(list.len() as u64) as usize]
     }
 
-    /// Pseudo-random single-precision number from -`reach` to `reach` with many digits.
+    /// Pseudo-random number from -`reach` to `reach`, a multiple of `reach` / 2^23.
     pub(super) fn number(&mut self, reach: f32) -> f32 {
         let share = self.below(1 << 24) as f32 / (1 << 23) as f32 - 1.0;
         share * reach

@@ -1,5 +1,5 @@
-//! Random actions of pages and cards. The view is never stuck, holds bounded memory, and settles to the
-//! picture of the last wish.
+//! Random actions of pages and cards, in a simulated view. It is never stuck, holds bounded memory, and
+//! settles to the picture of the last wish.
 
 use std::time::Duration;
 
@@ -80,7 +80,7 @@ fn ten_thousand_random_actions_end_in_the_picture_of_the_last_wish() {
     assert!(world.firsts > 100, "{} pictures", world.firsts);
 }
 
-/// Wishes arrive faster than a picture is rendered.
+/// Wishes arrive faster than their pictures are rendered.
 #[test]
 fn a_moving_camera_is_shown_and_settles_once_it_rests() {
     for is_edit in [false, true] {
@@ -105,7 +105,7 @@ fn a_moving_camera_is_shown_and_settles_once_it_rests() {
     }
 }
 
-/// A page that does not read uses no memory, and receives the newest picture once it reads.
+/// While a page does not read, no message to it is stored; once it reads, it receives the newest picture.
 #[test]
 fn a_slow_page_receives_fewer_and_newer_tiles() {
     let mut world = World::new();
@@ -139,7 +139,7 @@ fn a_reset_keeps_the_layers_that_pages_show() {
     }
 }
 
-/// Tiles beyond some megabytes wait for acknowledgements.
+/// About 4 MiB of unacknowledged tiles are sent, and no more.
 #[test]
 fn a_page_that_acknowledges_nothing_is_not_flooded() {
     let mut world = World::new();
@@ -156,7 +156,7 @@ fn a_page_that_acknowledges_nothing_is_not_flooded() {
     world.check_pictures();
 }
 
-/// The budget of a remote card is known only when the card refuses. Camera and edits are kept.
+/// The limits of a remote card are known only when it refuses settings. Camera and assignments are kept.
 #[test]
 fn settings_that_a_card_refuses_are_replaced_by_the_last_settled_ones() {
     let mut world = World::new();

@@ -1,4 +1,5 @@
-//! Simulated view with its pages, cards and a painter of model pictures, in one thread and virtual time.
+//! Simulated view with model pages, a model card and a painter of model pictures, in one thread and virtual
+//! time.
 
 use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasher, BuildHasherDefault, DefaultHasher};
@@ -19,26 +20,26 @@ use crate::view::refinement::{Outcome, Pass};
 use crate::view::state::{Effect, PageNumber, Start, Task, View};
 use crate::view::wish::{Sketch, Wish};
 
-/// Side of a model tile, pixels.
+/// Side of the tiles, pixels.
 const TILE: u32 = 16;
 
 /// Model of a page in a browser.
 #[derive(Default)]
 pub(super) struct ModelPage {
-    /// Bits of the radiance of each pixel.
+    /// `f32::to_bits` of the radiance of each pixel.
     pub(super) pixels: HashMap<(u32, u32), u32>,
     pub(super) received: u64,
     pub(super) state: Option<Value>,
     pub(super) errors: u64,
     version: u32,
-    /// Number of wishes of which the page has received a tile.
+    /// Number of wishes of which the page has received tiles.
     pub(super) versions: u64,
 }
 
-/// Running pass.
+/// Pass that the painter is rendering.
 struct Job {
     task: Task,
-    /// Number of remaining steps of the preparation.
+    /// Number of steps that the preparation has left.
     preparing: u64,
     left: Vec<Tile>,
 }
@@ -48,7 +49,7 @@ pub(super) struct World {
     pub(super) pages: BTreeMap<PageNumber, ModelPage>,
     pub(super) now: Duration,
     pub(super) has_card: bool,
-    /// Maximum number of gather rays that the card can hold.
+    /// Gather rays beyond which the card refuses a pass.
     pub(super) max_rays: u32,
     job: Option<Job>,
     /// Wish whose photons are on the card.
@@ -57,7 +58,7 @@ pub(super) struct World {
     pub(super) firsts: u64,
 }
 
-/// Scene of a floor under a lamp.
+/// Scene of a floor below an emissive triangle.
 fn scene() -> Scene {
     use glam::Vec3;
     let triangle = |y: f32, material| {
@@ -82,10 +83,10 @@ fn scene() -> Scene {
     })
 }
 
-/// Bits of every pixel of a wish's picture.
+/// `f32::to_bits` of the radiance of all pixels of a wish's picture: a hash of wish and `step`.
 fn bits(wish: &Wish, step: u32) -> u32 {
     let hasher = BuildHasherDefault::<DefaultHasher>::default();
-    // Any positive normal number.
+    // Exponent bits that make any hash a positive normal number.
     0x3f00_0000 | (hasher.hash_one((format!("{wish:?}"), step)) as u32 & 0x00ff_ffff)
 }
 
@@ -168,7 +169,7 @@ impl World {
                 let tile = FinishedTile::of_pixels(tile, sums, SumFormat::ONE).unwrap();
                 let origin = job.task.origin;
                 self.view.put(origin, "card 0 (tcp:card:7000)", None, &tile);
-                // Now and then a card has lied.
+                // Now and then a tile is revoked and sent again, as after a card that lied.
                 if self.now.as_millis().is_multiple_of(64) {
                     self.view.revoke(origin, tile.tile().id);
                     self.view.put(origin, "card 0 (tcp:card:7000)", None, &tile);
@@ -199,7 +200,7 @@ impl World {
         self.view.finish(&task, outcome, None, self.now);
     }
 
-    /// Delivers one message to a page. Returns whether there was one.
+    /// Delivers the next message to a page. Returns whether there was one.
     pub(super) fn read(&mut self, number: PageNumber) -> bool {
         let Some(message) = self.view.take(number) else { return false };
         let Some(page) = self.pages.get_mut(&number) else { return false };
@@ -212,13 +213,14 @@ impl World {
         true
     }
 
-    /// Acknowledges what a page has received.
+    /// Acknowledges all tiles that a page has received.
     pub(super) fn acknowledge(&mut self, number: PageNumber) {
         let bytes = self.pages[&number].received;
         self.send(number, &serde_json::json!({"type": "shown", "version": 1, "bytes": bytes}));
     }
 
-    /// Performs all remaining work, with all cards and attentive pages. Panics if it does not end.
+    /// Performs all remaining work, with a card, while all pages read and acknowledge. Panics if the work
+    /// does not end.
     pub(super) fn settle(&mut self) {
         self.has_card = true;
         for _ in 0..20_000 {

@@ -1,5 +1,5 @@
-//! Commands of the program and their options, read from its manual pages, and checks of arguments against the
-//! program.
+//! Commands of the program with their options, read from its manual pages, and checks of arguments by the
+//! program itself.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -7,7 +7,7 @@ use std::fs;
 use super::repository;
 use crate::support::Room;
 
-/// Options of each command, whose key is its words after `photoncard`, separated by spaces.
+/// Options by command. A key is the command's words after `photoncard`, separated by spaces.
 pub(crate) struct CommandTree {
     room: Room,
     options: BTreeMap<String, BTreeSet<String>>,
@@ -28,7 +28,7 @@ impl CommandTree {
         Self { room, options }
     }
 
-    /// Longest command with which some words begin.
+    /// Returns the longest command that `words` begin with.
     fn command(&self, words: &[&str]) -> Option<String> {
         let beginnings = (1..=words.len()).rev().map(|length| words[..length].join(" "));
         beginnings.into_iter().find(|command| self.options.contains_key(command))
@@ -45,8 +45,8 @@ impl CommandTree {
         having.map(|(command, _)| command.as_str()).collect()
     }
 
-    /// Defect of arguments that the program does not accept. A final `--help` makes it parse them without
-    /// work.
+    /// Defect of arguments that the program refuses. It is run with a final `--help`, by which it only parses
+    /// them.
     pub(crate) fn defect_of_arguments(&self, arguments: &[&str]) -> Option<String> {
         let outcome = self.room.run(&[arguments, &["--help"]].concat());
         let said = outcome.stderr.trim();
@@ -69,9 +69,9 @@ impl CommandTree {
         defects
     }
 
-    /// Defects of the words of a command after the program's name. They may contain placeholders.
+    /// Defects of the words after `photoncard`, which may contain placeholders.
     pub(crate) fn defects_of_form(&self, words: &[&str]) -> Vec<String> {
-        // Help and version are options of the program itself.
+        // Without a command the options are `--help` and `--version`.
         if words.first().is_none_or(|word| word.starts_with('-')) {
             return Vec::new();
         }
@@ -82,7 +82,7 @@ impl CommandTree {
         unknown.map(|option| format!("`photoncard {command}` has no {option}")).collect()
     }
 
-    /// Returns whether a form names a command that its group of commands does not have.
+    /// Returns whether the first word of `form` behind a group of commands names none of them.
     fn lacks(&self, group: &str, form: &str) -> bool {
         let below = form[group.len()..].trim_start();
         let is_group = self.options.keys().any(|command| command.starts_with(&format!("{group} ")));
@@ -101,7 +101,8 @@ pub(crate) fn options_in(text: &str) -> impl Iterator<Item = &str> {
     words.filter(|word| word.len() > 2 && word.starts_with("--"))
 }
 
-/// Options that a manual page describes. Each line that begins with a name in bold contains the names of one.
+/// Options that a manual page describes. A line that begins with a bold option names one option, with its
+/// short form.
 fn options_of_page(page: &str) -> BTreeSet<String> {
     let page = page.replace("\\-", "-").replace("\\fR", " ");
     let described =

@@ -1,4 +1,4 @@
-//! Documents and their parts that are not prose.
+//! Markdown documents, and their parts that are not prose.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use super::repository;
 
 /// Document of the repository.
 pub(crate) struct Document {
-    /// Path in the repository.
+    /// Path relative to the repository.
     pub(crate) name: String,
     text: String,
 }
@@ -29,7 +29,7 @@ pub(crate) enum Piece {
     Link(String),
 }
 
-/// All documents about the present state. The change log is about the past.
+/// All documents but the change log, whose commands may be of older versions.
 pub(crate) fn documents() -> Vec<Document> {
     let in_folder = |folder: &str| {
         let mut names: Vec<_> = fs::read_dir(repository::path(folder))

@@ -37,7 +37,7 @@ impl Kind {
             ["sh"] => Some(Self::Run),
             ["sh", "slow" | "network" | "hardware"] => Some(Self::Accepted),
             ["text", "synopsis"] => Some(Self::Synopsis),
-            // One name for commands, so that none is missed.
+            // Commands have one info string, `sh`, so that none is left unchecked.
             ["sh" | "bash" | "shell" | "console" | "zsh", ..] | [] => None,
             [_] => Some(Self::Other),
             [..] => None,
@@ -45,7 +45,7 @@ impl Kind {
     }
 }
 
-/// Defects of a block that are found without running it.
+/// Defects of a fenced block that are found without running its commands.
 fn defects_of_block(tree: &CommandTree, info: &str, text: &str) -> Vec<String> {
     match Kind::of(info) {
         None => vec![format!(
@@ -85,7 +85,7 @@ fn documents_name_existing_commands_options_and_files() {
     assert!(defects.is_empty(), "\n{}", defects.join("\n"));
 }
 
-/// Cells of the rows of a table, without surrounding spaces.
+/// Cells of the rows of Markdown tables, without surrounding spaces.
 fn rows(text: &str) -> Vec<Vec<&str>> {
     let rows = text.lines().filter_map(|line| line.strip_prefix('|')?.strip_suffix('|'));
     rows.map(|row| row.split('|').map(str::trim).collect()).collect()

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// Folders at the top of the repository.
 const FOLDERS: [&str; 8] = ["docs", "driver", "firmware", "host-cli", "scenes", "shared", "tests", ".config"];
 
-/// A path of the repository.
+/// Path of a file of the repository, from its path relative to the repository.
 pub(crate) fn path(name: impl AsRef<Path>) -> PathBuf {
     root().join(name)
 }
@@ -36,14 +36,14 @@ pub(crate) fn defect_of_path(word: &str) -> Option<String> {
     (is_path(word) && !path(word).exists()).then(|| format!("{word} does not exist"))
 }
 
-/// Defect of a script that a command runs.
+/// Defect of a script's path: it does not exist, or is not executable.
 pub(crate) fn defect_of_script(program: &str) -> Option<String> {
     let Ok(metadata) = fs::metadata(path(program)) else { return Some(format!("{program} does not exist")) };
     let is_executable = metadata.is_file() && metadata.permissions().mode() & 0o111 != 0;
     (!is_executable).then(|| format!("{program} is not executable"))
 }
 
-/// Returns whether any script of the repository has this option.
+/// Returns whether any script of the repository contains this option.
 pub(crate) fn has_script_with(option: &str) -> bool {
     let mut folders = vec![path("tests"), path("host-cli")];
     while let Some(folder) = folders.pop() {

@@ -1,4 +1,4 @@
-//! Shell commands in documents, which are run or checked without being run.
+//! Shell commands in documents: they are run, or checked without being run.
 
 use std::net::TcpListener;
 use std::os::unix::fs::symlink;
@@ -10,10 +10,10 @@ use crate::support::{Outcome, Room};
 
 const PRELUDE: &str = include_str!("prelude.sh");
 
-/// Programs from elsewhere that documents may call.
+/// Programs that are not of this project and that commands of documents may run.
 const FOREIGN: [&str; 4] = ["cmp", "mkdir", "export", "python"];
 
-/// Runs a script in an empty folder with the scenes and references. Returns its messages if it fails.
+/// Runs a script in an empty folder with links to `scenes` and `tests`. Returns its messages if it fails.
 pub(crate) fn run(text: &str) -> Result<(), String> {
     let room = Room::new();
     for folder in ["scenes", "tests"] {
@@ -29,7 +29,7 @@ pub(crate) fn run(text: &str) -> Result<(), String> {
     if outcome.status == Some(0) { Ok(()) } else { Err(said()) }
 }
 
-/// Replaces the ports that a script states by free ones.
+/// Replaces each port behind `--listen tcp:` by a free one, wherever it occurs in the text.
 fn with_free_ports(text: &str) -> String {
     let stated = text.split("--listen tcp:").skip(1).map(|rest| rest.split_whitespace().next().unwrap());
     stated.fold(text.to_owned(), |text, port| {
@@ -38,7 +38,7 @@ fn with_free_ports(text: &str) -> String {
     })
 }
 
-/// Simple commands of a script, as words without quotes, redirections and variable assignments.
+/// Words of each simple command of a script, without quotes, redirections and variable assignments.
 fn commands(script: &str) -> Vec<Vec<&str>> {
     let lines = script.lines().filter(|line| !line.trim_start().starts_with('#'));
     let parts = lines.flat_map(|line| line.split("&&").flat_map(|part| part.split([';', '|', '&'])));
@@ -96,8 +96,8 @@ pub(crate) fn defects_of_inline_code(tree: &CommandTree, text: &str) -> Vec<Stri
     defects
 }
 
-/// Defects of options and of values that are no placeholders. Some command must have all the options and
-/// accept each value.
+/// Defects of options with values: one command must have all the options, and accept each value that is no
+/// placeholder.
 fn defects_of_options(tree: &CommandTree, words: &[&str]) -> Vec<String> {
     let options: Vec<_> = words.iter().copied().filter(|word| word.starts_with("--")).collect();
     let commands = tree.commands_with(&options);

@@ -1,4 +1,4 @@
-//! Runs the command in a temporary folder on small scenes.
+//! Runs the command in a temporary folder, on small scenes.
 
 use std::fmt::Write;
 use std::fs;
@@ -9,7 +9,7 @@ use std::process::{Child, Command, Output, Stdio};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
-/// Options of a minimal render, which a test can replace or extend.
+/// Options of a minimal render. A test may state others in their place or besides.
 const SMALL: [(&str, &str); 6] = [
     ("--quality", "paper"),
     ("--size", "8x8"),
@@ -19,8 +19,7 @@ const SMALL: [(&str, &str); 6] = [
     ("--shadow-rays", "1"),
 ];
 
-/// Says loudly that something is not tested. It fails where tools are installed before, in continuous
-/// integration.
+/// Prints that something is not tested. Panics in continuous integration, where all tools are installed.
 pub(crate) fn skip(what: &str) {
     assert!(std::env::var_os("CI").is_none(), "{what}");
     eprintln!("SKIPPED: {what}");
@@ -34,7 +33,7 @@ pub(crate) struct Outcome {
 }
 
 impl Outcome {
-    /// Outcome of a process, which must not have panicked.
+    /// Returns the outcome of a process, which must not have panicked.
     pub(crate) fn of(output: &Output) -> Self {
         let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
         let outcome =
@@ -44,7 +43,7 @@ impl Outcome {
     }
 }
 
-/// Temporary folder in which commands run.
+/// Temporary folder that commands run in.
 pub(crate) struct Room(TempDir);
 
 impl Room {
@@ -68,7 +67,7 @@ impl Room {
         self.write(name, serde_json::to_vec(scene).unwrap());
     }
 
-    /// Names of all files, sorted.
+    /// Names of all entries of the folder, sorted.
     pub(crate) fn names(&self) -> Vec<String> {
         let entries = fs::read_dir(self.0.path()).unwrap();
         let mut names: Vec<_> =
@@ -87,7 +86,7 @@ impl Room {
         Outcome::of(&self.command().args(arguments).output().unwrap())
     }
 
-    /// Renders a small picture. `options` replace or extend [`SMALL`].
+    /// Renders a small picture. `options` replace those of [`SMALL`] or are added to them.
     pub(crate) fn render(&self, scene: &str, options: &[&str]) -> Outcome {
         self.run(&small_render(scene, options))
     }
@@ -101,7 +100,7 @@ impl Room {
     }
 }
 
-/// Card that another process serves. Dropping it ends the process.
+/// Process of `photoncard emulate`, which serves a card. Dropping it ends the process.
 pub(crate) struct Emulator {
     pub(crate) process: Child,
     pub(crate) address: String,
@@ -124,7 +123,7 @@ impl Emulator {
         assert!(Command::new("kill").args([signal, &id]).status().unwrap().success());
     }
 
-    /// Ends the process by a signal. Returns its exit status and its output.
+    /// Ends the process by a signal. Returns its exit status and its standard error.
     pub(crate) fn end(mut self, signal: &str) -> (Option<i32>, String) {
         self.signal(signal);
         let status = self.process.wait().unwrap().code();
@@ -136,13 +135,13 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // Both fail if the process has ended.
+        // Both calls fail if the process has ended already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// Arguments of a small render. `options` replace or extend [`SMALL`].
+/// Arguments of a small render. `options` replace those of [`SMALL`] or are added to them.
 pub(crate) fn small_render<'a>(scene: &'a str, options: &[&'a str]) -> Vec<&'a str> {
     let mut arguments = vec!["render", scene];
     for (option, value) in SMALL {
@@ -160,7 +159,8 @@ pub(crate) fn shipped(name: &str) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// Buffer of [`scene`]: four corners of the floor, three of the lamp, six indices of the floor.
+/// Buffer of [`scene`]: positions of the floor's four corners and the lamp's three, and six indices of the
+/// floor.
 pub(crate) fn scene_bytes() -> Vec<u8> {
     let floor = [-1f32, 0., 1., 1., 0., 1., 1., 0., -1., -1., 0., -1.];
     let lamp = [0f32, 1., 0., 0.5, 1., 0., 0., 1., 0.5];
@@ -174,7 +174,7 @@ pub(crate) fn scene() -> Value {
     scene_of(&scene_bytes())
 }
 
-/// [`scene`] with the given buffer.
+/// [`scene`] with another buffer.
 pub(crate) fn scene_of(bytes: &[u8]) -> Value {
     json!({
         "asset": {"version": "2.0"},
@@ -219,7 +219,7 @@ fn data_uri(bytes: &[u8]) -> String {
     })
 }
 
-/// GLB with the given JSON and binary chunk.
+/// GLB file of a JSON chunk and a binary chunk.
 pub(crate) fn glb(text: &[u8], bytes: &[u8]) -> Vec<u8> {
     let padded = |bytes: &[u8], padding: u8| {
         let mut chunk = bytes.to_vec();

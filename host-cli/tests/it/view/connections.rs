@@ -88,7 +88,8 @@ fn hostile_messages_are_answered_or_end_their_connection_alone() {
     assert_eq!(std::fs::read_dir(room.path("out")).unwrap().count(), 0);
 }
 
-/// There are 16 places. A page that has gone frees its place even while nothing changes.
+/// A view has 16 places for pages. A page that closes its connection gives up its place at once, without any
+/// message to it.
 #[test]
 fn pages_that_have_gone_free_their_places() {
     let room = Room::new();
@@ -101,7 +102,8 @@ fn pages_that_have_gone_free_their_places() {
     }
 }
 
-/// More silent connections than there are places neither end a page nor exclude the next one.
+/// More silent connections than there are places neither close a page's connection nor keep the next page
+/// out.
 #[test]
 fn silent_connections_do_not_exclude_pages() {
     let room = Room::new();

@@ -1,4 +1,4 @@
-//! Command `photoncard view`: what its page can see and do, and what others cannot.
+//! Command `photoncard view`: what its pages see and do, and what others cannot.
 
 mod connections;
 mod page;
@@ -75,7 +75,7 @@ fn the_settled_picture_equals_that_of_the_shown_command() {
                 page.send(&json!({"type": "layer", "name": "direct"}));
             }
         }
-        // A picture of some of the messages may settle before all have arrived.
+        // The picture may settle for some of the messages before the last one arrives.
         let state = page.wait("state", |state| {
             let is_last = match number {
                 0 => true,
@@ -99,7 +99,7 @@ fn the_settled_picture_equals_that_of_the_shown_command() {
     }
 }
 
-/// Pages see the denoised radiance, which a PNG shows and an EXR has beside the rendered one.
+/// Pages show the denoised radiance, as the PNG does. The EXR has it beside the rendered radiance.
 #[test]
 #[cfg(unix)]
 fn a_denoised_view_settles_to_the_denoised_picture_of_its_command() {
@@ -123,7 +123,8 @@ fn a_denoised_view_settles_to_the_denoised_picture_of_its_command() {
     assert_eq!(shown.collect::<Vec<_>>(), denoised.pixels);
 }
 
-/// The work of a settled picture's tiles adds up to that of its command, also for samples in several passes.
+/// The work in the headers of a settled picture's tiles adds up to that of its command, also after several
+/// passes.
 #[test]
 #[cfg(unix)]
 fn tiles_report_their_work() {
@@ -154,7 +155,7 @@ fn tiles_report_their_work() {
     }
 }
 
-/// The command of a view whose quality runs pilot renders states all settings that they have found.
+/// The command that a view shows states all settings that pilot renders have chosen.
 #[test]
 #[cfg(unix)]
 fn a_quality_finds_the_settings_of_the_settled_picture() {
@@ -192,7 +193,7 @@ fn pictures_are_refined_from_coarse_to_fine_and_follow_edits() {
         .map(|(_, step)| *step)
         .collect();
     steps.dedup();
-    // A page that is behind misses coarse ones.
+    // A page that is slow may miss coarse passes.
     assert!(steps.is_sorted_by(|a, b| a > b) && steps.last() == Some(&1), "{steps:?}");
     assert_eq!(state["changes"], json!([{"name": "lamp.emission", "value": 0.25}]));
     page.send(&json!({"type": "pick", "at": [10, 8]}));
@@ -331,7 +332,7 @@ fn impossible_options_are_refused_at_once() {
     }
 }
 
-/// A script stands in for the program that opens addresses, and `sh` for the reader of the view's output.
+/// Instead of a browser, a script named `xdg-open` is started; `sh` reads the output of the view.
 #[test]
 #[cfg(target_os = "linux")]
 fn open_opens_the_page_and_other_addresses_come_with_a_warning() {
@@ -374,7 +375,7 @@ fn open_opens_the_page_and_other_addresses_come_with_a_warning() {
     }
 }
 
-/// A signal soon ends the view, whatever it is doing.
+/// A signal ends the view within a short time, whatever the view is doing.
 #[test]
 #[cfg(unix)]
 fn an_interrupt_ends_the_view() {

@@ -1,4 +1,4 @@
-//! Page without a browser: a client of the view's WebSocket.
+//! Client of a view's WebSocket, in place of the page in a browser.
 
 use std::collections::HashMap;
 use std::io::{BufRead, BufReader, Read};
@@ -13,10 +13,10 @@ use tungstenite::{Message, WebSocket};
 
 use crate::support::Room;
 
-/// Time limit of every wait of a test, long enough for a busy machine.
+/// Time limit of each wait, long enough for a busy machine.
 const PATIENCE: Duration = Duration::from_secs(200);
 
-/// View in another process. Dropping it ends the process.
+/// Process of `photoncard view`. Dropping it ends the process.
 pub(crate) struct View {
     pub(crate) process: Child,
     /// Address and port of the view.
@@ -41,10 +41,10 @@ impl View {
         Self { host: host.to_owned(), token: token.to_owned(), process }
     }
 
-    /// Connects to the WebSocket with these headers.
+    /// Requests the WebSocket at `target`, with these headers `Host` and `Origin`.
     ///
     /// # Errors
-    /// HTTP status, if the view refuses the connection.
+    /// HTTP status of the refusal.
     pub(crate) fn try_connect(&self, target: &str, host: &str, origin: Option<&str>) -> Result<Page, u16> {
         let stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -67,13 +67,13 @@ impl View {
         }
     }
 
-    /// Connects a page with valid headers.
+    /// Connects to the WebSocket with token and valid headers.
     pub(crate) fn connect(&self) -> Page {
         let target = format!("/socket?token={}", self.token);
         self.try_connect(&target, &self.host, Some(&format!("http://{}", self.host))).unwrap()
     }
 
-    /// Requests a file. Returns status and text of the answer.
+    /// Requests a file. Returns status and text of the response.
     pub(crate) fn get(&self, target: &str, host: &str) -> (u16, String) {
         use std::io::Write;
         let mut stream = TcpStream::connect(&self.host).unwrap();
@@ -87,7 +87,7 @@ impl View {
 
 impl Drop for View {
     fn drop(&mut self) {
-        // Both fail if the process has ended.
+        // Both calls fail if the process has ended already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -97,14 +97,14 @@ impl Drop for View {
 pub(crate) struct Page {
     socket: WebSocket<TcpStream>,
     received: usize,
-    /// Last message of each type.
+    /// Last text message of each type.
     pub(crate) last: HashMap<String, Value>,
-    /// Radiance of each pixel.
+    /// Radiance or layer of each pixel as it is shown.
     pub(crate) pixels: HashMap<(u32, u32), [f32; 3]>,
-    /// Side of a pixel's square, with the wish, of each received tile.
+    /// Of each tile received: number of the wish, and side of the square that a rendered pixel covers.
     pub(crate) steps: Vec<(u32, u32)>,
-    /// Gathers, irradiance records and DRAM lines of each tile at full resolution of the newest wish, by the
-    /// tile's corner.
+    /// By the corner of each tile of the newest wish at full resolution: gathers, irradiance records, DRAM
+    /// lines.
     pub(crate) work: HashMap<(u32, u32), [u32; 3]>,
 }
 
@@ -129,7 +129,7 @@ impl Page {
         let _ = self.socket.send(message);
     }
 
-    /// Reads messages until one of type `kind` satisfies `is_right`. Returns it.
+    /// Reads messages until one of type `kind` satisfies `is_right`, and returns it.
     pub(crate) fn wait(&mut self, kind: &str, is_right: impl Fn(&Value) -> bool) -> Value {
         let begin = Instant::now();
         while begin.elapsed() < PATIENCE {
@@ -154,7 +154,7 @@ impl Page {
         self.wait(kind, |_| true)
     }
 
-    /// Waits for the settled picture of a wish that is newer than that of the last one.
+    /// Waits for a settled picture, of a newer wish if the last state is settled already. Returns its state.
     pub(crate) fn settle(&mut self) -> Value {
         let before = self
             .last
@@ -208,7 +208,7 @@ impl Page {
         self.send(&json!({"type": "shown", "version": version, "bytes": self.received}));
     }
 
-    /// Mean radiance of a picture's pixels.
+    /// Mean radiance over all pixels and channels of a picture, each of which must have been shown.
     pub(crate) fn mean(&self, [width, height]: [u32; 2]) -> f32 {
         let inside = self.pixels.iter().filter(|((x, y), _)| *x < width && *y < height);
         let sums: Vec<f32> = inside.map(|(_, pixel)| pixel.iter().sum()).collect();
@@ -217,7 +217,7 @@ impl Page {
     }
 }
 
-/// Message that sets the camera.
+/// Message that places the camera at `(x, 0.5, 3)`.
 pub(crate) fn camera(x: f64, is_moving: bool) -> Value {
     json!({"type": "camera", "position": [x, 0.5, 3], "look_at": [0, 0.3, 0], "fov": 40, "moving": is_moving})
 }

@@ -1,4 +1,4 @@
-//! Headless Chromium, driven by its `DevTools` protocol.
+//! Headless Chromium, driven by the Chrome `DevTools` Protocol.
 
 use std::io::{BufRead, BufReader};
 use std::net::TcpStream;
@@ -15,10 +15,10 @@ use crate::support::skip;
 
 /// Time limit for the browser's start and for each of its answers.
 const PATIENCE: Duration = Duration::from_secs(200);
-/// Names of programs that are Chromium, in order of preference.
+/// Names of Chromium's program, in order of preference.
 const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "google-chrome-stable"];
 
-/// Browser with its own profile. Dropping it ends the browser.
+/// Process of a browser with an empty profile. Dropping it ends the process.
 pub(crate) struct Browser {
     process: Child,
     address: String,
@@ -44,7 +44,7 @@ impl Browser {
         Some(Self { process, address, control, _profile: profile })
     }
 
-    /// Opens an empty tab in its own window of this size. A tab behind another would not be rendered.
+    /// Opens an empty tab in a window of its own with this size: a tab behind another would not be drawn.
     pub(crate) fn tab(&mut self, size: [u32; 2]) -> Tab {
         let target =
             self.control.call("Target.createTarget", &json!({"url": "about:blank", "newWindow": true}));
@@ -60,7 +60,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Both fail if the process has ended.
+        // Both calls fail if the process has ended already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -75,7 +75,7 @@ fn launch(program: &str, profile: &TempDir) -> Option<Child> {
         "--disable-dev-shm-usage",
         "--no-first-run",
     ]);
-    // WebGL2 by the processor, and colours as they are.
+    // WebGL2 is drawn by the processor, and colours are not adapted to a display.
     command.args(["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--force-color-profile=srgb"]);
     command.args(["--remote-debugging-port=0", "about:blank"]);
     command.arg(format!("--user-data-dir={}", profile.path().display()));
@@ -83,11 +83,11 @@ fn launch(program: &str, profile: &TempDir) -> Option<Child> {
     command.spawn().ok()
 }
 
-/// Address of the `DevTools` that the browser prints.
+/// Waits for the address of the `DevTools` server, which the browser prints.
 fn announced(process: &mut Child) -> String {
     let lines = BufReader::new(process.stderr.take().unwrap()).lines();
     let (sender, receiver) = mpsc::channel();
-    // It goes on to the end of the browser, whose messages would fill the pipe.
+    // The thread reads all that the browser prints: a full pipe would stop the browser.
     std::thread::spawn(move || {
         for line in lines.map_while(Result::ok) {
             if let Some(address) = line.strip_prefix("DevTools listening on ") {
@@ -98,7 +98,7 @@ fn announced(process: &mut Child) -> String {
     receiver.recv_timeout(PATIENCE).expect("the browser prints the address of its DevTools")
 }
 
-/// Tab with its own connection.
+/// Tab of the browser, with a `DevTools` connection.
 pub(crate) struct Tab {
     socket: WebSocket<TcpStream>,
     calls: u64,
@@ -116,7 +116,7 @@ impl Tab {
         Self { socket, calls: 0, faults: Vec::new() }
     }
 
-    /// Calls a method, and records the page's errors until its answer.
+    /// Calls a method of the protocol, and records errors of the page until the answer.
     pub(crate) fn call(&mut self, method: &str, parameters: &Value) -> Value {
         self.calls += 1;
         let call = json!({"id": self.calls, "method": method, "params": parameters});
@@ -147,7 +147,7 @@ impl Tab {
         self.call("Page.navigate", &json!({"url": address}));
     }
 
-    /// Evaluates an expression, which may be a promise.
+    /// Evaluates a JavaScript expression, and waits for its value if it is a promise.
     pub(crate) fn value(&mut self, expression: &str) -> Value {
         let parameters = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
         let result = self.call("Runtime.evaluate", &parameters);
@@ -155,7 +155,7 @@ impl Tab {
         result["result"]["value"].clone()
     }
 
-    /// Waits until an expression is true.
+    /// Waits until a JavaScript expression is true.
     pub(crate) fn wait(&mut self, expression: &str, limit: Duration) {
         let start = Instant::now();
         while self.value(&format!("Boolean({expression})")) != true {
@@ -179,8 +179,8 @@ impl Tab {
         self.call("Input.dispatchMouseEvent", &parameters);
     }
 
-    /// Drags by `[dx, dy]` pixels with a button (`left`, `middle` or `right`). With a zero shift it is a
-    /// click.
+    /// Drags from `[x, y]` by `[dx, dy]` pixels with the button `left`, `middle` or `right`; a zero shift is
+    /// a click.
     pub(crate) fn press(&mut self, button: &str, [x, y]: [f64; 2], [dx, dy]: [f64; 2]) {
         let buttons = match button {
             "left" => 1,
@@ -200,8 +200,8 @@ impl Tab {
         self.mouse("mouseWheel", place, &json!({"deltaX": 0, "deltaY": pixels}));
     }
 
-    /// Touches the first position of each finger, moves all fingers to their second positions, and releases
-    /// them.
+    /// Touches the screen with each finger, moves all fingers from their first to their second positions, and
+    /// releases them.
     pub(crate) fn touch(&mut self, fingers: &[[[f64; 2]; 2]]) {
         let points = |share: f64| -> Vec<Value> {
             let at =
@@ -220,7 +220,7 @@ impl Tab {
         }
     }
 
-    /// Holds the key with this code for some milliseconds.
+    /// Holds the key `code`, such as `ArrowLeft`, for some milliseconds.
     pub(crate) fn hold(&mut self, code: &str, milliseconds: u64) {
         self.key("keyDown", code);
         std::thread::sleep(Duration::from_millis(milliseconds));
@@ -232,14 +232,14 @@ impl Tab {
         self.call("Input.dispatchKeyEvent", &json!({"type": kind, "code": code}));
     }
 
-    /// Size of the page's objects and buffers after garbage collection, bytes.
+    /// Size of the page's JavaScript heap and array buffers after garbage collection, bytes.
     pub(crate) fn memory(&mut self) -> u64 {
         self.call("HeapProfiler.collectGarbage", &json!({}));
         let usage = self.call("Runtime.getHeapUsage", &json!({}));
         ["usedSize", "backingStorageSize"].iter().filter_map(|part| usage[part].as_f64()).sum::<f64>() as u64
     }
 
-    /// Colours of the pixels in a rectangle `[x, y, width, height]` of the screen, as sRGB codes.
+    /// Colours of the pixels in the rectangle `[x, y, width, height]` of the page, as sRGB codes.
     pub(crate) fn pixels(&mut self, [x, y, width, height]: [f64; 4]) -> Vec<[u8; 3]> {
         let clip = json!({"x": x, "y": y, "width": width, "height": height, "scale": 1});
         let shot = self.call("Page.captureScreenshot", &json!({"format": "png", "clip": clip}));
@@ -247,7 +247,7 @@ impl Tab {
     }
 }
 
-/// Colours of a PNG's pixels without alpha, as sRGB codes.
+/// Colours of a PNG's pixels, without alpha, as sRGB codes.
 pub(crate) fn decoded(png: &[u8]) -> Vec<[u8; 3]> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];

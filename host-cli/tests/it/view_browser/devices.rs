@@ -1,4 +1,4 @@
-//! Page on different devices: touch, clipboard, narrow windows, and a lost graphics context.
+//! Page on different devices: touch, clipboard, narrow windows, and the loss of the graphics context.
 
 use serde_json::{Value, json};
 
@@ -18,7 +18,7 @@ fn length([x, y, z]: Vector) -> f64 {
     (x * x + y * y + z * z).sqrt()
 }
 
-/// Position of the camera, unit vector of its view, and distance from the scene's centre.
+/// Position and unit view vector of the camera, and its distance from the centre of the scene's bounding box.
 fn camera(tab: &mut Tab) -> (Vector, Vector, f64) {
     let [position, target, low, high] =
         ["state.camera.position", "state.camera.look_at", "scene.low", "scene.high"]
@@ -67,7 +67,7 @@ fn fingers_orbit_pan_and_zoom() {
     assert_eq!(tab.faults, [""; 0]);
 }
 
-/// The page copies by the clipboard or, where it may not use that, by a selection.
+/// The page copies text by the clipboard or, where that is forbidden, by a selection.
 #[test]
 fn command_line_and_pose_are_copied() {
     let Some(mut browser) = Browser::start() else { return };
@@ -113,7 +113,7 @@ fn a_lost_graphics_context_comes_back_with_the_picture() {
     let before = tab.shown();
     tab.value("window.loss = photoncard.display.gl.getExtension('WEBGL_lose_context'); loss.loseContext()");
     tab.wait("photoncard.display.gl.isContextLost()", LIMIT);
-    // Tiles that come meanwhile are not lost.
+    // Tiles that arrive before the context is restored are drawn after it.
     tab.drag("left", [0.5, 0.5], [40.0, 0.0]);
     tab.wait(SETTLED, LIMIT);
     tab.value("document.getElementById('reset').click()");
@@ -125,7 +125,7 @@ fn a_lost_graphics_context_comes_back_with_the_picture() {
     assert!(before.iter().any(|pixel| pixel[0] > 100), "the picture is black");
 }
 
-/// Controls of the picture are inside the window and do not overlap, whatever its size.
+/// In windows of any size, the controls of the picture are inside and do not overlap.
 #[test]
 fn narrow_windows_cut_nothing_off() {
     let Some(mut browser) = Browser::start() else { return };
@@ -150,7 +150,7 @@ fn narrow_windows_cut_nothing_off() {
     }
 }
 
-/// Overlays drawn by the shader and by the processor are equal, and show their values.
+/// Overlays drawn by the shader equal those drawn by the processor, and show the tiles' counts.
 #[test]
 fn overlays_map_the_work_of_tiles() {
     let Some(mut browser) = Browser::start() else { return };
@@ -187,7 +187,7 @@ fn overlays_map_the_work_of_tiles() {
     assert!(difference <= Some(2), "shader and processor differ: {difference:?}");
 }
 
-/// A view that does not model memory says so when DRAM lines are requested.
+/// If a view does not model memory, the overlay of DRAM lines says so.
 #[test]
 fn missing_counts_are_reported() {
     let Some(mut browser) = Browser::start() else { return };

@@ -1,4 +1,5 @@
-//! Measures latency and frame rate of the view by the page's own clock; `tests/view_latency.sh` prints them.
+//! Measures latency and frame rate of the view, by the clock of the page; `tests/view_latency.sh` prints
+//! them.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -10,10 +11,10 @@ use crate::support::{Room, shipped};
 
 /// Time limit for any picture.
 const LIMIT: Duration = Duration::from_secs(120);
-/// Number of camera moves of which a median is taken.
+/// Number of camera moves that a median is of.
 const MOVES: usize = 7;
 
-/// Prints a figure with its goal.
+/// Prints a table row: scene, what is measured, value, goal.
 fn row(scene: &str, what: &str, value: f64, unit: &str, goal: &str) {
     println!("| {scene} | {what} | {value:.0} {unit} | {goal} |");
 }
@@ -49,7 +50,7 @@ fn latency() {
     }
 }
 
-/// Opens a tab and waits for its first picture.
+/// Opens a tab and waits for the first coarse picture.
 fn shown(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = browser.tab([1100, 760]);
     tab.open(&view.address);
@@ -61,8 +62,8 @@ fn start(room: &Room, file: &str, size: &str) -> View {
     View::start(room, &shipped(file), &["--size", size])
 }
 
-/// Opens a tab and waits until the settled picture has started: pilot renders have found its settings, and
-/// its photons are traced.
+/// Opens a tab and waits until tiles of the settled picture arrive: its settings are chosen, and its photons
+/// traced.
 fn refined(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = shown(browser, view);
     tab.wait("photoncard.state.settled || photoncard.picture.samples === photoncard.state.spp", LIMIT);
@@ -79,7 +80,7 @@ fn opened(browser: &mut Browser, file: &str) -> f64 {
     first.as_f64().unwrap() - started
 }
 
-/// Median times of parts of a picture after camera moves, milliseconds.
+/// Median times from a camera move to each of `parts` of the picture, milliseconds.
 fn moved<const N: usize>(
     browser: &mut Browser,
     room: &Room,
@@ -92,7 +93,7 @@ fn moved<const N: usize>(
     let mut times: [Vec<f64>; N] = std::array::from_fn(|_| Vec::new());
     for number in 0..MOVES {
         let turn = if number % 2 == 0 { 0.05 } else { -0.05 };
-        // One message, of a camera that rests: a moving one would be answered by coarse pictures alone.
+        // The message says that the camera rests: a moving camera would be answered by coarse pictures alone.
         let count = tab.value("photoncard.times.measured.length");
         tab.value(&format!(
             "import('/camera.js').then(({{ turned }}) => {{ const {{ camera }} = photoncard.view; \
@@ -108,7 +109,7 @@ fn moved<const N: usize>(
     times.map(median)
 }
 
-/// Complete pictures per second, in the last of four seconds of turning the camera.
+/// Complete pictures per second, in the last of four seconds in which the camera turns.
 fn turned(browser: &mut Browser, room: &Room, file: &str) -> f64 {
     let view = start(room, file, "256x256");
     let mut tab = refined(browser, &view);

@@ -1,5 +1,5 @@
-//! Page of `photoncard view` in a headless Chromium. It shows the picture that the command renders, whatever
-//! is done to it.
+//! Page of `photoncard view` in a headless Chromium. It shows the picture of `photoncard render`, whatever a
+//! person does.
 
 mod browser;
 mod devices;
@@ -16,7 +16,7 @@ use person::{Person, SETTLED, darkness};
 use serde_json::json;
 use server::{View, run_shown, serve_page};
 
-/// Options of a small picture with all kinds of light.
+/// Options of a small picture with direct, indirect and caustic light.
 const SMALL: [&str; 14] = [
     "--quality",
     "paper",
@@ -34,17 +34,17 @@ const SMALL: [&str; 14] = [
     "2",
 ];
 
-/// Size of the browser's window, pixels, at which the panel is below the picture.
+/// Size of the browser's window, pixels; it is so narrow that the panel is below the picture.
 const WINDOW: [u32; 2] = [360, 420];
 
 /// Script that makes WebGL2 unavailable to a page.
 const WITHOUT_WEBGL2: &str = "const get = HTMLCanvasElement.prototype.getContext; HTMLCanvasElement.prototype.getContext = \
      function (kind, ...rest) { return kind === 'webgl2' ? null : get.call(this, kind, ...rest); }";
 
-/// Time limit of every step, long enough for a busy machine.
+/// Time limit of each wait, long enough for a busy machine.
 const LIMIT: Duration = Duration::from_secs(150);
 
-/// Opens the page of a new view, and waits for its first complete picture.
+/// Opens the page of a new view, and waits for its settled picture.
 fn opened(browser: &mut Browser, view: &View) -> Tab {
     let mut tab = browser.tab(WINDOW);
     tab.open(&view.address);
@@ -52,8 +52,7 @@ fn opened(browser: &mut Browser, view: &View) -> Tab {
     tab
 }
 
-/// Saves the picture by the page, and runs the shown command line, which writes `picture.exr`. The files must
-/// be equal.
+/// Checks that the EXR saved by the page equals the one that the shown command line writes.
 fn check_saved(room: &Room, tab: &mut Tab, name: &str) {
     let line = tab.save(name, "exr");
     run_shown(room, &line);
@@ -80,7 +79,7 @@ fn the_settled_picture_equals_that_of_the_shown_command() {
     tab.check_walls();
     check_saved(&room, &mut tab, "first");
 
-    // A drag turns the camera, and the view settles at a picture of its own.
+    // A drag turns the camera, and the view settles to another picture.
     let [before, place] =
         ["photoncard.state.version", "photoncard.state.camera.position"].map(|of| tab.value(of));
     tab.drag("left", [0.5, 0.5], [60.0, 20.0]);
@@ -117,7 +116,7 @@ fn the_colours_on_the_screen_equal_those_of_the_png() {
             }
             let [shown, saved] = [tab.shown(), decoded(&png)];
             assert_eq!(shown.len(), saved.len());
-            // The processors of pictures differ from the host's in the last bits of a power.
+            // The exponentiation of GPUs and browsers differs from the host's in the last bits.
             let differences =
                 shown.as_flattened().iter().zip(saved.as_flattened()).map(|(a, b)| a.abs_diff(*b));
             assert!(differences.clone().all(|difference| difference <= 1), "{name}: {:?}", differences.max());
@@ -136,7 +135,7 @@ fn a_light_that_is_switched_off_darkens_the_picture() {
     let mut tab = opened(&mut browser, &view);
     tab.expose(Some(0.0));
     let lit = darkness(&tab.shown());
-    // Both the lamp's emission and the bulb's intensity have a switch.
+    // One switch is that of the lamp's emission, the other that of a point light's intensity.
     for light in ["light", "bulb"] {
         tab.switch(light);
         tab.wait(SETTLED, LIMIT);
@@ -149,7 +148,7 @@ fn a_light_that_is_switched_off_darkens_the_picture() {
     }
 }
 
-/// A material shows the properties of its kind, including a solid's if it transmits light.
+/// The panel shows the properties that a material has, and the thickness once the material transmits light.
 #[test]
 fn a_material_becomes_glass() {
     let Some(mut browser) = Browser::start() else { return };
@@ -204,7 +203,7 @@ fn only_one_of_two_pages_steers() {
     first.wait(&format!("{camera} !== '{}'", after.as_str().unwrap()), LIMIT);
 }
 
-/// The page's own camera is also reset, and the next move starts from there.
+/// The reset also moves the page's own camera, and the next move starts there.
 #[test]
 fn undoing_all_changes_takes_the_camera_back() {
     let Some(mut browser) = Browser::start() else { return };
@@ -216,7 +215,7 @@ fn undoing_all_changes_takes_the_camera_back() {
     let start = tab.value(&known);
     let start = start.as_str().unwrap();
 
-    // A place that the camera has left can be chosen again.
+    // A camera of the file can be chosen again once a drag has left it.
     tab.choose("camera", "0");
     assert_eq!(tab.value("document.getElementById('camera').value"), "0");
     tab.drag("left", [0.5, 0.5], [60.0, 20.0]);
@@ -230,7 +229,7 @@ fn undoing_all_changes_takes_the_camera_back() {
     assert_eq!(tab.value(&own), start);
     assert_eq!(tab.value("photoncard.picture.data.some((value, part) => part % 4 < 3 && value > 0)"), true);
 
-    // A camera that the command refuses leaves the page at the one before.
+    // If the command refuses a camera, the page returns to the camera before.
     tab.value("photoncard.view.move({ position: [0, 0, 1e16], look_at: [0, 0, 0], fov: 40 }, false)");
     tab.wait(&format!("{own} === '{start}'"), LIMIT);
     let fov = "document.getElementById('fov').value";
@@ -240,7 +239,7 @@ fn undoing_all_changes_takes_the_camera_back() {
     assert_eq!(tab.faults, [""; 0]);
 }
 
-/// The page of another origin is refused although it knows the token.
+/// A page of another origin has the token, and is refused all the same.
 #[test]
 fn a_page_of_another_origin_is_refused() {
     let Some(mut browser) = Browser::start() else { return };
@@ -255,14 +254,15 @@ fn a_page_of_another_origin_is_refused() {
     tab.open(&serve_page(page));
     tab.wait("document.title", LIMIT);
     assert_eq!(tab.value("document.title"), "refused");
-    // The command goes on, and its own page connects.
+    // The view goes on, and its own page connects.
     opened(&mut browser, &view);
 }
 
-/// Maximum growth of the page's memory after many actions, bytes: a small picture, and the last measurements.
+/// Maximum growth of the page's memory after many actions, bytes: a small picture and the last measured
+/// times.
 const MAX_PAGE: u64 = 8 << 20;
-/// Maximum growth of the command's memory, bytes: tiles of two pictures and three films of 700x500 pixels,
-/// the largest window, with all layers. Keeping tiles of each action would take more.
+/// Maximum growth of the command's memory after many actions, bytes: tiles of two pictures and three films,
+/// with all layers, of 700x500 pixels, the largest window.
 const MAX_COMMAND: u64 = 5 * 700 * 500 * 112;
 
 fn check_memory((whose, after, before): (&str, u64, u64), limit: u64) {
@@ -288,7 +288,7 @@ fn two_hundred_random_actions_end_at_the_exact_picture() {
     if let (Some(after), Some(before)) = (view.memory(), command) {
         check_memory(("command", after, before), MAX_COMMAND);
     }
-    // Errors of the network are the sockets that were closed.
+    // The browser reports the WebSockets that were closed as errors.
     tab.faults.retain(|fault| !fault.contains("WebSocket"));
     assert_eq!(tab.faults, [""; 0]);
 }

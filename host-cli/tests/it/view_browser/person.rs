@@ -1,4 +1,4 @@
-//! Uses of the page's controls as by a person.
+//! Use of the page's controls, as by a person.
 
 use std::time::Duration;
 
@@ -7,30 +7,30 @@ use serde_json::{Value, json};
 use super::browser::Tab;
 use crate::support::shipped;
 
-/// Expression that is true once the page shows a complete picture with all changes.
+/// JavaScript expression that is true once the page shows the settled picture with all changes.
 pub(crate) const SETTLED: &str = "window.photoncard?.isSettled";
 
 const LIMIT: Duration = Duration::from_secs(30);
 
 pub(crate) trait Person {
-    /// Selects an entry of a list, by the ids of the page.
+    /// Selects the entry with a value in the list with an id.
     fn choose(&mut self, list: &str, value: &str);
-    /// Sets the exposure, stops; `None` is automatic.
+    /// Sets the exposure in stops; `None` is automatic.
     fn expose(&mut self, stops: Option<f64>);
-    /// Drags on the picture by `shift` pixels. `from` is in fractions of the picture's sides. With a zero
-    /// shift it is a click.
+    /// Drags by `shift` pixels from a point of the picture, given in fractions of its sides. A zero shift is
+    /// a click.
     fn drag(&mut self, button: &str, from: [f64; 2], shift: [f64; 2]);
     /// Rectangle `[x, y, width, height]` of the picture on the screen, pixels.
     fn picture(&mut self) -> [f64; 4];
-    /// Hides the panel, so that the picture fills the window one to one.
+    /// Hides the panel: the picture has one pixel for each of the window's.
     fn fill_window(&mut self);
     /// Toggles the switch of a light.
     fn switch(&mut self, light: &str);
     /// Labels of the visible fields of a material.
     fn labels(&mut self, material: &str) -> Vec<String>;
-    /// Sets the field of a material with this label, or toggles it.
+    /// Sets the field of a material that has this label; a switch is toggled.
     fn set_material(&mut self, material: &str, label: &str, value: f64);
-    /// Takes over the steering from another page.
+    /// Presses the button by which a page takes over the steering.
     fn take_over(&mut self);
     /// Saves the picture. Returns the command line that the page shows.
     fn save(&mut self, name: &str, ending: &str) -> String;
@@ -57,7 +57,7 @@ impl Person for Tab {
                 self.value(automatic)
             }
         };
-        // The next frame has it.
+        // The exposure is drawn in the next animation frame.
         self.value("new Promise(act => requestAnimationFrame(() => requestAnimationFrame(act)))");
     }
 
@@ -145,7 +145,7 @@ impl Person for Tab {
     }
 }
 
-/// Expression for the labels of a material's fields.
+/// JavaScript expression for the labels of a material's fields.
 fn labels_of(material: &str) -> String {
     format!(
         "[...[...document.querySelectorAll('#materials details')].find(one => \
@@ -153,7 +153,7 @@ fn labels_of(material: &str) -> String {
     )
 }
 
-/// Mean difference of pixels from white.
+/// Mean over pixels and channels of 255 minus the code.
 pub(crate) fn darkness(pixels: &[[u8; 3]]) -> f64 {
     let sum: u64 = pixels.as_flattened().iter().map(|&code| u64::from(255 - code)).sum();
     sum as f64 / (3 * pixels.len()) as f64

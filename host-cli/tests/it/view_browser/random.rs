@@ -1,4 +1,4 @@
-//! Random actions on the page, as people, networks and cards may perform them in sequence.
+//! Random actions on the page, with a random order of what people, networks and cards may do.
 
 use std::time::Duration;
 
@@ -28,7 +28,7 @@ impl Numbers {
     }
 }
 
-/// Emulated card in another process, which can be killed and restarted at the same port.
+/// Process of an emulated card that can be killed, and restarted at the same port.
 pub(crate) struct Card {
     emulator: Option<Emulator>,
     port: String,
@@ -45,7 +45,7 @@ impl Card {
         format!("tcp:127.0.0.1:{}", self.port)
     }
 
-    /// Kills the card, or restarts it.
+    /// Kills the card if it runs; otherwise restarts it.
     fn toggle(&mut self, room: &Room) {
         self.emulator = match self.emulator.take() {
             Some(emulator) => {
@@ -110,12 +110,12 @@ pub(crate) fn act(room: &Room, tab: &mut Tab, card: &mut Card, actions: usize) {
             std::thread::sleep(Duration::from_millis(numbers.of(0.0, 400.0) as u64));
         }
     }
-    // The picture has a size that takes no long time at the end.
+    // The last picture is small, so that it settles soon.
     tab.resize([360, 420]);
     tab.choose("side", "128");
 }
 
-/// Types into a field of the panel, or toggles a switch.
+/// Types into a random field of the panel, or toggles a switch.
 fn edit(tab: &mut Tab, numbers: &mut Numbers) {
     let which = numbers.next();
     let value = numbers.of(0.0, 1.0);

@@ -1,4 +1,4 @@
-//! Command under test, and a server for a page of another origin.
+//! Process of `photoncard view`, and a server for a page of another origin.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use crate::support::Room;
 
-/// Running `photoncard view`. Dropping it ends the process.
+/// Process of `photoncard view`. Dropping it ends the process.
 pub(crate) struct View {
     process: Child,
     /// Address of the page, with the token.
@@ -25,12 +25,12 @@ impl View {
         let address = lines.by_ref().map_while(Result::ok).find_map(|line| {
             line.split_whitespace().find(|word| word.starts_with("http://")).map(str::to_owned)
         });
-        // Later lines must find a reader.
+        // The thread reads all further lines, so that the command can print.
         std::thread::spawn(move || lines.for_each(drop));
         Self { process, address: address.expect("the command prints the address of its page") }
     }
 
-    /// Memory of the command, bytes; `None` if the system does not report it.
+    /// Resident memory of the command, bytes; `None` on systems without `/proc`.
     pub(crate) fn memory(&self) -> Option<u64> {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).ok()?;
         let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"))?;
@@ -45,7 +45,7 @@ impl View {
 
 impl Drop for View {
     fn drop(&mut self) {
-        // Both fail if the process has ended.
+        // Both calls fail if the process has ended already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -63,7 +63,8 @@ pub(crate) fn run_shown(room: &Room, line: &str) {
     assert!(output.status.success(), "{line}: {}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// Serves a page to everyone on a port of its own, which makes it another origin. Returns its address.
+/// Serves a page, without access control, on a port of its own: the page has another origin. Returns its
+/// address.
 pub(crate) fn serve_page(page: String) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = format!("http://{}/", listener.local_addr().unwrap());

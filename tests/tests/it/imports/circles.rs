@@ -1,12 +1,12 @@
-//! Circles in the graph of files.
+//! Circles of imports between files.
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
-/// Imports of each file, each with a path that makes the import.
+/// For each file, the files that it imports, each with a path in its source that names an item there.
 pub(crate) type Imports = BTreeMap<PathBuf, BTreeMap<PathBuf, String>>;
 
-/// Disjoint circles of the graph, each as lines about its imports.
+/// Circles of imports without common files, each as text with a line for each import.
 pub(crate) fn circles(imports: &Imports, folder: &Path) -> Vec<String> {
     let mut known = BTreeSet::new();
     let mut circles = Vec::new();
@@ -22,7 +22,7 @@ pub(crate) fn circles(imports: &Imports, folder: &Path) -> Vec<String> {
     circles
 }
 
-/// Shortest path from a file back to itself, by breadth-first search. The file comes first.
+/// Shortest circle of imports that starts at a file, by breadth-first search; the file comes first.
 fn shortest_circle<'i>(imports: &'i Imports, start: &'i PathBuf) -> Option<Vec<&'i PathBuf>> {
     let mut importers: BTreeMap<&PathBuf, &PathBuf> = BTreeMap::new();
     let mut waiting = VecDeque::from([start]);

@@ -1,14 +1,12 @@
-//! No file imports another that directly or indirectly imports it, so that each can be read without its
-//! users.
+//! No file imports another file that imports it, directly or indirectly: each can be read without its users.
 //!
-//! The test reads all files of all targets of the workspace. A file imports another if a path in it, of a
-//! `use` or of an expression, names an item that the other defines, whichever module re-exports the item by
-//! `pub use`. Neither a `mod` declaration nor a `pub use` of a name that the file itself does not use is an
-//! import.
+//! The test reads all files of all targets of the workspace. A file imports another if a path in it, in a
+//! `use` or an expression, names an item that the other file defines, through whichever `pub use` the path
+//! leads. A `mod` declaration is no import, nor is a `pub use` of a name that the file itself does not use.
 //!
-//! Types are not resolved, so that some uses of another file are missed: methods and fields of a value whose
-//! type the file does not name, such as inherent methods that another file defines; paths in the body of a
-//! `macro_rules!`; and paths in macro arguments that are not comma-separated expressions.
+//! Types are not resolved. The test therefore misses methods and fields of a value whose type the file does
+//! not name, paths in the body of a `macro_rules!`, and paths in macro arguments that are not comma-separated
+//! expressions.
 
 mod circles;
 mod modules;
@@ -25,7 +23,7 @@ fn workspace() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the tests are a folder of the workspace")
 }
 
-/// Root files of all targets: libraries, programs, tests, examples, benchmarks and build scripts.
+/// Root files of all cargo targets: libraries, programs, tests, examples, benchmarks, build scripts.
 fn roots() -> BTreeSet<PathBuf> {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--no-deps", "--offline", "--format-version", "1"])
@@ -39,7 +37,7 @@ fn roots() -> BTreeSet<PathBuf> {
     targets.map(|target| target["src_path"].as_str().expect("a path").into()).collect()
 }
 
-/// Rust files below a folder.
+/// Adds all Rust files below a folder to `found`.
 fn rust_files(folder: &Path, found: &mut BTreeSet<PathBuf>) {
     for entry in folder.read_dir().expect("a folder") {
         let path = entry.expect("an entry").path();
@@ -80,7 +78,7 @@ fn no_file_imports_one_that_imports_it_back() {
     assert!(circles.is_empty(), "{} circles:\n{}", circles.len(), circles.join("\n"));
 }
 
-/// Circles of a crate that consists of these files, of which the first is the root.
+/// Circles of a crate of these files (name, source), the root first.
 fn circles_of(files: &[(&str, &str)]) -> Vec<String> {
     let folder = tempfile::tempdir().expect("a folder");
     for (name, text) in files {
@@ -134,19 +132,19 @@ fn circles_are_found_however_they_are_written() {
 #[test]
 fn imports_without_a_circle_are_accepted() {
     let cases: [&[(&str, &str)]; 4] = [
-        // Declarations, and re-exports of a parent.
+        // Files declare child modules, and import what a parent re-exports.
         &[
             ("main.rs", "mod a; use a::One; fn main() { a::b::two(One) }"),
             ("a/mod.rs", "pub mod b; mod c; pub use self::c::One;"),
             ("a/b.rs", "use super::One; pub fn two(_: One) {}"),
             ("a/c.rs", "pub struct One;"),
         ],
-        // A variable with the name of a module.
+        // A variable has the name of a module.
         &[
             ("lib.rs", "mod a; pub fn f(a: u32) -> u32 { a + 1 }"),
             ("a.rs", "use crate::f; pub fn g() { f(1); }"),
         ],
-        // Other crates, and items of the same file.
+        // Paths lead to other crates, and to items of the same file.
         &[
             ("lib.rs", "mod a;"),
             (
@@ -154,7 +152,7 @@ fn imports_without_a_circle_are_accepted() {
                 "use std::fs; mod b { use super::One; pub struct Two(One); } use self::b::Two; struct One;",
             ),
         ],
-        // A test module before the items that it tests.
+        // A test module imports more than the file that declares it.
         &[
             ("lib.rs", "mod a; mod b;"),
             ("a.rs", "pub fn f() {} #[cfg(test)] mod tests;"),

@@ -1,4 +1,4 @@
-//! Modules of a crate: their files, names and paths.
+//! Modules of a crate, with their files, names and paths.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -8,29 +8,29 @@ use syn::{Attribute, Expr, ExprLit, Item, ItemMod, Lit, Meta};
 use super::circles::Imports;
 use super::paths::{Names, PathText, Paths, names_and_paths};
 
-/// Index of a module in its crate.
+/// Index in [`Crate::modules`].
 type ModuleIndex = usize;
 
-/// Names that were looked up for a path, with their modules. They end circular look-ups, because modules may
-/// re-export each other's names.
+/// Modules and names that were looked up for a path. None is looked up twice: modules may re-export each
+/// other's names.
 type Asked = BTreeSet<(ModuleIndex, String)>;
 
-/// Inline module, or module in its own file.
+/// Module, inline or in a file of its own.
 struct Module {
     file: PathBuf,
     parent: Option<ModuleIndex>,
-    /// Child modules by name. A name may be declared several times for different systems.
+    /// Child modules by name. There may be several of a name, for different systems.
     children: BTreeMap<String, Vec<ModuleIndex>>,
     names: Names,
     paths: Paths,
 }
 
-/// Target with all its modules, the root first.
+/// Cargo target with all its modules, the root first.
 pub(crate) struct Crate {
     modules: Vec<Module>,
 }
 
-/// Item to which a path resolves.
+/// What a path resolves to.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Resolved {
     /// A module itself.
@@ -40,17 +40,17 @@ enum Resolved {
 }
 
 impl Crate {
-    /// Reads a target from its root file.
+    /// Reads the modules of a target, from its root file on.
     ///
     /// # Panics
-    /// If a file is missing or is not Rust.
+    /// If a file is missing or cannot be parsed as Rust.
     pub(crate) fn read(root: &Path) -> Self {
         let mut modules = Self { modules: Vec::new() };
         modules.read_file(root, None, root.parent().expect("a root is in a folder"));
         modules
     }
 
-    /// Reads the module of a file, whose child modules are in `folder`.
+    /// Reads the module in a file, with its child modules, whose files are in `folder`.
     fn read_file(&mut self, file: &Path, parent: Option<ModuleIndex>, folder: &Path) -> ModuleIndex {
         let text =
             std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
@@ -67,7 +67,7 @@ impl Crate {
     ) -> ModuleIndex {
         let (names, paths) = names_and_paths(items);
         let index = self.modules.len();
-        // Canonical path: targets may reach a file by several ways.
+        // The path is canonical, as targets may reach one file in several ways.
         let file = file.canonicalize().unwrap_or_else(|error| panic!("{}: {error}", file.display()));
         let module = Module { file: file.clone(), parent, children: BTreeMap::new(), names, paths };
         self.modules.push(module);
@@ -80,7 +80,7 @@ impl Crate {
         index
     }
 
-    /// Adds a module by the rules of the language: inline, at its `path`, in `NAME.rs` or in `NAME/mod.rs`.
+    /// Adds a declared module by Rust's rules: inline, at its `#[path]`, in `NAME.rs` or in `NAME/mod.rs`.
     fn add_child(
         &mut self,
         declared: &ItemMod,
@@ -102,7 +102,7 @@ impl Crate {
         self.read_file(&child, Some(parent), &own_folder)
     }
 
-    /// Adds the imports of each file of the target.
+    /// Adds the imports of each file of the target to `imports`.
     pub(crate) fn add_imports(&self, imports: &mut Imports) {
         let mut first_segments: BTreeMap<&Path, BTreeSet<&String>> = BTreeMap::new();
         for Module { file, paths, .. } in &self.modules {
@@ -124,7 +124,7 @@ impl Crate {
         }
     }
 
-    /// Items to which a path in a module resolves; none if they are in another crate.
+    /// Resolves a path in a module; empty if it leads to another crate.
     fn resolve(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
         let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         match (first.as_str(), self.modules[module].parent) {
@@ -135,15 +135,15 @@ impl Crate {
         }
     }
 
-    /// Items to which the rest of a path resolves, starting in a module. An unknown name, such as one that a
-    /// macro defines, counts as an item of the module.
+    /// Resolves the rest of a path from a module on. An unknown name, such as one that a macro defines,
+    /// counts as an item of this module.
     fn walk(&self, module: ModuleIndex, path: &[String], asked: &mut Asked) -> Vec<Resolved> {
         let [first, rest @ ..] = path else { return vec![Resolved::Module(module)] };
         let found = self.look_up(module, first, rest, asked);
         if found.is_empty() { vec![Resolved::ItemOf(module)] } else { found }
     }
 
-    /// Items of a name that a module declares, defines or imports, followed along the rest of the path.
+    /// Resolves `name`, if the module declares, defines or imports it, and the rest of the path from there.
     fn look_up(&self, module: ModuleIndex, name: &str, rest: &[String], asked: &mut Asked) -> Vec<Resolved> {
         if !asked.insert((module, name.to_owned())) {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! Names that a module defines and imports, and all its paths.
+//! Names that a module defines or imports, and all paths in it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,26 +7,26 @@ use syn::punctuated::Punctuated;
 use syn::visit::{self, Visit};
 use syn::{Expr, Item, ItemMod, ItemUse, Macro, Path, Token, UseTree, VisRestricted, Visibility};
 
-/// Segments of a path.
+/// Segments of a path, such as `crate`, `scene`, `Scene`.
 pub(crate) type PathText = Vec<String>;
 
-/// Names of a module, except those of modules that it declares.
+/// Names of a module, without those of its child modules.
 #[derive(Default)]
 pub(crate) struct Names {
     pub(crate) defined: BTreeSet<String>,
-    /// Imported paths, by the names that `use` gives them.
+    /// Paths that `use` imports, by the names that it gives them.
     pub(crate) imported: BTreeMap<String, PathText>,
-    /// Paths of glob imports.
+    /// Paths before the `*` of glob imports.
     pub(crate) globs: Vec<PathText>,
 }
 
-/// Paths that a module contains.
+/// All paths in a module.
 #[derive(Default)]
 pub(crate) struct Paths {
-    /// Paths of `use`, and all other paths of at least two segments. A single name is imported or defined by
-    /// the module, or is a variable.
+    /// Paths of `use`, and other paths of two segments or more: a single name is defined or imported here, or
+    /// a variable.
     pub(crate) imports: Vec<PathText>,
-    /// Paths of `pub use`, by name.
+    /// Paths of `pub use`, by the names that it gives them.
     pub(crate) handed_on: BTreeMap<String, PathText>,
     /// First segments of all paths except those of `use`.
     pub(crate) first_segments: BTreeSet<String>,
@@ -63,7 +63,8 @@ fn defined_name(item: &Item) -> Option<String> {
     Some(name.to_string())
 }
 
-/// Adds the names that a `use` imports. `self` stands for the last segment of `before`.
+/// Adds the names that a `use` imports below the path `before`; `self` stands for the last segment of
+/// `before`.
 fn add_imported(tree: &UseTree, before: &[String], names: &mut Names) {
     match tree {
         UseTree::Path(path) => add_imported(&path.tree, &with(before, &path.ident), names),
@@ -86,7 +87,7 @@ fn with(before: &[String], name: &syn::Ident) -> PathText {
 }
 
 impl<'ast> Visit<'ast> for Paths {
-    /// Skips child modules, because they are visited separately.
+    /// Skips child modules, which are read by themselves.
     fn visit_item_mod(&mut self, _: &'ast ItemMod) {}
 
     fn visit_item_use(&mut self, item: &'ast ItemUse) {
@@ -99,7 +100,7 @@ impl<'ast> Visit<'ast> for Paths {
         }
     }
 
-    /// Skips visibilities, because they are no imports.
+    /// Skips visibilities such as `pub(in PATH)`, which import nothing.
     fn visit_vis_restricted(&mut self, _: &'ast VisRestricted) {}
 
     fn visit_path(&mut self, path: &'ast Path) {
@@ -111,12 +112,12 @@ impl<'ast> Visit<'ast> for Paths {
         visit::visit_path(self, path);
     }
 
-    /// Visits the arguments of a macro if they are comma-separated expressions.
+    /// Visits a macro's path, and its arguments if they are comma-separated expressions.
     fn visit_macro(&mut self, called: &'ast Macro) {
         self.visit_path(&called.path);
         let arguments = Punctuated::<Expr, Token![,]>::parse_terminated.parse2(called.tokens.clone());
-        // The visitor borrows from the syntax tree of the file, which outlives the arguments: another visitor
-        // reads them.
+        // Another visitor reads the arguments: this one borrows from the file's syntax tree, which they do
+        // not outlive.
         let mut paths = Paths::default();
         arguments.iter().flatten().for_each(|argument| paths.visit_expr(argument));
         self.imports.append(&mut paths.imports);

@@ -1,4 +1,4 @@
-//! Adjoint of photons at a wall with a normal map: they transport as much power as paths do.
+//! Photons and paths at a wall with a normal map are adjoint: both transport the same power.
 
 use std::f64::consts::PI;
 
@@ -25,22 +25,22 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
 }
 
-/// Point of a low-discrepancy sequence in four dimensions: multiples of the powers of the root of `g^5 = g +
-/// 1` (Roberts 2018).
+/// Point `index` of the four-dimensional sequence R4 (Roberts 2018): multiples of the powers of 1 / g, with
+/// `g^5 = g + 1`.
 fn place(index: u32) -> [f32; 4] {
     const G: f64 = 1.167_303_978_261_418_7;
     [1, 2, 3, 4].map(|power| (0.5 + f64::from(index) / G.powi(power)).fract() as f32)
 }
 
-/// Floor beside a glossy wall with bumps that a lamp illuminates.
+/// Floor beside a glossy wall with a normal map, opposite to a lamp.
 fn wall_and_floor(normals: &[DVec3], roughness: f32) -> Scene {
     let lamp = Material { emission: Vec3::splat(10.0), ..lambertian("lamp", 0.0) };
-    // Black would store no photons.
+    // A black floor would store no photons.
     let materials = vec![mapped(metal(roughness), 1.0), lambertian("floor", 0.001), lamp];
     let mut scene = scene(Vec::new(), materials, camera(Vec3::new(0.0, 1.0, 3.0), Vec3::NEG_Z));
     let wall = [[0., 1.], [0., -1.], [1.5, -1.], [1.5, 1.]].map(|[y, z]| Vec3::new(-1.0, y, z));
     add_textured_quad(&mut scene, wall, [[0., 9.], [8., 9.], [8., 0.], [0., 0.]], 0);
-    // The wall's u runs along -z.
+    // The texture's u axis on the wall is -z.
     add_tangents(&mut scene, 0, Vec4::new(0.0, 0.0, -1.0, 1.0));
     let floor = [[-1., 1.], [1., 1.], [1., -1.], [-1., -1.]].map(|[x, z]| Vec3::new(x, 0.0, z));
     scene.triangles.extend(quad(floor, 1));
@@ -52,17 +52,17 @@ fn wall_and_floor(normals: &[DVec3], roughness: f32) -> Scene {
     scene
 }
 
-/// Power that photons transport to the floor by reflection at the wall, W.
+/// Power of photons on the floor that come from the wall, W.
 fn brought(packed: &PackedScene) -> f64 {
     let pass = trace(packed, 1, 600_000, &|_| true).unwrap();
     let unit = f64::from(pass.photons.power_unit());
-    // The lamp is towards +x of every point of the floor, the wall towards -x.
+    // From each point of the floor, the lamp is towards +x and the wall towards -x.
     let is_by_the_wall = |photon: &Photon| decode_direction(photon.direction)[0] < 0.0;
     let on_the_floor = pass.photons.iter().filter(|photon| photon.position[1].abs() < 1e-3);
     on_the_floor.filter(is_by_the_wall).map(|photon| f64::from(photon.power.decode()[0]) * unit).sum()
 }
 
-/// Power that paths from the floor find by reflection at the wall, W.
+/// Power that reaches the floor by way of the wall, by paths that start on the floor, W.
 fn found(packed: &PackedScene, view: &Camera) -> f64 {
     const PATHS: u32 = 700_000;
     const OF_A_TASK: u32 = 10_000;
@@ -75,11 +75,12 @@ fn found(packed: &PackedScene, view: &Camera) -> f64 {
         (task * OF_A_TASK..(task + 1) * OF_A_TASK).map(|index| path_to_the_lamp(&mut context, index)).sum()
     };
     let sums: Vec<f64> = (0..PATHS / OF_A_TASK).into_par_iter().map(of_task).collect();
-    // The floor has 4 m^2, and half of the cosine's integral is on the wall's side.
+    // Area of the floor, 4 m^2, times pi / 2, the integral of the cosine over the half of directions towards
+    // the wall.
     sums.iter().sum::<f64>() / f64::from(PATHS) * 4.0 * PI / 2.0
 }
 
-/// Radiance that path `index` finds from the floor towards the wall.
+/// Radiance that path `index` brings to the floor, by way of the wall.
 fn path_to_the_lamp<M: MemoryPort>(context: &mut Context<M>, index: u32) -> f64 {
     let [x, z, u, v] = place(index);
     let origin = Vec3::new(2.0 * x - 1.0, 1e-5, 2.0 * z - 1.0);
@@ -115,7 +116,7 @@ fn photons_and_paths_transport_equal_power_over_a_bumpy_wall() {
     }
 }
 
-/// Glass of a pane without thickness.
+/// Clear glass of a pane without thickness.
 fn pane() -> Material {
     let transmission = Transmission { factor: 1.0, ior: 1.5, is_volume: false, absorption: Vec3::ZERO };
     let Material { reflection, .. } = plastic(0.0);
@@ -134,8 +135,8 @@ fn pane() -> Material {
     Material::new("pane", reflection)
 }
 
-/// Sunlight through a pane reaches a floor by the caustic map, reduced by the transmittance of the pane. The
-/// lobe and the base of the floor have normals of their own; photons are stored for only one of them.
+/// Sunlight through a pane reaches a floor as a caustic, dimmed by the pane's transmittance. Lobe and base of
+/// the floor have normals of their own; each photon is stored once for both.
 #[test]
 fn photons_light_a_floor_of_two_parts_once() {
     let normals = [tilted(50.0, 180.0), tilted(50.0, 0.0), tilted(20.0, 90.0)];

@@ -1,4 +1,5 @@
-//! Normal maps of known appearance: tilted plates under lights and skies, and their adjoint for photons.
+//! Normal maps of known appearance: plates with tilted normals under lights and skies, and their adjoint for
+//! photons.
 
 mod adjoint;
 
@@ -33,7 +34,7 @@ fn film(scene: &Scene, settings: &RenderSettings) -> Film {
     render_or_panic(scene, settings).film
 }
 
-/// Adds a normal texture whose texels are these normals side by side, not interpolated.
+/// Adds a normal texture with a texel for each of these normals, side by side, without interpolation.
 fn normal_texture(scene: &mut Scene, normals: &[DVec3]) {
     let texel = |normal: &DVec3| {
         let [red, green, blue] = ((*normal * 0.5 + 0.5) * 255.0).round().to_array().map(|value| value as u8);
@@ -49,7 +50,7 @@ fn normal_texture(scene: &mut Scene, normals: &[DVec3]) {
     scene.textures = vec![Texture { nearest: normals.len() > 1, ..Texture::new(0) }];
 }
 
-/// Unit normal after rounding to 8 bits in a normal texture.
+/// Unit normal that a normal texture of 8 bits a channel gives for `normal`.
 fn rounded(normal: DVec3, scale: f64) -> DVec3 {
     let texel = ((normal * 0.5 + 0.5) * 255.0).round() / 255.0 * 2.0 - 1.0;
     (texel * DVec3::new(scale, scale, 1.0)).normalize()
@@ -77,7 +78,8 @@ fn metal(roughness: f32) -> Material {
     Material::new("metal", reflection)
 }
 
-/// Square of side 2 in the plane z = 0 that faces +z, with u from 0 to 1 to the right and v downwards.
+/// Square of side 2 in the plane z = 0 that faces +z. From its upper left corner, u is 0 to 1 to the right
+/// and v 0 to 1 downwards.
 fn plate(material: Material, normals: &[DVec3], tangent: Vec4, view: Camera) -> Scene {
     let mut scene = scene(Vec::new(), vec![material], view);
     let corners = [[-1., -1.], [1., -1.], [1., 1.], [-1., 1.]].map(|[x, y]| Vec3::new(x, y, 0.0));
@@ -87,10 +89,10 @@ fn plate(material: Material, normals: &[DVec3], tangent: Vec4, view: Camera) -> 
     scene
 }
 
-/// Distant camera that sees a square of 1.8 m at the origin.
+/// Camera 50 m from the origin that sees a square of 1.8 m there.
 fn far_camera(direction: Vec3) -> Camera {
     let origin = direction.normalize() * 50.0;
-    // Straight up, the camera's upper edge is along y.
+    // Seen from straight above, +y is upwards in the picture.
     let aside = if direction.x == 0.0 && direction.y == 0.0 { Vec3::new(0.0, 1e-4, 0.0) } else { Vec3::ZERO };
     Camera { vertical_fov: 2.0 * (0.9_f32 / 50.0).atan(), ..camera(origin, aside - origin) }
 }
@@ -103,8 +105,8 @@ fn directional(direction: DVec3, irradiance: f32) -> PunctualLight {
     }
 }
 
-/// A lone plane does not illuminate itself. Rays of irradiance records stay above the triangle, whatever the
-/// normal of the map.
+/// A lone plate does not light itself: whatever the map's normals, gather rays of irradiance records stay
+/// above the triangle.
 #[test]
 fn irradiance_records_of_a_lone_bumpy_plate_gather_nothing() {
     for normals in [vec![tilted(15.0, 40.0)], vec![tilted(25.0, 10.0), tilted(30.0, 200.0)]] {
@@ -137,7 +139,7 @@ fn a_tilted_plate_is_lit_by_the_cosine_to_its_mapped_normal() {
             let bitangent = DVec3::Z.cross(tangent) * sign;
             let world = tangent * texel.x + bitangent * texel.y + DVec3::Z * texel.z;
             let material = Material { double_sided: true, ..mapped(lambertian("plate", ALBEDO), scale) };
-            // From either side: the back has the opposite normal.
+            // From the back, the normals are the opposite ones.
             for side in [1.0, -1.0] {
                 let view = far_camera(Vec3::Z * side as f32);
                 let tangent = tangent.extend(sign).as_vec4();
@@ -176,7 +178,7 @@ fn a_scale_or_tangent_of_zero_disables_the_map() {
     assert!((tilted / plain - 1.0).abs() > 0.1, "{tilted} {plain}");
 }
 
-/// Normals point in all directions. Light from behind the plate must reach none of them.
+/// Normals are tilted in all directions; light from behind the plate reaches none of them.
 #[test]
 fn a_bumpy_plate_leaks_no_light_from_behind() {
     let normals: Vec<_> = (0..16).map(|k| tilted(70.0, 22.5 * f64::from(k))).collect();
@@ -192,7 +194,7 @@ fn a_bumpy_plate_leaks_no_light_from_behind() {
     }
 }
 
-/// GGX reflection `f cos` of a metal: height-correlated Smith masking, Schlick's Fresnel reflectance.
+/// GGX reflection `f cos` of a metal, with height-correlated Smith masking and Schlick's Fresnel reflectance.
 fn metal_times_cosine(normal: DVec3, outgoing: DVec3, incident: DVec3, roughness: f64) -> f64 {
     let squared = roughness.powi(4);
     let half = (outgoing + incident).normalize();
@@ -208,8 +210,8 @@ fn metal_times_cosine(normal: DVec3, outgoing: DVec3, incident: DVec3, roughness
     distribution * visibility * fresnel * i
 }
 
-/// Normal nearest to `normal`, in its plane with z, whose mirror direction is not below the plate; by
-/// bisection.
+/// Normal between `normal` and z that is nearest to `normal` and whose mirror direction is above the plate,
+/// by bisection.
 fn bent(normal: DVec3, outgoing: DVec3) -> DVec3 {
     let least = (0.9 * outgoing.z).min(0.01);
     let is_above = |n: DVec3| (n * (2.0 * n.dot(outgoing)) - outgoing).z >= least;
@@ -224,7 +226,7 @@ fn bent(normal: DVec3, outgoing: DVec3) -> DVec3 {
     good
 }
 
-/// Integral of a function over the directions above the plate, by midpoints in cosine and azimuth.
+/// Integral of a function over the directions above the plate, by the midpoint rule in cosine and azimuth.
 fn over_the_sky(value: impl Fn(DVec3) -> f64) -> f64 {
     const SIDE: u32 = 250;
     let mut sum = 0.0;
@@ -239,18 +241,18 @@ fn over_the_sky(value: impl Fn(DVec3) -> f64) -> f64 {
     sum * 2.0 * PI / f64::from(2 * SIDE * SIDE)
 }
 
-/// Normals that are tilted by up to 40 degrees.
+/// Sixteen normals that are tilted by 10 to 40 degrees.
 fn bumps() -> Vec<DVec3> {
     (0..16).map(|k| tilted(f64::from(k % 4 + 1) * 10.0, 97.0 * f64::from(k))).collect()
 }
 
-/// A direction mirrored in the plate, where a lobe's part below the plate is added.
+/// Mirror image of a direction in the plate: the part of a lobe below the plate is added to that above.
 fn below(direction: DVec3) -> DVec3 {
     DVec3::new(direction.x, direction.y, -direction.z)
 }
 
-/// Mean albedos of a bumpy plate over its texels: with [`bent`] normals and the lobe's part below the plate
-/// mirrored in it, with unbent ones, and with unbent ones over each texel's own hemisphere.
+/// Mean albedos over the texels of a bumpy plate: with [`bent`] normals and the lobe's lower part mirrored
+/// up; with unbent normals; and with unbent normals over each texel's own hemisphere.
 fn albedos(outgoing: DVec3, roughness: Option<f64>) -> [f64; 3] {
     let count = bumps().len() as f64;
     let mut sums = [0.0; 3];
@@ -274,11 +276,11 @@ fn albedos(outgoing: DVec3, roughness: Option<f64>) -> [f64; 3] {
     sums
 }
 
-/// Radiance of a plate with [`bumps`] under a white sky, seen from a direction.
+/// Radiance of a plate with [`bumps`] under a white sky, seen from `direction`.
 fn in_a_furnace(material: Material, direction: DVec3) -> f64 {
     let view = far_camera(direction.as_vec3());
     let mut scene = plate(mapped(material, 1.0), &bumps(), Vec4::new(1.0, 0.0, 0.0, 1.0), view);
-    // The picture is within the plate: repeated, as far as the camera sees.
+    // The plate and its repeated texture extend beyond the picture.
     for triangle in &mut scene.triangles {
         triangle.vertices.iter_mut().for_each(|vertex| *vertex *= 16.0);
     }
@@ -315,7 +317,7 @@ fn bumpy_plates_in_a_white_furnace_lose_little() {
     }
 }
 
-/// Cosine-weighted mean over the hemisphere of Schlick's reflectance of a dielectric with F0 0.04.
+/// Cosine-weighted mean of Schlick's reflectance over incident directions, for a dielectric of F0 0.04.
 fn mean_fresnel(outgoing: DVec3) -> f64 {
     over_the_sky(|direction| schlick(0.04, outgoing, direction) * direction.z / PI)
 }
@@ -324,9 +326,9 @@ fn schlick(f0: f64, outgoing: DVec3, incident: DVec3) -> f64 {
     f0 + (1.0 - f0) * (1.0 - (outgoing + incident).normalize().dot(outgoing)).powi(5)
 }
 
-/// Mean albedo of a bumpy plastic plate over its texels. The lobe uses the [`bent`] normal, and its part
-/// below the plate is mirrored in it. The Lambertian base uses the texel's own normal, and receives the light
-/// that the lobe does not reflect.
+/// Mean albedo over the texels of a bumpy plastic plate. The lobe has the [`bent`] normal, and its part below
+/// the plate is mirrored up. The Lambertian base has the texel's own normal, and reflects light that the lobe
+/// does not.
 fn plastic_albedo(outgoing: DVec3, roughness: f64) -> f64 {
     let base = f64::from(ALBEDO);
     let value = |normal: DVec3, outgoing: DVec3, direction: DVec3| {
@@ -363,7 +365,7 @@ fn plastic(roughness: f32) -> Material {
     Material::new("plastic", reflection)
 }
 
-/// Texels at grazing angles reflect by the bent normal. Their base must receive the remaining light.
+/// At grazing angles the lobe of many texels has a bent normal; the base must receive all other light.
 #[test]
 fn bumpy_plastic_plates_lose_no_light_where_normals_are_bent() {
     for (degrees, roughness) in [(0.0, 0.3), (60.0, 0.3), (75.0, 0.3), (75.0, 0.45)] {
@@ -375,7 +377,7 @@ fn bumpy_plastic_plates_lose_no_light_where_normals_are_bent() {
     }
 }
 
-/// A sheen has no mirror direction and uses the normal of its layer only, so that every sample shows it.
+/// A sheen has no mirror direction: only its layer's normal counts, and every sample shows the sheen.
 #[test]
 fn a_sheen_over_a_tilted_normal_is_uniform() {
     let sheen = Sheen { colour: Vec3::ONE, roughness: 0.5, colour_texture: None, roughness_texture: None };
@@ -394,7 +396,7 @@ fn a_sheen_over_a_tilted_normal_is_uniform() {
     }
 }
 
-/// Smooth normals that no lobe has to bend have no effect: the middle of a fine ball is as bright as a plate.
+/// The middle of a fine ball, where no normal is bent, is as bright as a plate.
 #[test]
 fn a_smooth_ball_of_plastic_is_as_bright_as_a_plate() {
     let sky = |mut scene: Scene| {
@@ -410,8 +412,8 @@ fn a_smooth_ball_of_plastic_is_as_bright_as_a_plate() {
     assert!((round / flat - 1.0).abs() < 0.005, "{round} {flat}");
 }
 
-/// A coarse ball with bumps, whose smooth normals deviate from its facets, reflects a white sky even at its
-/// silhouette.
+/// A coarse ball, whose smooth normals deviate from its facets and have bumps, reflects a white sky even at
+/// its silhouette.
 #[test]
 fn glossy_bumpy_balls_have_neither_black_nor_bright_fringes() {
     for roughness in [0.0, 0.1, 0.3] {

@@ -67,10 +67,10 @@ impl HostPort {
         }
     }
 
-    /// Accepts a second host, to be refused or served next. The system delivers the data of a link before
-    /// later events on other links. A host that was accepted before the present one was found silent but
-    /// connected is therefore too early, and is refused.
+    /// Accepts a second host. If the present host `is_silent` but connected, one accepted earlier is refused
+    /// first.
     fn look_for_others(&mut self, is_silent: bool) {
+        // A host that was accepted earlier did not wait for the end of the present host's connection.
         if is_silent {
             self.next = None;
         }
@@ -94,7 +94,7 @@ impl HostPort {
 }
 
 impl Host {
-    /// Parses the bytes received now. Returns true while no whole frame has arrived.
+    /// Parses the bytes received now. Returns true while no whole, valid frame has arrived.
     fn is_none_yet(&mut self, mut bytes: &[u8]) -> bool {
         while let Some(reader) = self.first_frame.as_mut().filter(|_| !bytes.is_empty()) {
             let (taken, frame) = reader.read(bytes);

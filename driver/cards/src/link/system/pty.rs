@@ -31,8 +31,8 @@ impl Pty {
         let path = PathBuf::from(OsString::from_vec(ptsname(&controller, Vec::new())?.into_bytes()));
         let flags = rustix::fs::fcntl_getfl(&controller)?;
         rustix::fs::fcntl_setfl(&controller, flags | OFlags::NONBLOCK)?;
-        // The hang-up state, which shows that no host has the terminal open, is reported only after it was
-        // opened once.
+        // The hang-up state, which shows that no host has the terminal open, is reported only after the
+        // terminal was opened once.
         let terminal =
             rustix::fs::open(&path, OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC, Mode::empty())?;
         let mut settings = termios::tcgetattr(&terminal)?;

@@ -21,7 +21,7 @@ use serialport::TTYPort as SystemPort;
 const QUIET: Duration = Duration::from_millis(50);
 /// Maximum time for which stale bytes of a busy card are dropped.
 const STALE: Duration = Duration::from_secs(1);
-/// Inverse of the maximum relative deviation of the speed, 2 %. A frame of ten bits tolerates more.
+/// Inverse of the maximum relative error of the bit rate, 2 %. A UART character of ten bits tolerates more.
 const SPEED_TOLERANCE: u32 = 50;
 /// Minimum timeout. Windows interprets 0 as infinite.
 const MIN_WAIT: Duration = if cfg!(windows) { Duration::from_millis(1) } else { Duration::ZERO };
@@ -89,7 +89,7 @@ fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
 }
 
 /// Returns whether a path names a pseudo terminal of macOS, which rejects any speed. `serialport` sets no
-/// speed if it is 0.
+/// speed if the stated one is 0.
 fn is_without_speed(path: &Path) -> bool {
     let is_terminal = |path: &Path| path.to_str().is_some_and(|name| name.starts_with("/dev/ttys"));
     cfg!(target_os = "macos") && path.canonicalize().is_ok_and(|path| is_terminal(&path))
@@ -106,7 +106,7 @@ fn device_error(error: serialport::Error) -> io::Error {
     }
 }
 
-/// Ends a frame that an earlier session may have left unfinished, and drops stale bytes. It stops once the
+/// Ends a frame that an earlier session may have left unfinished, and drops stale bytes. Returns once the
 /// line is quiet or, if the card is busy, at the end of a frame.
 fn begin(port: &mut impl Port) -> Result<(), PortError> {
     port.write(&[0], QUIET)?;

@@ -58,8 +58,8 @@ pub(super) fn tcp_port(stream: TcpStream) -> io::Result<StreamPort<TcpStream>> {
     Ok(StreamPort::new(stream))
 }
 
-/// Enables keep-alive: the connection ends after a minute without an answer to probes. Systems without the
-/// setting keep their default of hours.
+/// Sets the times of keep-alive probes: the connection ends after a minute without an answer. Other systems
+/// keep their default of hours.
 #[cfg(target_os = "linux")]
 fn probe_soon(stream: &TcpStream) -> io::Result<()> {
     sockopt::set_tcp_keepidle(stream, Duration::from_secs(30))?;

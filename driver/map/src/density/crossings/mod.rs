@@ -25,12 +25,12 @@ pub(super) struct Layer {
     /// Surface area per area of the disc, `1 / cos`.
     slope: f32,
     face: u32,
-    /// Index of the triangle in the image.
+    /// Index of the triangle in the card image.
     pub(super) triangle: u32,
 }
 
-/// Sort key of a crossing. It is greater for greater heights and, at equal heights, for front faces. It is
-/// never 0, because heights are within 1.
+/// Sort key of a crossing: greater for greater heights and, at equal heights, for front faces; never 0 for
+/// heights in `[-1, 1]`.
 #[inline(always)]
 fn key(height: f32, is_front: bool) -> u32 {
     let bits = height.to_bits();
@@ -39,7 +39,7 @@ fn key(height: f32, is_front: bool) -> u32 {
     ascending.wrapping_sub(LOWEST) << 1 | u32::from(is_front)
 }
 
-/// Integer below the keys of all heights above -2.
+/// Least value of `ascending` in [`key`] for heights above -2. Its subtraction leaves a bit for the face.
 const LOWEST: u32 = 1 << 30;
 
 /// Height of the crossing with this key.
@@ -49,8 +49,8 @@ fn height(key: u32) -> f32 {
     f32::from_bits(if ascending >> 31 == 0 { !ascending } else { ascending & !(1 << 31) })
 }
 
-/// Side of a triangle that a chord hits on its way down. Bits 0 to 7 are the code of the side's normal; bit 8
-/// is set if no photons are stored there; bits 9 and 10 are the change of depth plus 1.
+/// Encodes the side of a triangle that a downward chord hits. Bits 0 to 7 are the code of the side's normal;
+/// bit 8 is set if no photons are stored there; bits 9 and 10 are the change of depth plus 1.
 #[inline(always)]
 fn face(sides: Sides, is_front: bool) -> u32 {
     let normal = sides.normal(is_front).map_or(1 << 8, u32::from);
@@ -73,7 +73,7 @@ fn stores_photons(face: u32) -> bool {
 }
 
 impl Layer {
-    /// Crossings at the heights of those chords for which `misses` is 0.
+    /// Creates the crossings of a triangle, at `heights`, with the chords for which `misses` is 0.
     #[inline(always)]
     pub(super) fn new(
         (heights, misses): (&Lane, &[u32; LANES]),
@@ -141,12 +141,12 @@ impl Crossings {
     }
 }
 
-/// One crossing per chord of a batch: the crossings that have equally many others above them.
+/// Crossings of sixteen chords, one each: the n-th from above of every chord.
 #[derive(Clone, Copy)]
 struct Level {
-    /// Sort keys; 0 for a chord that has no such crossing.
+    /// Sort keys; 0 for a chord with fewer crossings.
     keys: [u32; LANES],
-    /// Bits of the slopes.
+    /// `f32::to_bits` of the slopes `1 / cos`: surface area per area of the disc.
     slopes: [u32; LANES],
     faces: [u32; LANES],
     /// Bit mask of the crossings outside all solids.
@@ -162,13 +162,14 @@ impl Level {
         Self { keys, slopes: [slope.to_bits(); LANES], faces: [face; LANES], open: 0 }
     }
 
-    /// For each chord, exchanges the crossings of `self` and `other` unless that of `self` is above.
+    /// For each chord, moves the upper of the crossings of `self` and `other` to `self`, and the lower to
+    /// `other`. Equal crossings are exchanged.
     #[inline(always)]
     fn sort(&mut self, other: &mut Self) {
         for lane in 0..LANES {
             let [a, b] = [self.keys[lane], other.keys[lane]];
-            // By their difference: lanes that are chosen in memory would be written one by one, and read back
-            // slowly.
+            // Exchanged by a mask of their XOR: lanes that are chosen in memory would be written one by one,
+            // and read back slowly.
             let exchange = if b >= a { u32::MAX } else { 0 };
             let slopes = (self.slopes[lane] ^ other.slopes[lane]) & exchange;
             let faces = (self.faces[lane] ^ other.faces[lane]) & exchange;
@@ -188,7 +189,7 @@ fn sort(isa: impl Isa, layers: &[Layer], levels: &mut Vec<Level>) {
     if layers.len() > MAX_LAYERS {
         return sort_each(layers, levels);
     }
-    // From the last: what is inserted comes before its equals.
+    // From the last layer on, because an inserted crossing comes before its equals.
     for layer in layers.iter().rev() {
         let mut inserted = Level::of(layer);
         for level in levels.iter_mut() {
@@ -232,7 +233,7 @@ impl Kernel for OpenAll<'_> {
     fn run(self, isa: impl Isa) {
         let Self { crossings, chords, surfaces, covered } = self;
         let Crossings { layers, depths, height, levels } = crossings;
-        // The sum is never -0.0.
+        // Adding 0.0 turns -0.0 into 0.0.
         let reference = key(*height + 0.0, false) >> 1;
         for (batch, (layers, depths)) in chords.batches.iter().zip(layers.iter().zip(depths)) {
             sort(isa, layers, levels);
@@ -242,8 +243,8 @@ impl Kernel for OpenAll<'_> {
     }
 }
 
-/// Finds the crossings outside all solids. `depths` are the depths of the chords at the reference point;
-/// `reference` is the height of that point as an integer.
+/// Marks the crossings outside all solids, in [`Level::open`]. `depths` are the chords' depths at the height
+/// of the reference point; `reference` is the [`key`] of that height without the bit of the face.
 #[inline(always)]
 fn open(isa: impl Isa, levels: &mut [Level], depths: &mut [i32; LANES], reference: u32) {
     for level in levels.iter() {

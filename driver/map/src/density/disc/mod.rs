@@ -42,14 +42,14 @@ const OPEN_HEIGHT: f32 = 0.1;
 /// Radius of the sphere in which a gather looks for hidden surfaces, divided by the radius of a gather at the
 /// photon. It exceeds 1 because the point of a gather lies beside the photon.
 const MARGIN: f32 = 1.15;
-/// Maximum difference between the hidden fraction of area and the hidden fraction of light, within
-/// [`MARGIN`], at which a gather uses all photons instead of those in its visible region.
+/// Maximum difference between the hidden fractions of area and of light, within [`MARGIN`] radii of a gather,
+/// at which the gather uses all photons instead of those in its visible region.
 const MAX_DIFFERENCE: f32 = 0.06;
-/// Maximum of that difference around all photons of a group, relative to the area of one photon's sphere, at
-/// which no photon of the group is measured individually.
+/// Maximum difference of the hidden fractions of area and of light around a group of photons, times the ratio
+/// of the group's disc area to a photon's, at which its photons have the fractions of their whole discs.
 const NEAR_DIFFERENCE: f32 = 0.03;
-/// Factor for estimating the radius of gathers from a leaf: it is multiplied by the distance of the farthest
-/// photon from the middle and by the square root of k over the number of photons.
+/// Ratio of the estimated radius of a leaf's gathers to `d sqrt(k / n)`, for n photons within the distance d
+/// of the middle one.
 const BY_SPREAD: f32 = 1.2;
 /// Maximum distance at which a photon shows that a surface is lit, divided by the radius of a gather.
 const EVIDENT: f32 = 0.7;
@@ -70,11 +70,11 @@ const WHOLE: Fraction = Fraction { fraction: 1.0, is_of_region: false };
 type Codes = [u8; LEAF_PHOTONS];
 type DiscPhotons = heapless::Vec<DiscPhoton, LEAF_PHOTONS>;
 
-/// Measures the disc fraction of every photon, for gathers of `neighbors` photons within some distances, and
-/// writes it into the image. `go_on` is called before each task.
+/// Measures the disc fraction of every photon, for gathers of `neighbors` photons within `distances`, and
+/// writes it into the card image. `go_on` is called before each task.
 ///
 /// # Errors
-/// If the image is malformed, or `go_on` returns false.
+/// If the card image is malformed, or `go_on` returns false.
 pub(crate) fn measure_discs(
     image: &mut CardImage,
     neighbors: u32,
@@ -117,7 +117,7 @@ struct Meter<'a> {
     usual: f32,
     surroundings: Surroundings,
     evidence: Evidence,
-    /// True if [`Self::evidence`] belongs to the current ball.
+    /// True if [`Self::evidence`] holds the photons of the current ball.
     has_evidence: bool,
     /// True if [`Self::surroundings`] contains all triangles in the ball.
     is_complete: bool,
@@ -146,11 +146,11 @@ impl DiscPhoton {
     }
 }
 
-/// Photons whose gathers have about the same radius, in metres.
+/// Ball and gather radius of photons that are measured together, in metres.
 struct Cluster {
     ball: Ball,
     radius: f32,
-    /// Radius of a disc that contains the discs of all photons.
+    /// Radius of a disc that contains the discs of all these photons.
     outer: f32,
 }
 
@@ -180,7 +180,8 @@ impl<'a> Meter<'a> {
         }
     }
 
-    /// Encoded fractions of the leaves `first..end`. Leaves whose fractions are all 1 are omitted.
+    /// Measures the leaves `first..end`. Returns the index and the encoded fractions of each leaf with a
+    /// fraction other than 1.
     fn measure_leaves(&mut self, first: usize, end: usize) -> Result<Vec<(usize, Codes)>, Fault> {
         let grid = self.searcher.scene.header.photon_grid;
         let mut measured = Vec::new();
@@ -219,8 +220,8 @@ impl<'a> Meter<'a> {
         Ok(fractions)
     }
 
-    /// Returns true if gathers at the photons of a leaf have at most the usual radius, as their own density
-    /// suggests.
+    /// Returns whether gathers at the photons of a leaf, estimated from the photons' own density, have at
+    /// most the usual radius.
     fn are_usual(&self, photons: &[DiscPhoton]) -> bool {
         let share = self.searcher.neighbors() as f32 / photons.len() as f32;
         let spread = middle(photons).map_or(0.0, |middle| spread(photons, middle));
@@ -244,8 +245,8 @@ impl<'a> Meter<'a> {
         self.surroundings.is_plain(scene, *memory, self.sides, ball, wall)
     }
 
-    /// Measures the disc fractions of those photons that are within `radius` of the photon `middle`. `radius`
-    /// is the radius of their gathers.
+    /// Measures the disc fractions of a cluster: photons within `radius`, the radius of their gathers, of the
+    /// photon `middle`.
     fn measure_cluster(
         &mut self,
         mut photons: DiscPhotons,
@@ -255,8 +256,8 @@ impl<'a> Meter<'a> {
     ) -> Result<(), Fault> {
         let spread = spread(&photons, middle);
         let outer = MARGIN * radius + spread;
-        // The paths from the reference point lie in the ball as well. Double precision: the squares of no two
-        // lengths overflow.
+        // The paths from the reference point lie in the ball as well. In `f64`, because squares of `f32`
+        // lengths can overflow.
         let [across, along] = [outer, spread + OPEN_HEIGHT * radius].map(f64::from);
         let reach = (across * across + along * along).sqrt() as f32;
         let ball = Ball { centre: middle.position, radius: 1.001 * reach + 2.0 * self.lift(radius) };
@@ -320,7 +321,7 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Measures the areas within two radii around a photon: the surfaces that its gathers count, and those
+    /// Measures around a photon, within two radii, the surfaces that its gathers count and the part of them
     /// that it sees.
     fn seen(
         &self,
@@ -338,8 +339,8 @@ impl<'a> Meter<'a> {
         run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift })
     }
 
-    /// Adds surfaces that lie below others if photons show that they are lit. A surface that is closer to the
-    /// one above than the grid's error is not added.
+    /// Adds the covered crossings that photons show to be lit ([`super::evidence`]), unless the gap to the
+    /// crossing above is within the error of the photon grid.
     fn add_covered(&mut self, photon: Vec3, frame: &ChordFrame, cluster: &Cluster) -> Result<(), Fault> {
         if self.covered.is_empty() {
             return Ok(());
@@ -367,8 +368,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Returns true if hidden and visible light may differ for the photons of a group. Decided for the first
-    /// of them.
+    /// Returns whether the hidden fractions of area and of light may differ for the photons of a group,
+    /// judged at the first one.
     fn may_differ(
         &mut self,
         group: &[DiscPhoton],
@@ -482,7 +483,8 @@ impl<'a> Meter<'a> {
         }))
     }
 
-    /// Does [`Surroundings::cross`] by rays, if there are more triangles than a list can hold.
+    /// Collects the crossings by rays through the scene, as [`Surroundings::cross`] does from a list, where
+    /// the list is incomplete.
     fn cross_by_rays(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
         self.crossings.clear(frame.open.z);
         let Searcher { scene, memory, .. } = &self.searcher;
@@ -516,8 +518,8 @@ impl<'a> Meter<'a> {
 }
 
 impl Fraction {
-    /// Chooses between the fraction of a photon's disc and that of its visible region. The latter is used if
-    /// hidden and visible light differ by more than the photons' random variation.
+    /// Chooses the fraction of a photon's disc or, if the hidden fractions of area and of light differ by
+    /// more than [`MAX_DIFFERENCE`] plus 1.5 standard deviations, that of its visible region.
     fn new(areas: &Areas, powers: &Areas) -> Self {
         let chance = areas.hidden * (1.0 - areas.hidden) / powers.points.max(1.0);
         let differs = (areas.hidden - powers.hidden).abs() > MAX_DIFFERENCE + 1.5 * chance.sqrt();

@@ -22,7 +22,7 @@ pub const UNITS: usize = Unit::ALL.len();
 pub struct Arithmetic(pub [Operations; UNITS]);
 
 impl Arithmetic {
-    /// Operations of some work: the sum over steps of their number times the operations per step.
+    /// Operations of the work `work`: the sum over all steps of their number times the operations per step.
     pub fn of(work: &Work) -> Self {
         let mut arithmetic = Self::default();
         for (step, operations) in Step::ALL.iter().zip(OPERATIONS) {
@@ -36,7 +36,7 @@ impl Arithmetic {
         self.0.iter_mut().zip(&other.0).for_each(|(operations, other)| operations.add(other));
     }
 
-    /// Operations of `count` repetitions.
+    /// Multiplies all numbers of operations by `count`.
     #[must_use]
     pub fn times(&self, count: f64) -> Self {
         Self(self.0.map(|operations| operations.times(count)))
@@ -65,8 +65,8 @@ mod tests {
 
     #[test]
     fn a_box_costs_the_operations_of_its_slab_test() {
-        // For each of six planes a product and a sum; six comparisons of planes, of near with far, and with 0
-        // or the limit.
+        // A product and a sum for each of six planes. Seven comparisons: near is the greatest of three planes
+        // and 0, far the least of three planes and the limit, and near is compared with far.
         let boxes = Contents { boxes: 1, ..Contents::ZERO };
         let work = Work::new(&Counters::ZERO, &boxes, 100.0);
         let traversal = *Arithmetic::of(&work).unit(Unit::Traversal);

@@ -21,7 +21,7 @@ pub enum Unit {
     Reflection,
     /// Evaluation of surfaces at the ends of rays.
     Shading,
-    /// Direct light: choice of a light, and its reflection.
+    /// Direct light: choice of a light, and reflection of its radiance.
     Light,
     /// Choice of the directions of gather rays.
     Sampling,
@@ -69,7 +69,7 @@ impl Unit {
 /// Step of a unit, with a fixed or nearly fixed number of operations.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Step {
-    /// Preparation of a ray.
+    /// Preparation of a ray for the tests of boxes and triangles.
     Ray,
     /// Computation that all boxes of a hierarchy node share.
     Node,
@@ -77,9 +77,9 @@ pub enum Step {
     Box,
     /// Shear of one vertex of a leaf.
     Vertex,
-    /// Edge functions of one triangle of a leaf, whether it is excluded or not.
+    /// Edge functions of one triangle of a leaf, whether or not they exclude it.
     Triangle,
-    /// Intersection of those triangles of a leaf that were not excluded.
+    /// Intersection of those triangles of a leaf that their edge functions do not exclude.
     Leaf,
     /// Distance to one box of photons.
     PhotonBox,
@@ -87,11 +87,11 @@ pub enum Step {
     Photon,
     /// Distance to one photon of the kd-tree.
     TreePhoton,
-    /// Share of one candidate in the guesses of a selection's interval.
+    /// Guess of the interval that has the k-th smallest distance, per candidate that a selection reads.
     Selected,
     /// Comparison of two distances.
     Compared,
-    /// Gather at the end of a ray.
+    /// Density estimate of a gather for radiance, or lookup of an irradiance point, without the search.
     Gather,
     /// Decoding of a photon's normal.
     Normal,
@@ -103,23 +103,23 @@ pub enum Step {
     Microfacets,
     /// Evaluation of a surface.
     Surface,
-    /// Evaluation of a light's record.
+    /// Evaluation of a light record: a node of the light tree, or an emitter.
     LightRecord,
-    /// A shadow ray.
+    /// Direct light of a shadow ray, without its intersection and light records.
     ShadowRay,
-    /// A gather ray.
+    /// Choice of the direction of a gather ray.
     GatherRay,
     /// Construction of a direction table.
     Table,
     /// Contribution of a photon to a direction table.
     TablePhoton,
-    /// A survey ray.
+    /// Survey ray of an irradiance record, without its intersection.
     SurveyRay,
-    /// A gather ray of an irradiance record.
+    /// Gradients of an irradiance record, per gather ray.
     RecordRay,
     /// Interpolation of a sample's irradiance.
     Interpolated,
-    /// An eye ray.
+    /// Eye ray and its contribution to a pixel, without its intersection.
     EyeRay,
 }
 
@@ -186,7 +186,7 @@ impl Step {
         }
     }
 
-    /// Number of these steps in some work.
+    /// Number of these steps in the work `work`.
     pub fn count(self, work: &Work) -> f64 {
         let Work { counters, contents, gather_rays } = work;
         let rays = [
@@ -207,7 +207,8 @@ impl Step {
             Self::Photon => contents.photons,
             Self::TreePhoton => contents.tree_photons,
             Self::Selected => counters.photons_selected,
-            // A photon of a leaf is compared with the limit by its bits, one of the kd-tree as a number.
+            // The distance of a photon of a leaf is compared with the limit by its bits, which `Self::Photon`
+            // does not count; `Self::TreePhoton` counts its comparison.
             Self::Compared => counters.distances_compared + contents.photons,
             Self::Gather => counters.gathers - counters.tables + counters.caustic_gathers + counters.lookups,
             Self::Normal => counters.normals_decoded,
@@ -229,12 +230,12 @@ impl Step {
     }
 }
 
-/// Photons found by the searches for direction tables, assuming the mean of all searches.
+/// Estimates the photons found by searches for direction tables: per search, the mean of all searches.
 fn photons_of_tables(counters: &Counters) -> f64 {
     counters.photons_found as f64 * counters.tables as f64 / counters.gathers.max(1) as f64
 }
 
-/// Numbers of operations by kind. A vector operation counts once per lane.
+/// Numbers of operations by kind. A vector operation counts once per lane that is used.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Operations {
     /// Additions and subtractions.
@@ -263,7 +264,7 @@ impl Operations {
         [self.add, self.multiply, self.divide, self.square_root, self.compare, self.convert]
     }
 
-    /// Operations of `count` repetitions.
+    /// Multiplies all numbers by `count`.
     #[must_use]
     pub fn times(&self, count: f64) -> Self {
         Self {

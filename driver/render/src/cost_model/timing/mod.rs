@@ -52,7 +52,7 @@ impl Shares {
     }
 }
 
-/// Parameters of a chip that determine its time.
+/// Parameters of a chip that determine the time of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedChip {
     /// DRAM, arithmetic and tasks in flight.
@@ -63,7 +63,7 @@ pub struct TimedChip {
     pub policy: Policy,
 }
 
-/// Work of a frame that determines its time.
+/// Work of a frame by unit, which determines the frame's time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FrameLoad {
     /// Rays in the ray caster, and their reads of the scene.
@@ -77,10 +77,11 @@ pub struct FrameLoad {
 /// Minimum number of drains that are simulated. From the first on, a frame's time is linear in its number of
 /// drains.
 const MIN_DRAINS: f64 = 4.0;
-/// Number of steps that are simulated if drains are short. Each further drain takes a few.
+/// Number of steps that are simulated: as many drains as have about this many together, at least
+/// [`MIN_DRAINS`].
 const STEPS: f64 = 65_536.0;
-/// Maximum number of entries of a queue that is simulated. A longer queue would save less per gather than the
-/// tasks in flight divided by its length.
+/// Maximum number of entries of a simulated queue. The fraction of time that a longer queue would save is
+/// below the number of tasks in flight over that of entries.
 const MAX_QUEUE: u64 = 32_768;
 
 impl FrameLoad {
@@ -92,10 +93,10 @@ impl FrameLoad {
         (bytes / machine.bandwidth).max(flops / machine.flops)
     }
 
-    /// Times of the frame on a chip that reads `line_bytes` bytes at once. A sample of the drains is
-    /// simulated. Each remaining drain takes the mean time of the sample's second half.
+    /// Times of the frame on a chip that fetches lines of `line_bytes` bytes from DRAM. A sample of the
+    /// drains is simulated. Each remaining drain takes the mean time of the sample's second half.
     pub fn times(&self, chip: &TimedChip, line_bytes: f64) -> FrameTimes {
-        // Pieces of the rays' work, of which each leads to one gather or none.
+        // Pieces of the rays' work, each of which leads to at most one gather.
         let pieces = self.rays.tasks.max(self.gathers.tasks);
         if pieces < 1.0 {
             return FrameTimes::default();

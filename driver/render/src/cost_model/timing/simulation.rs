@@ -14,7 +14,7 @@ const TICKS: f64 = 1e14;
 /// not change.
 const MAX_STEPS: f64 = 4.0;
 
-/// Sequence of integers with a real number as mean, distributed as evenly as possible.
+/// Sequence of integers whose mean is a real number, distributed as evenly as possible.
 #[derive(Clone, Copy)]
 pub(super) struct Spread {
     each: u64,
@@ -86,7 +86,7 @@ impl Task {
     }
 }
 
-/// Parameters of a frame and a chip, in ticks.
+/// Parameters of the simulation of a frame on a chip; times in ticks.
 pub(super) struct Plan {
     pub(super) rays: Task,
     /// Time of the controller's arithmetic per ray.
@@ -112,7 +112,7 @@ impl Plan {
         if self.alternates() { self.queue } else { self.queue / 2 }
     }
 
-    /// Number of entries that rays can fill.
+    /// Number of queue entries that rays may fill or reserve.
     fn room(&self, is_draining: bool) -> u64 {
         match (self.alternates(), is_draining) {
             (true, true) => 0,
@@ -130,7 +130,8 @@ struct Server {
 }
 
 impl Server {
-    /// Serves a request of length `time`. Returns its end. A request of length 0 does not wait.
+    /// Serves a request that takes `time` ticks. Returns the end of the service. A request of 0 ticks does
+    /// not wait.
     fn serve(&mut self, now: u64, time: u64) -> u64 {
         if time == 0 {
             return now;
@@ -176,7 +177,7 @@ impl UnitState {
         Self { task, busy: 0, reading: 0, computing: 0, memory_wait: 0, queue_wait: 0 }
     }
 
-    /// Accounts for a time span without events.
+    /// Counts a time span without events as a wait for memory or for the queue, unless a task computes.
     fn pass(&mut self, time: u64, waits_for_queue: bool) {
         if self.computing > 0 {
             return;
@@ -330,8 +331,8 @@ impl<'a> Simulation<'a> {
         self.foresee(end, Event::Computed(unit, steps - 1));
     }
 
-    /// Schedules arithmetic of a unit, or of the controller, whose number follows those of the units. Returns
-    /// its end.
+    /// Schedules arithmetic of a unit, or of the controller, whose index is 2. Returns the end of the
+    /// arithmetic.
     fn serve(&mut self, unit: usize, time: u64) -> u64 {
         let server = if self.plan.is_shared { 0 } else { unit };
         self.arithmetic[server].serve(self.now, time)

@@ -113,8 +113,8 @@ fn a_bus_that_both_units_fill_takes_the_sum_of_their_bytes() {
 
 #[test]
 fn units_with_shares_of_the_arithmetic_take_as_long_as_the_slowest() {
-    // By their work all three units need as long as the chip does for the sum; by equal shares the gather
-    // unit is the slowest.
+    // With shares in proportion to their work, all three units take as long as the whole chip takes for the
+    // sum. With equal shares the gather unit is the slowest.
     let work = FrameLoad {
         rays: load(1e6, 1.0, 0.0, 200.0),
         controller_flops: 1e6 * 100.0,
@@ -157,7 +157,7 @@ fn a_sample_of_drains_extrapolates_to_all() {
     let of = |count: f64| frame(load(2.0 * count, 3.0, 0.3, 300.0), load(count, 2.0, 0.4, 500.0));
     for policy in [Policy::Alternate, Policy::Overlapped(WHOLE)] {
         let chip = chip(16, 1000, policy);
-        // All drains are simulated of the first frame, a few hundredths of the second.
+        // All drains of the first frame are simulated, and a few hundredths of those of the second.
         let [few, many] = [4e3, 1e6].map(|count| seconds(&of(count), &chip) / count);
         assert_near(many, few, if policy == Policy::Alternate { 1e-3 } else { 0.15 });
         let whole = run(&of(3e5).plan(&chip, 6e5, LINE), 600_000);

@@ -30,7 +30,8 @@ fn brightness(colour: Vec3) -> f32 {
     libm::sqrtf(WEIGHTS.dot(colour * colour))
 }
 
-/// Metalness at which a base colour has this diffuse and specular brightness.
+/// Metalness at which a base colour has this diffuse and specular brightness. `one_minus_strength` is 1 minus
+/// the greatest channel of the specular colour.
 fn solve_metallic(diffuse: f32, specular: f32, one_minus_strength: f32) -> f32 {
     // At F0 itself, the most common value, rounding would decide whether dark texels are metal.
     if specular <= DIELECTRIC + EPSILON {
@@ -84,7 +85,7 @@ mod tests {
         );
     }
 
-    /// Tests white reflection at all angles, the extreme of the formula.
+    /// Tests F0 up to 1, at which no light is left for the diffuse part.
     #[test]
     fn white_reflection_at_all_angles_stays_in_range() {
         for diffuse in [0.0, 1.0] {

@@ -56,7 +56,7 @@ pub(super) fn convert(root: &mut json::Root) -> Conversions {
     conversions
 }
 
-/// Converts a material. Returns whether its specular-glossiness texture was left out.
+/// Converts a material. Returns the result, and whether the specular-glossiness texture was left out.
 fn convert_one(
     root: &mut json::Root,
     stated: &PbrSpecularGlossiness,
@@ -90,7 +90,7 @@ fn convert_one(
     };
     converted.base_color_factor = PbrBaseColorFactor([1.0, 1.0, 1.0, alpha]);
     converted.base_color_texture = add(Part::BaseColour);
-    // Without a texture of glossiness the roughness is a factor, which is not rounded to 8 bits.
+    // Without a specular-glossiness texture the roughness is a factor, which is not rounded to 8 bits.
     let roughness = if specular.is_some() { 1.0 } else { 1.0 - factors.glossiness };
     converted.roughness_factor = StrengthFactor(roughness);
     converted.metallic_roughness_texture = add(Part::MetallicRoughness);

@@ -8,7 +8,7 @@ use super::{Conversion, Part};
 /// Tables of the sRGB transfer function (IEC 61966-2-1) for 8-bit codes.
 struct Srgb {
     values: [f32; 256],
-    /// Least linear value that rounds to the next code, for each code.
+    /// For each code but the last, the least linear value that is rounded to the next code.
     borders: [f32; 255],
 }
 
@@ -35,7 +35,7 @@ impl Srgb {
     }
 }
 
-/// Nearest code of a linear value from 0 to 1.
+/// Nearest 8-bit code of a linear value from 0 to 1.
 fn linear(value: f32) -> u8 {
     (value * 255.0 + 0.5) as u8
 }
@@ -96,7 +96,7 @@ impl Conversion {
                 [red, green, blue, linear(diffuse.w)]
             }
             Part::MetallicRoughness => {
-                // Without a texture of glossiness the roughness is the material's factor.
+                // Without a specular-glossiness texture the roughness is the material's factor.
                 let roughness = if self.sources[1].is_some() { converted.roughness } else { 1.0 };
                 [255, linear(roughness), linear(converted.metallic), 255]
             }

@@ -53,7 +53,7 @@ fn changed(change: impl FnOnce(&mut Value)) -> Result<(), SceneError> {
     both(&scene)
 }
 
-/// Evaluates the scene at a moment. The list of animations must fail alike, unless only a value is invalid.
+/// Evaluates the scene at 0.5 s. If listing the animations fails as well, both errors must be equal.
 fn both(scene: &Animated) -> Result<(), SceneError> {
     let file = scene.file()?;
     let listed = file.animations().map(drop);
@@ -102,7 +102,7 @@ fn channels_that_refer_to_nothing_are_refused() {
 fn accessors_of_another_form_or_of_too_few_elements_are_refused() {
     type Change = fn(&mut Value);
     let cases: [(&str, Change); 6] = [
-        // More than the bytes there are.
+        // Counts that exceed the bytes.
         ("accessors[2]", |json| json["accessors"][2]["count"] = json!(1_000_000_000)),
         ("accessors[3]", |json| json["accessors"][3]["count"] = json!(u32::MAX)),
         ("animations[0].channels[0]", |json| json["accessors"][3]["count"] = json!(1)),

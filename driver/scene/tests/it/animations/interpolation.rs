@@ -165,7 +165,7 @@ fn cubic_rotations_are_of_unit_length() {
     let animation = scene.animation("turn");
     let accessors = [scene.0.floats("SCALAR", &[[0.0], [1.0]]), scene.0.floats("VEC4", &values)];
     scene.channel(animation, (NODE, "rotation"), accessors, "CUBICSPLINE");
-    // Halfway of two equal tangents the sum points between both.
+    // At the middle equal tangents cancel: the rotation is the mean of both.
     close(scene.corners(0.5), turned(0.25 * PI));
     let [_, x, _] = scene.corners(0.3);
     assert!((x.length() - 1.0).abs() < 1e-6, "{x}");

@@ -192,7 +192,7 @@ impl Axis {
         (0..count as i32).map(tick).collect()
     }
 
-    /// Every `every`-th power of `base`.
+    /// Ticks at the powers of `base` whose exponents are multiples of `every`.
     fn powers(&self, base: u32, every: i32) -> Vec<Tick> {
         let exponents = (self.low - WHOLE).ceil() as i32..=(self.high + WHOLE).floor() as i32;
         let is_plain = match base {

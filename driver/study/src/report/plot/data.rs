@@ -7,7 +7,7 @@ use super::content::{Panel, Point, XScale, YScale};
 const LARGEST: f64 = 1e300;
 /// Minimum value that is drawn on a logarithmic axis.
 const SMALLEST: f64 = 1e-300;
-/// Fraction of a value below which the end of its error bar does not extend a logarithmic axis.
+/// An error bar extends a logarithmic axis downwards to no less than this fraction of its value.
 const BAR_SHARE: f64 = 0.1;
 
 /// Points of one series that can be drawn, in runs that are joined by a line.

@@ -77,7 +77,7 @@ impl Plot {
         self.document(width, top + MARGIN, &body)
     }
 
-    /// Lays out the panels. Also returns the points that cannot be drawn.
+    /// Returns the laid-out panels, and the points that cannot be drawn.
     fn drawings<'a>(&'a self, names: &[&'a str]) -> (Vec<Drawing<'a>>, Vec<LeftOut<'a>>) {
         let area = if self.panels.len() == 1 { LONE_WIDTH } else { PANEL_WIDTH };
         let (mut all_data, mut all_left_out) = (Vec::new(), Vec::new());

@@ -99,7 +99,7 @@ impl<'a> Drawing<'a> {
         AREA_HEIGHT + self.x_tick_room() + text::height(self.x_label.len(), LABEL) + GAP
     }
 
-    /// Draws the panel as SVG. `left` is its left side, `top` the top of its plotting area.
+    /// Draws the panel as SVG. `left` is the panel's left side, `top` the top of its plotting area.
     pub(super) fn draw(&self, [left, top]: [f64; 2]) -> String {
         let frame = Frame {
             left: left + self.left,

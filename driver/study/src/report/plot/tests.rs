@@ -57,7 +57,7 @@ fn all_scales() -> Vec<(XScale, YScale)> {
     y.into_iter().flat_map(|y| x().into_iter().map(move |x| (x, y))).collect()
 }
 
-/// Two different panels of each kind of axes and data.
+/// Plots of one panel and of two panels for each kind of axes and data, and one with long names.
 fn nasty_plots() -> Vec<Plot> {
     let mut plots = vec![plot(vec![])];
     for (x, y) in all_scales() {

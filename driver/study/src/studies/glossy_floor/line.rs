@@ -13,7 +13,7 @@ use super::super::present::GLOSSY;
 /// A line of the figure: order of the gathers, and sampling of the rays.
 pub(super) type Line = (GatherOrder, Sampling);
 
-/// Lines of the figure: order of the gathers, and sampling of the rays.
+/// The seven lines of figure 6.17.
 pub(super) const LINES: [Line; 7] = [
     (Naive, Sampling::Reflection),
     (Tiled, Sampling::Reflection),

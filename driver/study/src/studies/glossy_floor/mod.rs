@@ -19,7 +19,7 @@ use super::present::{
     series, table, text,
 };
 
-/// Panels of the figure: without and with the irradiance cache.
+/// Panels of the figure: whether the irradiance cache is on, and the title.
 const PANELS: [(bool, &str); 2] =
     [(false, "without the irradiance cache"), (true, "with the irradiance cache")];
 

@@ -50,8 +50,8 @@ impl Sweep {
         report::report(scene, &self.axes, &self.points, results, machine)
     }
 
-    /// Names and values of the points' settings, for a report's provenance. Settings in which points differ
-    /// are marked.
+    /// Names and values of the points' settings, for a report's provenance. The value of a setting in which
+    /// points differ is `varied`.
     pub(crate) fn rows(&self) -> Vec<(String, String)> {
         let all: Vec<_> = self.points.iter().map(settings).collect();
         let names: BTreeSet<_> = all.iter().flatten().map(|(name, _)| name).collect();

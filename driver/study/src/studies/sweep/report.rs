@@ -59,7 +59,7 @@ impl Swept<'_> {
         self.results.traffic(&self.points[self.axes.point(indices)])
     }
 
-    /// Columns for the axes, followed by others.
+    /// Columns of the axes, followed by `others`.
     fn heads(&self, others: &[(&str, &str)]) -> Vec<Column> {
         let axes = self.axes.list().iter().map(|axis| Column::new(axis.name.as_str(), ""));
         axes.chain(columns(others)).collect()
@@ -146,8 +146,9 @@ impl Swept<'_> {
         table
     }
 
-    /// Plot of photon map and scene over an axis. There is a line for each combination of the other axes, as
-    /// many of them as give at most [`MAX_LINES`] lines; the remaining axes keep their first value.
+    /// Plot of the bytes of photon map and scene over an axis. There is a line for each combination of the
+    /// other axes, as many of them as give at most [`MAX_LINES`] lines; the remaining axes keep their first
+    /// value.
     fn plot(&self, axis: usize) -> Block {
         let (varied, kept) = self.other_axes(axis);
         let lines: Vec<Vec<usize>> = (self.axes.combinations())
@@ -186,7 +187,7 @@ impl Swept<'_> {
         plot(&format!("structures-by-{name}"), &title, &self.caption(&others), vec![axes])
     }
 
-    /// Line over an axis, starting from the combination `indices`.
+    /// Line over an axis. The other axes have their values of the combination `indices`.
     fn line(
         &self,
         name: String,
@@ -207,8 +208,7 @@ impl Swept<'_> {
         series(name, points)
     }
 
-    /// Divides the other axes with several values into those in which lines differ, and those that keep their
-    /// first value.
+    /// Divides the other axes into those in which lines differ, and those that keep their first value.
     fn other_axes(&self, axis: usize) -> (Vec<usize>, Vec<usize>) {
         let (mut varied, mut kept, mut lines) = (Vec::new(), Vec::new(), 1);
         for (other, Axis { values, .. }) in

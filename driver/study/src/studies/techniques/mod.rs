@@ -115,7 +115,7 @@ fn bytes(measured: &Measured, name: &str) -> Table {
     table
 }
 
-/// Sentence that states the noise of a scene's reference.
+/// Sentence that states the naive render's error and the noise of the reference.
 fn reference(measured: &Measured) -> String {
     let quality = measured.quality(&NAIVE, measured.scale.gather_rays);
     format!(

@@ -18,8 +18,8 @@ pub(super) struct Technique {
     pub(super) radiance: Radiance,
     pub(super) layout: PhotonLayout,
     pub(super) tile: u32,
-    /// Chip that renders whole frames with several tiles in flight; `None` to sample tiles on reference
-    /// chips, one at a time.
+    /// Chip on which all tiles are measured, several in flight; `None` to measure some tiles, one at a time,
+    /// on reference chips.
     pub(super) in_flight: Option<Setup>,
 }
 
@@ -111,7 +111,7 @@ impl Technique {
     }
 
     /// Point that measures the technique's error. Techniques that differ only in order, layout or tiles share
-    /// it, because these do not change pixels.
+    /// the point, because these do not change pixels.
     pub(super) fn quality(&self, scale: &Scale, scene: &'static str, rays: u32) -> Point {
         let settings = self.settings(scale, rays);
         let shared = scale.settings(GatherOrder::Sort);
@@ -140,8 +140,9 @@ impl Technique {
         with_equal_rays(scale, scale.pick(&[6, 12, 25, 50, 100, 200, 400], &[6, 12, 25, 50, 100]))
     }
 
-    /// Numbers of gather rays at which the technique's bytes are measured, ascending. There are at most 200
-    /// rays, because the curve of the bytes is nearly straight beyond, and fewer for whole frames.
+    /// Numbers of gather rays at which the technique's bytes are measured, ascending. Beyond
+    /// [`MAX_TRAFFIC_RAYS`] the curve of the bytes is nearly straight. Whole frames are measured at fewer
+    /// numbers.
     pub(super) fn traffic_sweep(&self, scale: &Scale) -> Vec<u32> {
         let mut rays = match self.in_flight {
             Some(_) => with_equal_rays(scale, scale.pick(&[25, 50, 100, 200], &[12, 50])),

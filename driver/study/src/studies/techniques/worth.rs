@@ -121,7 +121,7 @@ impl Measured<'_> {
         Worth { at, bytes: bytes_at(&curve, at.rays()), spread }
     }
 
-    /// Ratio of the bytes of two techniques at the naive render's error.
+    /// Ratio of the bytes of `base` to those of `technique` at the naive render's error.
     fn factor(&self, base: &Technique, technique: &Technique) -> Ratio {
         if technique.name == base.name {
             return Ratio::ONE;
@@ -131,7 +131,7 @@ impl Measured<'_> {
     }
 
     /// Ratio of the naive render's bytes to those of a technique at the naive render's error; `None` if the
-    /// technique does not reach it.
+    /// technique does not reach that error.
     pub(super) fn factor_at_quality(&self, technique: &Technique) -> Option<Ratio> {
         let is_reached = !matches!(self.worth(technique).at, AtQuality::Missed(_));
         is_reached.then(|| self.factor(&NAIVE, technique))
@@ -179,8 +179,8 @@ enum Verdict {
 }
 
 impl Verdict {
-    /// Verdict on a technique that reaches the error with `at` rays and reads `factor` times less there. If
-    /// it does so with the fewest rays measured, the factor is a lower bound; with the most, an upper bound.
+    /// Verdict on a technique that reaches the error with `at` rays and reads `factor` times less there. With
+    /// [`AtQuality::AtMost`] the factor is a lower bound, with [`AtQuality::Missed`] an upper bound.
     fn new(at: AtQuality, factor: Ratio) -> Self {
         match at {
             AtQuality::Met(_) | AtQuality::AtMost(_) if factor.lower > 1.0 => Self::Pays,
