@@ -9,7 +9,7 @@
 //! - `state`, `painting`: all of these as one state, without threads, clock, input or output.
 //! - `hub`, `painter`, `fitting`: the state under a lock; the thread that renders, and that of pilot renders.
 //! - `http`, `gate`, `page_files`, `socket`, `server`: requests, access control, the page's files,
-//!   WebSockets.
+//!   web sockets.
 //! - `saving`: pictures that a page saves.
 
 mod canvas;

@@ -1,4 +1,4 @@
-//! Serves the page: its files and WebSockets, with a thread for each connection. The number of connections is
+//! Serves the page: its files and web sockets, with a thread for each connection. The number of connections is
 //! bounded.
 //!
 //! A connection is a stranger until its request's head is read. There is a maximum number of strangers:
