@@ -226,7 +226,8 @@ impl<'a> Laboratory<'a> {
         Ok(outcome)
     }
 
-    /// Returns the card image of a point, which is the last one if their keys are equal.
+    /// Returns the card image for a point: the previous point's if their image keys are equal, else a new
+    /// one.
     fn image(&mut self, point: &Point) -> Result<LastImage, StudyError> {
         let key = point.image_key();
         if let Some(last) = self.last.take_if(|last| last.key == key) {

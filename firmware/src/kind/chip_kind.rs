@@ -27,7 +27,7 @@ pub trait ChipKind: 'static {
     fn budget(&self) -> &Budget;
 }
 
-/// A kind of chip whose capacities are types, as a board needs them.
+/// A kind of chip whose capacities are fixed by types at compile time, as a board needs them.
 pub trait FixedKind:
     ChipKind<
         TilePixels: FixedCapacity,

@@ -97,7 +97,8 @@ impl IntegratorOptions {
         self.irradiance_cache.unwrap_or(base.irradiance_error.is_some())
     }
 
-    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
+    /// Calls `add` for each option that other options can make useless. Its arguments are whether they do,
+    /// the option's name and the reason.
     pub(super) fn without_effect(&self, base: &Integrator, add: &mut impl FnMut(bool, &str, &str)) {
         let is_cached = self.is_cached(base);
         let not_cached = "without --irradiance-cache on";

@@ -161,7 +161,7 @@ pub(crate) fn denoiser(is_asked: bool) -> Result<Option<&'static Denoiser>, Fail
     Ok(FOUND.get())
 }
 
-/// Name and value that a picture's provenance has about the denoiser: its version.
+/// Entry of a picture's provenance for the denoiser: the name `denoise` and the denoiser's version.
 pub(crate) fn denoised_by(denoiser: &Denoiser) -> (String, Value) {
     ("denoise".to_owned(), Value::from(denoiser.version()))
 }

@@ -19,7 +19,7 @@ use crate::failure::Failure;
 use crate::input;
 use crate::notices::{self, Uses};
 
-/// Option that is varied, without dashes, and one of its values.
+/// Name of a varied option, without its leading dashes, and one of the option's values.
 type Value<'a> = (&'a str, &'a str);
 
 /// Loads the scene of a sweep and creates its points.

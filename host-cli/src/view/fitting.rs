@@ -17,7 +17,7 @@ pub(super) type Found = Result<Option<Fit>, RenderError>;
 /// Time between two polls of the thread.
 const LOOK: Duration = Duration::from_millis(2);
 
-/// Running pilot renders.
+/// Pilot renders in progress on their thread.
 pub(super) struct Fitting {
     thread: JoinHandle<Found>,
     stop: Arc<AtomicBool>,

@@ -1,5 +1,5 @@
-//! Serves the page: its files and web sockets, with a thread for each connection. The number of connections is
-//! bounded.
+//! Serves the page: its files and web sockets, with a thread for each connection. The number of connections
+//! is bounded.
 //!
 //! A connection is a stranger until its request's head is read. There is a maximum number of strangers:
 //! beyond it a new one closes the oldest. Silent strangers therefore cannot keep pages out, nor pages

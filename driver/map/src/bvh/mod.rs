@@ -376,7 +376,7 @@ mod tests {
         }
     }
 
-    /// If the builder received them singly, it would join only two of them at a time.
+    /// Given singly, nested boxes would make the builder search all of them for each pair that it joins.
     #[test]
     fn concentric_triangles_reach_the_builder_as_one_part() {
         for step in [0.0, 1e-5] {

@@ -30,7 +30,8 @@ impl RadixKey for Candidate {
     }
 }
 
-/// Optimizes a tree in rounds. The first round tries the fraction `share` of all nodes.
+/// Optimizes a tree in rounds. The first one tries to reinsert the fraction `share` of the nodes, those with
+/// large areas.
 pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
     if tree.nodes.first().is_none_or(Bvh2Node::is_leaf) {
         return;

@@ -32,8 +32,8 @@ const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
 const MAX_PATHS_TO_CAUSTICS: f64 = 1_000_000.0;
 /// Minimum number of additional paths for caustics.
 const MIN_PATHS_TO_CAUSTICS: u64 = 125_000;
-/// Fraction of the power received by surfaces from which caustics get [`MAX_PATHS_TO_CAUSTICS`] additional
-/// paths. Smaller fractions get proportionally fewer.
+/// Share of the arriving power, where caustics occur, at which they get all [`MAX_PATHS_TO_CAUSTICS`]
+/// additional paths. A smaller share gets proportionally fewer, but at least [`MIN_PATHS_TO_CAUSTICS`].
 const FULL_CAUSTIC_SHARE: f64 = 0.1;
 
 /// Traces paths until `count` photons are stored. It stores none if no surface stores photons, and fewer if

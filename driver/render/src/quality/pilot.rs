@@ -181,7 +181,7 @@ fn pixels_with_surfaces(pairs: &[&[Pixels; 2]]) -> impl Iterator<Item = usize> {
     (0..pixels).filter(move |&pixel| pairs.iter().copied().flatten().all(|pixels| pixels.is_seen[pixel]))
 }
 
-/// Median radiance of the lit pixels of a pair, W/(sr m^2).
+/// Median, over the lit pixels, of the mean radiance of two renders, W/(sr m^2); 1 for a black picture.
 fn level_of(best: &[Pixels; 2]) -> f64 {
     let [first, second] = best;
     Levels::new((0..first.direct.len()).map(|pixel| 0.5 * (first.radiance(pixel) + second.radiance(pixel))))

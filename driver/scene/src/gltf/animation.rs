@@ -191,8 +191,9 @@ impl<'a> Channel<'a> {
         self.source.document.invalid(&self.item, reason, remedy)
     }
 
-    /// Element of a keyframe's value. With a cubic spline `kind` selects the in-tangent (0), the value (1) or
-    /// the out-tangent (2); otherwise it is 0.
+    /// Element `element` of a keyframe's output: the weight of that morph target, or the only element of
+    /// another property. `kind` selects in-tangent (0), value (1) or out-tangent (2) of a cubic spline; else
+    /// `kind` is 0.
     fn key(&self, keyframe: u64, kind: u64, element: u64) -> DVec4 {
         let of_each = self.keyframes.values_of_each();
         let index = (keyframe * of_each + kind) * self.elements + element;

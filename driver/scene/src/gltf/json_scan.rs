@@ -134,7 +134,7 @@ enum Kind {
     Root,
     /// Member of the root. If it is a list, each element counts this number of bytes.
     List(u64),
-    /// Element of a list of the root, which is counted by its list.
+    /// Element of a top-level list. Its size was added when it began, as [`Self::List`] states.
     Element,
     Other,
 }

@@ -37,7 +37,8 @@ impl Room {
         self.take(tiles * LINE_BYTES as u64, || "images and materials".to_owned())
     }
 
-    /// Returns whether `triangles` triangles fit whatever vertices they share and attributes they have.
+    /// Returns whether the lower bound for `triangles` triangles fits even if they share no vertices and have
+    /// all attributes.
     pub(super) fn fits_any(&self, triangles: u64) -> bool {
         let corners = triangles.saturating_mul(3);
         self.available - self.taken

@@ -19,7 +19,7 @@ use serialport::TTYPort as SystemPort;
 
 /// Duration of silence after which a line holds no stale bytes.
 const QUIET: Duration = Duration::from_millis(50);
-/// Maximum time for which stale bytes of a busy card are dropped.
+/// Time after which the bytes of a busy card are dropped only up to the next end of a frame.
 const STALE: Duration = Duration::from_secs(1);
 /// Inverse of the maximum relative error of the bit rate, 2 %. A UART character of ten bits tolerates more.
 const SPEED_TOLERANCE: u32 = 50;

@@ -220,8 +220,8 @@ impl<'a> Meter<'a> {
         Ok(fractions)
     }
 
-    /// Returns whether gathers at the photons of a leaf, estimated from the photons' own density, have at
-    /// most the usual radius.
+    /// Returns whether the gathers at a leaf's photons have at most the usual radius. Their radius is
+    /// estimated from the density of these photons.
     fn are_usual(&self, photons: &[DiscPhoton]) -> bool {
         let share = self.searcher.neighbors() as f32 / photons.len() as f32;
         let spread = middle(photons).map_or(0.0, |middle| spread(photons, middle));

@@ -85,8 +85,7 @@ const STEPS: f64 = 65_536.0;
 const MAX_QUEUE: u64 = 32_768;
 
 impl FrameLoad {
-    /// Seconds of the frame if nothing waits for anything else: the longer of the times of arithmetic and
-    /// DRAM.
+    /// Lower bound of the frame's time, seconds: its arithmetic time or its DRAM time, whichever is longer.
     pub fn bound(&self, machine: &Machine) -> f64 {
         let bytes = self.rays.dram_bytes + self.gathers.dram_bytes;
         let flops = self.rays.flops + self.controller_flops + self.gathers.flops;
