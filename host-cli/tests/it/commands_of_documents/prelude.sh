@@ -1,6 +1,6 @@
 # Runs before each script: renders get these options, as far as a command does not state them, and few photons in any case, so that a
 # test has time for them.
-small=("--size 16x16" "--quality paper" "--photons 2000" "--gather-rays 8")
+small=("--size 16x16" "--quality paper" "--photons 2000" "--gather-rays 8" "--irradiance-cache on")
 
 trap 'kill $(jobs -p) 2>/dev/null || true' EXIT
 
