@@ -94,7 +94,7 @@ tar -C "$work/unpacked" -xzf "$work/archive"
 (
     cd "$work/unpacked/$name"
     [ "$(bin/photoncard -V)" = "photoncard $version" ] || fail "the packed program does not state its version"
-    bin/photoncard render scenes/cornell.gltf --quiet --quality draft --size 16x16 --photons 1000 -o "$work/cornell.png" ||
+    bin/photoncard render scenes/cornell.gltf --quiet --quality paper --size 16x16 --photons 1000 -o "$work/cornell.png" ||
         fail "the packed program does not render the packed scene"
 )
 mv "$work/archive" "$out/$name.tar.gz"

@@ -1,7 +1,7 @@
 //! Scene whose photon map several frames share, so that they differ only in their gathers.
 
 use glam::Vec3;
-use photoncard_driver::emulator::direct::render_tile;
+use photoncard_driver::emulator::direct::render_tile_of;
 use photoncard_driver::emulator::{EmulatedChip, EmulatedKind};
 use photoncard_driver::film::{SumFormat, Window};
 use photoncard_driver::pack::{CardImage, PackedScene};
@@ -73,9 +73,8 @@ impl MappedScene {
         frame: &FrameParameters,
         tile: Tile,
     ) -> (Tile, Vec<Vec3>, Counters) {
-        let (scene, memory) = self.image.view();
-        let rendered = render_tile(chip, &scene, memory, frame, tile, None).expect("sound");
-        let pixels = rendered.pixels(SumFormat::new(&scene.header, frame));
+        let rendered = render_tile_of(chip, &self.image, None, frame, tile, None).expect("sound");
+        let pixels = rendered.pixels(SumFormat::new(&self.image.view().0.header, frame));
         let radiance = pixels.map(|pixel| Vec3::from(pixel.pixel.radiance)).collect();
         (tile, radiance, rendered.counters)
     }

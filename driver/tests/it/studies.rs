@@ -151,7 +151,8 @@ fn is_a_trial_without_published_figures(files: &BTreeMap<PathBuf, Vec<u8>>) {
 #[test]
 fn a_stopped_study_goes_on_where_it_stopped() {
     let folder = tempfile::tempdir().unwrap();
-    let options = options(folder.path(), &[Study::Reordering]);
+    let scale = Scale { side: 24, gather_rays: 4, ..tiny() };
+    let options = StudyOptions { scale, ..options(folder.path(), &[Study::Reordering]) };
     let stopped = Counting::up_to(3);
     assert!(matches!(run(&options, &stopped), Err(StudyError::Stopped)));
     assert!(files(folder.path()).is_empty());

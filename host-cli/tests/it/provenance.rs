@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::support::{Room, scene, shipped};
+use crate::support::{Room, mirrored_cornell, scene};
 use serde_json::{Value, json};
 
 /// Options that pixels depend on: each with a value other than the default, its key in the provenance, and
@@ -97,20 +97,21 @@ fn provenance(file: &[u8]) -> Value {
     serde_json::from_slice(&text[..u32::from_le_bytes(*length) as usize]).expect("JSON")
 }
 
-/// Provenance of a rendered scene with mirrors and glass.
+/// Provenance of a rendered scene with a mirror.
 fn rendered(room: &Room, options: &[&str]) -> Value {
     let small = if options.contains(&"--caustic-photons") { &[][..] } else { &["--caustic-photons", "99"] };
     // A render without `--resume` does not overwrite the samples that an earlier one has kept.
     let _ = std::fs::remove_file(room.path("a.exr.partial"));
-    room.rendered(&shipped("cornell-spheres.glb"), &[&["-o", "a.exr"], small, options].concat());
+    room.rendered("mirrored.gltf", &[&["-o", "a.exr"], small, options].concat());
     provenance(&room.read("a.exr"))
 }
 
 #[test]
 fn the_provenance_has_exactly_the_options_that_pixels_depend_on() {
     let room = Room::new();
+    room.write_scene("mirrored.gltf", &mirrored_cornell());
     let plain = rendered(&room, &[]);
-    assert_eq!((&plain["scene"], &plain["aov"]), (&json!("cornell-spheres.glb"), &json!("albedo,N,Z")));
+    assert_eq!((&plain["scene"], &plain["aov"]), (&json!("mirrored.gltf"), &json!("albedo,N,Z")));
     let mut keys = BTreeSet::from(["program", "layout", "scene", "scene-checksum", "variant", "view"]);
     for (options, key, value) in options_of_pixels() {
         let found = rendered(&room, options);

@@ -35,13 +35,14 @@ fn an_interrupt_ends_a_study_and_keeps_its_points() {
     use std::io::{BufRead, BufReader};
     use std::process::{Command, Stdio};
 
-    let room = Room::new();
-    let folder = shipped("");
-    let arguments = ["study", "reordering", "--quick", "--out", "out", "--scenes", &folder, "--threads", "1"];
-    let mut child = room.command().args(arguments).stderr(Stdio::piped()).spawn().unwrap();
+    let room = room_with_a_scene();
+    let seeds = format!("seed={}", (0..200).map(|seed| seed.to_string()).collect::<Vec<_>>().join(","));
+    let own = ["--vary", &seeds, "--threads", "1"];
+    let (_quiet, sweep) = SWEEP.split_last().unwrap();
+    let mut child = room.command().arg("study").args(sweep).args(own).stderr(Stdio::piped()).spawn().unwrap();
     let mut lines = BufReader::new(child.stderr.take().unwrap()).lines().map(Result::unwrap);
     let finished = |line: &String| -> Option<usize> {
-        line.strip_prefix("photoncard: reordering ")?.split(' ').next()?.parse().ok()
+        line.strip_prefix("photoncard: sweep ")?.split(' ').next()?.parse().ok()
     };
     // A line follows each tenth of the points: the first may count several.
     let finished = lines.find_map(|line| finished(&line).filter(|&count| count > 0)).unwrap();

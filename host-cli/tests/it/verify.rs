@@ -3,8 +3,17 @@
 use crate::support::{Room, scene, shipped};
 use serde_json::json;
 
-const PICTURE: [&str; 8] =
-    ["--size", "64x64", "--photons", "2000", "--gather-rays", "20", "--quiet", "--stats=a.json"];
+const PICTURE: [&str; 9] = [
+    "--quality=paper",
+    "--size",
+    "64x64",
+    "--photons",
+    "2000",
+    "--gather-rays",
+    "20",
+    "--quiet",
+    "--stats=a.json",
+];
 
 fn statistics(room: &Room) -> serde_json::Value {
     serde_json::from_slice(&room.read("a.json")).unwrap()

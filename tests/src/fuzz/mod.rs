@@ -12,7 +12,7 @@ mod image;
 mod messages;
 pub(crate) mod mutation;
 pub(crate) mod picture;
-pub(crate) mod png;
+pub mod png;
 mod random;
 mod run;
 mod session;

@@ -3,10 +3,10 @@
 use super::{Random, mutation};
 
 /// Signature of PNG.
-pub(crate) const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
+pub const MAGIC: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Type and data of a PNG chunk.
-type Chunk = ([u8; 4], Vec<u8>);
+pub type Chunk = ([u8; 4], Vec<u8>);
 
 /// Types of chunks that decoders interpret.
 const TYPES: [&[u8; 4]; 9] =
@@ -14,7 +14,7 @@ const TYPES: [&[u8; 4]; 9] =
 
 /// Makes one edit of a PNG: of the data of a chunk, or of the list of chunks. Bytes behind the last chunk are
 /// lost.
-pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
+pub fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
     let mut chunks = split(file);
     if chunks.is_empty() {
         return;
@@ -40,7 +40,7 @@ pub(crate) fn edit_chunks(file: &mut Vec<u8>, random: &mut Random) {
 }
 
 /// Corrects the checksums of all chunks, and nothing else.
-pub(crate) fn mend_checksums(file: &mut [u8]) {
+pub fn mend_checksums(file: &mut [u8]) {
     let mut at = MAGIC.len();
     while let Some(length) = file.get(at..).and_then(|rest| rest.first_chunk::<4>()) {
         let end = at.saturating_add(8).saturating_add(u32::from_be_bytes(*length) as usize);
@@ -51,7 +51,8 @@ pub(crate) fn mend_checksums(file: &mut [u8]) {
     }
 }
 
-fn split(file: &[u8]) -> Vec<Chunk> {
+/// Chunks of a file, as far as it has complete lengths and types.
+pub fn split(file: &[u8]) -> Vec<Chunk> {
     let mut rest = file.get(MAGIC.len()..).unwrap_or_default();
     let mut chunks = Vec::new();
     while let Some((length, after)) = rest.split_first_chunk() {
@@ -63,7 +64,8 @@ fn split(file: &[u8]) -> Vec<Chunk> {
     chunks
 }
 
-fn join(chunks: &[Chunk]) -> Vec<u8> {
+/// A file of chunks, with their checksums.
+pub fn join(chunks: &[Chunk]) -> Vec<u8> {
     let mut file = MAGIC.to_vec();
     for (kind, data) in chunks {
         let body = [&kind[..], data].concat();
@@ -80,34 +82,4 @@ fn checksum(bytes: &[u8]) -> [u8; 4] {
         (0..8).fold(sum ^ u32::from(byte), |sum, _| (sum >> 1) ^ ((sum & 1) * 0xedb8_8320))
     });
     (!sum).to_be_bytes()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const FILE: &[u8] = include_bytes!("../../../driver/scene/tests/it/images/palette.png");
-
-    #[test]
-    fn a_file_is_its_chunks() {
-        let chunks = split(FILE);
-        let types: Vec<_> = chunks.iter().map(|(kind, _)| kind).collect();
-        assert_eq!(types, [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"]);
-        assert_eq!(join(&chunks), FILE);
-        let mut damaged = FILE.to_vec();
-        damaged[30] ^= 1;
-        mend_checksums(&mut damaged);
-        assert_eq!(damaged, FILE);
-    }
-
-    /// Edits must include palettes whose length is no multiple of three: a decoder has panicked on one.
-    #[test]
-    fn palettes_of_odd_lengths_are_reached() {
-        let odd = |number| {
-            let mut file = FILE.to_vec();
-            edit_chunks(&mut file, &mut Random::new("palettes", 0, number));
-            split(&file).iter().any(|(kind, data)| kind == b"PLTE" && data.len() % 3 != 0)
-        };
-        assert!((0..1000).filter(|number| odd(*number)).count() > 10);
-    }
 }

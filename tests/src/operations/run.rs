@@ -6,7 +6,7 @@ use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::arithmetic::{Arithmetic, OPERATIONS, Operations, Step, Unit, Work};
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::emulator::contents::Contents;
-use photoncard_driver::emulator::direct::render_tile;
+use photoncard_driver::emulator::direct::render_tile_of;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::photon_map::map_photons;
@@ -46,11 +46,10 @@ impl Run {
         let chosen: Vec<_> = all.iter().skip(step / 2).step_by(step).copied().collect();
         let counted = instrument.count(&mapped.image, &frame, &chosen);
         let (mut counters, mut contents) = (Counters::ZERO, Contents::ZERO);
-        let mut chip = EmulatedKind::Reference.emulated().chip();
+        let (mut chip, caches) = (EmulatedKind::Reference.emulated().chip(), CacheSettings::default());
         for (&tile, counted) in chosen.iter().zip(&counted.counters) {
-            let (image, memory) = mapped.image.view();
-            let memory = CacheSettings::default().over(memory);
-            let rendered = render_tile(&mut chip, &image, memory, &frame, tile, None).expect("a sound image");
+            let rendered = render_tile_of(&mut chip, &mapped.image, Some(&caches), &frame, tile, None)
+                .expect("a sound image");
             assert_eq!(rendered.counters, *counted, "tile {}", tile.id);
             counters.add(&rendered.counters);
             contents.add(&rendered.traffic.contents);

@@ -32,6 +32,7 @@ mod operations;
 mod passes;
 mod penumbra;
 mod photons_for;
+mod png_chunks;
 mod precomputed;
 mod qemu;
 mod quality;

@@ -101,7 +101,7 @@ fn is_full() -> bool {
 
 /// Side of the picture of the Cornell box, pixels, and number of photons.
 fn scale() -> (u32, usize) {
-    if is_full() { (64, 20_000) } else { (32, 4000) }
+    if is_full() { (64, 20_000) } else { (24, 4000) }
 }
 
 /// Settings of a small picture, with `PHOTONCARD_QEMU_GATHER_RAYS` gather rays a sample, by default 8.

@@ -54,6 +54,7 @@ fn compare(film: &Film, reference: &RgbImage, most: [f64; 2]) {
     errors.sort_by(f64::total_cmp);
     let [median, high] = [errors.len() / 2, errors.len() * 95 / 100].map(|place| errors[place]);
     assert!(overall.abs() < 0.01, "the overall mean is off by {overall}");
+    println!("overall {overall:+.4}, median {median:.4}, 95th percentile {high:.4}");
     let [most_median, most_high] = most;
     assert!(median < most_median, "the median block is off by {median}");
     assert!(high < most_high, "the 95th percentile of the blocks is off by {high}");

@@ -90,6 +90,7 @@ fn guided_photons_are_where_the_camera_uses_them_and_bring_equal_light() {
     assert!(many > 10.0 * few, "{many} of the photons, and {few}");
     for ([found, own], [expected, error]) in found.into_iter().zip(expected) {
         let error = own.hypot(error);
+        println!("{found} W, expected {expected} W, +- {error} W");
         assert!(error < 0.05 * expected, "an error of {error} W of {expected} W");
         assert!((found - expected).abs() < 3.5 * error, "{found} W instead of {expected} W, +-{error} W");
     }

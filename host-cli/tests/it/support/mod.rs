@@ -159,6 +159,17 @@ pub(crate) fn shipped(name: &str) -> String {
     path.to_str().unwrap().to_owned()
 }
 
+/// Cornell box whose large block is a mirror, which has caustics.
+pub(crate) fn mirrored_cornell() -> Value {
+    let mut scene: Value = serde_json::from_slice(&fs::read(shipped("cornell.gltf")).unwrap()).unwrap();
+    let materials = scene["materials"].as_array_mut().unwrap();
+    let mirror = materials.len();
+    materials.push(json!({"pbrMetallicRoughness": {"metallicFactor": 1.0, "roughnessFactor": 0.0}}));
+    let block = scene["meshes"].as_array_mut().unwrap().iter_mut().find(|mesh| mesh["name"] == "large-box");
+    block.unwrap()["primitives"][0]["material"] = json!(mirror);
+    scene
+}
+
 /// Buffer of [`scene`]: positions of the floor's four corners and the lamp's three, and six indices of the
 /// floor.
 pub(crate) fn scene_bytes() -> Vec<u8> {

@@ -41,8 +41,8 @@ fn assert_near(found: f64, expected: f64, tolerance: f64) {
 fn one_task_waits_for_everything_in_turn() {
     for steps in [1.0, 2.5, 40.0] {
         for (misses, nanoseconds) in [(0.0, 5.0), (0.25, 30.5), (1.0, 107.0)] {
-            let rays = frame(load(1e6, steps, misses, 500.0), Load::default());
-            let found = seconds(&rays, &chip(1, 64, Policy::Alternate)) / (1e6 * steps);
+            let rays = frame(load(1e5, steps, misses, 500.0), Load::default());
+            let found = seconds(&rays, &chip(1, 64, Policy::Alternate)) / (1e5 * steps);
             assert_near(found, nanoseconds * NANOSECOND, 1e-3);
         }
     }
@@ -56,8 +56,8 @@ fn tasks_hide_latency_until_a_resource_is_busy() {
         [(4, 500.0, 26.75), (16, 500.0, 6.6875), (64, 500.0, 5.0), (500, 100.0, 2.0)]
     {
         for steps in [1.0, 4.0, 40.0] {
-            let rays = frame(load(1e6, steps, 1.0, flops), Load::default());
-            let found = seconds(&rays, &chip(tasks, 16_384, Policy::Alternate)) / (1e6 * steps);
+            let rays = frame(load(1e5, steps, 1.0, flops), Load::default());
+            let found = seconds(&rays, &chip(tasks, 16_384, Policy::Alternate)) / (1e5 * steps);
             assert_near(found, nanoseconds * NANOSECOND, 0.01);
         }
     }
