@@ -3,6 +3,10 @@
 # of means over blocks of 12x12 pixels.
 #
 #   tests/peers/rooms.sh PHOTONCARD [--whole | --map | --furnace] [--seeds N] [NAME ..] [-- OPTION ..]
+#   tests/peers/rooms.sh PHOTONCARD --denoised [--long PIXELS] [--seconds S,..] [--samples N] [NAME ..]
+#
+# --denoised races photoncard and Blender's Cycles in equal CPU time, each with and without Open Image Denoise
+# (see rooms/denoised.py). References are rendered once, at 960x540 in hours; --long 320 --seconds 3,10 is short.
 #
 # All surfaces but glass are made Lambertian, so that both programs have the same; --whole keeps gloss and
 # metals, as glTF has them. --map looks at the photon
@@ -11,7 +15,7 @@
 # without it they are fetched. PNGs are left in target/peers/rooms: reference, picture, errors of blocks.
 set -euo pipefail
 [ $# -ge 1 ] && [ -x "$1" ] || {
-    echo "usage: $0 PHOTONCARD [--whole | --map | --furnace] [NAME ..] [-- OPTION ..]" >&2
+    echo "usage: $0 PHOTONCARD [--whole | --map | --furnace | --denoised] [NAME ..] [-- OPTION ..]" >&2
     exit 2
 }
 photoncard=$(realpath "$1")
@@ -27,5 +31,15 @@ rooms=${ROOMS:-$target/peers/dppm-scenes/scenes}
     git -C "$target/peers/dppm-scenes" sparse-checkout set \
         scenes/{living-room{,-2},staircase,classroom,dining-room}
 }
+if [ "${1:-}" = --denoised ]; then
+    shift
+    source tests/peers/cycles/environment.sh
+    make_cycles_environment "$target/peers/cycles"
+    "$target/peers/mitsuba/bin/pip" install --quiet --disable-pip-version-check -r tests/peers/rooms/requirements.txt
+    PHOTONCARD_OIDN=$(find "$target/peers/mitsuba" -name libOpenImageDenoise.so.2 | head -n 1)
+    export PHOTONCARD_OIDN
+    exec "$target/peers/mitsuba/bin/python" tests/peers/rooms/denoised.py --photoncard "$photoncard" \
+        --cycles "$target/peers/cycles/bin/python" --rooms "$rooms" --folder "$target/peers/rooms" "$@"
+fi
 exec "$target/peers/mitsuba/bin/python" tests/peers/rooms/compare.py --photoncard "$photoncard" \
     --rooms "$rooms" --folder "$target/peers/rooms" "$@"

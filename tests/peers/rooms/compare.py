@@ -206,24 +206,31 @@ def blocks(picture):
 
 def show(path, picture, truth, errors):
     """The reference, the picture, and the errors of blocks: too bright ones red, too dark ones blue."""
-    exposure = 0.36 / np.exp(np.log(truth.mean(axis=2) + 1e-6).mean())
     signed = np.zeros_like(picture)
     fine = np.kron(errors, np.ones((BLOCK, BLOCK)))
     signed[: fine.shape[0], : fine.shape[1], 0] = np.clip(fine / SHOWN, 0.0, 1.0)
     signed[: fine.shape[0], : fine.shape[1], 2] = np.clip(-fine / SHOWN, 0.0, 1.0)
-    shown = [
-        (light * exposure / (1.0 + light * exposure)) ** (1.0 / 2.2)
-        for light in np.maximum([truth, picture], 0.0)
-    ]
-    pixels = (255.0 * np.concatenate([*shown, signed], axis=1)).astype(np.uint8)
+    write_png(path, [*shown_by(truth, [truth, picture]), signed])
+
+
+def shown_by(truth, pictures):
+    """Pictures with tones from 0 to 1, by the exposure of a reference."""
+    exposure = 0.36 / np.exp(np.log(truth.mean(axis=2) + 1e-6).mean())
+    return [(light * exposure / (1.0 + light * exposure)) ** (1.0 / 2.2) for light in np.maximum(pictures, 0.0)]
+
+
+def write_png(path, pictures):
+    """Writes pictures of tones from 0 to 1 side by side."""
+    pixels = (255.0 * np.concatenate(pictures, axis=1)).astype(np.uint8)
     mi.Bitmap(np.ascontiguousarray(pixels)).write(str(path))
 
 
-def read(path):
-    """Red, green and blue, rows from the top."""
+def read(path, layer=None):
+    """Red, green and blue of a layer or of the unnamed one, rows from the top."""
     bitmap = mi.Bitmap(str(path))
     names = [member.name for member in bitmap.struct_()]
-    return np.array(bitmap).astype(np.float64)[..., [names.index(channel) for channel in "RGB"]]
+    channels = [f"{layer}.{channel}" if layer else channel for channel in "RGB"]
+    return np.array(bitmap).astype(np.float64)[..., [names.index(channel) for channel in channels]]
 
 
 def run(command):
