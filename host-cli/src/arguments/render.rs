@@ -1,12 +1,16 @@
 //! Options of `photoncard render`.
 
+use std::thread::available_parallelism;
+
 use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::partial::{PartialError, PartialSettings};
 use photoncard_driver::photon_map::PhotonsFor;
 use photoncard_driver::quality::{Fit, Quality, Stated};
-use photoncard_driver::render::{Observer, PhotonMaps, RenderError, RenderSettings, Schedule, TileOutputs};
+use photoncard_driver::render::{
+    Aim, Observer, PhotonMaps, RenderError, RenderSettings, Schedule, TileOutputs,
+};
 use photoncard_driver::scene::Scene;
 
 use super::cards::CardOptions;
@@ -116,8 +120,11 @@ impl RenderOptions {
             return Ok(None);
         }
         let fit = self.quality.fit(self.outputs.finish(), (scene, packed), &unfitted.settings, observer)?;
-        let noise = self.samples.aim().and_then(|aim| aim.noise);
-        Ok(fit.map(|fit| noise.map_or(fit, |noise| fit.for_noise(noise))))
+        let Aim { time, noise } = self.samples.aim().unwrap_or_default();
+        let threads = self.threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
+        let by_noise = |fit: Fit| noise.map_or(fit, |noise| fit.for_noise(noise));
+        let by_time = |fit: Fit| time.map_or(fit, |time| fit.for_time(time.as_secs_f64(), threads));
+        Ok(fit.map(by_noise).map(by_time))
     }
 
     /// Settings of these options. Others are the quality's defaults, before a pilot.

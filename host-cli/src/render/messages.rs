@@ -142,7 +142,7 @@ pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Ve
     let Beyond { photons, gather_rays } = fit.beyond;
     let photons = photons.filter(|_| !stated.photons).map(|more| {
         let most = settings.photons.count;
-        format!("no more than {most} photons; this scene would take {more} (--photons {more}, or a better --quality)")
+        format!("no more than {most} photons; this scene would take {more} (--photons {more}, a better --quality or more --time)")
     });
     let gather_rays = gather_rays.filter(|_| !stated.gather_rays).map(|more| {
         let most = fit.gather_rays;

@@ -158,6 +158,12 @@ const IRRADIANCE_ERROR_OF_NOISE: f64 = 2.5;
 /// record.
 const MAX_PHOTONS: usize = 16_000_000;
 const MAX_RAYS_OF_RECORD: u32 = 8_000;
+/// Number of photons that a thread traces and stores in a second, as measured in furnished rooms.
+const PHOTONS_IN_A_SECOND: f64 = 80_000.0;
+/// Maximum fraction of a picture's time that its photons take.
+const SHARE_OF_PHOTONS: f64 = 1.0 / 3.0;
+/// Number of photons that any time allows.
+const MIN_PHOTONS_IN_TIME: usize = 50_000;
 
 impl Fit {
     /// Adjusts the settings for a picture that gets samples until its noise, relative to the mean pixel, is
@@ -181,6 +187,15 @@ impl Fit {
             max_irradiance_error: (IRRADIANCE_ERROR_OF_NOISE * noise) as f32,
             ..self
         }
+    }
+
+    /// Adjusts the settings for a picture that gets samples on `threads` threads until `seconds` have passed:
+    /// the photon map takes a third of the time at most, or has 50,000 photons.
+    pub fn for_time(self, seconds: f64, threads: usize) -> Self {
+        let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * seconds * threads as f64;
+        let photons = self.photons.min(rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS)));
+        let wanted = self.beyond.photons.or((photons < self.photons).then_some(self.photons));
+        Self { photons, beyond: Beyond { photons: wanted, ..self.beyond }, ..self }
     }
 
     /// Applies the fit to settings, except for stated ones. If the number of samples is stated, samples share
@@ -463,6 +478,16 @@ mod tests {
         assert!(gather_rays.is_some_and(|more| is_multiple(more.into(), fit.gather_rays.into())));
         let most = beyond(f64::INFINITY, f64::INFINITY);
         assert_eq!(most, Beyond { photons: Some(MAX_PHOTONS), gather_rays: Some(MAX_RAYS_OF_RECORD) });
+    }
+
+    #[test]
+    fn a_short_time_takes_few_photons_and_tells_how_many_the_scene_would_take() {
+        let fit = good(&VARIANCES);
+        assert_eq!(fit.for_time(1e6, 2), fit);
+        let [short, on_two] = [fit.for_time(5.0, 1), fit.for_time(5.0, 2)];
+        assert!((133_000..=140_000).contains(&short.photons) && on_two.photons > 19 * short.photons / 10);
+        assert_eq!((short.beyond.photons, short.beyond.gather_rays), (Some(fit.photons), None));
+        assert_eq!(fit.for_time(1e-3, 1).photons, MIN_PHOTONS_IN_TIME);
     }
 
     /// Without records, pixels do not share rays, so that equal costs allow more rays.
