@@ -19,7 +19,8 @@ use photoncard_driver::scene::{Camera, Material, Reflection, Scene, SceneContent
 
 /// Prints that something is not tested, whether the test passes or not.
 ///
-/// # Panics In continuous integration, where all tools are installed.
+/// # Panics
+/// In continuous integration, where all tools are installed.
 pub fn skip(what: &str) {
     assert!(std::env::var_os("CI").is_none(), "{what}");
     // A closed standard error does not end the test.

@@ -96,7 +96,8 @@ impl RenderOptions {
     /// Settings before a pilot. If the render adds to kept samples, their settings replace those of
     /// `settings` that no option states.
     ///
-    /// # Errors If the file of kept samples cannot be read.
+    /// # Errors
+    /// If the file of kept samples cannot be read.
     pub(crate) fn unfitted(&self, settings: &RenderSettings) -> Result<Unfitted, PartialError> {
         let kept = settings.outputs.partial.as_ref().map(PartialSettings::kept).transpose()?.flatten();
         let (mut settings, stated) = (settings.clone(), self.stated());
@@ -121,7 +122,8 @@ impl RenderOptions {
         }
         let fit = self.quality.fit(self.outputs.finish(), (scene, packed), &unfitted.settings, observer)?;
         let Aim { time, noise } = self.samples.aim().unwrap_or_default();
-        let threads = self.threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from));
+        let cores = available_parallelism().map_or(1, usize::from);
+        let threads = rayon::current_num_threads().min(cores);
         let by_noise = |fit: Fit| noise.map_or(fit, |noise| fit.for_noise(noise));
         let by_time = |fit: Fit| time.map_or(fit, |time| fit.for_time(time.as_secs_f64(), threads));
         Ok(fit.map(by_noise).map(by_time))

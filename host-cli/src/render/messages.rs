@@ -89,8 +89,9 @@ pub(super) fn say_prepared(path: &Path, settings: &RenderSettings, inputs: &Name
 }
 
 /// Says that a scene was prepared for pictures of another finish.
-pub(super) fn say_other_finish(path: &Path, prepared: Finish, wanted: Finish) {
+pub(super) fn say_other_finish(path: &Path, quality: Quality, prepared: Finish, wanted: Finish) {
     let text = match (prepared, wanted) {
+        _ if quality == Quality::Paper => return,
         (Finish::Denoised, Finish::Rendered) => {
             "has the few samples of a picture that is denoised; add --denoise"
         }
@@ -139,10 +140,14 @@ pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Ve
         let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };
         format!("photons for the camera have {ratio:.2} times the squared error of as many for any camera: {taken}")
     });
-    let Beyond { photons, gather_rays } = fit.beyond;
+    let Beyond { photons, gather_rays, photons_in_time } = fit.beyond;
+    let (photons, remedy) = match photons_in_time {
+        Some(more) => (Some(more), "more --time"),
+        None => (photons, "a better --quality"),
+    };
     let photons = photons.filter(|_| !stated.photons).map(|more| {
         let most = settings.photons.count;
-        format!("no more than {most} photons; this scene would take {more} (--photons {more}, a better --quality or more --time)")
+        format!("no more than {most} photons; this scene would take {more} (--photons {more}, or {remedy})")
     });
     let gather_rays = gather_rays.filter(|_| !stated.gather_rays).map(|more| {
         let most = fit.gather_rays;

@@ -124,7 +124,7 @@ impl OpenScene {
             messages::say_prepared(path, &settings, &inputs, &camera);
             misfit.iter().for_each(|notice| say(format_args!("photoncard: {notice}")));
             if options.parts.part.is_none() {
-                messages::say_other_finish(path, *prepared_for, outputs.finish());
+                messages::say_other_finish(path, *quality, *prepared_for, outputs.finish());
             }
         }
         inputs.extend(frame.map(|frame| ("frame".to_owned(), json!(frame))));

@@ -113,7 +113,7 @@ fn a_scene_is_prepared_for_pictures_that_are_denoised() {
         let outcome = room.run(&[own, &picture].concat());
         assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
     };
-    let notices = |own: &[&str]| room.run(&[own, &["--spp=1", "--size=8x8"]].concat()).stderr;
+    let notices = |own: &[&str]| room.run(&[own, &["--size=8x8"]].concat()).stderr;
     let options = ["--quality=draft", "--photons=5000"];
     run(&[&["render", &cornell, "-o", "whole.exr", "--denoise"], &options[..]].concat());
     run(&[&["prepare", &cornell, "-o", "it.card", "--denoise"], &options[..]].concat());

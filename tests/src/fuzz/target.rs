@@ -31,7 +31,8 @@ pub(super) const fn bound(input: usize, for_each: usize) -> usize {
 /// Removes the file of the input before, and writes a new one. Some file systems write a truncated file to
 /// disk when it is closed, which takes milliseconds.
 ///
-/// # Panics If the file cannot be written.
+/// # Panics
+/// If the file cannot be written.
 pub(super) fn write_anew(path: &Path, contents: &[u8]) {
     let _ = fs::remove_file(path);
     fs::write(path, contents).expect("there is room for a file");

@@ -1,14 +1,18 @@
 //! Features for a denoiser: albedo and normal of a pixel are those of what mirrors, glass and sharp lobes
 //! show.
 
+use std::sync::atomic::AtomicU32;
+use std::sync::atomic::Ordering::Relaxed;
+
 use glam::{Vec3, Vec4};
+use photoncard_driver::denoise::{DenoiseError, Denoiser};
 use photoncard_driver::film::Film;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings};
 use photoncard_driver::scene::{
     Camera, Coat, Encoding, Image, Layers, Material, NormalMap, Reflection, Scene, Texture, Triangle,
 };
 use photoncard_tests::shapes::{add_tangents, add_textured_quad};
-use photoncard_tests::{camera, glass, lambertian, mean, quad, render_or_panic, room, scene};
+use photoncard_tests::{camera, glass, lambertian, mean, quad, render_or_panic, room, scene, skip};
 
 use super::specular::mirror;
 
@@ -144,6 +148,28 @@ fn coats_and_bumps_of_plastic_leave_the_features_of_the_plastic() {
     let bumpy = film(&room_before_bumps(bumpy, view));
     for (film, least) in [(coated, 0.999), (bumpy, 0.93)] {
         assert!(film.pixels().all(|pixel| pixel.normal[2] > least && pixel.albedo[0] > 0.6));
+    }
+}
+
+#[test]
+fn a_denoiser_stops_soon_after_it_is_told_to() {
+    let denoiser = match Denoiser::find() {
+        Ok(denoiser) => denoiser,
+        Err(error) => return skip(&format!("a stopped denoiser: {error}")),
+    };
+    let [view, _] = both_cameras();
+    let film = film(&room_before(None, view));
+    let asked = AtomicU32::new(0);
+    let stops_at = |call: u32| {
+        asked.store(0, Relaxed);
+        denoiser.radiance(&film, Some(1), &|| asked.fetch_add(1, Relaxed) >= call)
+    };
+    assert!(stops_at(u32::MAX).is_ok());
+    let all = asked.load(Relaxed);
+    assert!(all > 6, "the denoiser asks within its filters, too: {all}");
+    for call in [0, 1, all / 2] {
+        assert!(matches!(stops_at(call), Err(DenoiseError::Stopped)));
+        assert!(asked.load(Relaxed) < all);
     }
 }
 

@@ -41,13 +41,15 @@ pub struct Fit {
     pub measured: Measured,
 }
 
-/// Numbers that a scene would need, if they exceed the limits of a quality.
+/// Numbers that a scene would need, if they exceed the limits of a quality or of a time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Beyond {
     /// Number of photons in the map.
     pub photons: Option<usize>,
     /// Number of gather rays of a pixel, and of an irradiance record.
     pub gather_rays: Option<u32>,
+    /// Number of photons in the map within the limits of the quality, if the time allows fewer.
+    pub photons_in_time: Option<usize>,
 }
 
 /// Settings that the user stated. A fit does not change them.
@@ -176,13 +178,14 @@ impl Fit {
         let rays = if self.interpolates { within(rays, &(0..=MAX_RAYS_OF_RECORD), 8) } else { 0 };
         let photons = self.photons.max(rounded(photons, &(0..=MAX_PHOTONS)));
         let gather_rays = self.gather_rays.max(rays);
-        let Beyond { photons: more_photons, gather_rays: more_rays } = self.beyond;
+        let Beyond { photons: more_photons, gather_rays: more_rays, .. } = self.beyond;
         Self {
             photons,
             gather_rays,
             beyond: Beyond {
                 photons: more_photons.filter(|&more| more > photons),
                 gather_rays: more_rays.filter(|&more| more > gather_rays),
+                photons_in_time: None,
             },
             max_irradiance_error: (IRRADIANCE_ERROR_OF_NOISE * noise) as f32,
             ..self
@@ -190,12 +193,12 @@ impl Fit {
     }
 
     /// Adjusts the settings for a picture that gets samples on `threads` threads until `seconds` have passed:
-    /// the photon map takes a third of the time at most, or has 50,000 photons.
+    /// the photon map, without caustics, takes about a third of the time at most, or has 50,000 photons.
     pub fn for_time(self, seconds: f64, threads: usize) -> Self {
         let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * seconds * threads as f64;
         let photons = self.photons.min(rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS)));
-        let wanted = self.beyond.photons.or((photons < self.photons).then_some(self.photons));
-        Self { photons, beyond: Beyond { photons: wanted, ..self.beyond }, ..self }
+        let photons_in_time = (photons < self.photons).then_some(self.photons);
+        Self { photons, beyond: Beyond { photons_in_time, ..self.beyond }, ..self }
     }
 
     /// Applies the fit to settings, except for stated ones. If the number of samples is stated, samples share
@@ -319,6 +322,7 @@ impl Level {
                 photons: (photons > most as f64).then(|| rounded(photons, &(0..=MAX_PHOTONS))),
                 gather_rays: (gather_rays > f64::from(*self.gather_rays.end()))
                     .then(|| within(gather_rays, &(0..=MAX_RAYS_OF_RECORD), 8)),
+                photons_in_time: None,
             },
             shadow_rays: within(shadow_rays, &SHADOW_RAYS, 1),
             interpolates,
@@ -470,14 +474,15 @@ mod tests {
     fn numbers_beyond_the_limits_are_reported() {
         let beyond = |photon, gather_ray| good(&Variances { photon, gather_ray, ..VARIANCES }).beyond;
         assert_eq!(beyond(VARIANCES.photon, VARIANCES.gather_ray), Beyond::default());
-        let Beyond { photons, gather_rays } = beyond(400.0 * VARIANCES.photon, 400.0 * VARIANCES.gather_ray);
+        let Beyond { photons, gather_rays, .. } =
+            beyond(400.0 * VARIANCES.photon, 400.0 * VARIANCES.gather_ray);
         // 400 times the variance take 20 times the number; 4 % cover the rounding of both.
         let is_multiple = |more: f64, number: f64| (19.2..20.8).contains(&(more / number));
         let fit = good(&VARIANCES);
         assert!(photons.is_some_and(|more| is_multiple(more as f64, fit.photons as f64)), "{photons:?}");
         assert!(gather_rays.is_some_and(|more| is_multiple(more.into(), fit.gather_rays.into())));
         let most = beyond(f64::INFINITY, f64::INFINITY);
-        assert_eq!(most, Beyond { photons: Some(MAX_PHOTONS), gather_rays: Some(MAX_RAYS_OF_RECORD) });
+        assert_eq!((most.photons, most.gather_rays), (Some(MAX_PHOTONS), Some(MAX_RAYS_OF_RECORD)));
     }
 
     #[test]
@@ -486,7 +491,7 @@ mod tests {
         assert_eq!(fit.for_time(1e6, 2), fit);
         let [short, on_two] = [fit.for_time(5.0, 1), fit.for_time(5.0, 2)];
         assert!((133_000..=140_000).contains(&short.photons) && on_two.photons > 19 * short.photons / 10);
-        assert_eq!((short.beyond.photons, short.beyond.gather_rays), (Some(fit.photons), None));
+        assert_eq!(short.beyond, Beyond { photons_in_time: Some(fit.photons), ..Beyond::default() });
         assert_eq!(fit.for_time(1e-3, 1).photons, MIN_PHOTONS_IN_TIME);
     }
 
