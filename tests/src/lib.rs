@@ -1,4 +1,4 @@
-//! What several integration tests share: small scenes, renders of them, and a card on a link.
+//! Helpers of integration tests: small scenes, renders of them, and a card on a link.
 #![forbid(unsafe_code)]
 
 pub mod everything;

@@ -21,7 +21,7 @@ pub struct Wire<'a, K: FixedKind = Micro> {
     layers: bool,
 }
 
-/// What tests need of a [`Reply`], without its borrowed bytes.
+/// Content of a [`Reply`] that tests read, without its borrowed bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
     /// [`Reply::Hello`]: number of lines of card memory that were written, and use of on-chip memory.

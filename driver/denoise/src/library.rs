@@ -182,6 +182,7 @@ impl<'a> Device<'a> {
         input.switches.iter().for_each(|name| filter.switch_on(name));
         filter.set_quality(input.quality);
         filter.execute(must_stop);
+        // Releasing the filter waits for its work, which reads and writes the images.
         drop(filter);
         self.check()?;
         Ok(output)

@@ -97,7 +97,7 @@ pub enum SceneError {
     OtherFormat {
         /// Path of the file.
         file: PathBuf,
-        /// What the path names, such as `a folder` or `an FBX file`.
+        /// Kind of file at the path, such as `a folder` or `an FBX file`.
         what: &'static str,
         /// Remedy. Where a program converts the format to glTF, it contains the command.
         remedy: String,

@@ -76,7 +76,7 @@ pub(crate) struct RenderOptions {
 /// Settings before a pilot, which changes those that are not stated.
 pub(crate) struct Unfitted {
     pub(crate) settings: RenderSettings,
-    /// Which settings are stated or taken from kept samples.
+    /// Settings that are stated or taken from kept samples.
     pub(crate) stated: Stated,
     /// True if an earlier render has kept samples that this one adds to.
     pub(crate) are_kept: bool,

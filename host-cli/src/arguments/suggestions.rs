@@ -124,7 +124,7 @@ pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[Strin
     error
 }
 
-/// Those of `commands` that this build contains.
+/// Returns the names in `commands` of commands that this build contains.
 pub(super) fn built(commands: &'static [&'static str]) -> impl Iterator<Item = &'static str> {
     commands.iter().copied().filter(|command| cfg!(feature = "study") || !command.starts_with("study"))
 }

@@ -176,7 +176,7 @@ pub(crate) fn denoised(
     radiance.map_err(|error| Failure::work_error(&error))
 }
 
-/// What a picture's file contains, beside the film, by its format.
+/// Content of a picture's file besides the film, for each format.
 pub(crate) struct Form {
     /// Layers of an EXR.
     pub(crate) layers: Layers,

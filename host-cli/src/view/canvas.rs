@@ -11,7 +11,7 @@ use photoncard_driver::layer::{Layer, Layers};
 use photoncard_driver::sink::FinishedTile;
 use photoncard_shared::counters::Counters;
 
-/// What a page shows: radiance or a layer.
+/// Quantity that a page shows: radiance or a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shown {
     Radiance,

@@ -16,7 +16,7 @@ const PAGE_FILE: &str = "/index.html";
 /// Path of the WebSocket.
 const SOCKET: &str = "/socket";
 
-/// What a request is granted.
+/// Resource that a request may have.
 #[derive(Debug, PartialEq)]
 pub(super) enum Resource {
     /// File of the page.

@@ -47,7 +47,7 @@ pub(super) struct Task {
     pub(super) origin: Origin,
 }
 
-/// What the caller must do after a message from a page.
+/// Work for the caller after a message from a page.
 #[derive(Debug, PartialEq)]
 pub(super) enum Effect {
     Nothing,

@@ -17,7 +17,7 @@ const IRRADIANCE_ERROR: f32 = 0.1;
 pub(super) struct Wish {
     /// Settings of the settled picture.
     pub(super) settings: RenderSettings,
-    /// Which settings an option or a page has stated: a quality does not change them.
+    /// Settings that an option or a page has stated. A quality does not change them.
     stated: Stated,
     /// Assignments (`--set`) of the command line.
     given: Vec<String>,

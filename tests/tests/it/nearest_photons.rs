@@ -31,7 +31,7 @@ fn images(places: &[[f32; 3]]) -> [CardImage; 2] {
     [to_kd_tree(image()).unwrap(), image()]
 }
 
-/// What distinguishes photons here: `f32::to_bits` of the squared distance, and the direction code.
+/// Key that distinguishes photons here: `f32::to_bits` of the squared distance, and the direction code.
 type Found = (u32, [u8; 2]);
 
 /// Photons that the chip's search finds, in order of distance. All instruction sets must agree.

@@ -40,7 +40,7 @@ fn cards(text: &str) -> Vec<CardAddress> {
     vec![text.parse().expect("an address")]
 }
 
-/// What depends on a setting.
+/// Results that depend on a setting.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Dependence {
     /// Pixels and card image.

@@ -18,8 +18,10 @@ const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 /// | light, direct, indirect, caustic | at least 0; beside a lamp without extent there is no upper limit |
 /// | albedo | 0 to s |
 /// | normals | length 0 to s (1 + 2^-19) |
-/// | depths | 0 to s times the distance from the eye to the farthest corner of the scene's reach, with a tolerance of 2^-19 of the coordinates and one step per sample |
+/// | depths | 0 to s times the distance from the eye to the farthest corner of the scene's reach, see below |
 /// | surfaces s, gathers | 0 to n |
+///
+/// Depths have a tolerance of 2^-19 of the coordinates, and of one step a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     format: SumFormat,

@@ -30,7 +30,7 @@ pub(crate) struct Crate {
     modules: Vec<Module>,
 }
 
-/// What a path resolves to.
+/// Target of a path.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Resolved {
     /// A module itself.
