@@ -89,6 +89,7 @@ impl IntegratorOptions {
             shadow_rays: self.shadow_rays.is_some(),
             cache: self.irradiance_cache.is_some() || self.ic_error.is_some(),
             photons: false,
+            caustic_photons: false,
             adaptive: self.adaptive.is_some(),
         }
     }

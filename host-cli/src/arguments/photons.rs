@@ -3,6 +3,7 @@
 use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::photon_map::PhotonLayout;
+use photoncard_driver::quality::Stated;
 use photoncard_driver::render::{PhotonMaps, Radiance};
 
 use super::choice::choice;
@@ -45,9 +46,10 @@ pub(super) enum MaxDistance {
 }
 
 impl PhotonOptions {
-    /// Returns whether the number of photons is stated.
-    pub(super) fn states_photons(&self) -> bool {
-        self.photons.is_some()
+    /// Adds to `others` which settings of photons are stated.
+    pub(super) fn stated(&self, others: Stated) -> Stated {
+        let [photons, caustic_photons] = [self.photons, self.caustic_photons].map(|count| count.is_some());
+        Stated { photons, caustic_photons, ..others }
     }
 
     /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.

@@ -70,7 +70,7 @@ impl PrepareOptions {
 
     /// Returns which of the settings that a quality chooses are stated.
     pub(crate) fn stated(&self) -> Stated {
-        Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
+        self.photons.stated(self.integrator.stated())
     }
 
     /// Returns whether pictures will be denoised.

@@ -1,13 +1,14 @@
 //! Options of `photoncard render`.
 
 use std::thread::available_parallelism;
+use std::time::Duration;
 
 use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::partial::{PartialError, PartialSettings};
 use photoncard_driver::photon_map::PhotonsFor;
-use photoncard_driver::quality::{Fit, Quality, Stated};
+use photoncard_driver::quality::{Fit, Quality, Stated, TimeOfPicture};
 use photoncard_driver::render::{
     Aim, Observer, PhotonMaps, RenderError, RenderSettings, Schedule, TileOutputs,
 };
@@ -85,7 +86,7 @@ pub(crate) struct Unfitted {
 impl RenderOptions {
     /// Returns which of the settings that a quality chooses are stated.
     pub(crate) fn stated(&self) -> Stated {
-        Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
+        self.photons.stated(self.integrator.stated())
     }
 
     /// Returns whether `--planned-spp` is stated.
@@ -120,13 +121,35 @@ impl RenderOptions {
         if !unfitted.stated.needs_fit() {
             return Ok(None);
         }
-        let fit = self.quality.fit(self.outputs.finish(), (scene, packed), &unfitted.settings, observer)?;
+        let settings = &unfitted.settings;
         let Aim { time, noise } = self.samples.aim().unwrap_or_default();
-        let cores = available_parallelism().map_or(1, usize::from);
-        let threads = rayon::current_num_threads().min(cores);
+        let time = time.map(|time| self.time_of_picture(time, settings));
+        let wanted = (self.outputs.finish(), time.map(|time| time.cpu_seconds));
+        let fit = self.quality.fit(wanted, (scene, packed), settings, observer)?;
         let by_noise = |fit: Fit| noise.map_or(fit, |noise| fit.for_noise(noise));
-        let by_time = |fit: Fit| time.map_or(fit, |time| fit.for_time(time.as_secs_f64(), threads));
+        let by_time = |fit: Fit| time.map_or(fit, |time| fit.for_time(&time));
         Ok(fit.map(by_noise).map(by_time))
+    }
+
+    /// Aim of the passes of a picture: its time is without that of a denoiser.
+    pub(crate) fn aim_of_render(&self, settings: &RenderSettings) -> Option<Aim> {
+        let without_denoiser = |time: Duration| {
+            let picture = self.time_of_picture(time, settings);
+            let share = picture.cpu_seconds_of_denoiser() / picture.cpu_seconds.max(f64::MIN_POSITIVE);
+            time.mul_f64((1.0 - share).max(0.0))
+        };
+        self.samples.aim().map(|aim| Aim { time: aim.time.map(without_denoiser), ..aim })
+    }
+
+    fn time_of_picture(&self, time: Duration, settings: &RenderSettings) -> TimeOfPicture {
+        let cores = available_parallelism().map_or(1, usize::from);
+        let threads = rayon::current_num_threads().min(cores) as f64;
+        let window = settings.window();
+        TimeOfPicture {
+            cpu_seconds: time.as_secs_f64() * threads,
+            pixels: f64::from(window.width()) * f64::from(window.height()),
+            finish: self.outputs.finish(),
+        }
     }
 
     /// Settings of these options. Others are the quality's defaults, before a pilot.

@@ -59,7 +59,7 @@ pub(crate) struct ViewOptions {
 impl ViewOptions {
     /// Returns which of the settings that a quality chooses are stated.
     pub(crate) fn stated(&self) -> Stated {
-        Stated { photons: self.photons.states_photons(), ..self.integrator.stated() }
+        self.photons.stated(self.integrator.stated())
     }
 
     /// Returns whether the settled picture is denoised.

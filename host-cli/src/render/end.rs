@@ -1,6 +1,7 @@
 //! Message about the end of a picture by passes.
 
 use photoncard_driver::render::{Aim, Ending, Statistics};
+use serde_json::Value;
 
 use crate::arguments::RenderOptions;
 use crate::console::say;
@@ -54,32 +55,33 @@ fn percent(share: f64) -> String {
 /// `is_fitted` is true if a pilot has chosen settings.
 pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
     let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
+    let is_timed = is_fitted && options.samples.aim().is_some_and(|aim| aim.time.is_some());
     let are_needed = [
         ("spp", true),
         ("planned-spp", !options.states_planned_samples()),
         ("photons", is_fitted && !stated.photons),
+        ("caustic-photons", is_timed && !stated.caustic_photons && statistics.caustic_gathers > 0),
         ("gather-rays", is_fitted && !stated.gather_rays),
         ("shadow-rays", is_fitted && !stated.shadow_rays),
-        (
-            "ic-error",
-            is_fitted && !stated.cache && options.samples.aim().is_some_and(|aim| aim.noise.is_some()),
-        ),
+        ("ic-error", is_fitted && !stated.cache),
     ];
     let needed = are_needed.into_iter().filter(|(_, is_needed)| *is_needed);
     let valued =
         needed.filter_map(|(name, _)| Some((name, pixels.get(name).filter(|value| !value.is_null())?)));
     let words = valued.map(|(name, value)| format!("--{name} {value}"));
     let adaptive = (is_fitted && !stated.adaptive).then(|| {
-        match pixels.get("adaptive").and_then(serde_json::Value::as_f64) {
+        match pixels.get("adaptive").and_then(Value::as_f64) {
             // The `f32` prints fewer digits than the `f64` of JSON.
             Some(threshold) => format!("--adaptive {}", threshold as f32),
             None => "--adaptive off".to_owned(),
         }
     });
-    let for_camera = pixels.get("photons-for").and_then(serde_json::Value::as_str) == Some("camera");
+    let is_uncached = is_timed && !stated.cache && pixels.get("ic-error").is_some_and(Value::is_null);
+    let cache = is_uncached.then(|| "--irradiance-cache off".to_owned());
+    let for_camera = pixels.get("photons-for").and_then(Value::as_str) == Some("camera");
     let cameras =
         (is_fitted && options.leaves_cameras_open() && for_camera).then(|| "--photons-for camera".to_owned());
-    words.chain(adaptive).chain(cameras).collect::<Vec<_>>().join(" ")
+    words.chain(adaptive).chain(cache).chain(cameras).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

@@ -112,7 +112,7 @@ impl<'a> Preparation<'a> {
         let Self { options, settings, progress, said } = self;
         let stated = options.stated();
         let fit = if stated.needs_fit() {
-            options.quality.fit(options.finish(), (scene, packed), settings, progress)?
+            options.quality.fit((options.finish(), None), (scene, packed), settings, progress)?
         } else {
             None
         };

@@ -37,7 +37,8 @@ impl Fitting {
         let stop = Arc::new(AtomicBool::new(false));
         let observer = Stop(stop.clone());
         let work = move || {
-            let fit = || quality.fit(finish, (&scene, &PackedScene::new(&scene)?), &settings, &observer);
+            let fit =
+                || quality.fit((finish, None), (&scene, &PackedScene::new(&scene)?), &settings, &observer);
             let pool = threads.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build());
             match pool {
                 Some(Ok(pool)) => pool.install(fit),

@@ -18,7 +18,7 @@ fn small() -> RenderSettings {
 
 fn fit(scene: &Scene, settings: &RenderSettings) -> Fit {
     let packed = PackedScene::new(scene).expect("packs");
-    let fit = Quality::Good.fit(Finish::Rendered, (scene, &packed), settings, &Unobserved);
+    let fit = Quality::Good.fit((Finish::Rendered, None), (scene, &packed), settings, &Unobserved);
     fit.unwrap_or_else(|error| panic!("{error}")).expect("good depends on the scene")
 }
 
@@ -129,8 +129,12 @@ fn indirect_light_from_a_spot_takes_more_rays_and_photons() {
 fn the_dissertations_values_depend_on_no_scene() {
     let scene = lit_room();
     let packed = PackedScene::new(&scene).expect("packs");
-    let fit =
-        Quality::Paper.fit(Finish::Rendered, (&scene, &packed), &RenderSettings::default(), &Unobserved);
+    let fit = Quality::Paper.fit(
+        (Finish::Rendered, None),
+        (&scene, &packed),
+        &RenderSettings::default(),
+        &Unobserved,
+    );
     let fit = fit.expect("no pilot");
     assert_eq!(fit, None);
     assert_eq!(Quality::Paper.settings(), RenderSettings::default());

@@ -9,7 +9,7 @@ use photoncard_shared::message::PROBES;
 use serde::Serialize;
 
 use super::level::{Finish, Level, Quality};
-use super::pilot::{SHADOW_RAYS as PILOT_SHADOW_RAYS, Variances, measure};
+use super::pilot::{Effort, SHADOW_RAYS as PILOT_SHADOW_RAYS, Variances, measure};
 use crate::{Integrator, Observer, RenderError, RenderSettings};
 
 /// Settings chosen for a scene.
@@ -19,6 +19,8 @@ pub struct Fit {
     pub samples: u32,
     /// Number of photons in the map.
     pub photons: usize,
+    /// Maximum number of photons in the caustic map.
+    pub max_caustic_photons: usize,
     /// Cameras for which photons are traced; never [`PhotonsFor::Auto`].
     pub photons_for: PhotonsFor,
     /// Number of gather rays of a pixel, and of an irradiance record.
@@ -52,6 +54,24 @@ pub struct Beyond {
     pub photons_in_time: Option<usize>,
 }
 
+/// CPU time in which a picture is rendered.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimeOfPicture {
+    /// Time limit times the number of threads, in seconds.
+    pub cpu_seconds: f64,
+    /// Number of pixels.
+    pub pixels: f64,
+    /// Whether a denoiser follows.
+    pub finish: Finish,
+}
+
+impl TimeOfPicture {
+    /// Approximate CPU time of the denoiser, seconds; 0 without one.
+    pub fn cpu_seconds_of_denoiser(&self) -> f64 {
+        if self.finish == Finish::Denoised { SECONDS_OF_DENOISED_PIXEL * self.pixels } else { 0.0 }
+    }
+}
+
 /// Settings that the user stated. A fit does not change them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stated {
@@ -59,6 +79,8 @@ pub struct Stated {
     pub samples: bool,
     /// True if the number of photons is stated.
     pub photons: bool,
+    /// True if the number of caustic photons is stated.
+    pub caustic_photons: bool,
     /// True if the number of gather rays is stated.
     pub gather_rays: bool,
     /// True if the number of shadow rays is stated.
@@ -74,6 +96,7 @@ impl Stated {
     pub const ALL: Self = Self {
         samples: true,
         photons: true,
+        caustic_photons: true,
         gather_rays: true,
         shadow_rays: true,
         cache: true,
@@ -81,9 +104,9 @@ impl Stated {
     };
 
     /// Returns whether any setting is left to a pilot. Adaptive sampling does not count: it is off without a
-    /// pilot.
+    /// pilot. Neither do caustic photons, which only a short time changes.
     pub fn needs_fit(self) -> bool {
-        Self { adaptive: true, ..self } != Self::ALL
+        Self { adaptive: true, caustic_photons: true, ..self } != Self::ALL
     }
 }
 
@@ -162,8 +185,20 @@ const MAX_PHOTONS: usize = 16_000_000;
 const MAX_RAYS_OF_RECORD: u32 = 8_000;
 /// Number of photons that a thread traces and stores in a second, as measured in furnished rooms.
 const PHOTONS_IN_A_SECOND: f64 = 80_000.0;
+/// CPU seconds of a sample of cost 1, the unit of [`COST_OF_SHADOW_RAY`], as measured in furnished rooms.
+const SECONDS_OF_COST: f64 = 6e-6;
+/// CPU seconds of a pixel in a denoiser that follows the render.
+const SECONDS_OF_DENOISED_PIXEL: f64 = 18e-6;
 /// Maximum fraction of a picture's time that its photons take.
-const SHARE_OF_PHOTONS: f64 = 1.0 / 3.0;
+const SHARE_OF_PHOTONS: f64 = 0.25;
+/// Fraction of a picture's time for its first [`SAMPLES_IN_TIME`] samples and a denoiser.
+const SHARE_OF_SAMPLES: f64 = 0.5;
+/// Number of samples of a pixel that any time should allow: two passes, whose difference shows the noise.
+const SAMPLES_IN_TIME: f64 = 2.0;
+/// Minimum number of photons per caustic photon if the time allows fewer photons than the scene would take.
+const PHOTONS_OF_CAUSTIC_PHOTON: usize = 8;
+/// Minimum CPU time of a picture for the full pilot, seconds. In a furnished room the pilot takes six.
+const SECONDS_FOR_FULL_PILOT: f64 = 60.0;
 /// Number of photons that any time allows.
 const MIN_PHOTONS_IN_TIME: usize = 50_000;
 
@@ -192,13 +227,37 @@ impl Fit {
         }
     }
 
-    /// Adjusts the settings for a picture that gets samples on `threads` threads until `seconds` have passed:
-    /// the photon map, without caustics, takes about a third of the time at most, or has 50,000 photons.
-    pub fn for_time(self, seconds: f64, threads: usize) -> Self {
-        let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * seconds * threads as f64;
+    /// Adjusts the settings for a picture that gets samples until a time is over. The photon map takes about
+    /// a quarter of the time at most, or has 50,000 photons; the caustic map has an eighth of these at most. Two samples of each pixel
+    /// and the denoiser take about half of the time at most: irradiance is interpolated only if its records
+    /// fit in, and otherwise each sample has the gather rays that do, at least one.
+    pub fn for_time(self, within: &TimeOfPicture) -> Self {
+        let TimeOfPicture { cpu_seconds, pixels, .. } = *within;
+        let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * cpu_seconds;
         let photons = self.photons.min(rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS)));
         let photons_in_time = (photons < self.photons).then_some(self.photons);
-        Self { photons, beyond: Beyond { photons_in_time, ..self.beyond }, ..self }
+        let of_render = SHARE_OF_SAMPLES * cpu_seconds - within.cpu_seconds_of_denoiser();
+        let of_pixel = of_render / (SECONDS_OF_COST * pixels.max(1.0));
+        let of_sample = 1.0 + COST_OF_SHADOW_RAY * f64::from(self.shadow_rays);
+        let free = (of_pixel - SAMPLES_IN_TIME * of_sample) / COST_OF_GATHER_RAY;
+        let of_records = f64::from(self.gather_rays) * self.measured.gather_rays_per_ray;
+        let interpolates = self.interpolates && of_records <= free;
+        let samples = f64::from(self.samples);
+        let fitting = (free / SAMPLES_IN_TIME).max(1.0).floor() * samples;
+        let gather_rays = if interpolates { self.gather_rays } else { self.gather_rays.min(fitting as u32) };
+        Self {
+            photons,
+            max_caustic_photons: photons_in_time.map_or(usize::MAX, |_| photons / PHOTONS_OF_CAUSTIC_PHOTON),
+            interpolates,
+            gather_rays,
+            beyond: Beyond {
+                photons_in_time,
+                // More samples bring more rays than the quality has for a pixel.
+                gather_rays: self.beyond.gather_rays.filter(|_| interpolates),
+                ..self.beyond
+            },
+            ..self
+        }
     }
 
     /// Applies the fit to settings, except for stated ones. If the number of samples is stated, samples share
@@ -210,6 +269,10 @@ impl Fit {
         }
         if !stated.photons {
             photons.count = self.photons;
+        }
+        if !stated.caustic_photons {
+            let fewer = |count: usize| count.min(self.max_caustic_photons);
+            photons.caustic_photons = photons.caustic_photons.map(fewer);
         }
         if photons.photons_for == PhotonsFor::Auto {
             photons.photons_for = self.photons_for;
@@ -252,13 +315,14 @@ impl Fit {
 impl Quality {
     /// Chooses settings of this quality, for a picture with this finish, by pilot renders of a scene with the
     /// view, filter and sampling in `settings`; `None` if no setting of the quality depends on the scene.
-    /// Seed, cards, threads and crop window have no effect on the result.
+    /// Seed, cards, threads and crop window have no effect on the result. The pilot does half the work for
+    /// [`Self::Draft`], and for a picture that is to be rendered in less than a minute of `cpu_seconds`.
     ///
     /// # Errors
     /// As [`render`](crate::render).
     pub fn fit(
         self,
-        finish: Finish,
+        (finish, cpu_seconds): (Finish, Option<f64>),
         (scene, packed): (&Scene, &PackedScene),
         settings: &RenderSettings,
         observer: &dyn Observer,
@@ -270,7 +334,9 @@ impl Quality {
             triangles: scene.triangles.len(),
             is_cached: settings.integrator.irradiance_error.is_some(),
         };
-        Ok(Some(level.fit(&measure(scene, packed, settings, observer)?, &of)))
+        let is_short = cpu_seconds.is_some_and(|seconds| seconds < SECONDS_FOR_FULL_PILOT);
+        let effort = if self == Self::Draft || is_short { Effort::HALF } else { Effort::FULL };
+        Ok(Some(level.fit(&measure(effort, (scene, packed), settings, observer)?, &of)))
     }
 }
 
@@ -316,6 +382,7 @@ impl Level {
         Fit {
             samples,
             photons: rounded(photons, &(fewest.max(for_triangles).min(most)..=most)),
+            max_caustic_photons: usize::MAX,
             photons_for: if gaining.is_some() { PhotonsFor::Camera } else { PhotonsFor::Scene },
             gather_rays: within(gather_rays, &self.gather_rays, 8),
             beyond: Beyond {
@@ -381,6 +448,10 @@ mod tests {
         deviations: Deviations::NONE,
     };
     const PICTURED: Pictured = Pictured { pixels: 65_536.0, triangles: 32, is_cached: true };
+
+    fn rendered_in(cpu_seconds: f64) -> TimeOfPicture {
+        TimeOfPicture { cpu_seconds, pixels: 64.0, finish: Finish::Rendered }
+    }
 
     fn good(variances: &Variances) -> Fit {
         Quality::Good.level(Finish::Rendered).unwrap().fit(variances, &PICTURED)
@@ -488,11 +559,48 @@ mod tests {
     #[test]
     fn a_short_time_takes_few_photons_and_tells_how_many_the_scene_would_take() {
         let fit = good(&VARIANCES);
-        assert_eq!(fit.for_time(1e6, 2), fit);
-        let [short, on_two] = [fit.for_time(5.0, 1), fit.for_time(5.0, 2)];
-        assert!((133_000..=140_000).contains(&short.photons) && on_two.photons > 19 * short.photons / 10);
+        assert_eq!(fit.for_time(&rendered_in(1e6)), fit);
+        let [short, twice] = [5.0, 10.0].map(|seconds| fit.for_time(&rendered_in(seconds)));
+        assert!((100_000..=110_000).contains(&short.photons) && twice.photons > 19 * short.photons / 10);
         assert_eq!(short.beyond, Beyond { photons_in_time: Some(fit.photons), ..Beyond::default() });
-        assert_eq!(fit.for_time(1e-3, 1).photons, MIN_PHOTONS_IN_TIME);
+        assert_eq!(fit.for_time(&rendered_in(1e-3)).photons, MIN_PHOTONS_IN_TIME);
+        let caustics = |fit: &Fit, caustic_photons| {
+            let stated = Stated { caustic_photons, ..Stated::default() };
+            Quality::Good.settings().with(|settings| fit.apply(settings, stated)).photons.caustic_photons
+        };
+        let own = Quality::Good.settings().photons.caustic_photons;
+        assert_eq!([caustics(&fit, false), caustics(&short, true)], [own; 2]);
+        assert_eq!(caustics(&short, false), Some(short.photons / 8));
+    }
+
+    /// Two samples and the denoiser take half of the time. The cost of a sample in this model is 2.4, that of
+    /// a gather ray 1.2, in units of 6 microseconds.
+    #[test]
+    fn a_short_time_takes_records_or_gather_rays_that_fit() {
+        let fit = Fit { samples: 8, shadow_rays: 4, gather_rays: 100, ..good(&VARIANCES) };
+        let within = |micros_of_pixel: f64, finish| TimeOfPicture {
+            cpu_seconds: 2e-6 * micros_of_pixel * PICTURED.pixels,
+            pixels: PICTURED.pixels,
+            finish,
+        };
+        let of_samples = 2.0 * 6.0 * (1.0 + 4.0 * 0.4);
+        // Records of 100 rays for a fifth of the pixels.
+        let of_records = 6.0 * 1.2 * 20.0;
+        for (more, interpolates) in [(1.01, true), (0.99, false)] {
+            let fitted = fit.for_time(&within(of_samples + more * of_records, Finish::Rendered));
+            assert_eq!(
+                (fitted.interpolates, fitted.gather_rays),
+                (interpolates, if interpolates { 100 } else { 72 })
+            );
+        }
+        let alone = Fit { interpolates: false, ..fit };
+        let rays = |micros, finish| alone.for_time(&within(micros, finish)).gather_rays;
+        for (rays_of_sample, finish, of_denoiser) in [(3, Finish::Rendered, 0.0), (2, Finish::Denoised, 18.0)]
+        {
+            let of_rays = 2.0 * 6.0 * 1.2 * (f64::from(rays_of_sample) + 0.1);
+            assert_eq!(rays(of_denoiser + of_samples + of_rays, finish), 8 * rays_of_sample);
+        }
+        assert_eq!([rays(0.0, Finish::Denoised), rays(1e9, Finish::Denoised)], [8, 100]);
     }
 
     /// Without records, pixels do not share rays, so that equal costs allow more rays.

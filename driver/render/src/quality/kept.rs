@@ -20,6 +20,10 @@ impl Stated {
             let kept = number("photons").and_then(|count| usize::try_from(count).ok());
             photons.count = kept.unwrap_or(photons.count);
         }
+        if !self.caustic_photons {
+            let kept = number("caustic-photons").and_then(|count| usize::try_from(count).ok());
+            photons.caustic_photons = kept.or(photons.caustic_photons);
+        }
         if photons.photons_for == PhotonsFor::Auto {
             let kept = kept.get("photons-for").and_then(Value::as_str);
             let is_of_camera = kept == Some(PhotonsFor::Camera.name());

@@ -45,9 +45,11 @@ choices!(Quality {
     Paper = "paper": "The dissertation's nominal values, for studies: one sample a pixel, a hundred gather rays, no cache",
 });
 
-/// Number of photons that a gather searches for. Fewer photons blur less, and with 24 the noise of gather
-/// rays still dominates.
+/// Number of photons that a gather searches for. Fewer photons blur less and take less time, and with 24 the
+/// noise of gather rays still dominates.
 const NEIGHBORS: u32 = 24;
+/// [`NEIGHBORS`] in a picture that is denoised: it has fewer gather rays, whose noise dominates more.
+const NEIGHBORS_OF_DENOISED: u32 = 12;
 
 /// Parameters of a quality whose settings depend on the scene: the worth of accuracy, and limits of the
 /// settings chosen by it.
@@ -134,7 +136,7 @@ impl Quality {
             picture: Picture { filter: Filter::BlackmanHarris, ..Picture::default() },
             photons: PhotonMaps {
                 count: middle(*level.photons.start(), *level.photons.end()),
-                neighbors: NEIGHBORS,
+                neighbors: if finish == Finish::Denoised { NEIGHBORS_OF_DENOISED } else { NEIGHBORS },
                 caustic_photons: Some(level.caustic_photons),
                 ..PhotonMaps::default()
             },

@@ -10,5 +10,5 @@ mod paths;
 mod pilot;
 mod spread;
 
-pub use self::fit::{Beyond, Fit, Measured, Stated};
+pub use self::fit::{Beyond, Fit, Measured, Stated, TimeOfPicture};
 pub use self::level::{Finish, Quality};

@@ -25,8 +25,7 @@ const SURVEYED: Grid = Grid { cells: 4, side: 32 };
 /// the photons of an unguided map. In rooms, halls and Cornell boxes, where guiding gains nothing, the
 /// fraction is greater.
 const MAX_USED_SHARE: f64 = 0.3;
-/// Number of photons of the smaller map. The larger map has four times as many.
-const FEW_PHOTONS: usize = 16_384;
+/// Ratio of the numbers of photons of the larger and the smaller map.
 const MORE: usize = 4;
 /// Seeds of a pair of renders and of their photons. They differ from the picture's seed, on which settings
 /// must not depend.
@@ -36,7 +35,22 @@ const PHOTON_SEED: u32 = 0x5eed_0003;
 const MIN_SIDE: u32 = SPREAD.cells * SPREAD.side;
 /// Numbers of shadow rays that are compared.
 pub(super) const SHADOW_RAYS: [u32; 2] = [1, 4];
-const GATHER_RAYS: [u32; 2] = [8, 32];
+
+/// Work of a pilot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Effort {
+    /// Number of photons of the smaller map.
+    few_photons: usize,
+    /// Numbers of gather rays that are compared.
+    gather_rays: [u32; 2],
+}
+
+impl Effort {
+    pub(super) const FULL: Self = Self { few_photons: 16_384, gather_rays: [8, 32] };
+    /// Half of the work, for pictures of which the full pilot would take too large a part. Settings are less
+    /// certain.
+    pub(super) const HALF: Self = Self { few_photons: 8_192, gather_rays: [4, 16] };
+}
 
 /// Variances and errors from which the settings follow, relative to the radiance of the pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,8 +74,7 @@ pub(super) struct Variances {
     pub(super) gather_rays_per_ray: f64,
     /// Median radiance of the lit pixels, W/(sr m^2); 1 in a black picture.
     pub(super) level: f64,
-    /// Deviations of the direct light of a sample with the greater numbers of [`SHADOW_RAYS`] and
-    /// [`GATHER_RAYS`].
+    /// Deviations of the direct light of a sample with the greater numbers of shadow and gather rays.
     pub(super) deviations: Deviations,
 }
 
@@ -79,9 +92,9 @@ pub(super) struct ForCamera {
 impl ForCamera {
     /// Computes the errors from maps with fewer and with more photons for the camera, and the map with more
     /// photons for any camera.
-    fn new(best: &[Pixels; 2], [few, more]: [Pixels; 2], of_scene: &Pixels) -> Self {
-        let photon = of_photon(best, [&few, &more]);
-        let own = photon / (MORE * FEW_PHOTONS) as f64;
+    fn new(effort: Effort, best: &[Pixels; 2], [few, more]: [Pixels; 2], of_scene: &Pixels) -> Self {
+        let photon = of_photon(effort, best, [&few, &more]);
+        let own = photon / (MORE * effort.few_photons) as f64;
         let of_scene = (difference(best, [of_scene, &more]) - own).max(0.0);
         Self { photon, ratio: own / of_scene }
     }
@@ -92,11 +105,13 @@ impl ForCamera {
 /// # Errors
 /// If photons cannot be traced, the settings have no valid camera, or the observer stops the render.
 pub(super) fn measure(
-    scene: &Scene,
-    packed: &PackedScene,
+    effort: Effort,
+    (scene, packed): (&Scene, &PackedScene),
     settings: &RenderSettings,
     observer: &dyn Observer,
 ) -> Result<Variances, RenderError> {
+    let Effort { few_photons, gather_rays: numbers_of_gather_rays } = effort;
+    let more_photons = MORE * few_photons;
     let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
     let pool = threads.build().map_err(RenderError::Chips)?;
     let settings = &enlarged(settings);
@@ -104,7 +119,7 @@ pub(super) fn measure(
     let window = Window::full(settings.picture.width, settings.picture.height);
     let tiles = SPREAD.tiles(window);
     let pilot = |photons| Pilot::new(scene, packed, settings, photons, &pool, observer);
-    let [few, more] = [pilot(FEW_PHOTONS)?, pilot(MORE * FEW_PHOTONS)?];
+    let [few, more] = [pilot(few_photons)?, pilot(more_photons)?];
     let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
         let render = |seed| {
             let settings = settings.clone().with(|settings| {
@@ -117,7 +132,7 @@ pub(super) fn measure(
         Ok([render(SEEDS[0])?, render(SEEDS[1])?])
     };
     let [few_shadow_rays, shadow_rays] = SHADOW_RAYS;
-    let [few_gather_rays, gather_rays] = GATHER_RAYS;
+    let [few_gather_rays, gather_rays] = numbers_of_gather_rays;
     // Light has the noise of both kinds of rays: the number of each is varied with the greater number of the
     // other.
     let by_few_shadow_rays = pair(few_shadow_rays, gather_rays)?;
@@ -135,19 +150,21 @@ pub(super) fn measure(
     let for_camera = if more.used_share.is_some_and(|share| share < MAX_USED_SHARE) {
         let settings = settings.clone().with(|settings| settings.photons.photons_for = PhotonsFor::Camera);
         let pilot = |photons| Pilot::new(scene, packed, &settings, photons, &pool, observer);
-        let guided = [render_map(&pilot(FEW_PHOTONS)?)?, render_map(&pilot(MORE * FEW_PHOTONS)?)?];
-        Some(ForCamera::new(&best, guided, &maps[1]))
+        let guided = [render_map(&pilot(few_photons)?)?, render_map(&pilot(more_photons)?)?];
+        Some(ForCamera::new(effort, &best, guided, &maps[1]))
     } else {
         None
     };
-    let [shadow_ray, gather_ray] =
-        [of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best), of_ray(GATHER_RAYS, &by_few_gather_rays, &best)];
+    let [shadow_ray, gather_ray] = [
+        of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best),
+        of_ray(numbers_of_gather_rays, &by_few_gather_rays, &best),
+    ];
     let of_rays = shadow_ray / f64::from(shadow_rays) + gather_ray / f64::from(gather_rays);
     Ok(Variances {
         place: (of_pairs([&best])[0] - of_rays).max(0.0),
         shadow_ray,
         gather_ray,
-        photon: of_photon(&best, [&maps[0], &maps[1]]),
+        photon: of_photon(effort, &best, [&maps[0], &maps[1]]),
         for_camera,
         lambertian: best[0].lambertian,
         gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
@@ -199,8 +216,8 @@ fn deviations(pair: &[Pixels; 2]) -> Deviations {
 
 /// Mean squared error of tiles, extrapolated to a map of one photon, from the difference of two maps with
 /// fewer and more photons whose errors are independent.
-fn of_photon(best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
-    difference(best, maps) * FEW_PHOTONS as f64 / (1.0 + 1.0 / MORE as f64)
+fn of_photon(effort: Effort, best: &[Pixels; 2], maps: [&Pixels; 2]) -> f64 {
+    difference(best, maps) * effort.few_photons as f64 / (1.0 + 1.0 / MORE as f64)
 }
 
 /// Mean squared difference of tiles between two maps.
