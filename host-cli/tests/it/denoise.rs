@@ -9,7 +9,7 @@ use serde_json::Value;
 use crate::support::{Room, shipped, skip};
 
 /// Options of a picture with much noise: one sample a pixel, four gather rays, no irradiance cache.
-const NOISY: [&str; 8] = [
+const NOISY: [&str; 9] = [
     "--size=64x64",
     "--photons=5000",
     "--spp=1",
@@ -18,6 +18,7 @@ const NOISY: [&str; 8] = [
     "--irradiance-cache=off",
     "--shadow-rays=1",
     "--quiet",
+    "--neighbors=24",
 ];
 
 /// Renders the Cornell box with [`NOISY`] and `options`. `None`, with a notice, if Open Image Denoise is

@@ -228,9 +228,10 @@ impl Fit {
     }
 
     /// Adjusts the settings for a picture that gets samples until a time is over. The photon map takes about
-    /// a quarter of the time at most, or has 50,000 photons; the caustic map has an eighth of these at most. Two samples of each pixel
-    /// and the denoiser take about half of the time at most: irradiance is interpolated only if its records
-    /// fit in, and otherwise each sample has the gather rays that do, at least one.
+    /// a quarter of the time at most, or has 50,000 photons; the caustic map has an eighth of these at most.
+    /// Two samples of each pixel and the denoiser take about half of the time at most: irradiance is
+    /// interpolated only if its records fit in, and otherwise each sample has the gather rays that do, at
+    /// least one.
     pub fn for_time(self, within: &TimeOfPicture) -> Self {
         let TimeOfPicture { cpu_seconds, pixels, .. } = *within;
         let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * cpu_seconds;
