@@ -90,6 +90,7 @@ impl IntegratorOptions {
             cache: self.irradiance_cache.is_some() || self.ic_error.is_some(),
             photons: false,
             caustic_photons: false,
+            neighbors: false,
             adaptive: self.adaptive.is_some(),
         }
     }

@@ -49,7 +49,7 @@ impl PhotonOptions {
     /// Adds to `others` which settings of photons are stated.
     pub(super) fn stated(&self, others: Stated) -> Stated {
         let [photons, caustic_photons] = [self.photons, self.caustic_photons].map(|count| count.is_some());
-        Stated { photons, caustic_photons, ..others }
+        Stated { photons, caustic_photons, neighbors: self.neighbors.is_some(), ..others }
     }
 
     /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.

@@ -35,7 +35,7 @@ pub(crate) struct PrepareOptions {
     pub(crate) quality: Quality,
     /// Prepare for pictures that are denoised, by photoncard render --denoise or photoncard merge --denoise
     ///
-    /// The quality takes fewer samples and rays, and no irradiance cache.
+    /// The quality takes fewer samples and rays, 12 photons a gather, and no irradiance cache.
     #[arg(long)]
     denoise: bool,
     #[command(flatten)]

@@ -127,18 +127,19 @@ impl RenderOptions {
         let wanted = (self.outputs.finish(), time.map(|time| time.cpu_seconds));
         let fit = self.quality.fit(wanted, (scene, packed), settings, observer)?;
         let by_noise = |fit: Fit| noise.map_or(fit, |noise| fit.for_noise(noise));
-        let by_time = |fit: Fit| time.map_or(fit, |time| fit.for_time(&time));
+        let Unfitted { settings: RenderSettings { integrator, .. }, stated, .. } = unfitted;
+        let by_time = |fit: Fit| time.map_or(fit, |time| fit.for_time(time, integrator, *stated));
         Ok(fit.map(by_noise).map(by_time))
     }
 
-    /// Aim of the passes of a picture: its time is without that of a denoiser.
-    pub(crate) fn aim_of_render(&self, settings: &RenderSettings) -> Option<Aim> {
-        let without_denoiser = |time: Duration| {
+    /// Aim of the passes of a picture after `elapsed`: their time is what is left, without that of a denoiser.
+    pub(crate) fn aim_of_passes(&self, settings: &RenderSettings, elapsed: Duration) -> Option<Aim> {
+        let left = |time: Duration| {
             let picture = self.time_of_picture(time, settings);
             let share = picture.cpu_seconds_of_denoiser() / picture.cpu_seconds.max(f64::MIN_POSITIVE);
-            time.mul_f64((1.0 - share).max(0.0))
+            time.mul_f64((1.0 - share).max(0.0)).saturating_sub(elapsed)
         };
-        self.samples.aim().map(|aim| Aim { time: aim.time.map(without_denoiser), ..aim })
+        self.samples.aim().map(|aim| Aim { time: aim.time.map(left), ..aim })
     }
 
     fn time_of_picture(&self, time: Duration, settings: &RenderSettings) -> TimeOfPicture {

@@ -10,8 +10,9 @@ use photoncard_driver::render::Aim;
 pub(crate) struct SampleOptions {
     /// Add samples until so much time has passed since the start: 90, 60s, 5m or 2h
     ///
-    /// Passes double the number of samples; the last one is as long as the time allows. With --noise,
-    /// whichever comes first ends the render.
+    /// Passes double the number of samples; the last one is as long as the time allows. A short time also has
+    /// fewer photons and gather rays, where they are not stated. With --noise, whichever comes first ends the
+    /// render.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with_all = NOT_BY_PASSES)]
     time: Option<Duration>,
     /// Add samples until the estimated standard error of the pixels is below this share of the picture's mean

@@ -35,7 +35,7 @@ pub(crate) struct ViewOptions {
     pub(crate) quality: Quality,
     /// Denoise the settled picture by Open Image Denoise, as photoncard render --denoise does
     ///
-    /// The quality takes fewer samples and rays, and no irradiance cache.
+    /// The quality takes fewer samples and rays, 12 photons a gather, and no irradiance cache.
     #[arg(long)]
     pub(crate) denoise: bool,
     #[command(flatten)]

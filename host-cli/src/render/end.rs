@@ -68,14 +68,16 @@ pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitte
     let needed = are_needed.into_iter().filter(|(_, is_needed)| *is_needed);
     let valued =
         needed.filter_map(|(name, _)| Some((name, pixels.get(name).filter(|value| !value.is_null())?)));
-    let words = valued.map(|(name, value)| format!("--{name} {value}"));
-    let adaptive = (is_fitted && !stated.adaptive).then(|| {
-        match pixels.get("adaptive").and_then(Value::as_f64) {
-            // The `f32` prints fewer digits than the `f64` of JSON.
+    let words = valued.map(|(name, value)| match value.as_f64().filter(|_| value.is_f64()) {
+        // The `f32` prints fewer digits than the `f64` of JSON.
+        Some(number) => format!("--{name} {}", number as f32),
+        None => format!("--{name} {value}"),
+    });
+    let adaptive =
+        (is_fitted && !stated.adaptive).then(|| match pixels.get("adaptive").and_then(Value::as_f64) {
             Some(threshold) => format!("--adaptive {}", threshold as f32),
             None => "--adaptive off".to_owned(),
-        }
-    });
+        });
     let is_uncached = is_timed && !stated.cache && pixels.get("ic-error").is_some_and(Value::is_null);
     let cache = is_uncached.then(|| "--irradiance-cache off".to_owned());
     let for_camera = pixels.get("photons-for").and_then(Value::as_str) == Some("camera");

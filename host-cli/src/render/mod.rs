@@ -64,10 +64,11 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
         Ok(chosen(options, unfitted, found.get_or_init(|| fit).as_ref(), &progress))
     };
     let result = on_threads(options.threads, || {
-        let (Some(aim), Some(of_render)) = (options.samples.aim(), options.aim_of_render(&settings)) else {
+        let of_passes = options.aim_of_passes(&settings, start.elapsed());
+        let (Some(aim), Some(of_passes)) = (options.samples.aim(), of_passes) else {
             return Ok((render_chosen(&scene, &settings, &choose, &progress)?, None));
         };
-        let passes = Renderer::default().render_until(&scene, &settings, &choose, of_render, &progress)?;
+        let passes = Renderer::default().render_until(&scene, &settings, &choose, of_passes, &progress)?;
         let Passes { rendering, noise, count, ending } = passes;
         let samples = rendering.statistics.samples;
         Ok((rendering, Some(End { aim, noise, passes: count, samples, ending })))

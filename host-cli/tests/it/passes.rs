@@ -102,6 +102,35 @@ fn the_options_that_an_aim_ends_with_render_its_picture_at_once() {
 }
 
 #[test]
+fn a_time_too_short_for_records_and_caustics_names_the_settings_without_them() {
+    let room = Room::new();
+    let scene = shipped("cornell-spheres.glb");
+    let render = |output: &str, options: &[&str]| {
+        let picture = ["render", &scene, "-o", output, "--quality", "draft", "--size", "16x12"];
+        let outcome = room.run(&[&picture, options].concat());
+        assert_eq!(outcome.status, Some(0), "{}", outcome.stderr);
+        outcome.stderr
+    };
+    let said = render("passes.exr", &["--time", "0.001"]);
+    let (_, at_once) = said.split_once("this picture in one render: ").expect("the options");
+    let at_once: Vec<&str> = at_once.lines().next().unwrap().split(' ').collect();
+    // An eighth of 50,000.
+    for [option, value] in
+        [["--irradiance-cache", "off"], ["--caustic-photons", "6250"], ["--gather-rays", "1"]]
+    {
+        assert!(at_once.windows(2).any(|words| words == [option, value]), "{option} {value}: {at_once:?}");
+    }
+    render("once.exr", &at_once);
+    assert!(room.read("passes.exr") == room.read("once.exr"), "{at_once:?}");
+    let stated =
+        render("stated.exr", &["--time", "0.001", "--gather-rays", "16", "--caustic-photons", "900"]);
+    assert!(
+        stated.contains("irradiance interpolated") && !stated.contains("--irradiance-cache off"),
+        "{stated}"
+    );
+}
+
+#[test]
 fn samples_are_added_with_the_settings_that_a_pilot_chose() {
     let room = Room::new();
     let first = chosen(&room, "a.exr", &["--spp", "3", "--keep-samples"]);

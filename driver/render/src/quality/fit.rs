@@ -68,7 +68,15 @@ pub struct TimeOfPicture {
 impl TimeOfPicture {
     /// Approximate CPU time of the denoiser, seconds; 0 without one.
     pub fn cpu_seconds_of_denoiser(&self) -> f64 {
-        if self.finish == Finish::Denoised { SECONDS_OF_DENOISED_PIXEL * self.pixels } else { 0.0 }
+        let seconds = SECONDS_OF_DENOISER + SECONDS_OF_DENOISED_PIXEL * self.pixels;
+        if self.finish == Finish::Denoised { seconds } else { 0.0 }
+    }
+
+    /// Cost, in the unit of [`COST_OF_SHADOW_RAY`], that a pixel may have in the part of the time for
+    /// [`SAMPLES_IN_TIME`] samples.
+    fn cost_of_pixel(&self) -> f64 {
+        let of_render = SHARE_OF_SAMPLES * self.cpu_seconds - self.cpu_seconds_of_denoiser();
+        of_render / (SECONDS_OF_COST * self.pixels.max(1.0))
     }
 }
 
@@ -81,6 +89,8 @@ pub struct Stated {
     pub photons: bool,
     /// True if the number of caustic photons is stated.
     pub caustic_photons: bool,
+    /// True if the number of photons of a gather is stated.
+    pub neighbors: bool,
     /// True if the number of gather rays is stated.
     pub gather_rays: bool,
     /// True if the number of shadow rays is stated.
@@ -97,6 +107,7 @@ impl Stated {
         samples: true,
         photons: true,
         caustic_photons: true,
+        neighbors: true,
         gather_rays: true,
         shadow_rays: true,
         cache: true,
@@ -104,9 +115,10 @@ impl Stated {
     };
 
     /// Returns whether any setting is left to a pilot. Adaptive sampling does not count: it is off without a
-    /// pilot. Neither do caustic photons, which only a short time changes.
+    /// pilot. Neither do caustic photons, which only a short time changes, and photons of a gather, which no
+    /// pilot does.
     pub fn needs_fit(self) -> bool {
-        Self { adaptive: true, caustic_photons: true, ..self } != Self::ALL
+        Self { adaptive: true, caustic_photons: true, neighbors: true, ..self } != Self::ALL
     }
 }
 
@@ -187,7 +199,8 @@ const MAX_RAYS_OF_RECORD: u32 = 8_000;
 const PHOTONS_IN_A_SECOND: f64 = 80_000.0;
 /// CPU seconds of a sample of cost 1, the unit of [`COST_OF_SHADOW_RAY`], as measured in furnished rooms.
 const SECONDS_OF_COST: f64 = 6e-6;
-/// CPU seconds of a pixel in a denoiser that follows the render.
+/// CPU seconds of a denoiser that follows the render, and of each pixel in it.
+const SECONDS_OF_DENOISER: f64 = 0.25;
 const SECONDS_OF_DENOISED_PIXEL: f64 = 18e-6;
 /// Maximum fraction of a picture's time that its photons take.
 const SHARE_OF_PHOTONS: f64 = 0.25;
@@ -197,6 +210,9 @@ const SHARE_OF_SAMPLES: f64 = 0.5;
 const SAMPLES_IN_TIME: f64 = 2.0;
 /// Minimum number of photons per caustic photon if the time allows fewer photons than the scene would take.
 const PHOTONS_OF_CAUSTIC_PHOTON: usize = 8;
+/// Number of rays of a record below which a short time takes no records. They are fewer only if the quality
+/// has fewer.
+const MIN_RAYS_IN_TIME: u32 = 128;
 /// Minimum CPU time of a picture for the full pilot, seconds. In a furnished room the pilot takes six.
 const SECONDS_FOR_FULL_PILOT: f64 = 60.0;
 /// Number of photons that any time allows.
@@ -227,32 +243,31 @@ impl Fit {
         }
     }
 
-    /// Adjusts the settings for a picture that gets samples until a time is over. The photon map takes about
-    /// a quarter of the time at most, or has 50,000 photons; the caustic map has an eighth of these at most.
-    /// Two samples of each pixel and the denoiser take about half of the time at most: irradiance is
-    /// interpolated only if its records fit in, and otherwise each sample has the gather rays that do, at
-    /// least one.
-    pub fn for_time(self, within: &TimeOfPicture) -> Self {
-        let TimeOfPicture { cpu_seconds, pixels, .. } = *within;
-        let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * cpu_seconds;
-        let photons = self.photons.min(rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS)));
-        let photons_in_time = (photons < self.photons).then_some(self.photons);
-        let of_render = SHARE_OF_SAMPLES * cpu_seconds - within.cpu_seconds_of_denoiser();
-        let of_pixel = of_render / (SECONDS_OF_COST * pixels.max(1.0));
-        let of_sample = 1.0 + COST_OF_SHADOW_RAY * f64::from(self.shadow_rays);
-        let free = (of_pixel - SAMPLES_IN_TIME * of_sample) / COST_OF_GATHER_RAY;
-        let of_records = f64::from(self.gather_rays) * self.measured.gather_rays_per_ray;
-        let interpolates = self.interpolates && of_records <= free;
-        let samples = f64::from(self.samples);
-        let fitting = (free / SAMPLES_IN_TIME).max(1.0).floor() * samples;
-        let gather_rays = if interpolates { self.gather_rays } else { self.gather_rays.min(fitting as u32) };
+    /// Adjusts the settings for a picture that gets samples until a time is over, with the stated settings of
+    /// `integrator`. The photon map takes about a quarter of the time at most, or has 50,000 photons; the
+    /// caustic map has an eighth of these at most. Two samples of each pixel and the denoiser take about half of
+    /// the time at most: records have as many rays as fit in, or else nothing is interpolated, and each sample
+    /// has the gather rays that fit in, at least one. Stated gather rays keep the records.
+    pub fn for_time(self, time: TimeOfPicture, integrator: &Integrator, stated: Stated) -> Self {
+        let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds;
+        let most = rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS));
+        let photons = self.photons.min(most);
+        let shadow_rays = if stated.shadow_rays { integrator.shadow_rays } else { self.shadow_rays };
+        let of_sample = 1.0 + COST_OF_SHADOW_RAY * f64::from(shadow_rays);
+        let rays = (time.cost_of_pixel() - SAMPLES_IN_TIME * of_sample) / COST_OF_GATHER_RAY;
+        let of_record = within(rays / self.measured.gather_rays_per_ray, &(1..=self.gather_rays), 1);
+        let is_cached = if stated.cache { integrator.irradiance_error.is_some() } else { self.interpolates };
+        let fits = stated.cache || stated.gather_rays || of_record >= self.gather_rays.min(MIN_RAYS_IN_TIME);
+        let interpolates = is_cached && fits;
+        let of_sample = (rays / SAMPLES_IN_TIME).max(1.0).floor();
+        let of_samples = (of_sample * f64::from(self.samples)) as u32;
         Self {
             photons,
-            max_caustic_photons: photons_in_time.map_or(usize::MAX, |_| photons / PHOTONS_OF_CAUSTIC_PHOTON),
+            max_caustic_photons: most / PHOTONS_OF_CAUSTIC_PHOTON,
             interpolates,
-            gather_rays,
+            gather_rays: if interpolates { of_record } else { self.gather_rays.min(of_samples) },
             beyond: Beyond {
-                photons_in_time,
+                photons_in_time: (photons < self.photons).then_some(self.photons),
                 // More samples bring more rays than the quality has for a pixel.
                 gather_rays: self.beyond.gather_rays.filter(|_| interpolates),
                 ..self.beyond
@@ -316,14 +331,14 @@ impl Fit {
 impl Quality {
     /// Chooses settings of this quality, for a picture with this finish, by pilot renders of a scene with the
     /// view, filter and sampling in `settings`; `None` if no setting of the quality depends on the scene.
-    /// Seed, cards, threads and crop window have no effect on the result. The pilot does half the work for
-    /// [`Self::Draft`], and for a picture that is to be rendered in less than a minute of `cpu_seconds`.
+    /// Seed, cards, threads and crop window have no effect on the result. The pilot does less work for
+    /// [`Self::Draft`], and for a picture with a time limit of less than a minute of CPU time, in seconds.
     ///
     /// # Errors
     /// As [`render`](crate::render).
     pub fn fit(
         self,
-        (finish, cpu_seconds): (Finish, Option<f64>),
+        (finish, time_limit): (Finish, Option<f64>),
         (scene, packed): (&Scene, &PackedScene),
         settings: &RenderSettings,
         observer: &dyn Observer,
@@ -335,8 +350,8 @@ impl Quality {
             triangles: scene.triangles.len(),
             is_cached: settings.integrator.irradiance_error.is_some(),
         };
-        let is_short = cpu_seconds.is_some_and(|seconds| seconds < SECONDS_FOR_FULL_PILOT);
-        let effort = if self == Self::Draft || is_short { Effort::HALF } else { Effort::FULL };
+        let is_short = time_limit.is_some_and(|seconds| seconds < SECONDS_FOR_FULL_PILOT);
+        let effort = if self == Self::Draft || is_short { Effort::LESS } else { Effort::FULL };
         Ok(Some(level.fit(&measure(effort, (scene, packed), settings, observer)?, &of)))
     }
 }
@@ -450,10 +465,6 @@ mod tests {
     };
     const PICTURED: Pictured = Pictured { pixels: 65_536.0, triangles: 32, is_cached: true };
 
-    fn rendered_in(cpu_seconds: f64) -> TimeOfPicture {
-        TimeOfPicture { cpu_seconds, pixels: 64.0, finish: Finish::Rendered }
-    }
-
     fn good(variances: &Variances) -> Fit {
         Quality::Good.level(Finish::Rendered).unwrap().fit(variances, &PICTURED)
     }
@@ -560,11 +571,15 @@ mod tests {
     #[test]
     fn a_short_time_takes_few_photons_and_tells_how_many_the_scene_would_take() {
         let fit = good(&VARIANCES);
-        assert_eq!(fit.for_time(&rendered_in(1e6)), fit);
-        let [short, twice] = [5.0, 10.0].map(|seconds| fit.for_time(&rendered_in(seconds)));
+        let in_time = |seconds| {
+            let time = TimeOfPicture { cpu_seconds: seconds, pixels: 64.0, finish: Finish::Rendered };
+            fit.for_time(time, &Quality::Good.settings().integrator, Stated::default())
+        };
+        assert_eq!(in_time(1e4), Fit { max_caustic_photons: MAX_PHOTONS / 8, ..fit });
+        let [short, twice] = [5.0, 10.0].map(in_time);
         assert!((100_000..=110_000).contains(&short.photons) && twice.photons > 19 * short.photons / 10);
         assert_eq!(short.beyond, Beyond { photons_in_time: Some(fit.photons), ..Beyond::default() });
-        assert_eq!(fit.for_time(&rendered_in(1e-3)).photons, MIN_PHOTONS_IN_TIME);
+        assert_eq!(in_time(1e-3).photons, MIN_PHOTONS_IN_TIME);
         let caustics = |fit: &Fit, caustic_photons| {
             let stated = Stated { caustic_photons, ..Stated::default() };
             Quality::Good.settings().with(|settings| fit.apply(settings, stated)).photons.caustic_photons
@@ -574,34 +589,62 @@ mod tests {
         assert_eq!(caustics(&short, false), Some(short.photons / 8));
     }
 
-    /// Two samples and the denoiser take half of the time. The cost of a sample in this model is 2.4, that of
-    /// a gather ray 1.2, in units of 6 microseconds.
+    /// Fit of [`PICTURED`] for a time of which the samples may take half: `costs` of each pixel, in units of 6
+    /// microseconds, and the denoiser.
+    fn in_time(fit: Fit, costs: f64, finish: Finish, stated: Stated) -> Fit {
+        let pixels = PICTURED.pixels;
+        let of_denoiser = TimeOfPicture { cpu_seconds: 0.0, pixels, finish }.cpu_seconds_of_denoiser();
+        let cpu_seconds = 2.0 * (costs * 6e-6 * pixels + of_denoiser);
+        fit.for_time(
+            TimeOfPicture { cpu_seconds, pixels, finish },
+            &Quality::Good.settings().integrator,
+            stated,
+        )
+    }
+
+    /// Cost of two samples with four shadow rays.
+    const TWO_SAMPLES: f64 = 2.0 * (1.0 + 4.0 * 0.4);
+
     #[test]
-    fn a_short_time_takes_records_or_gather_rays_that_fit() {
-        let fit = Fit { samples: 8, shadow_rays: 4, gather_rays: 100, ..good(&VARIANCES) };
-        let within = |micros_of_pixel: f64, finish| TimeOfPicture {
-            cpu_seconds: 2e-6 * micros_of_pixel * PICTURED.pixels,
-            pixels: PICTURED.pixels,
-            finish,
+    fn a_short_time_takes_the_rays_of_records_that_fit_or_none() {
+        let fit = Fit { shadow_rays: 4, gather_rays: 200, ..good(&VARIANCES) };
+        // A fifth of the pixels have a record.
+        let by = |rays: f64, stated| {
+            let Fit { interpolates, gather_rays, .. } =
+                in_time(fit, TWO_SAMPLES + 1.2 * 0.2 * rays, Finish::Rendered, stated);
+            (interpolates, gather_rays)
         };
-        let of_samples = 2.0 * 6.0 * (1.0 + 4.0 * 0.4);
-        // Records of 100 rays for a fifth of the pixels.
-        let of_records = 6.0 * 1.2 * 20.0;
-        for (more, interpolates) in [(1.01, true), (0.99, false)] {
-            let fitted = fit.for_time(&within(of_samples + more * of_records, Finish::Rendered));
-            assert_eq!(
-                (fitted.interpolates, fitted.gather_rays),
-                (interpolates, if interpolates { 100 } else { 72 })
-            );
+        let open = Stated::default();
+        assert_eq!([300.5, 150.5].map(|rays| by(rays, open)), [(true, 200), (true, 151)]);
+        // 24 samples have the 25 rays of two among them.
+        assert_eq!(by(126.5, open), (false, 200.min(12 * 24)));
+        assert_eq!(by(20.5, open), (false, 2 * 24));
+        assert_eq!(by(20.5, Stated { cache: true, ..open }), (true, 21));
+        assert!(by(20.5, Stated { gather_rays: true, ..open }).0);
+    }
+
+    #[test]
+    fn a_short_time_takes_the_gather_rays_of_samples_that_fit_and_at_least_one() {
+        let fit =
+            Fit { samples: 8, shadow_rays: 4, gather_rays: 100, interpolates: false, ..good(&VARIANCES) };
+        for finish in [Finish::Rendered, Finish::Denoised] {
+            let by = |costs| in_time(fit, costs, finish, Stated::default()).gather_rays;
+            for rays_of_sample in [2, 3] {
+                assert_eq!(
+                    by(TWO_SAMPLES + 2.0 * 1.2 * (f64::from(rays_of_sample) + 0.1)),
+                    8 * rays_of_sample
+                );
+            }
+            assert_eq!([by(0.0), by(1e9)], [8, 100]);
         }
-        let alone = Fit { interpolates: false, ..fit };
-        let rays = |micros, finish| alone.for_time(&within(micros, finish)).gather_rays;
-        for (rays_of_sample, finish, of_denoiser) in [(3, Finish::Rendered, 0.0), (2, Finish::Denoised, 18.0)]
-        {
-            let of_rays = 2.0 * 6.0 * 1.2 * (f64::from(rays_of_sample) + 0.1);
-            assert_eq!(rays(of_denoiser + of_samples + of_rays, finish), 8 * rays_of_sample);
-        }
-        assert_eq!([rays(0.0, Finish::Denoised), rays(1e9, Finish::Denoised)], [8, 100]);
+    }
+
+    #[test]
+    fn rays_that_an_aimed_noise_raises_fit_the_time_as_well() {
+        let noisy = Fit { shadow_rays: 4, ..good(&VARIANCES) }.for_noise(1e-3);
+        assert!(noisy.gather_rays > 2000);
+        let fit = in_time(noisy, TWO_SAMPLES + 1.2 * 0.2 * 400.5, Finish::Rendered, Stated::default());
+        assert_eq!((fit.interpolates, fit.gather_rays), (true, 401));
     }
 
     /// Without records, pixels do not share rays, so that equal costs allow more rays.

@@ -14,7 +14,7 @@ impl Stated {
     /// samples anyway.
     pub fn take_over(self, settings: &mut RenderSettings, kept: &NamedSettings) {
         let number = |name: &str| kept.get(name).and_then(Value::as_u64);
-        let rays = |name: &str| number(name).and_then(|rays| u32::try_from(rays).ok());
+        let small = |name: &str| number(name).and_then(|rays| u32::try_from(rays).ok());
         let RenderSettings { photons, integrator, .. } = settings;
         if !self.photons {
             let kept = number("photons").and_then(|count| usize::try_from(count).ok());
@@ -24,16 +24,19 @@ impl Stated {
             let kept = number("caustic-photons").and_then(|count| usize::try_from(count).ok());
             photons.caustic_photons = kept.or(photons.caustic_photons);
         }
+        if !self.neighbors {
+            photons.neighbors = small("neighbors").unwrap_or(photons.neighbors);
+        }
         if photons.photons_for == PhotonsFor::Auto {
             let kept = kept.get("photons-for").and_then(Value::as_str);
             let is_of_camera = kept == Some(PhotonsFor::Camera.name());
             photons.photons_for = if is_of_camera { PhotonsFor::Camera } else { PhotonsFor::Scene };
         }
         if !self.gather_rays {
-            integrator.gather_rays = rays("gather-rays").unwrap_or(integrator.gather_rays);
+            integrator.gather_rays = small("gather-rays").unwrap_or(integrator.gather_rays);
         }
         if !self.shadow_rays {
-            integrator.shadow_rays = rays("shadow-rays").unwrap_or(integrator.shadow_rays);
+            integrator.shadow_rays = small("shadow-rays").unwrap_or(integrator.shadow_rays);
         }
         // The error is the quality's own, or less for little noise; the scene decides only if irradiance is
         // interpolated.
@@ -50,7 +53,7 @@ impl Stated {
             integrator.adaptive_threshold =
                 kept.filter(|threshold| threshold.is_finite() && *threshold > 0.0);
         }
-        integrator.planned_samples = integrator.planned_samples.or(rays("planned-spp"));
+        integrator.planned_samples = integrator.planned_samples.or(small("planned-spp"));
     }
 }
 
@@ -70,6 +73,7 @@ mod tests {
     fn unstated_settings_become_those_of_the_kept_samples() {
         let earlier = RenderSettings::default().with(|s| {
             s.photons.count = 3000;
+            (s.photons.caustic_photons, s.photons.neighbors) = (Some(700), 9);
             s.integrator.samples = 3;
             (s.integrator.gather_rays, s.integrator.shadow_rays) = (40, 6);
             s.integrator.adaptive_threshold = Some(0.25);

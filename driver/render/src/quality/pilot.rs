@@ -47,9 +47,10 @@ pub(super) struct Effort {
 
 impl Effort {
     pub(super) const FULL: Self = Self { few_photons: 16_384, gather_rays: [8, 32] };
-    /// Half of the work, for pictures of which the full pilot would take too large a part. Settings are less
-    /// certain.
-    pub(super) const HALF: Self = Self { few_photons: 8_192, gather_rays: [4, 16] };
+    /// Half of the photons and three quarters of the gather rays, for pictures of which the full pilot would
+    /// take too large a part. Settings are less certain. Points of fewer than eight rays would be sampled in
+    /// another way.
+    pub(super) const LESS: Self = Self { few_photons: 8_192, gather_rays: [8, 24] };
 }
 
 /// Variances and errors from which the settings follow, relative to the radiance of the pixels.
