@@ -38,7 +38,8 @@ pub(crate) struct OutputOptions {
     /// Remove noise by Open Image Denoise, a library that is found at run time
     ///
     /// The PNG shows the denoised picture. The EXR keeps the rendered one, and has the denoised one in the
-    /// layer denoised. The quality takes fewer samples and rays, 12 photons a gather, and no irradiance cache.
+    /// layer denoised. The quality takes fewer samples and rays, 12 photons a gather, and no irradiance
+    /// cache.
     #[arg(long)]
     pub(crate) denoise: bool,
     /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port:

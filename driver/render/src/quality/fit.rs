@@ -245,9 +245,9 @@ impl Fit {
 
     /// Adjusts the settings for a picture that gets samples until a time is over, with the stated settings of
     /// `integrator`. The photon map takes about a quarter of the time at most, or has 50,000 photons; the
-    /// caustic map has an eighth of these at most. Two samples of each pixel and the denoiser take about half of
-    /// the time at most: records have as many rays as fit in, or else nothing is interpolated, and each sample
-    /// has the gather rays that fit in, at least one. Stated gather rays keep the records.
+    /// caustic map has an eighth of these at most. Two samples of each pixel and the denoiser take about half
+    /// of the time at most: records have as many rays as fit in, or else nothing is interpolated, and each
+    /// sample has the gather rays that fit in, at least one. Stated gather rays keep the records.
     pub fn for_time(self, time: TimeOfPicture, integrator: &Integrator, stated: Stated) -> Self {
         let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds;
         let most = rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS));
@@ -589,8 +589,8 @@ mod tests {
         assert_eq!(caustics(&short, false), Some(short.photons / 8));
     }
 
-    /// Fit of [`PICTURED`] for a time of which the samples may take half: `costs` of each pixel, in units of 6
-    /// microseconds, and the denoiser.
+    /// Fit of [`PICTURED`] for a time of which the samples may take half: `costs` of each pixel, in units of
+    /// 6 microseconds, and the denoiser.
     fn in_time(fit: Fit, costs: f64, finish: Finish, stated: Stated) -> Fit {
         let pixels = PICTURED.pixels;
         let of_denoiser = TimeOfPicture { cpu_seconds: 0.0, pixels, finish }.cpu_seconds_of_denoiser();
@@ -617,7 +617,7 @@ mod tests {
         let open = Stated::default();
         assert_eq!([300.5, 150.5].map(|rays| by(rays, open)), [(true, 200), (true, 151)]);
         // 24 samples have the 25 rays of two among them.
-        assert_eq!(by(126.5, open), (false, 200.min(12 * 24)));
+        assert_eq!(by(126.5, open), (false, 200));
         assert_eq!(by(20.5, open), (false, 2 * 24));
         assert_eq!(by(20.5, Stated { cache: true, ..open }), (true, 21));
         assert!(by(20.5, Stated { gather_rays: true, ..open }).0);

@@ -138,8 +138,8 @@ fn the_command_line_shown_parses_to_the_settings_of_the_view() {
         assert_eq!(settings.schedule.order, wish.settings.schedule.order, "{line}");
         assert_eq!(settings.schedule.tile, wish.settings.schedule.tile, "{line}");
         assert_eq!(settings.picture.layers, wish.settings.picture.layers, "{line}");
-        // The command line states every setting that a quality could choose. Without a number of caustic photons
-        // each program takes its own default.
+        // The command line states every setting that a quality could choose. Without a number of caustic
+        // photons each program takes its own default.
         assert_eq!(Stated { caustic_photons: true, ..render.stated() }, Stated::ALL, "{line}");
         assert_eq!(render.scene.assignments, wish.assignments(), "{line}");
         assert_eq!(render.scene.variant, view.scene.variant, "{line}");
