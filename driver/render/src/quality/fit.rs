@@ -206,8 +206,9 @@ const SECONDS_OF_DENOISED_PIXEL: f64 = 18e-6;
 const SHARE_OF_PHOTONS: f64 = 0.25;
 /// Fraction of a picture's time for its first [`SAMPLES_IN_TIME`] samples and a denoiser.
 const SHARE_OF_SAMPLES: f64 = 0.5;
-/// Number of samples of a pixel that any time should allow: two passes, whose difference shows the noise.
-const SAMPLES_IN_TIME: f64 = 2.0;
+/// Number of samples of a pixel that any time should allow: with fewer, the time that a whole pass leaves
+/// would be a large part of it.
+const SAMPLES_IN_TIME: f64 = 4.0;
 /// Minimum number of photons per caustic photon if the time allows fewer photons than the scene would take.
 const PHOTONS_OF_CAUSTIC_PHOTON: usize = 8;
 /// Number of rays of a record below which a short time takes no records. They are fewer only if the quality
@@ -245,9 +246,9 @@ impl Fit {
 
     /// Adjusts the settings for a picture that gets samples until a time is over, with the stated settings of
     /// `integrator`. The photon map takes about a quarter of the time at most, or has 50,000 photons; the
-    /// caustic map has an eighth of these at most. Two samples of each pixel and the denoiser take about half
-    /// of the time at most: records have as many rays as fit in, or else nothing is interpolated, and each
-    /// sample has the gather rays that fit in, at least one. Stated gather rays keep the records.
+    /// caustic map has an eighth of these at most. Four samples of each pixel and the denoiser take about
+    /// half of the time at most: records have as many rays as fit in, or else nothing is interpolated, and
+    /// each sample has the gather rays that fit in, at least one. Stated gather rays keep the records.
     pub fn for_time(self, time: TimeOfPicture, integrator: &Integrator, stated: Stated) -> Self {
         let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds;
         let most = rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS));
@@ -602,8 +603,8 @@ mod tests {
         )
     }
 
-    /// Cost of two samples with four shadow rays.
-    const TWO_SAMPLES: f64 = 2.0 * (1.0 + 4.0 * 0.4);
+    /// Cost of four samples with four shadow rays.
+    const FOUR_SAMPLES: f64 = 4.0 * (1.0 + 4.0 * 0.4);
 
     #[test]
     fn a_short_time_takes_the_rays_of_records_that_fit_or_none() {
@@ -611,14 +612,13 @@ mod tests {
         // A fifth of the pixels have a record.
         let by = |rays: f64, stated| {
             let Fit { interpolates, gather_rays, .. } =
-                in_time(fit, TWO_SAMPLES + 1.2 * 0.2 * rays, Finish::Rendered, stated);
+                in_time(fit, FOUR_SAMPLES + 1.2 * 0.2 * rays, Finish::Rendered, stated);
             (interpolates, gather_rays)
         };
         let open = Stated::default();
         assert_eq!([300.5, 150.5].map(|rays| by(rays, open)), [(true, 200), (true, 151)]);
-        // 24 samples have the 25 rays of two among them.
-        assert_eq!(by(126.5, open), (false, 200));
-        assert_eq!(by(20.5, open), (false, 2 * 24));
+        // Four samples have 25 rays, or 4.
+        assert_eq!([126.5, 20.5].map(|rays| by(rays, open)), [(false, 6 * 24), (false, 24)]);
         assert_eq!(by(20.5, Stated { cache: true, ..open }), (true, 21));
         assert!(by(20.5, Stated { gather_rays: true, ..open }).0);
     }
@@ -631,7 +631,7 @@ mod tests {
             let by = |costs| in_time(fit, costs, finish, Stated::default()).gather_rays;
             for rays_of_sample in [2, 3] {
                 assert_eq!(
-                    by(TWO_SAMPLES + 2.0 * 1.2 * (f64::from(rays_of_sample) + 0.1)),
+                    by(FOUR_SAMPLES + 4.0 * 1.2 * (f64::from(rays_of_sample) + 0.1)),
                     8 * rays_of_sample
                 );
             }
@@ -643,7 +643,7 @@ mod tests {
     fn rays_that_an_aimed_noise_raises_fit_the_time_as_well() {
         let noisy = Fit { shadow_rays: 4, ..good(&VARIANCES) }.for_noise(1e-3);
         assert!(noisy.gather_rays > 2000);
-        let fit = in_time(noisy, TWO_SAMPLES + 1.2 * 0.2 * 400.5, Finish::Rendered, Stated::default());
+        let fit = in_time(noisy, FOUR_SAMPLES + 1.2 * 0.2 * 400.5, Finish::Rendered, Stated::default());
         assert_eq!((fit.interpolates, fit.gather_rays), (true, 401));
     }
 
