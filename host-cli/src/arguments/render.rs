@@ -132,15 +132,15 @@ impl RenderOptions {
         Ok(fit.map(by_noise).map(by_time))
     }
 
-    /// Aim of the passes of a picture after `elapsed`: their time is what is left, without that of a
+    /// Aim of the passes of a picture, after `elapsed`: their time is what is left of `aim`, without that of a
     /// denoiser.
-    pub(crate) fn aim_of_passes(&self, settings: &RenderSettings, elapsed: Duration) -> Option<Aim> {
+    pub(crate) fn aim_of_passes(&self, aim: Aim, settings: &RenderSettings, elapsed: Duration) -> Aim {
         let left = |time: Duration| {
             let picture = self.time_of_picture(time, settings);
             let share = picture.cpu_seconds_of_denoiser() / picture.cpu_seconds.max(f64::MIN_POSITIVE);
             time.mul_f64((1.0 - share).max(0.0)).saturating_sub(elapsed)
         };
-        self.samples.aim().map(|aim| Aim { time: aim.time.map(left), ..aim })
+        Aim { time: aim.time.map(left), ..aim }
     }
 
     fn time_of_picture(&self, time: Duration, settings: &RenderSettings) -> TimeOfPicture {

@@ -56,34 +56,28 @@ fn percent(share: f64) -> String {
 pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
     let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
     let is_timed = is_fitted && options.samples.aim().is_some_and(|aim| aim.time.is_some());
-    let are_needed = [
-        ("spp", true),
-        ("planned-spp", !options.states_planned_samples()),
-        ("photons", is_fitted && !stated.photons),
-        ("caustic-photons", is_timed && !stated.caustic_photons && statistics.caustic_gathers > 0),
-        ("gather-rays", is_fitted && !stated.gather_rays),
-        ("shadow-rays", is_fitted && !stated.shadow_rays),
-        ("ic-error", is_fitted && !stated.cache),
+    // Options with their use, and the words for a setting without a value.
+    let options_of_settings = [
+        ("spp", true, ""),
+        ("planned-spp", !options.states_planned_samples(), ""),
+        ("photons", is_fitted && !stated.photons, ""),
+        ("caustic-photons", is_timed && !stated.caustic_photons && statistics.caustic_gathers > 0, ""),
+        ("gather-rays", is_fitted && !stated.gather_rays, ""),
+        ("shadow-rays", is_fitted && !stated.shadow_rays, ""),
+        ("ic-error", is_fitted && !stated.cache, if is_timed { "--irradiance-cache off" } else { "" }),
+        ("adaptive", is_fitted && !stated.adaptive, "--adaptive off"),
     ];
-    let needed = are_needed.into_iter().filter(|(_, is_needed)| *is_needed);
-    let valued =
-        needed.filter_map(|(name, _)| Some((name, pixels.get(name).filter(|value| !value.is_null())?)));
-    let words = valued.map(|(name, value)| match value.as_f64().filter(|_| value.is_f64()) {
+    let needed = options_of_settings.into_iter().filter(|(_, is_needed, _)| *is_needed);
+    let words = needed.map(|(name, _, without)| match pixels.get(name) {
+        None | Some(Value::Null) => without.to_owned(),
         // The `f32` prints fewer digits than the `f64` of JSON.
-        Some(number) => format!("--{name} {}", number as f32),
-        None => format!("--{name} {value}"),
+        Some(value) if value.is_f64() => format!("--{name} {}", value.as_f64().unwrap_or_default() as f32),
+        Some(value) => format!("--{name} {value}"),
     });
-    let adaptive =
-        (is_fitted && !stated.adaptive).then(|| match pixels.get("adaptive").and_then(Value::as_f64) {
-            Some(threshold) => format!("--adaptive {}", threshold as f32),
-            None => "--adaptive off".to_owned(),
-        });
-    let is_uncached = is_timed && !stated.cache && pixels.get("ic-error").is_some_and(Value::is_null);
-    let cache = is_uncached.then(|| "--irradiance-cache off".to_owned());
     let for_camera = pixels.get("photons-for").and_then(Value::as_str) == Some("camera");
     let cameras =
         (is_fitted && options.leaves_cameras_open() && for_camera).then(|| "--photons-for camera".to_owned());
-    words.chain(adaptive).chain(cache).chain(cameras).collect::<Vec<_>>().join(" ")
+    words.chain(cameras).filter(|words| !words.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

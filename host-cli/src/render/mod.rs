@@ -64,10 +64,10 @@ fn run_one(options: &RenderOptions) -> Result<(), Failure> {
         Ok(chosen(options, unfitted, found.get_or_init(|| fit).as_ref(), &progress))
     };
     let result = on_threads(options.threads, || {
-        let of_passes = options.aim_of_passes(&settings, start.elapsed());
-        let (Some(aim), Some(of_passes)) = (options.samples.aim(), of_passes) else {
+        let Some(aim) = options.samples.aim() else {
             return Ok((render_chosen(&scene, &settings, &choose, &progress)?, None));
         };
+        let of_passes = options.aim_of_passes(aim, &settings, start.elapsed());
         let passes = Renderer::default().render_until(&scene, &settings, &choose, of_passes, &progress)?;
         let Passes { rendering, noise, count, ending } = passes;
         let samples = rendering.statistics.samples;

@@ -61,7 +61,7 @@ pub struct TimeOfPicture {
     pub cpu_seconds: f64,
     /// Number of pixels.
     pub pixels: f64,
-    /// Whether a denoiser follows.
+    /// Finish of the picture. A denoiser takes part of the time.
     pub finish: Finish,
 }
 
@@ -209,10 +209,10 @@ const SHARE_OF_SAMPLES: f64 = 0.5;
 /// Number of samples of a pixel that any time should allow: with fewer, the time that a whole pass leaves
 /// would be a large part of it.
 const SAMPLES_IN_TIME: f64 = 4.0;
-/// Minimum number of photons per caustic photon if the time allows fewer photons than the scene would take.
+/// Minimum ratio of the number of photons that a time allows to that of caustic photons.
 const PHOTONS_OF_CAUSTIC_PHOTON: usize = 8;
-/// Number of rays of a record below which a short time takes no records. They are fewer only if the quality
-/// has fewer.
+/// Minimum number of rays of a record in a short time, unless the fit has fewer. If fewer fit into the time,
+/// nothing is interpolated.
 const MIN_RAYS_IN_TIME: u32 = 128;
 /// Minimum CPU time of a picture for the full pilot, seconds. In a furnished room the pilot takes six.
 const SECONDS_FOR_FULL_PILOT: f64 = 60.0;
@@ -254,14 +254,17 @@ impl Fit {
         let most = rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS));
         let photons = self.photons.min(most);
         let shadow_rays = if stated.shadow_rays { integrator.shadow_rays } else { self.shadow_rays };
-        let of_sample = 1.0 + COST_OF_SHADOW_RAY * f64::from(shadow_rays);
-        let rays = (time.cost_of_pixel() - SAMPLES_IN_TIME * of_sample) / COST_OF_GATHER_RAY;
+        let cost_of_sample = 1.0 + COST_OF_SHADOW_RAY * f64::from(shadow_rays);
+        let rays = (time.cost_of_pixel() - SAMPLES_IN_TIME * cost_of_sample) / COST_OF_GATHER_RAY;
         let of_record = within(rays / self.measured.gather_rays_per_ray, &(1..=self.gather_rays), 1);
-        let is_cached = if stated.cache { integrator.irradiance_error.is_some() } else { self.interpolates };
-        let fits = stated.cache || stated.gather_rays || of_record >= self.gather_rays.min(MIN_RAYS_IN_TIME);
-        let interpolates = is_cached && fits;
-        let of_sample = (rays / SAMPLES_IN_TIME).max(1.0).floor();
-        let of_samples = (of_sample * f64::from(self.samples)) as u32;
+        let interpolates = if stated.cache {
+            integrator.irradiance_error.is_some()
+        } else {
+            let fits = of_record >= self.gather_rays.min(MIN_RAYS_IN_TIME);
+            self.interpolates && (stated.gather_rays || fits)
+        };
+        let of_sample = (rays / SAMPLES_IN_TIME).max(1.0) as u32;
+        let of_samples = of_sample.saturating_mul(self.samples);
         Self {
             photons,
             max_caustic_photons: most / PHOTONS_OF_CAUSTIC_PHOTON,
@@ -333,7 +336,7 @@ impl Quality {
     /// Chooses settings of this quality, for a picture with this finish, by pilot renders of a scene with the
     /// view, filter and sampling in `settings`; `None` if no setting of the quality depends on the scene.
     /// Seed, cards, threads and crop window have no effect on the result. The pilot does less work for
-    /// [`Self::Draft`], and for a picture with a time limit of less than a minute of CPU time, in seconds.
+    /// [`Self::Draft`], and for a time limit of less than 60 CPU seconds.
     ///
     /// # Errors
     /// As [`render`](crate::render).

@@ -14,7 +14,7 @@ impl Stated {
     /// samples anyway.
     pub fn take_over(self, settings: &mut RenderSettings, kept: &NamedSettings) {
         let number = |name: &str| kept.get(name).and_then(Value::as_u64);
-        let small = |name: &str| number(name).and_then(|rays| u32::try_from(rays).ok());
+        let count = |name: &str| number(name).and_then(|count| u32::try_from(count).ok());
         let RenderSettings { photons, integrator, .. } = settings;
         if !self.photons {
             let kept = number("photons").and_then(|count| usize::try_from(count).ok());
@@ -25,7 +25,7 @@ impl Stated {
             photons.caustic_photons = kept.or(photons.caustic_photons);
         }
         if !self.neighbors {
-            photons.neighbors = small("neighbors").unwrap_or(photons.neighbors);
+            photons.neighbors = count("neighbors").unwrap_or(photons.neighbors);
         }
         if photons.photons_for == PhotonsFor::Auto {
             let kept = kept.get("photons-for").and_then(Value::as_str);
@@ -33,10 +33,10 @@ impl Stated {
             photons.photons_for = if is_of_camera { PhotonsFor::Camera } else { PhotonsFor::Scene };
         }
         if !self.gather_rays {
-            integrator.gather_rays = small("gather-rays").unwrap_or(integrator.gather_rays);
+            integrator.gather_rays = count("gather-rays").unwrap_or(integrator.gather_rays);
         }
         if !self.shadow_rays {
-            integrator.shadow_rays = small("shadow-rays").unwrap_or(integrator.shadow_rays);
+            integrator.shadow_rays = count("shadow-rays").unwrap_or(integrator.shadow_rays);
         }
         // The error is the quality's own, or less for little noise; the scene decides only if irradiance is
         // interpolated.
@@ -53,7 +53,7 @@ impl Stated {
             integrator.adaptive_threshold =
                 kept.filter(|threshold| threshold.is_finite() && *threshold > 0.0);
         }
-        integrator.planned_samples = integrator.planned_samples.or(small("planned-spp"));
+        integrator.planned_samples = integrator.planned_samples.or(count("planned-spp"));
     }
 }
 
