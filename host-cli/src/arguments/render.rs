@@ -132,8 +132,8 @@ impl RenderOptions {
         Ok(fit.map(by_noise).map(by_time))
     }
 
-    /// Aim of the passes of a picture, after `elapsed`: their time is what is left of `aim`, without that of a
-    /// denoiser.
+    /// Aim of the passes of a picture, after `elapsed`: their time is what is left of `aim`, without that of
+    /// a denoiser.
     pub(crate) fn aim_of_passes(&self, aim: Aim, settings: &RenderSettings, elapsed: Duration) -> Aim {
         let left = |time: Duration| {
             let picture = self.time_of_picture(time, settings);
