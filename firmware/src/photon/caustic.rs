@@ -195,9 +195,8 @@ impl Collector for Sums<'_> {
     }
 
     #[inline(always)]
-    fn skips(&self, node: PhotonNode) -> bool {
-        let classes = node.normals();
-        classes != 0 && classes & self.classes == 0
+    fn skipped(&self, node: PhotonNode) -> u16 {
+        node.children_without(self.classes)
     }
 
     #[inline(always)]

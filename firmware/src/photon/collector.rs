@@ -14,10 +14,10 @@ pub(super) trait Collector {
     #[inline(always)]
     fn narrow(&mut self, _photon_share: f32) {}
 
-    /// Returns true if the collector needs no photon below a node.
+    /// Bit mask of the children of a node of whose photons the collector needs none.
     #[inline(always)]
-    fn skips(&self, _node: PhotonNode) -> bool {
-        false
+    fn skipped(&self, _node: PhotonNode) -> u16 {
+        0
     }
 
     /// Adds those photons in the first `count` lanes that belong to the result: within [`Self::limit`], or

@@ -45,11 +45,15 @@ pub(super) fn gather(
             }
             Child::Node(node) => descent.enter(isa, memory, node, Order::NearestFirst, |line| {
                 let line = PhotonNode(line);
-                if nearest.skips(line) {
-                    return [BEYOND; LANES];
-                }
                 nearest.narrow(line.photon_share());
-                distances_to_boxes(isa, grid, line, query, nearest.limit())
+                let mut distances = distances_to_boxes(isa, grid, line, query, nearest.limit());
+                let skipped = nearest.skipped(line);
+                for (lane, distance) in distances.iter_mut().enumerate() {
+                    if skipped >> lane & 1 != 0 {
+                        *distance = BEYOND;
+                    }
+                }
+                distances
             })?,
         }
     }

@@ -15,13 +15,18 @@ use crate::address::LINE_BYTES;
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | x, y, z of the corner: bits 0-23 grid coordinate, 24-31 exponent of the unit on this axis |
-/// | 22..24 | in the caustic map [`Self::normals`], else upper half of the bits of [`Self::photon_share`] |
+/// | 22..24 | upper half of the bits of [`Self::photon_share`]; in the caustic map one bit a child: set if its photons are of one class |
+/// | 24..32 | in the caustic map the class of each such child, 4 bits each: [`normal_class`](super::normal_class) |
 #[derive(Clone, Copy)]
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
 const COORDINATE_BITS: u32 = 24;
-/// Offset in the line, bytes, of the photon share or, in the caustic map, of the classes of normals.
+/// Offset in the line of the photon share, bytes.
 const SHARE: usize = 22;
+/// Offset in the line of a caustic map of the bits of children of one class, bytes.
+const OF_ONE_CLASS: usize = 22;
+/// Offset in the line of a caustic map of the children's classes, bytes.
+const CLASSES: usize = 24;
 /// Maximum of [`NodeCoordinates::exponent`], for a box as large as the grid.
 const MAX_EXPONENT: u32 = 13;
 
@@ -64,19 +69,36 @@ impl<'a> PhotonNode<'a> {
         [line[SHARE], line[SHARE + 1]] = [low, high];
     }
 
-    /// Bit mask of the classes ([`normal_class`]) of the normals of all photons below the node; 0 if the host
-    /// has not stored them.
-    ///
-    /// [`normal_class`]: super::normal_class
+    /// Bit mask of the children of a caustic map whose photons have normals of one class
+    /// ([`normal_class`](super::normal_class)) that is not in the bit mask `classes`.
     #[inline(always)]
-    pub fn normals(&self) -> u16 {
-        u16::from_le_bytes([WideNode(self.0).byte(SHARE), WideNode(self.0).byte(SHARE + 1)])
+    pub fn children_without(&self, classes: u16) -> u16 {
+        let node = WideNode(self.0);
+        let of_one = u16::from_le_bytes([node.byte(OF_ONE_CLASS), node.byte(OF_ONE_CLASS + 1)]);
+        let codes = u64::from(read_u32(self.0, CLASSES)) | u64::from(read_u32(self.0, CLASSES + 4)) << 32;
+        let mut without = 0;
+        for child in 0..NODE_CHILDREN {
+            let class = codes >> (4 * child) & 15;
+            without |= (!classes >> class & 1) << child;
+        }
+        of_one & without
     }
 
-    /// Stores the bit mask of the classes ([`normal_class`](super::normal_class)) of a node's photon normals
-    /// in its line.
-    pub fn set_normals(line: &mut [u8; LINE_BYTES], classes: u16) {
-        [line[SHARE], line[SHARE + 1]] = classes.to_le_bytes();
+    /// Stores the classes ([`normal_class`](super::normal_class)) below each child of a caustic map:
+    /// `children` has a bit mask of them for each. A child of several classes is in no result of
+    /// [`Self::children_without`].
+    pub fn set_classes(line: &mut [u8; LINE_BYTES], children: impl IntoIterator<Item = u16>) {
+        let (mut of_one, mut codes) = (0_u16, 0_u64);
+        for (child, classes) in children.into_iter().enumerate().take(NODE_CHILDREN) {
+            if classes.is_power_of_two() {
+                of_one |= 1 << child;
+                codes |= u64::from(classes.trailing_zeros()) << (4 * child);
+            }
+        }
+        let [a, b, c, d, e, f, g, h] = codes.to_le_bytes();
+        write_u32(line, CLASSES, u32::from_le_bytes([a, b, c, d]));
+        write_u32(line, CLASSES + 4, u32::from_le_bytes([e, f, g, h]));
+        [line[OF_ONE_CLASS], line[OF_ONE_CLASS + 1]] = of_one.to_le_bytes();
     }
 
     /// Boxes of all children, by axis.
@@ -202,6 +224,17 @@ mod tests {
     }
 
     #[test]
+    fn children_of_one_class_are_without_all_others() {
+        let mut line = [0xff; LINE_BYTES];
+        PhotonNode::set_classes(&mut line, [1 << 3, 1 << 15, 0b1001, 1, 0].into_iter().chain([1 << 9; 11]));
+        let node = PhotonNode(&line);
+        assert_eq!(node.children_without(0), !0b1_0100);
+        assert_eq!(node.children_without(!0), 0);
+        assert_eq!(node.children_without(1 << 3), !0b1_0101);
+        assert_eq!(node.children_without(1 << 9), 0b1011);
+    }
+
+    #[test]
     fn reading_a_photon_node_of_arbitrary_bytes_does_not_panic() {
         let mut next = random(2);
         for _ in 0..2000 {
@@ -209,6 +242,7 @@ mod tests {
             let node = PhotonNode(&line);
             for child in 0..NODE_CHILDREN {
                 core::hint::black_box(node.coordinates().map(|axis| axis.sides(child)));
+                core::hint::black_box(node.children_without(child as u16));
             }
         }
     }
