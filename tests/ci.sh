@@ -6,7 +6,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 export CARGO_TERM_COLOR=${CARGO_TERM_COLOR:-never}
 # What a service of continuous integration builds is built once: the state of incremental builds would only fill its disk.
-[ -z "${CI:-}" ] || export CARGO_INCREMENTAL=0
+# A failing test names its place without line tables.
+[ -z "${CI:-}" ] || export CARGO_INCREMENTAL=0 CARGO_PROFILE_DEV_DEBUG=false CARGO_PROFILE_DEV_CODEGEN_UNITS=4
 
 # The images of boards, and the target of each.
 images=(mps2-an386 stm32h747i-disco virt-riscv32)

@@ -46,10 +46,10 @@ macro_rules! tests_of_targets {
 
 mod no_input_panics_hangs_or_takes_much_memory {
     tests_of_targets! {
-        frames: 100_000,
-        messages: 300_000,
+        frames: 30_000,
+        messages: 100_000,
         session: 12_000,
-        image: 3_000,
+        image: 1_000,
         gltf: 2_500,
         meshopt: 2_000,
         draco: 2_500,

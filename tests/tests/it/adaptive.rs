@@ -69,7 +69,7 @@ fn check_means([even, even_error, _]: [f64; 3], [adaptive, error, _]: [f64; 3]) 
 /// dark: bright probes add more paths, and so would weigh less in it.
 #[test]
 fn adaptive_sampling_changes_the_noise_and_not_the_mean() {
-    let [even, adaptive] = [None, Some(0.02)].map(|threshold| moments(threshold, 0, 120));
+    let [even, adaptive] = [None, Some(0.02)].map(|threshold| moments(threshold, 0, 84));
     check_means(even, adaptive);
     let [even_variance, variance] = [even[2], adaptive[2]];
     assert!(variance < 0.75 * even_variance, "{variance} of {even_variance}");

@@ -115,7 +115,7 @@ fn a_groove_of_glossy_metal_reflects_a_distant_light() {
             intensity: Vec3::ONE,
         };
         let lit = groove(roughness, 2.0).with(|scene| scene.lights = vec![sun]);
-        let many = settings().with(|s| s.photons.caustic_photons = Some(1_000_000));
+        let many = settings().with(|s| s.photons.caustic_photons = Some(500_000));
         let found = mean(&radiances(&render_or_panic(&lit, &many).film));
         assert!((found / expected - 1.0).abs() < 0.03, "{roughness}: {found} of {expected}");
         // Without the caustic map, gather rays that end on the second plate sample the light there.

@@ -130,7 +130,6 @@ fn no_seam_shows_at_the_borders_of_tiles() {
             .frame(&settings().with(|s| {
                 s.integrator.seed = seed;
                 s.integrator.irradiance_error = irradiance_error;
-                s.integrator.shadow_rays = 64;
             }))
             .radiance
     };

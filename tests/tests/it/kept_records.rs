@@ -39,7 +39,7 @@ impl World {
     fn new() -> Self {
         let scene = everything();
         let settings = RenderSettings::default().with(|s| {
-            (s.picture.width, s.picture.height) = (24, 20);
+            (s.picture.width, s.picture.height) = (18, 16);
             (s.photons.count, s.photons.neighbors) = (2000, 20);
             (s.photons.caustic_photons, s.photons.caustic_neighbors) = (Some(500), 20);
             (s.integrator.gather_rays, s.integrator.shadow_rays) = (8, 2);
@@ -106,7 +106,7 @@ fn check_passes<K: ChipKind>(world: &World, new_chip: impl Fn() -> Box<Chip<K>>)
     let passes = [world.samples(0, 2), world.samples(2, 1)];
     let alone = passes.map(|frame| world.alone(&frame));
     let mut kept = Vec::new();
-    for room in [0, DIRECTORY, DIRECTORY + 1, DIRECTORY + 40, DIRECTORY + 200, PLENTY] {
+    for room in [0, DIRECTORY, DIRECTORY + 1, DIRECTORY + 40, DIRECTORY + 100, PLENTY] {
         let mut chip = new_chip();
         let mut lines = world.memory(room);
         for (frame, (expected, alone)) in passes.iter().zip(&alone) {
