@@ -46,7 +46,7 @@ pub(crate) struct RenderOptions {
     /// Guide photons to the whole scene, or to what this camera uses
     ///
     /// By the camera more photons are where the picture uses them: light through a window wastes fewer on the
-    /// outside of a house. The picture's expected value stays. With auto a pilot measures what that gains,
+    /// outside of a house. The picture's expected value stays. With auto a pilot finds what that gains,
     /// unless all that it would choose is stated. Pictures of several cameras, such as frames and prepared
     /// scenes, share photons for the scene.
     #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::Auto.name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]

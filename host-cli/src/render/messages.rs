@@ -138,7 +138,7 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
 pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Vec<String> {
     let gain = fit.measured.photons_for_camera.map(|ratio| {
         let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };
-        format!("photons for the camera have {ratio:.2} times the squared error of as many for any camera: {taken}")
+        format!("photons for the camera have some {ratio:.2} times the squared error of as many for any camera: {taken}")
     });
     let Beyond { photons, gather_rays, photons_in_time } = fit.beyond;
     let (photons, remedy) = match photons_in_time {

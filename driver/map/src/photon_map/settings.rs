@@ -36,12 +36,12 @@ pub enum PhotonsFor {
     Scene,
     /// The picture's camera. Photons are guided towards what its picture uses, without bias.
     Camera,
-    /// The picture's camera if a pilot measures that guiding helps, otherwise any camera.
+    /// The picture's camera if a pilot finds that guiding helps, otherwise any camera.
     Auto,
 }
 
 choices!(PhotonsFor {
-    Auto = "auto": "The camera of the picture, where a pilot measures that this gains",
+    Auto = "auto": "The camera of the picture, where a pilot finds that this gains",
     Scene = "scene": "Any camera",
     Camera = "camera": "The camera of the picture: fewer where it does not use them",
 });

@@ -122,7 +122,7 @@ impl Stated {
     }
 }
 
-/// Noise and map errors that pilot renders measured, and the gather rays that a pixel costs.
+/// Noise and map errors that pilot renders show, and the gather rays that a pixel costs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Measured {
     /// Relative standard deviation of a sample caused by its position in the pixel.

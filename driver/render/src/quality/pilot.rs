@@ -1,5 +1,7 @@
 //! Pilot renders: pixels spread over the picture, rendered on emulated chips of this process.
 
+use std::ops::RangeInclusive;
+
 use glam::Vec3;
 use photoncard_firmware::sampler::hash;
 use photoncard_map::pack::PackedScene;
@@ -21,10 +23,17 @@ const SPREAD: Grid = Grid { cells: 8, side: 4 };
 /// Grid of tiles in which irradiance records are placed. The tiles are large, because tiles do not share the
 /// records at their borders.
 const SURVEYED: Grid = Grid { cells: 4, side: 32 };
-/// Photon maps guided towards the camera are measured only if the picture can use less than this fraction of
+/// Photon maps guided towards the camera are taken only if the picture can use less than this fraction of
 /// the photons of an unguided map. In rooms, halls and Cornell boxes, where guiding gains nothing, the
 /// fraction is greater.
 const MAX_USED_SHARE: f64 = 0.3;
+/// Fractions of the photons of an unguided map that the picture uses from which the short pilot estimates
+/// the error of a guided map. Below them it has a hundred photons at most, and above them guiding may gain
+/// nothing.
+const ESTIMATED_SHARES: RangeInclusive<f64> = 0.003..=0.1;
+/// Ratio of the squared errors of a guided and of an unguided map, over the fraction of the unguided photons
+/// that the picture uses. It is above 1, because guided photons differ in power.
+const ERROR_BY_USED_SHARE: f64 = 2.0;
 /// Ratio of the numbers of photons of the larger and the smaller map.
 const MORE: usize = 4;
 /// Seeds of a pair of renders and of their photons. They differ from the picture's seed, on which settings
@@ -43,14 +52,17 @@ pub(super) struct Effort {
     few_photons: usize,
     /// Numbers of gather rays that are compared.
     gather_rays: [u32; 2],
+    /// Whether maps guided towards the camera are rendered even if their errors can be estimated. Guides take
+    /// most of a pilot's time.
+    measures_guided: bool,
 }
 
 impl Effort {
-    pub(super) const FULL: Self = Self { few_photons: 16_384, gather_rays: [8, 32] };
-    /// Half of the photons and three quarters of the gather rays, for pictures of which the full pilot would
-    /// take too large a part. Settings are less certain. Points of fewer than eight rays would be sampled in
-    /// another way.
-    pub(super) const LESS: Self = Self { few_photons: 8_192, gather_rays: [8, 24] };
+    pub(super) const FULL: Self = Self { few_photons: 16_384, gather_rays: [8, 32], measures_guided: true };
+    /// Half of the photons, three quarters of the gather rays and few guided maps, for pictures of which the
+    /// full pilot would take too large a part. Settings are less certain. Points of fewer than eight rays
+    /// would be sampled in another way.
+    pub(super) const LESS: Self = Self { few_photons: 8_192, gather_rays: [8, 24], measures_guided: false };
 }
 
 /// Variances and errors from which the settings follow, relative to the radiance of the pixels.
@@ -99,6 +111,13 @@ impl ForCamera {
         let of_scene = (difference(best, [of_scene, &more]) - own).max(0.0);
         Self { photon, ratio: own / of_scene }
     }
+
+    /// Estimates the errors from that of a map for any camera and the fraction of its photons that the
+    /// picture uses.
+    fn estimated(of_scene: f64, used_share: f64) -> Self {
+        let photon = ERROR_BY_USED_SHARE * used_share * of_scene;
+        Self { photon, ratio: photon / of_scene }
+    }
 }
 
 /// Renders the pilots of a picture. Returns the variances that they show.
@@ -111,7 +130,7 @@ pub(super) fn measure(
     settings: &RenderSettings,
     observer: &dyn Observer,
 ) -> Result<Variances, RenderError> {
-    let Effort { few_photons, gather_rays: numbers_of_gather_rays } = effort;
+    let Effort { few_photons, gather_rays: numbers_of_gather_rays, measures_guided } = effort;
     let more_photons = MORE * few_photons;
     let threads = rayon::ThreadPoolBuilder::new().num_threads(rayon::current_num_threads());
     let pool = threads.build().map_err(RenderError::Chips)?;
@@ -148,13 +167,16 @@ pub(super) fn measure(
     });
     let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
     let maps = [render_map(&few)?, render_map(&more)?];
-    let for_camera = if more.used_share.is_some_and(|share| share < MAX_USED_SHARE) {
-        let settings = settings.clone().with(|settings| settings.photons.photons_for = PhotonsFor::Camera);
-        let pilot = |photons| Pilot::new(scene, packed, &settings, photons, &pool, observer);
-        let guided = [render_map(&pilot(few_photons)?)?, render_map(&pilot(more_photons)?)?];
-        Some(ForCamera::new(effort, &best, guided, &maps[1]))
-    } else {
-        None
+    let photon = of_photon(effort, &best, [&maps[0], &maps[1]]);
+    let for_camera = match more.used_share.filter(|share| *share < MAX_USED_SHARE) {
+        Some(share) if measures_guided || !ESTIMATED_SHARES.contains(&share) => {
+            let settings =
+                settings.clone().with(|settings| settings.photons.photons_for = PhotonsFor::Camera);
+            let pilot = |photons| Pilot::new(scene, packed, &settings, photons, &pool, observer);
+            let guided = [render_map(&pilot(few_photons)?)?, render_map(&pilot(more_photons)?)?];
+            Some(ForCamera::new(effort, &best, guided, &maps[1]))
+        }
+        share => share.map(|share| ForCamera::estimated(photon, share)),
     };
     let [shadow_ray, gather_ray] = [
         of_ray(SHADOW_RAYS, &by_few_shadow_rays, &best),
@@ -165,7 +187,7 @@ pub(super) fn measure(
         place: (of_pairs([&best])[0] - of_rays).max(0.0),
         shadow_ray,
         gather_ray,
-        photon: of_photon(effort, &best, [&maps[0], &maps[1]]),
+        photon,
         for_camera,
         lambertian: best[0].lambertian,
         gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
@@ -392,6 +414,13 @@ impl Grid {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_estimate_gains_by_the_used_share_and_nothing_without_an_error() {
+        let ForCamera { photon, ratio } = ForCamera::estimated(8.0, 0.05);
+        assert_eq!((photon, ratio), (0.8, 0.1));
+        assert!(ForCamera::estimated(0.0, 0.05).ratio.is_nan());
+    }
 
     #[test]
     fn tiles_lie_in_the_window_and_are_spread_over_it() {
