@@ -15,8 +15,9 @@ use crate::address::LINE_BYTES;
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | x, y, z of the corner: bits 0-23 grid coordinate, 24-31 exponent of the unit on this axis |
-/// | 22..24 | upper half of the bits of [`Self::photon_share`]; in the caustic map one bit a child: set if its photons are of one class |
-/// | 24..32 | in the caustic map the class of each such child, 4 bits each: [`normal_class`](super::normal_class) |
+/// | 22..24 | photon map: upper half of the bits of [`Self::photon_share`] |
+/// | 22..24 | caustic map: one bit per child, set if its photons have normals of one class |
+/// | 24..32 | caustic map: four bits per child, this class ([`normal_class`](super::normal_class)) |
 #[derive(Clone, Copy)]
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
@@ -95,9 +96,8 @@ impl<'a> PhotonNode<'a> {
                 codes |= u64::from(classes.trailing_zeros()) << (4 * child);
             }
         }
-        let [a, b, c, d, e, f, g, h] = codes.to_le_bytes();
-        write_u32(line, CLASSES, u32::from_le_bytes([a, b, c, d]));
-        write_u32(line, CLASSES + 4, u32::from_le_bytes([e, f, g, h]));
+        write_u32(line, CLASSES, codes as u32);
+        write_u32(line, CLASSES + 4, (codes >> 32) as u32);
         [line[OF_ONE_CLASS], line[OF_ONE_CLASS + 1]] = of_one.to_le_bytes();
     }
 

@@ -46,8 +46,6 @@ struct Run {
 pub(super) struct PhotonTree<'a> {
     photons: &'a [StoredPhoton],
     folded: Folded<Run, Extent>,
-    /// Whether it is of a caustic map.
-    is_of_discs: bool,
 }
 
 impl<'a> PhotonTree<'a> {
@@ -73,7 +71,7 @@ impl<'a> PhotonTree<'a> {
             // The tree above the groups is too deep.
             folded = Folded::new(build(photons, 0, searches, MAX_SKEWED)?);
         }
-        Some(Self { photons, folded, is_of_discs: searches.reach.is_some() })
+        Some(Self { photons, folded })
     }
 
     /// Lines of the inner nodes.
@@ -82,9 +80,7 @@ impl<'a> PhotonTree<'a> {
             let boxes: Vec<GridBox> = node.children.iter().map(|extent| extent.room).collect();
             let mut line = PhotonNode::encode(&boxes, node.links)
                 .unwrap_or_else(|| unreachable!("a node of {} children", boxes.len()));
-            if self.is_of_discs {
-                PhotonNode::set_classes(&mut line, node.children.iter().map(|extent| extent.normals));
-            }
+            PhotonNode::set_classes(&mut line, node.children.iter().map(|extent| extent.normals));
             line
         })
     }

@@ -27,9 +27,9 @@ const SURVEYED: Grid = Grid { cells: 4, side: 32 };
 /// the photons of an unguided map. In rooms, halls and Cornell boxes, where guiding gains nothing, the
 /// fraction is greater.
 const MAX_USED_SHARE: f64 = 0.3;
-/// Fractions of the photons of an unguided map that the picture uses from which the short pilot estimates
-/// the error of a guided map. Below them it has a hundred photons at most, and above them guiding may gain
-/// nothing.
+/// Range of the used fraction of an unguided map's photons in which the short pilot estimates the error of a
+/// guided map. Below it the picture uses less than a hundred of the pilot's photons; above it guiding may
+/// gain nothing.
 const ESTIMATED_SHARES: RangeInclusive<f64> = 0.003..=0.1;
 /// Ratio of the squared errors of a guided and of an unguided map, over the fraction of the unguided photons
 /// that the picture uses. It is above 1, because guided photons differ in power.
@@ -52,8 +52,8 @@ pub(super) struct Effort {
     few_photons: usize,
     /// Numbers of gather rays that are compared.
     gather_rays: [u32; 2],
-    /// Whether maps guided towards the camera are rendered even if their errors can be estimated. Guides take
-    /// most of a pilot's time.
+    /// True if guided maps are rendered even where their errors can be estimated. Guides take most of a
+    /// pilot's time.
     measures_guided: bool,
 }
 
