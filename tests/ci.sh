@@ -37,6 +37,7 @@ command -v cc >/dev/null || {
     apt-get update -qq && apt-get install -y -qq build-essential
 }
 rustup component add rustfmt clippy llvm-tools
+rustup target add "${target_of[@]}"
 
 can_install() { [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; }
 # install NAME PACKAGE...: installs packages of the distribution, or says by which command.
@@ -177,7 +178,6 @@ refuse_panics() {
 }
 
 check_boards() {
-    rustup target add "${target_of[@]}"
     local image arguments
     for image in "${images[@]}"; do
         step "image of $image"
@@ -197,7 +197,6 @@ check_test() {
     find_farms
     find_denoiser
     find_operations
-    rustup target add "${target_of[@]}"
     # A test that hangs is stopped and named: by nextest one by one, else with its test program. Examples have no tests; the lints
     # compile them.
     step "tests"
@@ -250,6 +249,22 @@ check_packages() {
 for stage in "$@"; do
     declare -F "check_$stage" >/dev/null || fail "there is no stage $stage; the stages are lint, boards, test, docs, packages"
 done
+# A board's image is linked as a whole by one thread: lints take the other, in another folder of cargo's.
+if [ "$1 ${2:-}" = "lint boards" ]; then
+    said=$(mktemp)
+    # A group of its own, so that a failure of the lints ends all of it.
+    set -m
+    check_boards >"$said" 2>&1 &
+    set +m
+    boards=$!
+    trap 'kill -- -$boards 2>/dev/null || true; cat "$said"; rm -f "$said"' EXIT
+    check_lint
+    wait "$boards" || fail "an image of a board cannot be built"
+    trap - EXIT
+    cat "$said"
+    rm -f "$said"
+    shift 2
+fi
 for stage in "$@"; do
     "check_$stage"
 done

@@ -16,7 +16,7 @@ use crate::console::write_out;
 use crate::failure::Failure;
 
 /// Name of the program.
-const NAME: &str = env!("CARGO_BIN_NAME");
+const NAME: &str = env!("CARGO_PKG_NAME");
 
 /// Prints the completions for a shell.
 pub(crate) fn completions(shell: Shell) -> Result<(), Failure> {

@@ -1,0 +1,98 @@
+//! The `photoncard` command: arguments and printing, no rendering.
+//!
+//! Standard output is for data, standard error for messages. Exit status: 0 done; 1 the work failed; 2
+//! invalid arguments or unreadable input; 130 stopped by an interrupt.
+//!
+//! | module | contents |
+//! |---|---|
+//! | `console`, `report` | the standard streams, with foreign text escaped; layout of errors |
+//! | `failure` | errors with their exit status |
+//!  `flags` | flags of the command line in place of the settings that the library's errors name |
+//! | `arguments`, `environment` | command line: options of every command, and their values |
+//! | `input` | scene and environment of a render |
+//!  `notices` | contents of a scene that are ignored, missing or interpreted in another way |
+//! | `shell` | quoting of commands |
+//! | `outputs` | checks of output files before any work |
+//! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
+//! | `render` (and `prepare`), `farm`, `view`, `scene`, `documents`, `study` | one module for each command |
+//! | `card`, `pictures` | commands on cards, and on pictures (`merge`, `tonemap`, `diff`) |
+//!
+//! A command turns arguments into settings of `photoncard_driver`, calls it, and prints the result. To render
+//! from Rust, use `photoncard_driver` directly.
+#![forbid(unsafe_code)]
+
+mod arguments;
+mod card;
+mod console;
+mod documents;
+mod environment;
+mod failure;
+mod farm;
+mod flags;
+#[cfg(target_os = "linux")]
+mod hang_up;
+mod input;
+mod notices;
+mod outputs;
+mod pictures;
+mod progress;
+mod render;
+mod report;
+mod scene;
+mod shell;
+#[cfg(feature = "study")]
+mod study;
+mod view;
+
+use std::process::ExitCode;
+
+use crate::arguments::{Arguments, CardCommand, Command, ProgressForm, SceneCommand};
+use crate::progress::fail_openjd;
+
+#[cfg(not(feature = "study"))]
+fn without_studies() -> failure::Failure {
+    let remedy = "build it with them: cargo build --release -p photoncard --features study";
+    failure::Failure::Input(
+        miette::MietteDiagnostic::new("this program was built without studies").with_help(remedy).into(),
+    )
+}
+
+/// Runs the command that the process's arguments state. Returns its exit status.
+pub fn main() -> ExitCode {
+    // Invalid arguments end the process here, with status 2.
+    let mut arguments = Arguments::parse_printably();
+    report::lay_out_errors();
+    let result = match &mut arguments.command {
+        Command::Render(options) => render::run(options),
+        Command::Prepare(options) => render::prepare::run(options),
+        Command::Merge(options) => pictures::merge(options),
+        Command::Farm(command) => farm::run(command),
+        Command::View(options) => view::run(options),
+        Command::Tonemap(options) => pictures::tonemap(options),
+        Command::Scene(SceneCommand::Info { scene, json, lights }) => scene::info(scene, *json, lights),
+        Command::Card(CardCommand::List) => card::list(),
+        Command::Card(CardCommand::Info { card, chip }) => {
+            card::info(&card.clone().of_kind(|kind| chip.or(kind)))
+        }
+        Command::Card(CardCommand::Ping { card, count }) => card::ping(card, *count),
+        Command::Card(CardCommand::Selftest { card, quiet }) => card::self_test(card, *quiet),
+        Command::Emulate(options) => card::emulate(options),
+        Command::Diff(options) => pictures::diff(options),
+        Command::Completions { shell } => documents::completions(*shell),
+        Command::Man { folder } => documents::man(folder),
+        #[cfg(feature = "study")]
+        Command::Study(arguments) => study::run(arguments),
+        #[cfg(not(feature = "study"))]
+        Command::Study { .. } => Err(without_studies()),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            console::say_failure(&failure);
+            if arguments.command.progress() == ProgressForm::Openjd {
+                fail_openjd(&failure);
+            }
+            failure.status()
+        }
+    }
+}
