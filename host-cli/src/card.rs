@@ -221,8 +221,9 @@ pub(crate) fn emulate(options: &EmulateOptions) -> Result<(), Failure> {
         ));
     }
     print(&[listener.card_address().to_owned()])?;
-    serve_card(options.chip.or(options.card), &mut HostPort::new(listener, stop, say))
-        .map_err(|error| Failure::work_error(&error))?;
+    let kind = options.chip.or(options.card).emulated();
+    let chip = options.card_memory.map_or(kind, |bytes| kind.with_memory(bytes));
+    serve_card(chip, &mut HostPort::new(listener, stop, say)).map_err(|error| Failure::work_error(&error))?;
     Err(Failure::Stopped("stopped; the card is gone"))
 }
 

@@ -2,14 +2,18 @@
 
 use photoncard_driver::render::{RenderSettings, Setting};
 
-/// Field of the settings as the library's errors name it, and the two flags that set it.
-const CACHES: [&str; 2] = ["`cards.caches`", "--counters or --cache"];
+/// Names in the library's errors that are no field of the settings, and the flags that stand for them.
+const OTHERS: [[&str; 2]; 3] = [
+    ["`cards.caches`", "--counters or --cache"],
+    ["`CardAddress::with_memory`", "--card-memory"],
+    ["`LoadSettings::texture_limit`", "--texture-limit"],
+];
 
 /// Replaces each field of the settings, between backticks, by its flag: `integrator.samples` by `--spp`.
 pub(crate) fn with_flags(text: &str) -> String {
-    let [caches, flags] = CACHES;
+    let text = OTHERS.iter().fold(text.to_owned(), |text, [name, flags]| text.replace(name, flags));
     let options = RenderSettings::default().options().into_iter();
-    options.fold(text.replace(caches, flags), |text, Setting { field, option, .. }| {
+    options.fold(text, |text, Setting { field, option, .. }| {
         text.replace(&format!("`{field}`"), &format!("--{option}"))
     })
 }
@@ -20,9 +24,8 @@ mod tests {
 
     #[test]
     fn fields_of_errors_become_flags() {
-        let text =
-            "`integrator.samples` 0 is not possible: `a` (`integrator.irradiance_error`, `cards.caches`)";
-        let expected = "--spp 0 is not possible: `a` (--ic-error, --counters or --cache)";
+        let text = "`integrator.samples` 0 is not possible: `a` (`integrator.irradiance_error`, `cards.caches`, `CardAddress::with_memory`)";
+        let expected = "--spp 0 is not possible: `a` (--ic-error, --counters or --cache, --card-memory)";
         assert_eq!(with_flags(text), expected);
     }
 }

@@ -22,7 +22,7 @@ pub(crate) fn files(options: &SceneOptions) -> Vec<(&Path, &'static str)> {
 }
 
 /// Loads a scene for cards with `dram_bytes` bytes of memory. Assignments (`--set`) are not applied.
-pub(crate) fn load(options: &SceneOptions, dram_bytes: u32) -> Result<Scene, Failure> {
+pub(crate) fn load(options: &SceneOptions, dram_bytes: u64) -> Result<Scene, Failure> {
     let Input { file, environment, rotation, compensates_energy } = Input::open(options, dram_bytes)?;
     let scene = file.into_rest().map_err(Failure::input)?;
     Ok(completed(scene, (environment, rotation), compensates_energy))
@@ -40,9 +40,9 @@ pub(crate) struct Input {
 
 impl Input {
     /// Opens the files for cards with `dram_bytes` bytes of memory.
-    pub(crate) fn open(options: &SceneOptions, dram_bytes: u32) -> Result<Self, Failure> {
+    pub(crate) fn open(options: &SceneOptions, dram_bytes: u64) -> Result<Self, Failure> {
         let (variant, light_units) = (options.variant.clone(), options.lights.light_units);
-        let load = LoadSettings { dram_bytes, variant, light_units };
+        let load = LoadSettings { dram_bytes, texture_limit: options.texture_limit, variant, light_units };
         Ok(Self {
             file: SceneFile::open(&options.path, &load).map_err(Failure::input)?,
             environment: options.environment.as_ref().map(EnvironmentOption::load).transpose()?,
@@ -103,6 +103,7 @@ pub(crate) fn name(options: &SceneOptions) -> String {
 pub(crate) fn provenance(options: &SceneOptions) -> NamedSettings {
     let inputs = [
         ("scene", json!(name(options))),
+        ("texture-limit", json!(options.texture_limit)),
         ("variant", json!(options.variant)),
         ("light-units", json!(options.lights.light_units.name())),
         ("set", json!(options.assignments)),

@@ -10,6 +10,7 @@
 //!  `flags` | flags of the command line in place of the settings that the library's errors name |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `input` | scene and environment of a render |
+//! | `memory` | free memory of the machine |
 //!  `notices` | contents of a scene that are ignored, missing or interpreted in another way |
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
@@ -32,6 +33,7 @@ mod flags;
 #[cfg(target_os = "linux")]
 mod hang_up;
 mod input;
+mod memory;
 mod notices;
 mod outputs;
 mod pictures;

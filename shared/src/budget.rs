@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::address::LINE_BYTES;
 use crate::layout::LEAF_LANES;
 
 /// Fixed capacities of one kind of chip. A card reports them in [`crate::message::Reply::Hello`]; the host
@@ -11,7 +12,7 @@ pub struct Budget {
     /// On-chip memory in total, bytes.
     pub sram_bytes: u32,
     /// Private DRAM, bytes.
-    pub dram_bytes: u32,
+    pub dram_bytes: u64,
     /// On-chip memory that the photon map's cache takes, bytes.
     pub photon_cache_bytes: u32,
     /// On-chip memory that the ray caster's cache takes, bytes.
@@ -62,7 +63,10 @@ pub const MAX_IN_FLIGHT: u32 = 8;
 pub const MAX_TILE_PIXELS: u32 = 1 << 15;
 
 /// [`Budget::dram_bytes`] of the reference chip. Scenes are checked against this size when no card is known.
-pub const REFERENCE_DRAM_BYTES: u32 = 512 << 20;
+pub const REFERENCE_DRAM_BYTES: u64 = 512 << 20;
+
+/// Upper limit of [`Budget::dram_bytes`] for all kinds of chips: a line's address has 32 bits.
+pub const MAX_DRAM_BYTES: u64 = u32::MAX as u64 * LINE_BYTES as u64;
 
 /// Upper limit of [`Budget::gather_rays`] for all kinds of chips.
 pub const MAX_GATHER_RAYS: u32 = 1 << 14;

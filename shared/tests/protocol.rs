@@ -12,7 +12,7 @@ use proptest::prelude::*;
 /// Budget with values as large as those of real cards.
 const BUDGET: Budget = Budget {
     sram_bytes: 1 << 20,
-    dram_bytes: 512 << 20,
+    dram_bytes: 8 << 30,
     photon_cache_bytes: 128 << 10,
     scene_cache_bytes: 75 << 10,
     stack_bytes: 16 << 10,

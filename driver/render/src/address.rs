@@ -19,33 +19,50 @@ pub enum CardAddress {
         kind: EmulatedKind,
         /// Number of chips.
         chips: usize,
+        /// Memory of each card, bytes.
+        memory: u64,
     },
     /// A card at the other end of a link.
     Remote(RemoteAddress),
 }
 
+/// Memory for which a scene is loaded that a remote card renders, bytes.
+const REMOTE_DRAM_BYTES: u64 = 4 << 30;
 /// Maximum number of chips that one process emulates.
 const MAX_CHIPS: usize = 1024;
 impl Default for CardAddress {
     /// One emulated reference chip.
     fn default() -> Self {
-        Self::Emulated { kind: EmulatedKind::Reference, chips: 1 }
+        Self::chips(EmulatedKind::Reference, 1)
     }
 }
 
 impl CardAddress {
     /// Emulated chips of a kind in this process, one per processor core.
     pub fn emulated(kind: EmulatedKind) -> Self {
-        let chips = std::thread::available_parallelism().map_or(1, usize::from);
-        Self::Emulated { kind, chips }
+        Self::chips(kind, std::thread::available_parallelism().map_or(1, usize::from))
     }
 
-    /// Replaces the kind of emulated chips by `change` of the kind. The address of a remote card does not
-    /// change.
+    /// Emulated chips of a kind in this process, each with the memory of its kind.
+    fn chips(kind: EmulatedKind, chips: usize) -> Self {
+        Self::Emulated { kind, chips, memory: kind.budget().dram_bytes }
+    }
+
+    /// Replaces the kind of emulated chips by `change` of the kind, and their memory by that of the new kind.
+    /// The address of a remote card does not change.
     #[must_use]
     pub fn of_kind(self, change: impl Fn(EmulatedKind) -> EmulatedKind) -> Self {
         match self {
-            Self::Emulated { kind, chips } => Self::Emulated { kind: change(kind), chips },
+            Self::Emulated { kind, chips, .. } => Self::chips(change(kind), chips),
+            remote @ Self::Remote(_) => remote,
+        }
+    }
+
+    /// Replaces the memory of emulated cards by `bytes`. The address of a remote card does not change.
+    #[must_use]
+    pub fn with_memory(self, bytes: u64) -> Self {
+        match self {
+            Self::Emulated { kind, chips, .. } => Self::Emulated { kind, chips, memory: bytes },
             remote @ Self::Remote(_) => remote,
         }
     }
@@ -79,12 +96,12 @@ impl CardAddress {
         }
     }
 
-    /// Memory size of each card at this address, bytes. For a remote card it is the maximum that a card can
-    /// report.
-    pub fn dram_bytes(&self) -> u32 {
-        match self {
-            Self::Emulated { kind, .. } => kind.budget().dram_bytes,
-            Self::Remote(_) => u32::MAX,
+    /// Memory for which a scene is loaded that a card at this address renders, bytes. A remote card states
+    /// its own later; until then 4 GB bound what a file may cost.
+    pub fn dram_bytes(&self) -> u64 {
+        match *self {
+            Self::Emulated { memory, .. } => memory,
+            Self::Remote(_) => REMOTE_DRAM_BYTES,
         }
     }
 }
@@ -118,7 +135,7 @@ pub(super) fn first_remote(addresses: &[CardAddress]) -> Option<&CardAddress> {
 impl fmt::Display for CardAddress {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Self::Emulated { kind, chips } => write!(f, "{}:{chips}", kind.name()),
+            Self::Emulated { kind, chips, .. } => write!(f, "{}:{chips}", kind.name()),
             Self::Remote(address) => address.fmt(f),
         }
     }
@@ -142,7 +159,7 @@ fn emulated(kind: EmulatedKind, chips: Option<&str>) -> Result<CardAddress, Stri
     let Some(text) = chips else { return Ok(CardAddress::emulated(kind)) };
     let chips = text.parse().ok().filter(|count| (1..=MAX_CHIPS).contains(count));
     let chips = chips.ok_or_else(|| format!("{text:?} is no number of chips; use 1 to {MAX_CHIPS}"))?;
-    Ok(CardAddress::Emulated { kind, chips })
+    Ok(CardAddress::chips(kind, chips))
 }
 
 #[cfg(test)]

@@ -43,8 +43,9 @@ impl OpenCard {
         faults: Option<LineFaults>,
     ) -> Result<Self, CardError> {
         let connection = match address {
-            CardAddress::Emulated { kind, .. } => Connection::Emulated(
-                EmulatedCard::start(*kind, model, shared.clone()).map_err(CardError::Start)?,
+            &CardAddress::Emulated { kind, memory, .. } => Connection::Emulated(
+                EmulatedCard::start(kind.emulated().with_memory(memory), model, shared.clone())
+                    .map_err(CardError::Start)?,
             ),
             CardAddress::Remote(address) => {
                 Connection::Remote { address: address.clone(), port: Some(reach(address)?) }

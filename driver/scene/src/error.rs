@@ -250,7 +250,7 @@ pub enum SceneError {
     #[diagnostic(
         code(scene::too_large),
         help(
-            "simplify the meshes, place fewer instances, use fewer materials or smaller textures, or use a card with more memory"
+            "simplify the meshes, place fewer instances, use fewer materials or smaller textures (`LoadSettings::texture_limit`), or use a card with more memory (an emulated one by `CardAddress::with_memory`)"
         )
     )]
     TooLarge {

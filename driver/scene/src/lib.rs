@@ -23,7 +23,9 @@ mod out_of_range;
 mod parts;
 mod radiance;
 mod raster;
+mod reduction;
 mod settings;
+mod srgb;
 mod texture;
 mod triangle;
 

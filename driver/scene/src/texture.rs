@@ -5,9 +5,6 @@ use photoncard_shared::layout::TexelFormat;
 /// Maximum width and height of an image or an environment, texels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// Maximum number of texels of all images of a scene together.
-pub(crate) const MAX_TEXELS: u64 = 1 << 28;
-
 /// Mapping of an image to surfaces: transform of coordinates, wrap modes and filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Texture {

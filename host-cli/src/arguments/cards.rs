@@ -7,12 +7,14 @@ use clap::builder::{PathBufValueParser, TypedValueParser};
 use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::memory_model::CacheSettings;
 use photoncard_driver::emulator::trace::{TraceFormat, TraceSettings};
-use photoncard_driver::emulator::{Emulated, EmulatedKind};
+use photoncard_driver::emulator::{Emulated, EmulatedKind, MIN_DRAM_BYTES};
 use photoncard_driver::link::LineFaults;
-use photoncard_driver::render::{CardAddress, CardSet};
+use photoncard_driver::render::{CardAddress, CardSet, MAX_DRAM_BYTES};
+use photoncard_shared::address::LINE_BYTES;
 
 use super::choice::choice;
 use super::files::file;
+use crate::memory::free_memory;
 
 #[derive(Args)]
 #[command(next_help_heading = "Cards")]
@@ -25,6 +27,8 @@ pub(crate) struct CardOptions {
     cards: Vec<CardAddress>,
     #[command(flatten)]
     pub(super) chip: ChipOption,
+    #[command(flatten)]
+    pub(super) memory: MemoryOption,
     /// Share of the tiles, above 0 and at most 1, that two cards render and that are compared bit for bit
     ///
     /// Of three cards the outvoted one is given up, and others render its tiles.
@@ -66,7 +70,10 @@ impl CardOptions {
         let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
         let addresses = if self.cards.is_empty() { emulated() } else { self.cards.clone() };
         let cards = CardSet {
-            addresses: addresses.into_iter().map(|card| card.of_kind(|kind| self.chip.or(kind))).collect(),
+            addresses: addresses
+                .into_iter()
+                .map(|card| self.memory.of(card.of_kind(|kind| self.chip.or(kind))))
+                .collect(),
             faults: self.faults,
             verify: self.verify,
             caches: self.cache,
@@ -100,7 +107,99 @@ impl ChipOption {
     }
 }
 
+#[derive(Args)]
+pub(crate) struct MemoryOption {
+    /// Memory of each emulated card: bytes, or with K, M or G [default: a quarter of the machine's free
+    /// memory, at least 512M; that of emulated-micro and of --chip is their own]
+    #[arg(long, value_name = "SIZE", value_parser = memory_size, help_heading = "Cards", hide_short_help = true)]
+    card_memory: Option<u64>,
+}
+
+impl MemoryOption {
+    /// Address of cards with the stated memory, or else that of their kind. The reference and the large chip
+    /// have a quarter of the machine's free memory, if that is more: the host takes up to four times what a
+    /// card does.
+    pub(super) fn of(&self, address: CardAddress) -> CardAddress {
+        self.with_free(free_memory(), address)
+    }
+
+    fn with_free(&self, free: Option<u64>, address: CardAddress) -> CardAddress {
+        let memory = self.card_memory.or_else(|| match address {
+            CardAddress::Emulated { kind: EmulatedKind::Reference | EmulatedKind::Large, memory, .. } => {
+                let quarter = (free? / 4).min(MAX_DRAM_BYTES);
+                Some(memory.max(quarter - quarter % LINE_BYTES as u64))
+            }
+            _ => None,
+        });
+        match memory {
+            Some(bytes) => address.with_memory(bytes),
+            None => address,
+        }
+    }
+
+    /// Returns whether `--card-memory` is stated.
+    pub(super) fn is_stated(&self) -> bool {
+        self.card_memory.is_some()
+    }
+}
+
+/// Parses a number of bytes, with K, M or G for powers of 1024. A part of a line is left out.
+pub(super) fn memory_size(text: &str) -> Result<u64, String> {
+    let suffixes = [("K", 10), ("M", 20), ("G", 30)];
+    let suffix = suffixes.into_iter().find_map(|(suffix, shift)| Some((text.strip_suffix(suffix)?, shift)));
+    let (digits, shift) = suffix.unwrap_or((text, 0));
+    let bytes = digits.parse().ok().and_then(|number: u64| number.checked_mul(1 << shift));
+    bytes
+        .filter(|bytes| (MIN_DRAM_BYTES..=MAX_DRAM_BYTES).contains(bytes))
+        .map(|bytes| bytes - bytes % LINE_BYTES as u64)
+        .ok_or_else(|| {
+            format!("use bytes, with K, M or G for powers of 1024, from 1M to {}G", MAX_DRAM_BYTES >> 30)
+        })
+}
+
 /// Parser of the path of a JSON file, which reads the kind of chip in it.
 fn kind_of_file() -> impl TypedValueParser<Value = EmulatedKind> {
     PathBufValueParser::new().try_map(|path| Emulated::read(&path).map(EmulatedKind::File))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_of_memory_are_bytes_or_have_a_suffix() {
+        for (text, bytes) in [
+            ("1048576", 1 << 20),
+            ("1024K", 1 << 20),
+            ("1048577", 1 << 20),
+            ("512M", 512 << 20),
+            ("8G", 8 << 30),
+        ] {
+            assert_eq!(memory_size(text), Ok(bytes));
+        }
+        for wrong in ["", "G", "1K", "-1G", "1.5G", "1g", "512", "1T", "600G", "99999999999999G"] {
+            assert!(memory_size(wrong).unwrap_err().contains("from 1M to 511G"), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn cards_have_the_stated_memory_or_a_quarter_of_what_is_free() {
+        let of = |stated, free, kind| {
+            let address = CardAddress::emulated(kind);
+            MemoryOption { card_memory: stated }.with_free(free, address).dram_bytes()
+        };
+        for kind in [EmulatedKind::Reference, EmulatedKind::Large] {
+            let own = kind.budget().dram_bytes;
+            assert_eq!(of(None, Some(16 << 30), kind), 4 << 30);
+            assert_eq!(of(None, Some(1 << 30), kind), own);
+            assert_eq!(of(None, None, kind), own);
+            assert_eq!(of(None, Some(u64::MAX), kind), MAX_DRAM_BYTES);
+            assert_eq!(of(Some(3 << 30), Some(16 << 30), kind), 3 << 30);
+        }
+        let micro = EmulatedKind::Micro;
+        assert_eq!(of(None, Some(16 << 30), micro), micro.budget().dram_bytes);
+        assert_eq!(of(Some(1 << 30), None, micro), 1 << 30);
+        let remote = CardAddress::serial("/dev/ttyUSB0");
+        assert_eq!(MemoryOption { card_memory: Some(1 << 30) }.of(remote.clone()), remote);
+    }
 }

@@ -47,7 +47,7 @@ use photoncard_driver::render::CardAddress;
 use photoncard_shared::image::LAYOUT_VERSION;
 use photoncard_shared::message::PROTOCOL_VERSION;
 
-use self::cards::ChipOption;
+use self::cards::{ChipOption, memory_size};
 use self::choice::choice;
 pub(crate) use self::farm::{FarmCommand, FarmOptions};
 pub(crate) use self::files::{PictureFormat, PictureOutput, TextOutput};
@@ -232,6 +232,9 @@ pub(crate) struct EmulateOptions {
     pub(crate) card: EmulatedKind,
     #[command(flatten)]
     pub(crate) chip: ChipOption,
+    /// Memory of the card: bytes, or with K, M or G [default: that of its kind]
+    #[arg(long, value_name = "SIZE", value_parser = memory_size)]
+    pub(crate) card_memory: Option<u64>,
 }
 
 #[derive(Args)]

@@ -6,9 +6,9 @@ use clap::Args;
 use photoncard_driver::choice::Choice;
 use photoncard_driver::emulator::EmulatedKind;
 use photoncard_driver::quality::{Finish, Quality, Stated};
-use photoncard_driver::render::{CardAddress, CardSet, RenderSettings};
+use photoncard_driver::render::{Budget, CardAddress, CardSet, RenderSettings};
 
-use super::cards::ChipOption;
+use super::cards::{ChipOption, MemoryOption};
 use super::choice::choice;
 use super::files::file;
 use super::frames::FrameOptions;
@@ -51,6 +51,8 @@ pub(crate) struct PrepareOptions {
     card: EmulatedKind,
     #[command(flatten)]
     chip: ChipOption,
+    #[command(flatten)]
+    memory: MemoryOption,
     /// Threads for the work [default: one per core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true, hide_short_help = true)]
     pub(crate) threads: Option<usize>,
@@ -63,9 +65,15 @@ pub(crate) struct PrepareOptions {
 }
 
 impl PrepareOptions {
-    /// Returns the kind of the cards that will render.
-    pub(crate) fn chip(&self) -> EmulatedKind {
-        self.chip.or(self.card)
+    /// Returns the address of the cards that will render, as if they were emulated.
+    fn cards(&self) -> CardAddress {
+        self.memory.of(CardAddress::emulated(self.chip.or(self.card)))
+    }
+
+    /// Returns the budget of the cards that will render.
+    pub(crate) fn budget(&self) -> Budget {
+        let budget = self.chip.or(self.card).budget();
+        Budget { dram_bytes: self.cards().dram_bytes(), ..budget }
     }
 
     /// Returns which of the settings that a quality chooses are stated.
@@ -85,7 +93,7 @@ impl PrepareOptions {
             picture: self.picture.settings(&base.picture),
             photons: self.photons.settings(&base.photons),
             integrator: self.integrator.settings(&base.integrator),
-            cards: CardSet { addresses: vec![CardAddress::emulated(self.chip())], ..CardSet::default() },
+            cards: CardSet { addresses: vec![self.cards()], ..CardSet::default() },
             ..RenderSettings::default()
         }
     }

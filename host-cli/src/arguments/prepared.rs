@@ -32,7 +32,7 @@ impl Step {
         match option.get_id().as_str() {
             // By their headings, if they have any, these options would be of other steps.
             "quality" => Self::Prepare,
-            "threads" | "quiet" => Self::Both,
+            "threads" | "quiet" | "card_memory" => Self::Both,
             "denoise" => Self::PrepareAndMerge,
             "display_server" => Self::Render,
             "frames" | "parts" => Self::Job,

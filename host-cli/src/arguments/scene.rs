@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use photoncard_driver::scene::{LightUnits, Material, Reflection, Scene};
+use photoncard_driver::scene::{LightUnits, MAX_SIDE, Material, Reflection, Scene};
 
 use super::lights::LightOptions;
 use crate::environment::EnvironmentOption;
@@ -29,6 +29,9 @@ pub(crate) struct SceneOptions {
     /// Variant of the scene's materials, by its name [default: the materials that its meshes state]
     #[arg(long, value_name = "NAME", help_heading = "Scene", hide_short_help = true)]
     pub(crate) variant: Option<String>,
+    /// Scale images down to at most this width and height, texels, by means in linear light
+    #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIDE)), help_heading = "Scene", hide_short_help = true)]
+    pub(crate) texture_limit: Option<u32>,
     #[command(flatten)]
     pub(crate) lights: LightOptions,
     /// Light from infinitely far: an equirectangular map, .hdr or .exr, or a constant radiance
@@ -55,6 +58,7 @@ impl SceneOptions {
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });
         let no_lights = self.lights.light_units != LightUnits::Auto && scene.lights.is_empty();
         add(no_lights, "--light-units", "without point, spot or directional lights in the file");
+        add(self.texture_limit.is_some() && scene.images.is_empty(), "--texture-limit", "without images");
         let no_lobe = self.energy_compensation && !scene.materials.iter().any(has_lobe);
         add(no_lobe, "--energy-compensation", "without a metallic-roughness material");
     }

@@ -23,7 +23,7 @@ impl<'a> Moments<'a> {
     pub(super) fn open(
         options: &'a SceneOptions,
         frames: &'a FrameOptions,
-        dram_bytes: u32,
+        dram_bytes: u64,
     ) -> Result<(Self, Scene), Failure> {
         let input = Input::open(options, dram_bytes)?;
         check_animations(&input)?;

@@ -31,7 +31,7 @@ pub(crate) fn run(options: &PrepareOptions) -> Result<(), Failure> {
 
 fn prepare_rest(options: &PrepareOptions) -> Result<(), Failure> {
     check(options, &options.output)?;
-    let scene = assigned(&options.scene, input::load(&options.scene, options.chip().budget().dram_bytes)?)?;
+    let scene = assigned(&options.scene, input::load(&options.scene, options.budget().dram_bytes)?)?;
     let preparation = Preparation::new(options, &scene)?;
     let prepared = preparation.of(&scene, &|packed| preparation.choose(&scene, packed))?;
     preparation.write(&prepared, &options.output)
@@ -41,7 +41,7 @@ fn prepare_rest(options: &PrepareOptions) -> Result<(), Failure> {
 fn prepare_frames(options: &PrepareOptions, numbers: &[u32]) -> Result<(), Failure> {
     let path = |number: u32| numbered(&options.output, number).unwrap_or_else(|| options.output.clone());
     numbers.iter().try_for_each(|&number| check(options, &path(number)))?;
-    let dram_bytes = options.chip().budget().dram_bytes;
+    let dram_bytes = options.budget().dram_bytes;
     let (mut moments, rest) = Moments::open(&options.scene, &options.frames, dram_bytes)?;
     if !moments.is_still() && numbers.len() > 1 && numbered(&options.output, 0).is_none() {
         return Err(one_file(&options.output));
@@ -132,7 +132,7 @@ impl<'a> Preparation<'a> {
         choose: &(dyn Fn(&PackedScene) -> Chosen + Sync),
     ) -> Result<PreparedScene, Failure> {
         let Self { options, settings, progress, .. } = self;
-        let (budgets, notes) = ([options.chip().budget()], notes(options));
+        let (budgets, notes) = ([options.budget()], notes(options));
         let prepared = on_threads(options.threads, || {
             PreparedScene::new(scene, settings, &budgets, &choose, notes, progress)
         })?;

@@ -100,8 +100,8 @@ pub(super) fn chosen(
 }
 
 /// Memory of the card that has most, bytes: a scene may need all of it, and smaller cards are then left out.
-pub(super) fn dram_bytes(settings: &RenderSettings) -> u32 {
-    settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u32::MAX)
+pub(super) fn dram_bytes(settings: &RenderSettings) -> u64 {
+    settings.cards.addresses.iter().map(CardAddress::dram_bytes).max().unwrap_or(u64::MAX)
 }
 
 /// Applies the assignments (`--set`) to a scene, and checks that the scene has light.

@@ -24,7 +24,7 @@ type Value<'a> = (&'a str, &'a str);
 
 /// Loads the scene of a sweep and creates its points.
 pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Result<SweepOptions, Failure> {
-    let scene = input::load(&arguments.scene, u32::MAX)?;
+    let scene = input::load(&arguments.scene, u64::from(u32::MAX))?;
     let name = input::name(&arguments.scene);
     let picture = arguments.point(&name).settings.picture;
     notices::say_ignored(&arguments.scene, &scene, &Uses::of(&arguments.scene, &picture, None))?;

@@ -67,6 +67,7 @@ fn of_scene(scene: &SceneOptions, wish: &Wish, words: &mut Words) {
         assignments: _,
         energy_compensation,
         variant,
+        texture_limit,
         lights,
         environment,
         environment_rotation,
@@ -75,6 +76,7 @@ fn of_scene(scene: &SceneOptions, wish: &Wish, words: &mut Words) {
     wish.assignments().iter().for_each(|assignment| words.add("set", assignment));
     words.add_switch("energy-compensation", *energy_compensation);
     words.add_some("variant", variant.as_ref());
+    words.add_some("texture-limit", *texture_limit);
     if lights.light_units != LightUnits::default() {
         words.add("light-units", lights.light_units.name());
     }

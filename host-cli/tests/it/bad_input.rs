@@ -154,6 +154,9 @@ fn numbers_out_of_range_are_refused() {
         ("--fov", "-20", ["above 0 and below 180", "such as 40"]),
         ("--fov", "180", ["above 0 and below 180", "such as 40"]),
         ("--fov", "wide", ["--fov", "invalid"]),
+        ("--texture-limit", "0", ["0 is not in 1..=16384", "--texture-limit"]),
+        ("--texture-limit", "16385", ["16385 is not in 1..=16384", "--texture-limit"]),
+        ("--card-memory", "100K", ["from 1M to 511G", "--card-memory"]),
     ] {
         refused(&room, "scene.gltf", &[option, value], &[option, words[0], words[1]]);
     }

@@ -21,8 +21,8 @@ fn limited(room: &Room, arguments: &[&str]) -> Outcome {
 
 /// Checks that a render of `scene.glb` is refused with these words.
 fn refused(room: &Room, words: &[&str]) {
-    let outcome =
-        limited(room, &["render", "scene.glb", "-o", "out.exr", "--size", "8x8", "--photons", "100"]);
+    let options = ["-o", "out.exr", "--size", "8x8", "--photons", "100", "--card-memory", "512M"];
+    let outcome = limited(room, &[&["render", "scene.glb"], &options[..]].concat());
     assert_eq!(outcome.status, Some(2), "{}", outcome.stderr);
     for word in words.iter().chain(&["scene.glb"]) {
         assert!(outcome.stderr.contains(word), "{word:?} is not in: {}", outcome.stderr);

@@ -20,6 +20,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
         (&["--filter", "gaussian"], "filter", json!("gaussian")),
         (&["--aov", "direct,Z"], "aov", json!("direct,Z")),
         (&["--set", "white.diffuse=0.5,0.5,0.5"], "set", json!(["white.diffuse=0.5,0.5,0.5"])),
+        (&["--texture-limit", "64"], "texture-limit", json!(64)),
         (&["--light-units", "watts"], "light-units", json!("watts")),
         (&["--energy-compensation"], "energy-compensation", json!(true)),
         (&["--environment", "1,2,3"], "environment", json!("1,2,3")),
@@ -46,7 +47,7 @@ fn options_of_pixels() -> Vec<(&'static [&'static str], &'static str, Value)> {
 const CHIP: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/chip.json");
 
 /// Options that no pixel depends on.
-const OTHERS: [&[&str]; 24] = [
+const OTHERS: [&[&str]; 25] = [
     &["--strict"],
     &["--photon-map", "jensen"],
     &["--tile", "3"],
@@ -56,6 +57,7 @@ const OTHERS: [&[&str]; 24] = [
     &["--in-flight", "1"],
     &["--card", "emulated-micro:2"],
     &["--chip", CHIP],
+    &["--card-memory", "1G"],
     &["--verify", "0.5", "--card", "emulated:2"],
     &["--faults", "flips=1e-6"],
     &["--resume"],

@@ -36,7 +36,7 @@ const SEEDS: [&[u8]; 14] = [
 
 /// Memory of the card, bytes. It limits the number of texels, which in WebP and in KTX2 with ETC1S may take
 /// no bytes of the file.
-const DRAM_BYTES: u32 = 2 << 20;
+const DRAM_BYTES: u64 = 2 << 20;
 
 /// glTF of a triangle whose base colour is the image in the second buffer view, of `image_bytes` bytes.
 fn scene(image_bytes: usize) -> String {

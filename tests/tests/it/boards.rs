@@ -14,8 +14,8 @@ fn the_page_states_the_budget() {
     let page = include_str!("../../../docs/bring-up.md");
     for (name, bytes, unit, shift) in [
         ("dram_bytes", MICRO.dram_bytes, "MB", 20),
-        ("sram_bytes", MICRO.sram_bytes, "KB", 10),
-        ("stack_bytes", MICRO.stack_bytes, "KB", 10),
+        ("sram_bytes", MICRO.sram_bytes.into(), "KB", 10),
+        ("stack_bytes", MICRO.stack_bytes.into(), "KB", 10),
     ] {
         let row = format!("| {} {unit} | `MICRO.{name}`", bytes >> shift);
         assert!(page.contains(&row), "{row}");

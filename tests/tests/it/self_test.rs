@@ -65,7 +65,7 @@ fn a_sound_card_passes_on_any_line() {
     for faults in ["seed=1", "flips=1e-4,drops=1e-4,repeats=1e-4,delays=1e-3,seed=2"] {
         let test = tested(lines, faults);
         assert!(test.is_passed(), "{faults}: {test:?}");
-        assert_eq!(test.memory_bytes(), u64::from(MICRO.dram_bytes));
+        assert_eq!(test.memory_bytes(), MICRO.dram_bytes);
         let patterns: Vec<_> = test.patterns.iter().map(|test| test.pattern).collect();
         assert_eq!(patterns, MemoryPattern::ALL);
         assert!(test.arithmetic.cases > 200);
@@ -97,7 +97,7 @@ struct Chip {
 
 /// Report at the end of a pattern without errors, for a memory of the budget's size.
 fn end(pattern: MemoryPattern) -> MemoryTest {
-    let lines = MICRO.dram_bytes / LINE_BYTES as u32;
+    let lines = (MICRO.dram_bytes / LINE_BYTES as u64) as u32;
     MemoryTest { lines, pattern, written: lines, checked: lines, wrong: WrongWords::default() }
 }
 
@@ -347,7 +347,7 @@ fn an_observer_stops_the_test() {
     let mut chip = Chip::new(compute);
     // After two reports, the card only says that it is still at work.
     chip.memory.truncate(2);
-    let stop = Stop(4 * u64::from(MICRO.dram_bytes), AtomicBool::new(false));
+    let stop = Stop(4 * MICRO.dram_bytes, AtomicBool::new(false));
     let result = self_test_on(&mut chip, "card 0", &stop);
     assert!(matches!(result, Err(RenderError::Stopped)), "{result:?}");
 }

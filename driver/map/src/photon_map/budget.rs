@@ -34,7 +34,7 @@ pub fn check_packed(
     let photon_bytes = (lines(settings.photons) * LINE_BYTES) as u64;
     let scene_bytes = packed.image().bytes();
     let needed = scene_bytes + photon_bytes;
-    let available = budget.dram_bytes as u64;
+    let available = budget.dram_bytes;
     if needed <= available {
         return Ok(());
     }
@@ -58,7 +58,7 @@ pub fn check_packed(
 /// # Errors
 /// [`PackError::Dram`], with the setting to lower.
 pub fn check_image(image: &CardImage, budget: &Budget) -> Result<(), PackError> {
-    let (needed, available) = (image.bytes(), budget.dram_bytes as u64);
+    let (needed, available) = (image.bytes(), budget.dram_bytes);
     if needed <= available {
         return Ok(());
     }
@@ -81,18 +81,25 @@ fn is_most(part: u64, all: u64) -> bool {
 
 /// Remedy if photons do not fit. It names textures too if texels take most of the card image.
 fn lower(photons: &str, texels: u64, needed: u64) -> String {
-    let textures = if is_most(texels, needed) { ", use smaller textures" } else { "" };
-    format!("{photons}{textures}, or use a card with more memory")
+    let textures =
+        if is_most(texels, needed) { ", use smaller textures (`LoadSettings::texture_limit`)" } else { "" };
+    format!(
+        "{photons}{textures}, or use a card with more memory (an emulated one by `CardAddress::with_memory`)"
+    )
 }
 
 /// Remedy if the scene is too large without photons.
 fn simplify(scene: u64, texels: u64) -> String {
     let part = if is_most(texels, scene) {
-        format!(", {texels} of them texels: use smaller textures or a smaller environment")
+        format!(
+            ", {texels} of them texels: use smaller textures (`LoadSettings::texture_limit`) or a smaller environment"
+        )
     } else {
         ": simplify it".to_owned()
     };
-    format!("the scene alone takes {scene} bytes{part}, or use a card with more memory")
+    format!(
+        "the scene alone takes {scene} bytes{part}, or use a card with more memory (an emulated one by `CardAddress::with_memory`)"
+    )
 }
 
 #[cfg(test)]
@@ -121,7 +128,7 @@ mod tests {
         PackedScene::new(&scene).expect("it is small")
     }
 
-    fn remedy(scene: &PackedScene, photons: usize, dram_bytes: u32) -> String {
+    fn remedy(scene: &PackedScene, photons: usize, dram_bytes: u64) -> String {
         let budget = Budget { dram_bytes, ..REFERENCE };
         let settings = PhotonSettings {
             camera: None,
@@ -173,7 +180,7 @@ mod tests {
             };
             let packed = PackedScene::new(&scene).expect("it is small");
             let image = map_photons(packed, &settings, &|_| true).expect("it has light").image;
-            let dram_bytes = image.bytes() as u32 - 1;
+            let dram_bytes = image.bytes() - 1;
             match check_image(&image, &Budget { dram_bytes, ..REFERENCE }) {
                 Err(PackError::Dram { remedy, .. }) => assert!(remedy.starts_with(expected), "{remedy}"),
                 other => panic!("{other:?}"),

@@ -13,7 +13,8 @@ use photoncard_firmware::kind::{
 };
 use photoncard_firmware::memory::Dram;
 use photoncard_shared::budget::{
-    Budget, MAX_GATHER_RAYS, MAX_IN_FLIGHT, MAX_TILE_PIXELS, SUMS_WITH_LAYERS, gather_candidates,
+    Budget, MAX_DRAM_BYTES, MAX_GATHER_RAYS, MAX_IN_FLIGHT, MAX_TILE_PIXELS, SUMS_WITH_LAYERS,
+    gather_candidates,
 };
 use serde_json::{Value, json};
 
@@ -23,26 +24,28 @@ use super::memory_model::CacheSpec;
 /// Maximum size of a file, bytes.
 const MAX_BYTES: u64 = 1 << 16;
 /// Maximum on-chip memory of a kind, bytes. Each emulated chip takes as much host memory.
-const MAX_SRAM: u32 = 16 << 20;
+const MAX_SRAM: u64 = 16 << 20;
+/// Minimum memory of an emulated card, bytes.
+pub const MIN_DRAM_BYTES: u64 = 1 << 20;
 
 /// Capacities in a file, with the ranges that the chip's indices and the host's searches allow. A capacity
 /// that the file does not state is that of the reference chip.
-const RANGES: [(&str, RangeInclusive<u32>); 15] = [
+const RANGES: [(&str, RangeInclusive<u64>); 15] = [
     ("sram_bytes", 1..=MAX_SRAM),
-    ("dram_bytes", 1 << 20..=u32::MAX),
+    ("dram_bytes", MIN_DRAM_BYTES..=MAX_DRAM_BYTES),
     ("photon_cache_bytes", 1..=MAX_SRAM),
     ("scene_cache_bytes", 1..=MAX_SRAM),
     ("stack_bytes", 0..=MAX_SRAM),
-    ("tile_pixels", SUMS_WITH_LAYERS..=MAX_TILE_PIXELS),
-    ("neighbors", 2..=REFERENCE.neighbors),
-    ("gather_rays", 1..=MAX_GATHER_RAYS),
+    ("tile_pixels", SUMS_WITH_LAYERS as u64..=MAX_TILE_PIXELS as u64),
+    ("neighbors", 2..=REFERENCE.neighbors as u64),
+    ("gather_rays", 1..=MAX_GATHER_RAYS as u64),
     ("gather_queue", 1..=1 << 20),
-    ("irradiance_records", MIN_RECORDS as u32..=MAX_TILE_PIXELS),
-    ("shadow_rays", 1..=REFERENCE.shadow_rays),
-    ("samples", 1..=REFERENCE.samples),
-    ("tiles", 1..=MAX_TILES as u32),
-    ("in_flight", 1..=MAX_IN_FLIGHT),
-    ("gather_points", MIN_RECORDS as u32..=MAX_TILE_PIXELS),
+    ("irradiance_records", MIN_RECORDS as u64..=MAX_TILE_PIXELS as u64),
+    ("shadow_rays", 1..=REFERENCE.shadow_rays as u64),
+    ("samples", 1..=REFERENCE.samples as u64),
+    ("tiles", 1..=MAX_TILES as u64),
+    ("in_flight", 1..=MAX_IN_FLIGHT as u64),
+    ("gather_points", MIN_RECORDS as u64..=MAX_TILE_PIXELS as u64),
 ];
 
 /// Error of a file with the capacities of a chip.
@@ -68,9 +71,9 @@ pub enum ChipError {
         /// Value in the file.
         value: Value,
         /// Smallest value.
-        least: u32,
+        least: u64,
         /// Largest value.
-        most: u32,
+        most: u64,
     },
     /// A capacity contradicts others.
     #[error("{name} is {value}; use {rule}")]
@@ -107,8 +110,7 @@ impl Emulated {
             let Some((name, range)) = RANGES.into_iter().find(|(known, _)| *known == name) else {
                 return Err(ChipError::Unknown { name });
             };
-            let number = value.as_u64().and_then(|number| u32::try_from(number).ok());
-            if !number.is_some_and(|number| range.contains(&number)) {
+            if !value.as_u64().is_some_and(|number| range.contains(&number)) {
                 let (least, most) = range.into_inner();
                 return Err(ChipError::OutOfRange { name, value, least, most });
             }
@@ -307,13 +309,13 @@ mod tests {
         /// Half of the numbers are near the ends of a range.
         #[test]
         fn a_chip_that_is_not_refused_fits_and_can_be_built(
-            stated in prop::collection::vec((0..RANGES.len(), any::<u32>(), 0..4_u32, any::<bool>()), 0..6),
+            stated in prop::collection::vec((0..RANGES.len(), any::<u64>(), 0..4_u64, any::<bool>()), 0..6),
         ) {
             let mut fields = json!({});
             for (field, number, step, is_near) in stated {
                 let (name, range) = &RANGES[field];
                 let near = if number % 2 == 0 { range.start() + step } else { range.end() - step.min(*range.end()) };
-                fields[*name] = (if is_near { near } else { number >> (number % 32) }).into();
+                fields[*name] = (if is_near { near } else { number >> (number % 64) }).into();
             }
             if let Ok(kind) = Emulated::from_json(&fields.to_string()) {
                 prop_assert!(kind.sram_bytes() <= kind.budget.sram_bytes as usize);

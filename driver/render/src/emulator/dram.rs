@@ -66,8 +66,13 @@ impl<'a> EmulatedDram<'a> {
         Self { lines: Stored::Lent(lines), limit, shared, held }
     }
 
-    pub(super) fn new(bytes: u32, shared: SharedImage, held: SharedImage) -> Self {
-        Self { lines: Stored::Own(Vec::new()), limit: bytes / LINE_BYTES as u32, shared, held }
+    pub(super) fn new(bytes: u64, shared: SharedImage, held: SharedImage) -> Self {
+        Self {
+            lines: Stored::Own(Vec::new()),
+            limit: u32::try_from(bytes / LINE_BYTES as u64).unwrap_or(u32::MAX),
+            shared,
+            held,
+        }
     }
 
     /// Image that the memory contains by reference, if no line was written.
@@ -173,6 +178,7 @@ impl MemoryPort for EmulatedDram<'_> {
             let (own, first) = self.own_from(first);
             let end = first + lines.len();
             if own.len() < end {
+                own.try_reserve(end - own.len()).ok()?;
                 own.resize(end, Line::ZERO);
             }
             copy_lines(lines, &mut own[first..end]);
@@ -305,7 +311,7 @@ mod tests {
     #[test]
     fn lines_outside_the_memory_are_refused() {
         let mut dram =
-            EmulatedDram::new(2 * LINE_BYTES as u32, SharedImage::default(), SharedImage::default());
+            EmulatedDram::new(2 * LINE_BYTES as u64, SharedImage::default(), SharedImage::default());
         assert_eq!(dram.write(LineAddress(1), &[[1; LINE_BYTES]; 2]), None);
         assert!(dram.stored(LineAddress(0), 1).is_none());
     }

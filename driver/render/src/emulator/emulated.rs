@@ -30,6 +30,14 @@ impl Emulated {
         Self { budget, ..self }
     }
 
+    /// Replaces the memory of the chip's card by `bytes`, at most
+    /// [`MAX_DRAM_BYTES`](photoncard_shared::budget::MAX_DRAM_BYTES).
+    #[must_use]
+    pub fn with_memory(self, bytes: u64) -> Self {
+        let budget = Budget { dram_bytes: bytes, ..self.budget };
+        self.with_budget(budget)
+    }
+
     /// Creates a chip of this kind.
     pub fn chip(self) -> EmulatedChip {
         Chip::sized(self, self.points)

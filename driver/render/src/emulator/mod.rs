@@ -27,7 +27,7 @@ use photoncard_shared::frame::MAX_FRAME;
 use photoncard_shared::link::Port;
 use photoncard_shared::transport::WINDOW;
 
-pub use self::chip_file::ChipError;
+pub use self::chip_file::{ChipError, MIN_DRAM_BYTES};
 use self::dram::EmulatedDram;
 pub(crate) use self::dram::SharedImage;
 pub use self::emulated::{Emulated, EmulatedChip};
@@ -91,15 +91,12 @@ impl EmulatedKind {
         tag_bytes(&self.budget())
     }
 
-    /// Name of the kind of chip with this budget: `reference`, `large`, `micro` or `other`. The chip may be
-    /// on a board.
+    /// Name of the kind of chip with this budget, whatever its card's memory: `reference`, `large`, `micro`
+    /// or `other`. The chip may be on a board.
     pub fn name_of(budget: &Budget) -> &'static str {
-        match *budget {
-            kind::REFERENCE => "reference",
-            kind::LARGE => "large",
-            kind::MICRO => "micro",
-            _ => "other",
-        }
+        let is = |kind: &Budget| Budget { dram_bytes: kind.dram_bytes, ..*budget } == *kind;
+        let kinds = [(&kind::REFERENCE, "reference"), (&kind::LARGE, "large"), (&kind::MICRO, "micro")];
+        kinds.into_iter().find(|(kind, _)| is(kind)).map_or("other", |(_, name)| name)
     }
 
     /// Capacities of this kind, as values.
@@ -172,7 +169,7 @@ impl EmulatedCard {
     /// # Errors
     /// If the card's thread cannot be started.
     pub(crate) fn start(
-        kind: EmulatedKind,
+        chip: Emulated,
         model: Option<MemoryModel>,
         shared: SharedImage,
     ) -> std::io::Result<Self> {
@@ -183,11 +180,11 @@ impl EmulatedCard {
         let tile_lines = TileLines::default();
         let noted = tile_lines.clone();
         let held = SharedImage::default();
-        let dram = EmulatedDram::new(kind.budget().dram_bytes, shared, held.clone());
+        let dram = EmulatedDram::new(chip.budget().dram_bytes, shared, held.clone());
         let held = model.is_none().then_some(held);
         let thread = std::thread::Builder::new()
             .name("chip".into())
-            .spawn(move || run(kind, model.map(|model| (model, noted)), dram, &mut card))?;
+            .spawn(move || run(chip, model.map(|model| (model, noted)), dram, &mut card))?;
         Ok(Self { thread: Some(thread), port: Some(host), trace_has_failed, tile_lines, held })
     }
 
@@ -243,31 +240,31 @@ impl Drop for EmulatedCard {
 ///
 /// # Panics
 /// If the chip panicked.
-pub fn serve_card(kind: EmulatedKind, port: &mut (dyn Port + Send)) -> std::io::Result<()> {
-    let dram = EmulatedDram::new(kind.budget().dram_bytes, SharedImage::default(), SharedImage::default());
+pub fn serve_card(chip: Emulated, port: &mut (dyn Port + Send)) -> std::io::Result<()> {
+    let dram = EmulatedDram::new(chip.budget().dram_bytes, SharedImage::default(), SharedImage::default());
     std::thread::scope(|scope| {
         let thread = std::thread::Builder::new()
             .name("chip".into())
-            .spawn_scoped(scope, || run(kind, None, dram, port))?;
+            .spawn_scoped(scope, || run(chip, None, dram, port))?;
         thread.join().map(drop).or_else(|panic| std::panic::resume_unwind(panic))
     })
 }
 
 fn run(
-    kind: EmulatedKind,
+    chip: Emulated,
     model: Option<(MemoryModel, TileLines)>,
     dram: EmulatedDram<'static>,
     port: &mut dyn Port,
 ) -> Option<MemoryRecord> {
     match model {
-        None => serve_on(kind, dram, port, |_| None),
+        None => serve_on(chip, dram, port, |_| None),
         Some((MemoryModel { caches, trace }, tile_lines)) => {
             let (below, above) = match trace {
                 Some(trace) if trace.is_below_caches() => (Some(trace), None),
                 trace => (None, trace),
             };
             let memory = Traced::new(caches.over(Traced::new(dram, below)), above);
-            serve_on(kind, Measured::new(TileMeter::new(memory, tile_lines)), port, |memory| {
+            serve_on(chip, Measured::new(TileMeter::new(memory, tile_lines)), port, |memory| {
                 Some(MemoryRecord { traffic: memory.traffic(), trace: memory.take_trace() })
             })
         }
@@ -277,12 +274,12 @@ fn run(
 /// Serves a card with a given memory until the host drops its end of the link. Returns the result of `end` on
 /// the memory.
 fn serve_on<M: CardMemory, R>(
-    kind: EmulatedKind,
+    chip: Emulated,
     memory: M,
     port: &mut dyn Port,
     end: impl FnOnce(&mut M) -> R,
 ) -> R {
-    let mut card = Card::with_chip(kind.emulated().chip(), memory);
+    let mut card = Card::with_chip(chip.chip(), memory);
     // The end of the link is no error: a host ends a card by closing the link.
     let _ = serve(&mut card, port);
     end(card.memory())

@@ -37,7 +37,7 @@ impl SelfTest {
 
     /// Returns whether the card has less memory than its budget states.
     pub fn lacks_memory(&self) -> bool {
-        self.memory_bytes() < u64::from(self.budget.dram_bytes)
+        self.memory_bytes() < self.budget.dram_bytes
     }
 
     /// Returns whether all results and all words are right, and the memory is as large as the budget states.

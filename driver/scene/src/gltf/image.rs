@@ -1,5 +1,6 @@
 //! Images of textures, decoded in parallel.
 
+use std::iter::Peekable;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -12,14 +13,16 @@ use super::specular_glossiness::{Conversion, Grid};
 use super::uri::{decode_data, is_data, locate};
 use crate::error::SceneError;
 use crate::raster::{Deep, Fault, Kind};
-use crate::texture::MAX_TEXELS;
+use crate::reduction::reduced;
 use crate::{Encoding, Image};
 
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
 const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
 
-/// Maximum total size of all image files, bytes. In every format a texel takes at most eight bytes.
-const MAX_FILE_BYTES: u64 = 8 * MAX_TEXELS;
+/// Maximum number of texels of all images, in the sizes of their files: what decoding them may take of time.
+const MAX_TEXELS: u64 = 1 << 31;
+/// Maximum number of texels of several images that are decoded at once, before they are scaled down.
+const TEXELS_AT_ONCE: u64 = 1 << 28;
 
 /// Image that a texture requests, with its encoding.
 #[derive(Clone, Copy)]
@@ -51,7 +54,7 @@ enum Found<'a> {
 struct Decoded {
     size: [u32; 2],
     texels: Option<Vec<[u8; 4]>>,
-    deep: Option<Deep>,
+    encoding: Encoding,
     faults: Vec<(Origin, Fault)>,
 }
 
@@ -69,6 +72,19 @@ impl From<Fault> for Failure {
     }
 }
 
+/// Takes the next images, as many as may be decoded at once.
+fn take_together<'a, 'w>(
+    found: &mut Peekable<impl Iterator<Item = (Option<Found<'a>>, &'w Wanted)>>,
+) -> Vec<(Option<Found<'a>>, &'w Wanted)> {
+    let mut texels = 0;
+    let mut fits = |image: &Option<Found<'_>>| {
+        let before = texels;
+        texels += image.as_ref().map_or(0, Found::texels);
+        before == 0 || texels <= TEXELS_AT_ONCE
+    };
+    std::iter::from_fn(|| found.next_if(|(image, _)| fits(image))).collect()
+}
+
 /// Decodes images, whose indices must exist. Those that cannot be read are `None` in the result, and are
 /// described in `unreadable`.
 ///
@@ -80,38 +96,36 @@ pub(super) fn load(
     room: &mut Room,
     unreadable: &mut Vec<String>,
 ) -> Result<Vec<Option<Image>>, SceneError> {
-    let (mut texels, mut bytes) = (0, 0);
+    let (mut bytes, mut texels, limit) = (0, 0, room.image_file_bytes());
     let mut found = Vec::with_capacity(wanted.len());
     for &Wanted { origin, .. } in wanted {
         let image = find(source, origin, unreadable)?;
         if let Some(image) = &image {
-            let size = image.size();
-            texels += u64::from(size[0]) * u64::from(size[1]);
             bytes += image.bytes();
-            let (count, limit, unit) = if texels > MAX_TEXELS {
-                (texels, MAX_TEXELS, "texels")
-            } else {
-                (bytes, MAX_FILE_BYTES, "bytes")
-            };
+            texels += image.texels();
+            let (count, limit, unit) =
+                if bytes > limit { (bytes, limit, "bytes") } else { (texels, MAX_TEXELS, "texels") };
             if count > limit {
                 let reason = format!("the images up to this one have {count} {unit}, more than {limit}");
                 return Err(error(source, origin, reason, "scale the images down, or use fewer"));
             }
-            room.texels(size)?;
+            room.texels(image.size())?;
         }
         found.push(image);
     }
-    let decoded: Vec<_> = found
-        .into_par_iter()
-        .zip(wanted)
-        .map(|(image, wanted)| image.map(|image| image.decode(wanted.deep)))
-        .collect();
+    let mut decoded = Vec::with_capacity(found.len());
+    let mut found = found.into_iter().zip(wanted).peekable();
+    while found.peek().is_some() {
+        let together = take_together(&mut found);
+        decoded.par_extend(
+            together.into_par_iter().map(|(image, wanted)| Some(image?.decode(wanted).reduced(room))),
+        );
+    }
     // The first error in the order of the file is returned, whichever thread failed first.
-    let images = decoded.into_iter().zip(wanted).map(|(decoded, &Wanted { origin, encoding, .. })| {
-        let Some(Decoded { size: [width, height], texels, faults, deep }) = decoded else {
+    let images = decoded.into_iter().zip(wanted).map(|(decoded, &Wanted { origin, .. })| {
+        let Some(Decoded { size: [width, height], texels, encoding, faults }) = decoded else {
             return Ok(None);
         };
-        let encoding = deep.map_or(encoding, Deep::encoding);
         for (origin, fault) in faults {
             unreadable.push(description(source, origin, fault)?);
         }
@@ -130,6 +144,11 @@ impl Found<'_> {
         }
     }
 
+    fn texels(&self) -> u64 {
+        let [width, height] = self.size();
+        u64::from(width) * u64::from(height)
+    }
+
     /// Size of the files, bytes.
     fn bytes(&self) -> u64 {
         match self {
@@ -138,11 +157,11 @@ impl Found<'_> {
         }
     }
 
-    /// Decodes the texels. An image of more than 8 bits per channel is stored as `deep`.
-    fn decode(&self, deep: Option<Deep>) -> Decoded {
+    /// Decodes the texels. An image of more than 8 bits per channel has the encoding [`Wanted::deep`].
+    fn decode(&self, wanted: &Wanted) -> Decoded {
         let size = self.size();
         let deep = match self {
-            Self::File(file) => deep.filter(|_| file.kind.is_deep(&file.bytes)),
+            Self::File(file) => wanted.deep.filter(|_| file.kind.is_deep(&file.bytes)),
             Self::Converted(..) => None,
         };
         let mut faults = Vec::new();
@@ -164,7 +183,19 @@ impl Found<'_> {
                 Some(conversion.texels(size, grids))
             }
         };
-        Decoded { size, texels, deep, faults }
+        Decoded { size, texels, encoding: deep.map_or(wanted.encoding, Deep::encoding), faults }
+    }
+}
+
+impl Decoded {
+    /// Scales texels down to the size in which they are stored.
+    fn reduced(self, room: &Room) -> Self {
+        let size = room.image_size(self.size);
+        if size == self.size {
+            return self;
+        }
+        let texels = self.texels.map(|texels| reduced(&texels, self.encoding, self.size, size));
+        Self { size, texels, ..self }
     }
 }
 

@@ -13,6 +13,7 @@ use photoncard_shared::layout::{
 };
 
 use crate::error::SceneError;
+use crate::reduction::reduced_size;
 
 /// Memory of a card and the part that is in use, bytes.
 #[derive(Clone)]
@@ -20,19 +21,33 @@ pub(super) struct Room {
     file: PathBuf,
     available: u64,
     taken: u64,
+    /// Maximum width and height of an image, texels.
+    side: u32,
 }
 
 impl Room {
-    pub(super) fn new(file: &Path, available: u64) -> Self {
-        Self { file: file.to_owned(), available, taken: 0 }
+    pub(super) fn new(file: &Path, available: u64, side: u32) -> Self {
+        Self { file: file.to_owned(), available, taken: 0, side }
+    }
+
+    /// Size in which an image of size `size` is stored.
+    pub(super) fn image_size(&self, size: [u32; 2]) -> [u32; 2] {
+        reduced_size(size, self.side)
     }
 
     pub(super) fn materials(&mut self, count: usize) -> Result<(), SceneError> {
         self.take((count * Material::BYTES) as u64, || format!("{count} materials"))
     }
 
-    /// Adds the card memory of an image's texels.
-    pub(super) fn texels(&mut self, [width, height]: [u32; 2]) -> Result<(), SceneError> {
+    /// Maximum total size of all image files, bytes: 2 GB, or eight for each texel that fits. No format takes
+    /// more.
+    pub(super) fn image_file_bytes(&self) -> u64 {
+        self.available.saturating_mul(2).max(2 << 30)
+    }
+
+    /// Adds the card memory of the texels of an image of size `size`.
+    pub(super) fn texels(&mut self, size: [u32; 2]) -> Result<(), SceneError> {
+        let [width, height] = self.image_size(size);
         let tiles = u64::from(width.div_ceil(TILE_WIDTH)) * u64::from(height.div_ceil(TILE_HEIGHT));
         self.take(tiles * LINE_BYTES as u64, || "images and materials".to_owned())
     }
@@ -80,6 +95,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn texels_are_counted_in_the_size_in_which_they_are_stored() {
+        let mut room = Room::new(Path::new("scene.gltf"), 2 * 128, 16);
+        assert!(room.texels([64, 32]).is_err());
+        assert!(Room { side: 8, ..room.clone() }.texels([64, 32]).is_ok());
+        assert!(room.texels([9, 4]).is_ok());
+    }
+
+    #[test]
     fn triangles_take_a_leaf_for_eight_of_them_or_nine_corners() {
         assert_eq!(Room::geometry(0, 0), 0);
         assert_eq!(Room::geometry(8, 9), 128);
@@ -89,7 +112,7 @@ mod tests {
 
     #[test]
     fn the_error_of_a_scene_too_large_counts_all_contents() {
-        let mut room = Room::new(Path::new("scene.gltf"), 128 * 10);
+        let mut room = Room::new(Path::new("scene.gltf"), 128 * 10, 16);
         assert!(room.materials(2).is_ok() && room.texels([9, 4]).is_ok());
         assert!(room.fits_any(1) && !room.fits_any(1000));
         let error = room.triangles(7, 128 * 8).unwrap_err();

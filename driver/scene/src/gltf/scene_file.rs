@@ -18,7 +18,7 @@ use super::settings::LoadSettings;
 use super::texture::Textures;
 use super::{camera, material, nodes, solid_glass, touching_glass, variants};
 use crate::error::SceneError;
-use crate::{Camera, LightUnits, Scene, SceneContents};
+use crate::{Camera, LightUnits, MAX_SIDE, Scene, SceneContents};
 
 /// Open glTF file. Materials and images are read once, geometry for each moment.
 ///
@@ -60,10 +60,10 @@ impl SceneFile {
     /// images exceed the cards' memory; or if it lacks the variant of `settings`. The error names the
     /// location in the file and the remedy.
     pub fn open(path: &Path, settings: &LoadSettings) -> Result<Self, SceneError> {
-        let LoadSettings { dram_bytes, variant, light_units } = settings;
+        let LoadSettings { dram_bytes, texture_limit, variant, light_units } = settings;
         let mut document = Document::read(path)?;
         variant.as_deref().map_or(Ok(()), |name| variants::select(&mut document, name))?;
-        let mut room = Room::new(path, (*dram_bytes).into());
+        let mut room = Room::new(path, *dram_bytes, texture_limit.unwrap_or(MAX_SIDE));
         room.materials(document.root.materials.len())?;
         let (bare, unreadable) = bare_scene(&document, &mut room)?;
         let (framed, anchor) = (OnceLock::new(), OnceLock::new());

@@ -9,16 +9,24 @@ use crate::LightUnits;
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadSettings {
     /// Memory of the cards into which the scene must fit, bytes.
-    pub dram_bytes: u32,
+    pub dram_bytes: u64,
+    /// Maximum width and height of an image, texels, at least 1. Larger images are scaled down by a whole
+    /// number, to means in linear light. `None` keeps the sizes of the files.
+    pub texture_limit: Option<u32>,
     /// Variant of the materials (`KHR_materials_variants`); `None` for the materials that the meshes state.
     pub variant: Option<String>,
     /// Units of the file's punctual lights.
     pub light_units: LightUnits,
 }
 
-/// Memory of the reference chip, no variant, and units chosen by the exporter.
+/// Memory of the reference chip, images of all sizes, no variant, and units chosen by the exporter.
 impl Default for LoadSettings {
     fn default() -> Self {
-        Self { dram_bytes: REFERENCE_DRAM_BYTES, variant: None, light_units: LightUnits::default() }
+        Self {
+            dram_bytes: REFERENCE_DRAM_BYTES,
+            texture_limit: None,
+            variant: None,
+            light_units: LightUnits::default(),
+        }
     }
 }

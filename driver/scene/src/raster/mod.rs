@@ -13,7 +13,7 @@ mod webp;
 
 pub(super) use self::deep::Deep;
 pub(super) use self::fault::Fault;
-use super::texture::{MAX_SIDE, MAX_TEXELS};
+use super::texture::MAX_SIDE;
 use photoncard_picture::allocation;
 use photoncard_picture::foreign;
 
@@ -118,7 +118,7 @@ pub(super) fn check_size([width, height]: [u32; 2]) -> Result<(), Fault> {
     if width == 0 || height == 0 {
         return Err(Fault::damaged("it has no texels"));
     }
-    if width > MAX_SIDE || height > MAX_SIDE || u64::from(width) * u64::from(height) > MAX_TEXELS {
+    if width > MAX_SIDE || height > MAX_SIDE {
         let reason = format!("the image has {width} x {height} texels, more than {MAX_SIDE} x {MAX_SIDE}");
         return Err(Fault {
             reason,

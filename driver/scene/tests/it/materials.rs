@@ -236,7 +236,7 @@ fn load_variant(json: &Value, variant: Option<&str>) -> Result<Scene, SceneError
     let path = folder.path().join("scene.gltf");
     std::fs::write(&path, json.to_string()).unwrap();
     let variant = variant.map(str::to_owned);
-    gltf::load_with(&path, &LoadSettings { dram_bytes: u32::MAX, variant, ..LoadSettings::default() })
+    gltf::load_with(&path, &LoadSettings { dram_bytes: u64::MAX, variant, ..LoadSettings::default() })
 }
 
 #[test]

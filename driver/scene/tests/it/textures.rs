@@ -309,12 +309,6 @@ fn sizes_are_refused_by_the_header() {
     two.json["materials"][0]["emissiveTexture"] = json!({"index": 1});
     let words = ["images and materials take 1073741888 bytes", "the card has 536870912"];
     check(&two.load().unwrap_err(), &words);
-    // A card of maximum memory has room for both images, whose texels exceed the limit.
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("scene.glb");
-    fs::write(&path, glb(two.json, &two.bytes)).unwrap();
-    let roomy = gltf::LoadSettings { dram_bytes: u32::MAX, ..gltf::LoadSettings::default() };
-    check(&gltf::load_with(&path, &roomy).unwrap_err(), &["images[1]", "268435457 texels"]);
     for (size, part) in [
         ([1, 100_000], "1 x 100000 texels, more than 16384"),
         ([16_385, 1], "16385 x 1"),
@@ -330,6 +324,39 @@ fn sizes_are_refused_by_the_header() {
     let frame = wide.windows(2).position(|bytes| bytes == [0xff, 0xc0]).unwrap();
     wide[frame + 5..frame + 9].copy_from_slice(&[0xff; 4]);
     check(&embedded(&wide, "image/jpeg").load().unwrap_err(), &["images[0]", "65535 x 65535"]);
+}
+
+#[test]
+fn images_above_a_limit_are_scaled_down_and_count_so_in_the_memory_of_cards() {
+    let textured = embedded(COLOUR, "image/jpeg");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.glb");
+    fs::write(&path, glb(textured.json, &textured.bytes)).unwrap();
+    let image = |limit| {
+        let settings = gltf::LoadSettings { texture_limit: limit, ..gltf::LoadSettings::default() };
+        let scene = gltf::load_with(&path, &settings).unwrap();
+        (scene.images[0].clone(), scene.checksum().to_owned())
+    };
+    let ((whole, checksum), (same, of_same), (small, of_small)) =
+        (image(None), image(Some(24)), image(Some(8)));
+    assert_eq!((whole.width, whole.height), (24, 16));
+    assert_eq!((&whole, &checksum), (&same, &of_same));
+    assert_ne!(checksum, of_small);
+    // A third of each side: means of nine texels, whose columns are about 10 apart.
+    assert_eq!((small.width, small.height, small.texels.len()), (8, 6, 48));
+    let red = |image: &photoncard_scene::Image, x: usize| i32::from(image.texels[x][0]);
+    for x in 0..8 {
+        let (mean, middle) = (red(&small, x), red(&whole, 3 * x + 1));
+        assert!((mean - middle).abs() < 6, "{mean}, {middle}");
+    }
+    // Twelve lines of texels, or two.
+    let load = |texture_limit| {
+        let settings =
+            gltf::LoadSettings { dram_bytes: 1000, texture_limit, ..gltf::LoadSettings::default() };
+        gltf::load_with(&path, &settings)
+    };
+    assert!(matches!(load(None), Err(SceneError::TooLarge { .. })));
+    load(Some(8)).unwrap();
 }
 
 #[test]

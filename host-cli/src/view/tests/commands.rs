@@ -76,12 +76,13 @@ fn options(random: &mut Random) -> Vec<String> {
         ("filter", random.one(Filter::ALL).name().to_owned()),
         ("camera", random.one(&["eye", "the 'left' one", "-", "$HOME"]).to_owned()),
     ];
-    let more: [(&str, &str); 5] = [
+    let more: [(&str, &str); 6] = [
         ("set", "wall 'n'.diffuse=0.1,0.2,0.3"),
         ("aov", "direct,Z"),
         ("environment", "0.5,0.25,1"),
         ("environment", "my sky.exr"),
         ("light-units", "watts"),
+        ("texture-limit", "64"),
     ];
     let all = choices.iter().map(|(name, value)| (*name, value.as_str())).chain(more);
     for (name, value) in all {
