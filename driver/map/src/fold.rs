@@ -35,17 +35,7 @@ impl<L, B: Copy> Tree<L, B> {
     /// Node with two children. `node` is the cost of visiting it as a wide node; `leaf` is the leaf that it
     /// can become, with the cost of its visit.
     pub(crate) fn node(parts: [Self; 2], bounds: B, node: f32, leaf: Option<(L, f32)>) -> Self {
-        let mut costs = [f32::INFINITY; NODE_CHILDREN];
-        let mut first = [0; NODE_CHILDREN];
-        let [below, above] = parts.each_ref().map(|tree| tree.costs);
-        for both in 2..=NODE_CHILDREN {
-            for below_children in 1..both {
-                let cost = below[below_children - 1] + above[both - below_children - 1];
-                if cost < costs[both - 1] {
-                    (costs[both - 1], first[both - 1]) = (cost, below_children as u8);
-                }
-            }
-        }
+        let (mut costs, mut first) = cheapest_pairs(parts.each_ref().map(|tree| &tree.costs));
         // As a wide node of its own it may be split differently than among the children of its parent.
         let opened = first[NODE_CHILDREN - 1];
         let as_one = leaf.as_ref().map_or(node + costs[NODE_CHILDREN - 1], |(_, cost)| *cost);
@@ -57,7 +47,10 @@ impl<L, B: Copy> Tree<L, B> {
         // The last entry is read only when the node becomes a wide node of its own.
         first[NODE_CHILDREN - 1] = opened;
         let leaf = leaf.map(|(leaf, _)| leaf);
-        let parts = Some(Box::new(parts.map(|tree| tree.part)));
+        // A node that is always a leaf drops what is below it, so that the memory is free. A root of so few
+        // triangles has one leaf then.
+        let is_opened = leaf.is_none() || first[..NODE_CHILDREN - 1].iter().any(|&first| first > 0);
+        let parts = is_opened.then(|| Box::new(parts.map(|tree| tree.part)));
         Self { part: Part { bounds, leaf, parts, first }, costs }
     }
 
@@ -70,6 +63,22 @@ impl<L, B: Copy> Tree<L, B> {
     pub(crate) fn as_leaf(&self) -> Option<&L> {
         self.part.leaf.as_ref()
     }
+}
+
+/// Costs of two trees as at most 1 to [`NODE_CHILDREN`] children in all, infinite for one, and how many of
+/// them come from the first tree: of equally cheap numbers the smallest.
+fn cheapest_pairs([below, above]: [&[f32; NODE_CHILDREN]; 2]) -> ([f32; NODE_CHILDREN], [u8; NODE_CHILDREN]) {
+    // Lanes past the end, so that each number of the first tree's children is one pass over all lanes.
+    let (mut costs, mut first) = ([f32::INFINITY; 2 * NODE_CHILDREN], [0_u32; 2 * NODE_CHILDREN]);
+    for (children, below) in (1..NODE_CHILDREN).zip(below) {
+        for (index, above) in (children..).zip(above) {
+            let cost = below + above;
+            let is_less = cost < costs[index];
+            costs[index] = if is_less { cost } else { costs[index] };
+            first[index] = if is_less { children as u32 } else { first[index] };
+        }
+    }
+    (std::array::from_fn(|i| costs[i]), std::array::from_fn(|i| first[i] as u8))
 }
 
 impl<L, B: Copy> Part<L, B> {
@@ -131,5 +140,44 @@ impl<L, B: Copy> Folded<L, B> {
             folded.nodes.push(WideNode { children: bounds, links });
         }
         folded
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Costs that fall with the number of children, as those of trees do; equal ones are frequent.
+    fn costs(seed: u32) -> [f32; NODE_CHILDREN] {
+        let mut cost = 100.0;
+        std::array::from_fn(|i| {
+            cost -= ((seed.wrapping_mul(i as u32 + 7) >> 5) % 4) as f32;
+            cost
+        })
+    }
+
+    #[test]
+    fn pairs_are_the_cheapest_and_of_equal_ones_have_the_fewest_children_of_the_first() {
+        for seed in 0..200 {
+            let (below, above) = (costs(seed), costs(seed * 31 + 5));
+            let (found, first) = cheapest_pairs([&below, &above]);
+            assert_eq!((found[0], first[0]), (f32::INFINITY, 0));
+            for both in 2..=NODE_CHILDREN {
+                let cost = |children: usize| below[children - 1] + above[both - children - 1];
+                let least = (1..both).min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap();
+                assert_eq!((found[both - 1], usize::from(first[both - 1])), (cost(least), least), "{both}");
+            }
+        }
+    }
+
+    #[test]
+    fn trees_below_what_is_always_a_leaf_are_dropped() {
+        let leaf = |index: u32, cost| Tree::leaf(index, (), cost);
+        let pair = |leaf_cost| Tree::node([leaf(1, 1.0), leaf(2, 1.0)], (), 1.0, Some((0, leaf_cost)));
+        assert!(pair(1.5).part.parts.is_none());
+        assert!(pair(2.5).part.parts.is_some());
+        assert_eq!(Folded::new(pair(1.5)).leaves, [0]);
+        let folded = Folded::new(Tree::node([pair(1.5), pair(2.5)], (), 1.0, None));
+        assert_eq!(folded.leaves, [0, 1, 2]);
     }
 }

@@ -13,6 +13,10 @@ use rdst::{RadixKey, RadixSort};
 /// tries.
 const ROUNDS: usize = 16;
 
+/// Maximum number of parts that a round tries. The nodes with the largest areas make most of a tree's cost:
+/// with twice the time for all parts of a million triangles, rays read 2 % less.
+const MAX_TRIED: usize = 100_000;
+
 /// Part of a tree that can be reinserted.
 #[derive(Clone, Copy)]
 struct Candidate {
@@ -42,7 +46,7 @@ pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
     for round in 0..ROUNDS {
         let part = 1.0 / (2 * round + 1) as f32;
         let count = ((tree.nodes.len() as f32 * share * part) as usize).max(1);
-        let found = reinsertions(tree, count.min(tree.nodes.len() - 1));
+        let found = reinsertions(tree, count.min(MAX_TRIED).min(tree.nodes.len() - 1));
         touched.fill(false);
         for Reinsertion { from, to, .. } in found {
             let [from, to] = [from, to].map(|node| node as usize);
