@@ -156,7 +156,8 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     image.append(SectionKind::Materials, materials.iter().map(layout::Material::to_bytes))?;
     image.append(SectionKind::Layers, materials::layers(scene).into_iter())?;
     image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
-    image.append_lines(SectionKind::Texels, textures::lines(scene, lights.environment()))?;
+    let texel_lines = textures::lines(scene, lights.environment());
+    textures::write(scene, lights.environment(), image.append_zeroed(SectionKind::Texels, texel_lines)?);
     let index_in_image = |triangle: usize| indices.get(triangle).copied().unwrap_or(0);
     image.append(SectionKind::Emitters, lights.emitters(index_in_image).map(|emitter| emitter.to_bytes()))?;
     image.append(SectionKind::LightNodes, lights.nodes())?;

@@ -4,8 +4,13 @@ use photoncard_scene::{Image, Scene, Wrap};
 use photoncard_shared::address::Line;
 use photoncard_shared::layout::{self, NO_TEXTURE, TEXELS_PER_LINE, TILE_HEIGHT, TILE_WIDTH};
 
+use rayon::prelude::*;
+
 use super::error::PackError;
 use crate::light::EnvironmentMap;
+
+/// Minimum number of lines that a thread writes at a time.
+const SEQUENTIAL: usize = 1024;
 
 /// Records of a scene's textures, followed by the environment's. Textures with the same image share its
 /// texels.
@@ -42,31 +47,43 @@ pub(super) fn records(
     Ok(textures.chain(environment.map(|map| map.texture(first_line))).collect())
 }
 
-/// Lines of the texels of all images, one image after another, followed by the environment's.
-pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> impl Iterator<Item = Line> {
-    let of_images = scene.images.iter().flat_map(|image| {
-        tiles(bare(image), |x, y| image.texels[y as usize * image.width as usize + x as usize])
-    });
-    let of_environment =
-        environment.into_iter().flat_map(|map| tiles(map.texture(0), |x, y| map.texel(x, y)));
-    of_images.chain(of_environment)
+/// Number of lines of the texels of all images and of the environment.
+pub(super) fn lines(scene: &Scene, environment: Option<&EnvironmentMap>) -> usize {
+    let of_images = scene.images.iter().map(|image| bare(image).lines() as usize);
+    of_images.chain(environment.map(|map| map.texture(0).lines() as usize)).sum()
 }
 
-/// Lines of a texture. `texel` returns the texel at a column and a row.
-fn tiles(texture: layout::Texture, texel: impl Fn(u32, u32) -> [u8; 4]) -> impl Iterator<Item = Line> {
+/// Writes the lines of the texels of all images, one image after another, and then the environment's.
+pub(super) fn write(scene: &Scene, environment: Option<&EnvironmentMap>, mut lines: &mut [Line]) {
+    for image in &scene.images {
+        let width = image.width as usize;
+        lines = write_tiles(bare(image), lines, |x, y| image.texels[y as usize * width + x as usize]);
+    }
+    if let Some(map) = environment {
+        write_tiles(map.texture(0), lines, |x, y| map.texel(x, y));
+    }
+}
+
+/// Writes the lines of a texture at the start of `lines`, and returns the others. `texel` returns the texel at
+/// a column and a row.
+fn write_tiles(
+    texture: layout::Texture,
+    lines: &mut [Line],
+    texel: impl Fn(u32, u32) -> [u8; 4] + Sync,
+) -> &mut [Line] {
     let [width, height] = texture.size.map(u32::from);
     let across = width.div_ceil(TILE_WIDTH);
-    (0..texture.lines()).map(move |tile| {
+    let (own, others) = lines.split_at_mut(texture.lines() as usize);
+    own.par_iter_mut().zip(0..texture.lines()).with_min_len(SEQUENTIAL).for_each(|(line, tile)| {
         let [column, row] = [tile % across * TILE_WIDTH, tile / across * TILE_HEIGHT];
-        let mut line = Line::ZERO;
         for (place, bytes) in (0..TEXELS_PER_LINE).zip(line.0.as_chunks_mut().0) {
             // A line that extends beyond the borders repeats the last texels.
             let x = (column + place % TILE_WIDTH).min(width - 1);
             let y = (row + place / TILE_WIDTH).min(height - 1);
             *bytes = texel(x, y);
         }
-        line
-    })
+    });
+    others
 }
 
 /// Texture of an image whose texels begin at line 0.
@@ -107,7 +124,8 @@ mod tests {
         let images = vec![image(13, 6), image(1, 1), image(8, 4), image(3, 70)];
         let textures = [0, 3, 1, 2, 3].map(Texture::new).to_vec();
         let scene = Scene::from(SceneContents { images, textures, ..SceneContents::default() });
-        let lines: Vec<Line> = lines(&scene, None).collect();
+        let mut lines = vec![Line::ZERO; lines(&scene, None)];
+        write(&scene, None, &mut lines);
         for (texture, record) in scene.textures.iter().zip(records(&scene, None).expect("few")) {
             let Image { width, height, texels, .. } = &scene.images[texture.image as usize];
             for (number, texel) in (0..).zip(texels) {

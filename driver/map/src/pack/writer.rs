@@ -53,22 +53,6 @@ impl ImageWriter {
         Ok(())
     }
 
-    /// Appends a section of whole lines, which need not be counted before.
-    ///
-    /// # Errors
-    /// As [`Self::append`].
-    pub(super) fn append_lines(
-        &mut self,
-        kind: SectionKind,
-        lines: impl Iterator<Item = Line>,
-    ) -> Result<(), PackError> {
-        let first = self.lines.len();
-        self.lines.extend(lines);
-        let count = self.lines.len() - first;
-        self.header.sections[kind as usize] = section(first, count, count)?;
-        Ok(())
-    }
-
     /// Appends a section of zeroed records and returns its lines, so that the records can be written in any
     /// order.
     ///

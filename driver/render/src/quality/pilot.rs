@@ -138,8 +138,23 @@ pub(super) fn measure(
     // Tiles are spread over the whole picture, so that a crop has the same settings and pixels.
     let window = Window::full(settings.picture.width, settings.picture.height);
     let tiles = SPREAD.tiles(window);
-    let pilot = |photons| Pilot::new(scene, packed, settings, photons, &pool, observer);
-    let [few, more] = [pilot(few_photons)?, pilot(more_photons)?];
+    let [few_shadow_rays, shadow_rays] = SHADOW_RAYS;
+    let [few_gather_rays, gather_rays] = numbers_of_gather_rays;
+    // Rays have equal directions with all maps: only the maps differ.
+    let by_map = settings.clone().with(|settings| {
+        settings.integrator.shadow_rays = 0;
+        settings.integrator.gather_rays = gather_rays;
+        settings.integrator.sampling = Sampling::Reflection;
+        settings.integrator.seed = SEEDS[0];
+    });
+    let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
+    let pilot = |settings, photons| Pilot::new(scene, packed, settings, photons, &pool, observer);
+    // A pilot has a card image of its own: there is one at a time.
+    let few = pilot(settings, few_photons)?;
+    let by_few_photons = render_map(&few)?;
+    let gather_rays_per_ray = few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?;
+    drop(few);
+    let more = pilot(settings, more_photons)?;
     let pair = |shadow_rays, gather_rays| -> Result<[Pixels; 2], RenderError> {
         let render = |seed| {
             let settings = settings.clone().with(|settings| {
@@ -151,30 +166,22 @@ pub(super) fn measure(
         };
         Ok([render(SEEDS[0])?, render(SEEDS[1])?])
     };
-    let [few_shadow_rays, shadow_rays] = SHADOW_RAYS;
-    let [few_gather_rays, gather_rays] = numbers_of_gather_rays;
     // Light has the noise of both kinds of rays: the number of each is varied with the greater number of the
     // other.
     let by_few_shadow_rays = pair(few_shadow_rays, gather_rays)?;
     let by_few_gather_rays = pair(shadow_rays, few_gather_rays)?;
     let best = pair(shadow_rays, gather_rays)?;
-    // Rays have equal directions with both maps: only the maps differ.
-    let by_map = settings.clone().with(|settings| {
-        settings.integrator.shadow_rays = 0;
-        settings.integrator.gather_rays = gather_rays;
-        settings.integrator.sampling = Sampling::Reflection;
-        settings.integrator.seed = SEEDS[0];
-    });
-    let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
-    let maps = [render_map(&few)?, render_map(&more)?];
+    let maps = [by_few_photons, render_map(&more)?];
+    let used_share = more.used_share;
+    drop(more);
     let photon = of_photon(effort, &best, [&maps[0], &maps[1]]);
-    let for_camera = match more.used_share.filter(|share| *share < MAX_USED_SHARE) {
+    let for_camera = match used_share.filter(|share| *share < MAX_USED_SHARE) {
         Some(share) if measures_guided || !ESTIMATED_SHARES.contains(&share) => {
             let settings =
                 settings.clone().with(|settings| settings.photons.photons_for = PhotonsFor::Camera);
-            let pilot = |photons| Pilot::new(scene, packed, &settings, photons, &pool, observer);
-            let guided = [render_map(&pilot(few_photons)?)?, render_map(&pilot(more_photons)?)?];
-            Some(ForCamera::new(effort, &best, guided, &maps[1]))
+            let guided = [few_photons, more_photons].map(|photons| render_map(&pilot(&settings, photons)?));
+            let [few, more] = guided;
+            Some(ForCamera::new(effort, &best, [few?, more?], &maps[1]))
         }
         share => share.map(|share| ForCamera::estimated(photon, share)),
     };
@@ -190,7 +197,7 @@ pub(super) fn measure(
         photon,
         for_camera,
         lambertian: best[0].lambertian,
-        gather_rays_per_ray: few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?,
+        gather_rays_per_ray,
         level: level_of(&best),
         deviations: deviations(&best),
     })
