@@ -9,6 +9,8 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{Header, HeaderError, Lights, Section, SectionKind};
 use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, WideNode};
 
+use super::writer::room_for_photons;
+
 const LIGHT_SECTIONS: [SectionKind; 4] = [
     SectionKind::Emitters,
     SectionKind::LightNodes,
@@ -17,11 +19,19 @@ const LIGHT_SECTIONS: [SectionKind; 4] = [
 ];
 
 /// A card image in host memory.
-#[derive(Clone)]
 pub struct CardImage {
     /// Header, also encoded in the first lines.
     pub(super) header: Header,
     pub(super) lines: Vec<Line>,
+}
+
+impl Clone for CardImage {
+    /// Copy with room for a photon map, as [`ImageWriter`](super::ImageWriter) leaves it.
+    fn clone(&self) -> Self {
+        let mut lines = Vec::with_capacity(self.lines.len() + room_for_photons(self.lines.len()));
+        lines.extend_from_slice(&self.lines);
+        Self { header: self.header, lines }
+    }
 }
 
 impl AsRef<[Line]> for CardImage {

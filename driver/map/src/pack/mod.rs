@@ -11,7 +11,7 @@ use photoncard_picture::allocation::{self, OutOfMemory};
 use photoncard_scene::Scene;
 use photoncard_shared::image::{Header, SectionKind};
 use photoncard_shared::layout::{
-    self, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, power_of_two_above,
+    self, DistantLight, LEAF_TRIANGLES, NodeBox, PhotonGrid, Record, power_of_two_above,
 };
 use photoncard_shared::message::SumScale;
 
@@ -147,7 +147,11 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     let corners = PackedCorners::new(scene, lights, (&hierarchy.leaf_triangles, &uncovered));
     let textures = textures::records(scene, lights.environment())?;
     let indices = indices_in_image(scene, &hierarchy.leaf_triangles);
-    let mut image = ImageWriter::new(header(scene, lights));
+    let texel_lines = textures::lines(scene, lights.environment());
+    let attribute_lines = corners.records.len().div_ceil(layout::Attributes::PER_LINE);
+    // Other sections have place in the room for photons.
+    let large = [hierarchy.nodes.len(), hierarchy.leaves.len(), attribute_lines, texel_lines];
+    let mut image = ImageWriter::new(header(scene, lights), large.into_iter().sum());
     image.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
     image.append(SectionKind::Triangles, hierarchy.leaves.into_iter())?;
     image.append(SectionKind::LeafAttributes, corners.leaves.iter().map(|entry| entry.to_le_bytes()))?;
@@ -156,7 +160,6 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     image.append(SectionKind::Materials, materials.iter().map(layout::Material::to_bytes))?;
     image.append(SectionKind::Layers, materials::layers(scene).into_iter())?;
     image.append(SectionKind::Textures, textures.iter().map(layout::Texture::to_bytes))?;
-    let texel_lines = textures::lines(scene, lights.environment());
     textures::write(scene, lights.environment(), image.append_zeroed(SectionKind::Texels, texel_lines)?);
     let index_in_image = |triangle: usize| indices.get(triangle).copied().unwrap_or(0);
     image.append(SectionKind::Emitters, lights.emitters(index_in_image).map(|emitter| emitter.to_bytes()))?;

@@ -64,8 +64,8 @@ pub(super) fn write(scene: &Scene, environment: Option<&EnvironmentMap>, mut lin
     }
 }
 
-/// Writes the lines of a texture at the start of `lines`, and returns the others. `texel` returns the texel at
-/// a column and a row.
+/// Writes the lines of a texture at the start of `lines`, and returns the others. `texel` returns the texel
+/// at a column and a row.
 fn write_tiles(
     texture: layout::Texture,
     lines: &mut [Line],

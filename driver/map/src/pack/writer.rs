@@ -7,6 +7,13 @@ use photoncard_shared::layout::PhotonGrid;
 use super::card_image::CardImage;
 use super::error::PackError;
 
+/// Number of lines to allocate for a photon map, beyond the `lines` of an image. The allocator copies an
+/// image that grows, which takes seconds if it is large; room that is not written takes no memory.
+pub(super) fn room_for_photons(lines: usize) -> usize {
+    const PHOTON_LINES: usize = 1 << 20;
+    (lines / 16).min(PHOTON_LINES)
+}
+
 /// Writer of a card image. It appends sections after the last line.
 pub(crate) struct ImageWriter {
     header: Header,
@@ -14,10 +21,12 @@ pub(crate) struct ImageWriter {
 }
 
 impl ImageWriter {
-    /// Creates a writer of a card image without sections. `header` has the units and lights; the writer sets
-    /// the numbers of lines and the sections.
-    pub(super) fn new(header: Header) -> Self {
-        Self { header, lines: vec![Line::ZERO; HEADER_LINES] }
+    /// Creates a writer of a card image without sections, with room for `lines` lines and a photon map.
+    /// `header` has the units and lights; the writer sets the numbers of lines and the sections.
+    pub(super) fn new(header: Header, lines: usize) -> Self {
+        let mut all = Vec::with_capacity(HEADER_LINES + lines + room_for_photons(lines));
+        all.resize(HEADER_LINES, Line::ZERO);
+        Self { header, lines: all }
     }
 
     /// Creates a writer that appends to a finished image.
@@ -47,7 +56,6 @@ impl ImageWriter {
     ) -> Result<(), PackError> {
         let lines = records.len().div_ceil(LINE_BYTES / N);
         self.header.sections[kind as usize] = section(self.lines.len(), records.len(), lines)?;
-        // Reserves exactly: the card image is most of the host's memory.
         self.lines.reserve_exact(lines);
         self.lines.extend(pack_lines(records));
         Ok(())
