@@ -9,14 +9,19 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{Header, HeaderError, Lights, Section, SectionKind};
 use photoncard_shared::layout::{BvhNode, Material, NodeBox, Record, WideNode};
 
-use super::writer::room_for_photons;
-
 const LIGHT_SECTIONS: [SectionKind; 4] = [
     SectionKind::Emitters,
     SectionKind::LightNodes,
     SectionKind::DistantLights,
     SectionKind::EnvironmentCells,
 ];
+
+/// Number of lines to allocate for a photon map, beyond the `lines` of an image. The allocator copies an
+/// image that grows, which takes seconds if it is large; room that is not written takes no memory.
+pub(super) fn room_for_photons(lines: usize) -> usize {
+    const PHOTON_LINES: usize = 1 << 20;
+    (lines / 16).min(PHOTON_LINES)
+}
 
 /// A card image in host memory.
 pub struct CardImage {
@@ -26,7 +31,7 @@ pub struct CardImage {
 }
 
 impl Clone for CardImage {
-    /// Copy with room for a photon map, as [`ImageWriter`](super::ImageWriter) leaves it.
+    /// Copy with room for a photon map.
     fn clone(&self) -> Self {
         let mut lines = Vec::with_capacity(self.lines.len() + room_for_photons(self.lines.len()));
         lines.extend_from_slice(&self.lines);

@@ -4,15 +4,8 @@ use photoncard_shared::address::{LINE_BYTES, Line};
 use photoncard_shared::image::{HEADER_LINES, Header, Section, SectionKind};
 use photoncard_shared::layout::PhotonGrid;
 
-use super::card_image::CardImage;
+use super::card_image::{CardImage, room_for_photons};
 use super::error::PackError;
-
-/// Number of lines to allocate for a photon map, beyond the `lines` of an image. The allocator copies an
-/// image that grows, which takes seconds if it is large; room that is not written takes no memory.
-pub(super) fn room_for_photons(lines: usize) -> usize {
-    const PHOTON_LINES: usize = 1 << 20;
-    (lines / 16).min(PHOTON_LINES)
-}
 
 /// Writer of a card image. It appends sections after the last line.
 pub(crate) struct ImageWriter {
