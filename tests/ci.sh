@@ -235,6 +235,8 @@ check_packages() {
     if ! cargo deny --version >/dev/null 2>&1 && ! install_deny; then
         go_without "licences, sources and advisories of dependencies" "cargo-deny is missing; run: cargo install cargo-deny --locked"
     else
+        # Also packages that this system does not build.
+        cargo fetch --locked
         cargo deny --locked --offline check licenses bans sources
         # The database is on GitHub.
         if timeout 120 cargo deny fetch db; then
