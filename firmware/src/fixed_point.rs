@@ -154,7 +154,7 @@ mod tests {
         assert_eq!(greatest.value(), Vec3::splat((1 << 23) as f32));
         for order in [[5, 4, 3, 2, 1, 0], [3, 0, 1, 2, 5, 4], [1, 5, 0, 2, 4, 3]] {
             assert_eq!(sum(order), greatest);
-            // Nor does it matter whether some are added up before.
+            // The result is the same if some terms are added up beforehand.
             let [mut first, mut second] = [ColourSum::ZERO; 2];
             order[..2].iter().for_each(|&index| first.add_light(terms[index]));
             order[2..].iter().for_each(|&index| second.add_light(terms[index]));

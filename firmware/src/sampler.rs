@@ -28,10 +28,10 @@ pub enum Dimension {
     Irradiance = 4,
     /// Directions of an irradiance record's survey rays.
     Survey = 5,
-    /// Choices on an eye path, at perfectly specular surfaces, between reflection, transmission and
-    /// absorption.
+    /// Random choices on an eye path: between reflection, transmission and an end at a perfectly specular
+    /// surface, and between material layers.
     Specular = 6,
-    /// Ray of a sharp lobe, which finds albedo and normal of what the lobe shows.
+    /// Direction of the ray that finds the albedo and normal of the surface that a sharp lobe reflects.
     Features = 7,
 }
 

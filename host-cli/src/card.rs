@@ -96,7 +96,8 @@ fn milliseconds(time: Duration) -> String {
 
 const COLUMNS: [&str; 4] = ["path", "USB name", "serial number", "--card"];
 
-/// Prints a table of this machine's serial ports, one per line; nothing if there are none.
+/// Prints a table of this machine's serial ports, one per line. If there are none, only a message is written
+/// to standard error.
 pub(crate) fn list() -> Result<(), Failure> {
     let ports = list_serial_ports().map_err(Failure::work)?;
     if ports.is_empty() {
@@ -108,8 +109,8 @@ pub(crate) fn list() -> Result<(), Failure> {
     print(&port_table(&ports))
 }
 
-/// Lines of a table whose columns are as wide as their longest entry and two blanks apart. A dash stands for
-/// a missing value.
+/// Lines of a table of serial ports. Its columns are as wide as their longest entry and two blanks apart. A
+/// missing value is shown as a dash.
 fn port_table(ports: &[ListedPort]) -> Vec<String> {
     let rows: Vec<[String; 4]> =
         [COLUMNS.map(str::to_owned)].into_iter().chain(ports.iter().map(port_row)).collect();
@@ -126,7 +127,7 @@ fn port_row(port: &ListedPort) -> [String; 4] {
     })
 }
 
-/// Tests a card and prints its results.
+/// Runs the self-test of a card and prints the results.
 pub(crate) fn self_test(address: &CardAddress, quiet: bool) -> Result<(), Failure> {
     let progress = Progress::start(quiet, 1).map_err(|error| Failure::work_error(&error))?;
     let result = card_self_test(address, &progress);

@@ -1,5 +1,5 @@
 //! Standard streams: all output passes through this module. A closed or full stream never makes the program
-//! panic, and foreign text is escaped.
+//! panic, and unprintable characters, which text from files and devices may have, are escaped.
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write, stderr, stdout};
@@ -25,7 +25,7 @@ pub(crate) fn counted(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 
-/// Writes lines to standard output.
+/// Writes lines to standard output, with unprintable characters escaped.
 pub(crate) fn print(lines: &[String]) -> Result<(), Failure> {
     write_out(&lines.iter().map(|line| printable(line) + "\n").collect::<String>())
 }
@@ -35,8 +35,8 @@ pub(crate) fn print_json(text: &str) -> Result<(), Failure> {
     write_out(&(printable_json(text) + "\n"))
 }
 
-/// Replaces characters of JSON that do not print as themselves by `\u` escapes. Line ends stay; all other
-/// characters of this kind are in strings.
+/// Replaces the unprintable characters of a JSON text by `\u` escapes, except line ends. The text must have
+/// all other unprintable characters in strings, where the escapes have the same meaning.
 pub(crate) fn printable_json(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {

@@ -16,7 +16,8 @@ pub(crate) enum Failure {
     Input(Report),
     /// Failure of the work: status 1.
     Work(Report),
-    /// Interrupt: status 130, as for a process ended by SIGINT. The text names the files that remain.
+    /// Interrupt: status 130, as for a process ended by SIGINT. The text says what the interrupt leaves
+    /// behind.
     Stopped(&'static str),
 }
 
@@ -41,20 +42,20 @@ impl Failure {
         Self::Work(Report::new(MietteDiagnostic::new(with_causes(error))))
     }
 
-    /// Creates the failure of writing to standard output.
+    /// Creates the failure of a write to standard output.
     pub(crate) fn output(error: &std::io::Error) -> Self {
         let text = format!("cannot write to standard output: {error}");
         let help = "check the space of the file or the device that it is directed to";
         Self::Work(Report::new(MietteDiagnostic::new(text).with_help(help)))
     }
 
-    /// Creates the failure of making a folder.
+    /// Creates the failure of a folder that cannot be made.
     pub(crate) fn folder(path: &Path, error: &std::io::Error) -> Self {
         let text = format!("cannot make the folder {}: {error}", path.display());
         Self::Input(Report::new(MietteDiagnostic::new(text).with_help("choose another folder")))
     }
 
-    /// Creates the failure of a folder that should exist.
+    /// Creates the failure of a folder that should exist, but cannot be used.
     pub(crate) fn no_folder(path: &Path, error: &std::io::Error) -> Self {
         let text = format!("cannot use the folder {}: {error}", path.display());
         Self::Input(Report::new(

@@ -2,14 +2,15 @@
 
 use photoncard_driver::render::{RenderSettings, Setting};
 
-/// Names in the library's errors that are no field of the settings, and the flags that stand for them.
+/// Names in the library's errors that are no field of the settings, and the flags that replace them.
 const OTHERS: [[&str; 2]; 3] = [
     ["`cards.caches`", "--counters or --cache"],
     ["`CardAddress::with_memory`", "--card-memory"],
     ["`LoadSettings::texture_limit`", "--texture-limit"],
 ];
 
-/// Replaces each field of the settings, between backticks, by its flag: `integrator.samples` by `--spp`.
+/// Replaces each name of a setting in backticks by the flag that states the setting, such as
+/// `integrator.samples` by `--spp`.
 pub(crate) fn with_flags(text: &str) -> String {
     let text = OTHERS.iter().fold(text.to_owned(), |text, [name, flags]| text.replace(name, flags));
     let options = RenderSettings::default().options().into_iter();

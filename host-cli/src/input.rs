@@ -68,8 +68,10 @@ impl Input {
     }
 }
 
-/// Adds the environment, turned by `rotation` degrees, to a scene, with its notice and remarks. Compensates
-/// energy if requested.
+/// Completes a loaded scene: compensates the energy of rough reflections if requested, and adds the
+/// environment with the notice about clamped texels. The environment is turned by `rotation` degrees, in
+/// addition to the convention of the program that wrote the scene. Remarks are added about this convention,
+/// and about a rotation that has no effect.
 fn completed(
     mut scene: Scene,
     (environment, rotation): (Option<(Environment, Option<String>)>, Option<f32>),
@@ -99,7 +101,8 @@ pub(crate) fn name(options: &SceneOptions) -> String {
     options.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// Names of the input files and options that change what is loaded, for the provenance of a picture.
+/// Returns the file names of the inputs and the options that change the loaded scene, for the provenance of a
+/// picture.
 pub(crate) fn provenance(options: &SceneOptions) -> NamedSettings {
     let inputs = [
         ("scene", json!(name(options))),

@@ -5,13 +5,13 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | `console`, `report` | the standard streams, with foreign text escaped; layout of errors |
+//! | `console`, `report` | standard streams, on which unprintable characters are escaped; layout of errors |
 //! | `failure` | errors with their exit status |
-//!  `flags` | flags of the command line in place of the settings that the library's errors name |
+//! | `flags` | replacement of the settings' names in the library's errors by flags of the command line |
 //! | `arguments`, `environment` | command line: options of every command, and their values |
 //! | `input` | scene and environment of a render |
 //! | `memory` | free memory of the machine |
-//!  `notices` | contents of a scene that are ignored, missing or interpreted in another way |
+//! | `notices` | contents of a scene that are ignored, missing or interpreted in another way |
 //! | `shell` | quoting of commands |
 //! | `outputs` | checks of output files before any work |
 //! | `progress`, `hang_up` | progress of a render, and the signals that stop it |
@@ -59,7 +59,8 @@ fn without_studies() -> failure::Failure {
     )
 }
 
-/// Runs the command that the process's arguments state. Returns its exit status.
+/// Runs the command that the process's arguments state, and returns the command's exit status. Invalid
+/// arguments end the process with status 2.
 pub fn main() -> ExitCode {
     // Invalid arguments end the process here, with status 2.
     let mut arguments = Arguments::parse_printably();

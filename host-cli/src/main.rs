@@ -1,5 +1,6 @@
-//! The program `photoncard`. All its code is in the library of its name: cargo compiles a library while
-//! the crates that it calls are still optimised, and a program after them.
+//! The program `photoncard`. All of its code is in the library crate `photoncard`, for a shorter build: cargo
+//! compiles a library while the crates that the library calls are still being optimised, but compiles a
+//! program only after them.
 #![forbid(unsafe_code)]
 
 use std::process::ExitCode;

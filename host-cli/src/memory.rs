@@ -4,8 +4,9 @@ use std::fs::read_to_string;
 use std::path::Path;
 use std::sync::OnceLock;
 
-/// Bytes of memory that this process could take when it first asked, as Linux estimates them: at most the
-/// limit of its address space, and what the control groups above it leave. `None` on other systems.
+/// Free memory at the first call, bytes: Linux's estimate of the memory that is available on the machine, but
+/// at most the limit of this process's address space and the memory that its control groups leave. `None` on
+/// other systems.
 pub(crate) fn free_memory() -> Option<u64> {
     static FREE: OnceLock<Option<u64>> = OnceLock::new();
     *FREE.get_or_init(|| {
@@ -15,19 +16,21 @@ pub(crate) fn free_memory() -> Option<u64> {
     })
 }
 
-/// Available bytes that a text like that of `/proc/meminfo` states.
+/// Parses the available memory, bytes, in the text of `/proc/meminfo`.
 fn available(text: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix("MemAvailable:"))?;
     line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()?.checked_mul(1 << 10)
 }
 
-/// Limit of the address space that a text like that of `/proc/self/limits` states, bytes, if there is one.
+/// Parses the soft limit of the address space, bytes, in the text of `/proc/self/limits`; `None` without a
+/// limit.
 fn address_space(text: &str) -> Option<u64> {
     let line = text.lines().find_map(|line| line.strip_prefix("Max address space"))?;
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// Bytes that the control groups of this process leave, those of version 2, if one has a limit.
+/// Memory that the control groups of this process (version 2) leave, bytes: the minimum over its group and
+/// all groups that contain it. `None` if none of these groups has a limit.
 fn of_groups() -> Option<u64> {
     let groups = read_to_string("/proc/self/cgroup").ok()?;
     let own = groups.lines().find_map(|line| line.strip_prefix("0::/"))?;
@@ -38,8 +41,9 @@ fn of_groups() -> Option<u64> {
     free.min()
 }
 
-/// Bytes that a group leaves, of its files `memory.max`, `memory.current` and `memory.stat`; `None` without a
-/// limit. Pages of files that nobody uses count as free.
+/// Memory that a control group leaves, bytes, by the texts of its files `memory.max`, `memory.current` and
+/// `memory.stat`; `None` without a limit. Cached pages of files that are not in active use (`inactive_file`)
+/// count as free.
 fn free_of_group([most, taken, parts]: [&str; 3]) -> Option<u64> {
     let [most, taken]: [u64; 2] = [most.trim().parse().ok()?, taken.trim().parse().ok()?];
     let unused = parts.lines().find_map(|line| line.strip_prefix("inactive_file "));

@@ -11,10 +11,11 @@ use crate::arguments::{FrameOptions, SceneOptions};
 use crate::console::say;
 use crate::failure::Failure;
 
-/// Maximum number of sentences per notice. Further ones are counted.
+/// Maximum number of sentences in one message. Further sentences are only counted.
 const NAMED: usize = 3;
 
-/// Contents of the scene's file that the pictures use: true unless an option replaces them.
+/// Contents of the scene file that pictures use. View and environment are used unless options replace them;
+/// animations are used if frames are requested.
 pub(crate) struct Uses {
     view: bool,
     animations: bool,
@@ -22,7 +23,8 @@ pub(crate) struct Uses {
 }
 
 impl Uses {
-    /// Contents of the file that `picture`, or `frames` of it, uses.
+    /// Returns which contents of the scene file are used by `picture` or, if `frames` states any, by its
+    /// frames.
     pub(crate) fn of(options: &SceneOptions, picture: &Picture, frames: Option<&FrameOptions>) -> Self {
         Self {
             view: !picture.states_view(),
@@ -65,7 +67,7 @@ pub(crate) fn say_remarks(path: &Path, scene: &Scene) {
     }
 }
 
-/// Text of the first [`NAMED`] sentences, with the number of the others; `None` if there are none.
+/// Text of the first [`NAMED`] sentences, with the number of the others; `None` without sentences.
 fn first(path: &Path, sentences: &[&str]) -> Option<String> {
     let mut said = sentences.get(..NAMED.min(sentences.len()))?.join("; ");
     if said.is_empty() {
@@ -121,7 +123,8 @@ mod tests {
         assert_eq!(refused("", &scene.with(|scene| scene.notices.clear())), None);
     }
 
-    /// Each of these notices concerns contents that options replace: the view, animations or the environment.
+    /// Each case has a notice about contents of the file, options with which pictures do not use these
+    /// contents, and, if there are any, options with which pictures use them.
     #[test]
     fn strict_renders_accept_contents_that_the_command_line_replaces() {
         for (concern, replaced, used) in [

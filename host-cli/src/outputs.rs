@@ -8,8 +8,8 @@ use photoncard_driver::tone_mapping::is_of_photoncard;
 
 use crate::failure::Failure;
 
-/// Checks that the files `written` are writable, and that no file of `written` or `reserved` is one of the
-/// inputs (path, and what it is) or occurs twice.
+/// Checks that the files `written` are writable, and that no file of `written` or `reserved` occurs twice or
+/// is an input. Each input is a path with the words by which the error names it.
 pub(crate) fn check(inputs: &[(&Path, &str)], written: &[&Path], reserved: &[&Path]) -> Result<(), Failure> {
     for path in written {
         output::check_writable(path).map_err(|error| Failure::input_error(&error))?;
@@ -26,7 +26,8 @@ pub(crate) fn check(inputs: &[(&Path, &str)], written: &[&Path], reserved: &[&Pa
     Ok(())
 }
 
-/// Checks that existing files at derived paths were written by photoncard, so that they may be replaced.
+/// Checks that photoncard wrote the existing files at `paths`, which no option states, so that they may be
+/// replaced.
 pub(crate) fn check_foreign(mut paths: impl Iterator<Item = PathBuf>) -> Result<(), Failure> {
     let Some(other) = paths.find(|path| path.exists() && !is_of_photoncard(path)) else {
         return Ok(());

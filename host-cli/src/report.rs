@@ -1,4 +1,4 @@
-//! Layout of printed errors: colours and line breaks on a terminal, escaped foreign text.
+//! Layout of printed errors: colours and line breaks on a terminal; unprintable characters are escaped.
 
 use std::error::Error;
 use std::fmt::{Display, Formatter, Result};
@@ -11,7 +11,7 @@ use photoncard_driver::printable::printable;
 
 use crate::flags::with_flags;
 
-/// Columns before the text of an excerpt: ` │ `.
+/// Number of columns before the text of an excerpt: those of `   │ `.
 const EXCERPT_MARK: usize = 5;
 
 /// Installs the layout. Lines are broken on a terminal only, so that a path in a log stays in one piece.
@@ -100,7 +100,7 @@ impl Layout {
 }
 
 /// Messages of an error and of its causes, escaped and with flags in place of settings' names. A cause is
-/// left out if the message before ends with the cause's.
+/// left out if the message before it ends with the cause's message.
 fn messages(error: &dyn Diagnostic) -> Vec<String> {
     let mut texts = vec![escaped(error)];
     let mut cause: Option<&dyn Error> =
@@ -139,8 +139,9 @@ fn broken(line: &str, width: usize) -> Vec<String> {
     parts
 }
 
-/// Part of a line of at most `width` characters, and the column of `at` in this part, which leaves `mark`
-/// columns from `at` to the end. An ellipsis stands for each end cut off.
+/// Cuts a part of at most `width` characters out of a line, so that a mark of `mark` columns that begins
+/// below column `at` fits into `width` columns. Returns the part, and the column in it of `at`. An ellipsis
+/// replaces the character at each end that is cut off.
 fn around(line: &str, at: usize, mark: usize, width: usize) -> (String, usize) {
     let count = line.chars().count();
     let least = (at + mark).saturating_sub(width).min(at);

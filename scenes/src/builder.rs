@@ -46,14 +46,14 @@ impl Joined {
     }
 }
 
-/// Wrap mode: the image beyond texture coordinates 0 to 1.
+/// Wrap mode: what a texture shows outside the texture coordinates 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {
-    /// The image repeated (`REPEAT`).
+    /// The image is repeated (`REPEAT`).
     Repeat,
-    /// The image repeated, every other one mirrored (`MIRRORED_REPEAT`).
+    /// The image is repeated, and every other copy is mirrored (`MIRRORED_REPEAT`).
     Mirror,
-    /// The texels at the border (`CLAMP_TO_EDGE`).
+    /// The texels at the border of the image continue (`CLAMP_TO_EDGE`).
     Clamp,
 }
 
@@ -84,7 +84,7 @@ impl Camera {
     /// Axes of the camera's node: right, up and back. A glTF camera looks along -z of its node, with +y up.
     fn axes(&self) -> [Vec3; 3] {
         let back = self.eye - self.target;
-        // Divided rather than normalised, so that coordinate axes stay exact.
+        // Unlike `normalize`, a division by the length leaves directions along coordinate axes exact.
         let back = back / back.length();
         let right = Vec3::Y.cross(back);
         let right = right / right.length();
@@ -148,7 +148,7 @@ impl SceneBuilder {
     pub fn geometry(&mut self, mesh: &Mesh) -> Geometry {
         let attributes = self.attributes(mesh);
         let indices = mesh.triangles.iter().flatten();
-        // 0xffff restarts a primitive, so it cannot name a vertex.
+        // The index 0xffff restarts a primitive, so that it cannot be that of a vertex.
         let (bytes, component): (Vec<u8>, u32) = if mesh.positions.len() <= 0xffff {
             (indices.flat_map(|&index| (index as u16).to_le_bytes()).collect(), UNSIGNED_SHORT)
         } else {

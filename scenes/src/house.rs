@@ -1,5 +1,5 @@
-//! House of one room with a window, on open ground, for an environment: most of the sky's light does not
-//! reach the window.
+//! House of one room with a window, on open ground, to be lit by an environment map. Most of the sky's light
+//! does not reach the window.
 
 use glam::Vec3;
 
@@ -9,8 +9,8 @@ use crate::mesh::Mesh;
 
 /// Lower and upper corner of the room, metres.
 const ROOM: [Vec3; 2] = [Vec3::new(-2.5, 0.0, -2.0), Vec3::new(2.5, 2.6, 2.0)];
-/// Lower and upper corner of the window, metres. It is in the wall towards -z, on the side of the sun of
-/// `sky.exr`.
+/// Lower and upper corner of the window (x and y), metres. The window is in the wall towards -z, on the side
+/// of the sun of `sky.exr`.
 const WINDOW: [[f32; 2]; 2] = [[-0.9, 0.9], [0.5, 2.1]];
 /// Thickness of walls, floor and ceiling, metres.
 const THICKNESS: f32 = 0.2;

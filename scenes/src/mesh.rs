@@ -86,8 +86,9 @@ impl Mesh {
         self.cuboid(Vec3::new(-half, bottom, -half), Vec3::new(half, top, half));
     }
 
-    /// Adds a grid of `columns` by `rows` vertices. Its front is on the side of (step to the next column) x
-    /// (step to the next row). `wrap` joins the last column to the first, the last row to the first, or both.
+    /// Adds a grid of `columns` by `rows` vertices. `point` returns the position of the vertex of a column
+    /// and a row. The front of the grid is on the side of the cross product of a step to the next column and
+    /// a step to the next row. `wrap` joins the last column to the first, the last row to the first, or both.
     pub fn grid(&mut self, size: [usize; 2], wrap: [bool; 2], point: impl Fn(usize, usize) -> Vec3) {
         self.grid_cut(size, wrap, point, |_, _| false);
     }
@@ -121,8 +122,9 @@ impl Mesh {
         }
     }
 
-    /// Adds a surface of revolution about the y axis. `profile` has radius and height, upwards on the
-    /// outside. If it begins and ends on the axis, the solid is closed.
+    /// Adds a surface of revolution about the y axis. `profile` has a radius and a height for each row of
+    /// vertices. Where it leads upwards, the surface faces away from the axis. If it begins and ends on the
+    /// axis, the solid is closed.
     pub fn lathe(&mut self, segments: usize, profile: &[[f32; 2]]) {
         self.fluted_lathe(segments, profile, |_, _| 1.0);
     }

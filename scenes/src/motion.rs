@@ -125,7 +125,7 @@ impl SceneBuilder {
         })
     }
 
-    /// Adds a point light. Returns the extension for the node that emits it.
+    /// Adds a point light with `intensity` in W/sr. Returns the extension for the node at which the light is.
     pub(crate) fn point_light(&mut self, name: &str, color: [f64; 3], intensity: f64) -> NodeExtensions {
         let extensions = &mut self.document.extensions;
         let lights =
@@ -134,7 +134,8 @@ impl SceneBuilder {
         NodeExtensions { light: LightIndex { light: lights.len() - 1 } }
     }
 
-    /// Adds a skin; returns its index. Joints are nodes with their positions in the bind pose.
+    /// Adds a skin; returns its index. Each of `joints` has the index of its node and its position in the
+    /// bind pose, metres.
     pub(crate) fn skin(&mut self, joints: &[(usize, Vec3)]) -> usize {
         let inverse = joints.iter().flat_map(|(_, place)| Mat4::from_translation(-*place).to_cols_array());
         let inverse: Vec<f32> = inverse.map(|number| number + 0.0).collect();
@@ -144,7 +145,8 @@ impl SceneBuilder {
         self.document.skins.len() - 1
     }
 
-    /// Binds vertices to the first two joints of a skin. `shares` are the weights of the second one.
+    /// Binds vertices to the first two joints of a skin. For each vertex, `shares` has the weight of the
+    /// second joint; the first has the rest of 1.
     pub(crate) fn hung(&mut self, mut geometry: Geometry, shares: &[f32]) -> Geometry {
         geometry.attributes.joints_0 = Some(self.joints(&vec![[0, 1, 0, 0]; shares.len()]));
         let weights = shares.iter().map(|share| [1.0 - share, *share, 0.0, 0.0]);

@@ -44,7 +44,7 @@ pub(crate) fn sky() -> Vec<u8> {
         let [red, green, blue] = radiance(direction(place.x(), place.y())).to_array().map(f16::from_f32);
         (red, green, blue)
     });
-    // Not compressed, so that the bytes do not depend on a version of a compressor.
+    // The file is not compressed, so that its bytes do not depend on the version of a compressor.
     let layer = Layer::new((SIZE[0], SIZE[1]), LayerAttributes::default(), Encoding::UNCOMPRESSED, channels);
     let mut bytes = Cursor::new(Vec::new());
     Image::from_layer(layer)

@@ -79,7 +79,7 @@ mod tests {
         let sphere = icosphere(3);
         assert_eq!(sphere.triangles.len(), 20 * 64);
         assert_eq!(sphere.positions.len(), sphere.triangles.len() / 2 + 2);
-        // A little less than the ball's volume, as the mesh is inscribed.
+        // The mesh is inscribed in the ball, so that its volume is a little less.
         let share = sphere.volume() / (4.0 / 3.0 * core::f32::consts::PI);
         assert!((0.98..1.0).contains(&share), "{share}");
     }

@@ -80,7 +80,7 @@ fn triangles(file: &Gltf) -> Vec<[Vec3; 3]> {
 #[test]
 fn shipped_files_equal_the_generators_output() {
     let scenes = photoncard_scenes::scenes();
-    // One of them is the sky, which is no scene of its own.
+    // One of the files is the sky, which is no scene.
     assert_eq!(scenes.len(), EXPECTED.len() + 1);
     for scene in scenes {
         let same = shipped(scene.name) == scene.bytes;

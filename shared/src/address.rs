@@ -1,5 +1,5 @@
-//! Addresses in a card's memory. The unit is the 128-byte line, the cache line of the dissertation (chapter
-//! 7).
+//! Addresses in a card's memory. The unit is the 128-byte line, the cache line of Steinhurst's dissertation
+//! (2007, chapter 7).
 
 /// Bytes of one line.
 pub const LINE_BYTES: usize = 128;
@@ -20,7 +20,8 @@ impl Line {
         self.0.as_chunks::<N>().0.get(slot)
     }
 
-    /// [`Self::record`], mutable.
+    /// Record number `slot` of the line, mutable: `N` bytes, packed from the start of the line. `None` past
+    /// the last whole record.
     pub fn record_mut<const N: usize>(&mut self, slot: usize) -> Option<&mut [u8; N]> {
         self.0.as_chunks_mut::<N>().0.get_mut(slot)
     }
@@ -50,7 +51,7 @@ pub enum Structure {
     PhotonNodes = 5,
     /// Photons of the photon map: leaves of the line layout, or nodes of the kd-tree.
     Photons = 6,
-    /// Inner nodes above irradiance points.
+    /// Inner nodes of the tree of irradiance points.
     IrradianceNodes = 7,
     /// Irradiance points.
     IrradiancePoints = 8,

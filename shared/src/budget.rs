@@ -33,7 +33,8 @@ pub struct Budget {
     pub shadow_rays: u32,
     /// Maximum number of samples of a pixel.
     pub samples: u32,
-    /// Maximum number of tile commands that a chip holds, queued or at work: the host's credits.
+    /// Maximum number of tile commands that a chip holds, waiting or in flight. The host sends no more before
+    /// a tile is complete.
     pub tiles: u32,
     /// Maximum number of tiles in flight. A tile is in flight until its last gather is done, so several tiles
     /// can wait for gathers at once.
@@ -91,8 +92,8 @@ pub const KD_TREE_LEVELS: usize = 27;
 /// Number of stack entries for a search in a photon map with leaves. The host builds no tree that needs more.
 pub const PHOTON_STACK: usize = 160;
 
-/// Number of candidates at which a search for the `neighbors` nearest photons drops all but these. A lower
-/// number shrinks the search radius sooner, but takes more selections.
+/// Number of candidates at which a search for the k = `neighbors` nearest photons drops all candidates but
+/// the k nearest. A lower number shrinks the search radius sooner, but takes more selections.
 pub const fn selected_candidates(neighbors: u32) -> usize {
     const MIN_BEYOND: usize = 32;
     let beyond = neighbors as usize * 3 / 5;

@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
     /// Eye rays. In a pixel with gather rays, a path takes at least two: one to place its gather point, one
-    /// to complete the pixel. If the gather point is seen in a mirror or through glass, each further piece of
-    /// the path's work takes another. In other pixels a path takes one. A survey takes one for each lattice
-    /// point that it visits.
+    /// to complete the pixel. If the gather point is seen in a mirror or through glass, the path is also
+    /// traced again for the point's shadow rays, and for each group of up to 64 of its gather rays. In other
+    /// pixels a path takes one. A survey takes one for each lattice point that it visits.
     pub eye_rays: u64,
     /// Shadow rays.
     pub shadow_rays: u64,
@@ -44,13 +44,14 @@ pub struct Counters {
     /// Photons of [`Self::photons_tested`] that lay within the search radius when they were tested, and
     /// became candidates.
     pub photons_taken: u64,
-    /// Candidates read by selections of the k nearest; a candidate counts in each selection.
+    /// Candidates read by selections of the k nearest; a candidate counts once for each selection that reads
+    /// it.
     pub photons_selected: u64,
     /// Comparisons of distances in selections of the k nearest, except those between equal distances.
     pub distances_compared: u64,
     /// Photons that searches returned: k each, or fewer if fewer lie within the maximum distance.
     pub photons_found: u64,
-    /// Photons that gathers found at surfaces with a lobe, which is evaluated for the photons' directions.
+    /// Photons found by gathers at surfaces with a lobe, which is evaluated for the direction of each photon.
     /// Gathers in the caustic map are included.
     pub photons_reflected: u64,
     /// Photons of [`Self::photons_reflected`] whose lobe is a microfacet model (GGX).
@@ -98,8 +99,8 @@ impl Counters {
     };
 
     /// Counts one search for the k nearest photons. The arguments are the numbers of photons tested, of
-    /// photons that became candidates, of candidates read by selections, of their comparisons, and of photons
-    /// found.
+    /// photons that became candidates, of candidates read by selections and comparisons made by selections,
+    /// and of photons found.
     #[inline(always)]
     pub fn count_gather(&mut self, tested: u32, taken: u32, [selected, compared]: [u32; 2], found: u32) {
         self.gathers += 1;

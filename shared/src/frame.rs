@@ -17,7 +17,7 @@ use memchr::memchr;
 use crate::checksum::{Checksum, checksum};
 use crate::stuffing::{max_stuffed_bytes, stuff, unstuff};
 
-/// Maximum length of a payload, bytes: eight lines and the other fields of their message.
+/// Maximum length of a payload, bytes: eight lines, and 32 bytes for the other fields of a message.
 pub const MAX_PAYLOAD: usize = 8 * crate::address::LINE_BYTES + 32;
 /// Bytes of a frame's header.
 pub const HEADER_BYTES: usize = 10;
@@ -91,8 +91,8 @@ pub struct FrameHeader {
     /// Number of the frame's message among the messages in this direction, modulo 2^16. In probes and answers
     /// it is the number of another message ([`FrameKind`]); in other frames without a message it is 0.
     pub sequence: u16,
-    /// Number of the message of the other direction that the frame's sender takes next: all before it are
-    /// taken.
+    /// Number of the message of the other direction that the frame's sender takes next. The sender has taken
+    /// all messages before it.
     pub acknowledged: u16,
     /// Bit `i` is set if message `acknowledged + i` of the other direction has arrived.
     pub held: u8,

@@ -1,4 +1,4 @@
-//! The card image: the scene in lines of card memory, with all that a chip reads of it.
+//! The card image: all that a chip reads of a scene, in lines of card memory.
 //!
 //! The first lines are the header: magic, layout version, number of lines, units, lights, and a table of
 //! sections. A section is a run of lines with records of one kind ([`crate::layout`]). Each line holds as
@@ -51,7 +51,7 @@ pub enum SectionKind {
     Texels = 7,
     /// [`Emitter`]s.
     Emitters = 8,
-    /// [`crate::layout::LightNode`]s above the emitters, the root first.
+    /// [`crate::layout::LightNode`]s of the light tree, the root first.
     LightNodes = 9,
     /// [`DistantLight`]s.
     DistantLights = 10,
@@ -61,7 +61,7 @@ pub enum SectionKind {
     ///
     /// If cells are subdivided, four further parts follow: the number of subdivided cells; the number n of
     /// rows and columns that each is divided into; the row-major numbers of these cells, in increasing order;
-    /// and for each cell the distributions of its n rows and n x n parts, in the same form.
+    /// and for each of these cells the distributions of its n rows and n x n parts, in the same form.
     EnvironmentCells = 11,
     /// [`Photon`]s as a left-balanced kd-tree: the children of photon `i` are photons `2 i + 1` and
     /// `2 i + 2`.
@@ -75,7 +75,7 @@ pub enum SectionKind {
     /// [`crate::layout::PhotonLeaf`]s of the caustic map, whose photons have followed paths `L S+ D`: one
     /// bounce or more, all specular.
     CausticLeaves = 16,
-    /// [`crate::layout::PhotonNode`]s above irradiance points, the root first.
+    /// [`crate::layout::PhotonNode`]s of the tree of irradiance points, the root first.
     IrradianceNodes = 17,
     /// [`crate::layout::PhotonLeaf`]s that hold [`crate::layout::IrradiancePoint`]s in place of photons.
     IrradianceLeaves = 18,
@@ -241,8 +241,9 @@ pub enum HeaderError {
     Magic,
     /// The card image has this layout version, which is not [`LAYOUT_VERSION`].
     Version(u16),
-    /// A number is out of range: a unit or the grid's cell is not a positive normal number, a probability is
-    /// not in [0, 1], or the environment's radiance or the reach is negative or not finite.
+    /// A number is out of range: a unit or the cell size of the photon grid is not a positive normal number,
+    /// a probability is not in [0, 1], or the environment's radiance or [`Header::reach`] is negative or not
+    /// finite.
     Unit,
     /// The section with this index extends past the card image's last line.
     Section(u8),
@@ -264,8 +265,8 @@ impl core::error::Error for HeaderError {}
 const PHOTON_GRID: usize = 32;
 const SECTION_TABLE: usize = 64;
 const HEADER_BYTES: usize = HEADER_LINES * LINE_BYTES;
-/// Offset of [`Lights`] in the header, bytes. They are at its end, so that the section table can grow towards
-/// them.
+/// Offset of [`Lights`] in the header, bytes. The lights are at the header's end, so that the section table
+/// can grow towards them.
 const LIGHTS: usize = HEADER_BYTES - 32;
 const _: () = assert!(SECTION_TABLE + 8 * SECTIONS <= LIGHTS);
 /// Value stored as [`Lights::texture`] in a card image without an environment.

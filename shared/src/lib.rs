@@ -1,4 +1,4 @@
-//! Wire and memory formats of photoncard: bytes, no rendering.
+//! Wire and memory formats of photoncard, without any rendering.
 //!
 //! Firmware and host are built on this crate. It defines the contents of a card's memory ([`address`],
 //! [`layout`], [`image`]), the capacities of a chip ([`budget`]), and the protocol of a link ([`message`],
@@ -36,7 +36,7 @@
 //! | [`address`] | 128-byte line | addresses of card memory |
 //! | [`layout`] | record | little-endian photons, nodes, triangles, materials, emitters |
 //! | [`image`] | section | positions of a scene's records in the card image |
-//! | [`budget`] | | capacities of a chip, and bounds for every kind |
+//! | [`budget`] | | capacities of a chip, and limits for all kinds of chips |
 //!
 //! Protocol, from bottom to top:
 //!
@@ -47,7 +47,7 @@
 //! | [`frame`] | frame | header, payload, checksum |
 //! | [`transport`] | message | windowed acknowledgement, selective repetition |
 //! | [`message`] | message | commands of the host, replies of a card, faults |
-//! | [`counters`] | | work of a tile, which a card reports with it |
+//! | [`counters`] | | counts of the work on a tile, which a card reports at the tile's end |
 //!
 //! [`hash`] is the hash from which all random numbers are made.
 //!

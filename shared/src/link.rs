@@ -8,7 +8,7 @@ use core::time::Duration;
 pub enum PortError {
     /// The other end is gone.
     Closed,
-    /// The device failed with this error code of its own.
+    /// The device failed with this device-specific error code.
     Device(u32),
 }
 

@@ -1,8 +1,8 @@
 //! Consistent overhead byte stuffing (COBS; Cheshire, Baker 1999): an encoding without zero bytes.
 //!
 //! The plain bytes are cut into pieces at every zero byte, which is dropped, and after 254 non-zero bytes in
-//! a row. A code byte, the piece's length plus one, precedes each piece. A code below 255 stands for a zero
-//! byte after its piece, except after the last piece.
+//! a row. A code byte, the piece's length plus one, precedes each piece. A code below 255 says that a zero
+//! byte follows its piece, except after the last piece.
 
 use heapless::Vec;
 
@@ -51,15 +51,17 @@ fn write_pieces(parts: &[&[u8]], room: &mut [u8]) -> Option<usize> {
 /// Decodes stuffed bytes, without the terminating zero, in place; `None` if they are not a COBS encoding.
 /// `wire` must hold no zero byte.
 pub fn unstuff(wire: &mut [u8]) -> Option<&mut [u8]> {
-    // Each plain byte stays in place, and each code is overwritten by the zero byte that it stands for. Only
-    // the code after a full piece stands for no zero byte. It is removed: the bytes before it move up by one.
+    // Each plain byte stays in place, and each code but the first is overwritten by the zero byte before its
+    // piece. There is no such zero byte after a full piece: the code there is removed, and the bytes before
+    // it move up by one.
     let mut begin = 1;
     let mut place = 0;
     let mut is_zero = false;
     while place < wire.len() {
         let code = core::mem::take(wire.get_mut(place)?);
         if place > 0 && !is_zero {
-            // Never empty, but the compiler cannot see that; `rotate_right` panics on an empty slice.
+            // The slice is never empty, but the compiler cannot see that; `rotate_right` panics on an empty
+            // slice.
             if let Some(moved @ [_, ..]) = wire.get_mut(begin..=place) {
                 moved.rotate_right(1);
             }

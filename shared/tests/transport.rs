@@ -83,7 +83,7 @@ fn converse(count: usize, faults: Faults, seed: u64) -> [LineStatistics; 2] {
     let mut quiet = 0;
     for _ in 0..200_000 {
         for (end, transport) in [&mut host, &mut card].into_iter().enumerate() {
-            // A card speaks when it has been spoken to.
+            // A card sends its first message after a message of the host has arrived.
             if said[end] < count
                 && (end == 0 || heard[1] > 0)
                 && transport.send(fill(&message(said[end], end)))

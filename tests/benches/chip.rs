@@ -71,7 +71,8 @@ fn map(scene: &Scene, photons: usize, layout: PhotonLayout) -> MappedImage {
 }
 
 impl Prepared {
-    /// Positions of `count` photons of the kd-tree: of its lowest level in order, or random.
+    /// Positions of `count` photons of the kd-tree: random photons if `shuffled`, otherwise consecutive
+    /// photons of the lowest level.
     fn queries(&self, count: u32, shuffled: bool) -> Vec<Vec3> {
         let (scene, mut memory) = self.image.view();
         let photons = scene.header.section(SectionKind::Photons).records;

@@ -32,8 +32,8 @@ struct Frame {
     luminance: Vec<f64>,
     depths: Vec<f64>,
     at: DVec3,
-    /// Right, up and forward. At distance 1, half the picture's width is as long as the first, half its
-    /// height as the second.
+    /// Right, up and forward. The lengths of the first two are half the width and half the height of the
+    /// picture at distance 1.
     axes: [DVec3; 3],
 }
 
@@ -76,7 +76,8 @@ impl Frame {
         depth.is_finite().then(|| self.at + (forward + right * across + up * upwards) * depth)
     }
 
-    /// Interpolated luminance of the pixels that see a position; `None` if none do.
+    /// Luminance at a position, interpolated between four pixels; `None` unless all four see the position's
+    /// surface.
     fn luminance_at(&self, place: DVec3) -> Option<f64> {
         let [width, height] = self.size;
         let [right, up, forward] = self.axes;

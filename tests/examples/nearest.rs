@@ -24,7 +24,7 @@ const POINTS: u32 = 1_000_000;
 const QUERIES: u32 = 100_000;
 const NEIGHBORS: u32 = 100;
 const MAX_DISTANCE: f32 = 0.025;
-/// One point of this number is in a cluster.
+/// Of this number of points, one is in a cluster.
 const CLUSTER_SHARE: u32 = 5;
 const CLUSTER_RADIUS: f32 = 0.05;
 

@@ -42,7 +42,8 @@ const TECHNIQUES: [&[&str]; 9] = [
     &["--card", "emulated-micro:2", "--neighbors", "50", "--tile", "8"],
 ];
 
-/// Options of the picture: small enough for a minute or two in all, large enough to fill gather queues.
+/// Options of each picture. It is so small that all pictures take a minute or two, and so large that gather
+/// queues are filled.
 const SIZE: [&str; 8] = ["--size", "48x48", "--photons", "20000", "--gather-rays", "20", "--aov", "all"];
 
 /// Statistics that count work, and depend neither on the machine nor on links.

@@ -35,8 +35,8 @@ fn random(index: u32, dimension: u32) -> f32 {
     (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / (1 << 24) as f32
 }
 
-/// Cells along each axis of the unit square that directions are mapped from. The rays of a bundle are in one
-/// cell.
+/// Number of cells along each axis of the unit square from which directions are mapped. The rays of a bundle
+/// are in one cell.
 const CELLS: [f32; 2] = [8.0, 4.0];
 
 /// Rays from surfaces that the camera sees, in directions sampled by the reflection: `bundle` rays from each
@@ -100,7 +100,8 @@ fn cast_all(
     (hits, sum)
 }
 
-/// Mean numbers of nodes and of leaves that a ray reads, cast in a `way` (any hit, in bundles).
+/// Mean numbers of nodes and of leaves that a ray reads. `way` states whether queries are for any hit, and
+/// whether rays are cast in bundles.
 fn lines_of_a_ray(image: &SceneImage, memory: Lines, rays: &[Ray], way: (bool, bool)) -> [f64; 2] {
     let mut counted = Counted::new(memory);
     cast_all(image, &mut counted, rays, way);

@@ -3,10 +3,10 @@
 //! `cargo run --release -p photoncard-tests --example sampling_variance [SCENE [camera=NAME]
 //! [ASSIGNMENT...]]`
 //!
-//! Prints for every sampling, at several numbers of rays: the relative RMSE of a point's indirect radiance;
-//! the variance of `brdf` over that of the sampling; and the bias in standard errors, by the mean over seeds
-//! and a gather of 10,000 rays. Then prints the number of rays at which the sampling has the RMSE of 200
-//! `brdf` rays.
+//! For every sampling, and for several numbers of rays, the program prints the relative RMSE of a point's
+//! indirect radiance; the ratio of the variance of `brdf` to that of the sampling; and the difference of the
+//! mean over seeds from that of 10,000 rays, in standard errors. Then it prints the number of rays with which
+//! the sampling has the RMSE of 200 `brdf` rays.
 
 use glam::DVec3;
 use photoncard_driver::render::{PhotonMaps, RenderSettings, Sampling};
@@ -59,8 +59,8 @@ impl Moments {
     }
 }
 
-/// Number of rays at which a sampling has this RMSE, by interpolation of the logarithms in `curve` (rays,
-/// RMSE).
+/// Number of rays with which a sampling has the RMSE `rmse`. Between the pairs (rays, RMSE) of `curve`, the
+/// logarithm of the RMSE is linear in that of the rays.
 fn rays_for(rmse: f64, curve: &[(u32, f64)]) -> f64 {
     let log = |(rays, rmse): (u32, f64)| ((rays as f64).ln(), rmse.ln());
     let target = rmse.ln();

@@ -17,7 +17,7 @@ use photoncard_driver::film::Film;
 use photoncard_driver::render::{RenderSettings, Rendering, Unobserved, render};
 use photoncard_driver::scene::{Camera, Material, Reflection, Scene, SceneContents, Transmission, Triangle};
 
-/// Prints that something is not tested, whether the test passes or not.
+/// Prints `what`, which says what is not tested, even if the test passes.
 ///
 /// # Panics
 /// In continuous integration, where all tools are installed.

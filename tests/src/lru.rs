@@ -1,7 +1,7 @@
 //! Set-associative LRU cache in its simplest form: the oracle for the firmware's caches.
 
-/// Set-associative cache with least-recently-used replacement. A set lists its blocks, the one used last at
-/// the end.
+/// Set-associative cache with least-recently-used replacement. A set lists its blocks in the order of their
+/// last use, the most recent one at the end.
 pub struct LruOracle {
     sets: Vec<Vec<u32>>,
     ways: usize,
@@ -12,7 +12,7 @@ pub struct LruOracle {
 
 impl LruOracle {
     /// Creates an empty cache of `sets` sets with `ways` blocks each. A block has `lines` lines of card
-    /// memory; `set` gives the index of its set.
+    /// memory; `set` returns the index of a block's set.
     pub fn new(sets: u32, ways: u32, lines: u32, set: impl Fn(u32) -> u32 + 'static) -> Self {
         Self { sets: vec![Vec::new(); sets as usize], ways: ways as usize, lines, set: Box::new(set) }
     }
@@ -20,7 +20,7 @@ impl LruOracle {
     /// Reads a line, and returns whether its block was in the cache. If not, the block enters the cache.
     ///
     /// # Panics
-    /// If `set` gives an index of no set.
+    /// If `set` returns an index of no set.
     pub fn hits(&mut self, line: u32) -> bool {
         let block = line / self.lines;
         let set = &mut self.sets[(self.set)(block) as usize];

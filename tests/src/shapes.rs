@@ -61,7 +61,8 @@ pub fn add_textured_quad(scene: &mut Scene, corners: [Vec3; 4], coordinates: [[f
     }
 }
 
-/// Gives all corners of a material's triangles this tangent; w is the sign of the bitangent.
+/// Sets the tangent of all corners of a material's triangles to `tangent`, whose w is the sign of the
+/// bitangent.
 pub fn add_tangents(scene: &mut Scene, material: u32, tangent: Vec4) {
     let scene = &mut **scene;
     for triangle in scene.triangles.iter().filter(|triangle| triangle.material == material) {

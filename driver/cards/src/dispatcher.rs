@@ -17,7 +17,7 @@ pub struct Dispatcher<'a> {
     sinks: Vec<&'a dyn TileSink>,
     /// Called before the sinks receive a tile from a card.
     rendered: &'a (dyn Fn(CardNumber, &Tile) + Sync),
-    /// Locked shared while sinks receive a tile, exclusively while they revoke tiles.
+    /// Held as a reader while sinks receive a tile, and as the writer while they revoke tiles.
     order: RwLock<()>,
 }
 
@@ -45,8 +45,8 @@ impl<'a> Dispatcher<'a> {
         self.scheduler.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Assigns tiles to a card while it has a free credit. If the scheduler has none for it, the card does
-    /// its waiting gathers.
+    /// Assigns tiles to a card while it has a free credit. If the scheduler has no tile for the card, makes
+    /// the card do the gathers that wait in its queue.
     pub fn supply(&self, card: CardNumber, session: &mut Session, now: Duration) {
         while session.wants_tile() {
             match self.scheduler().take(card, now) {
@@ -133,7 +133,7 @@ impl<'a> Dispatcher<'a> {
     /// Checks whether other cards have outvoted a card whose session has ended.
     ///
     /// # Errors
-    /// [`SessionError::Outvoted`] with the card's wrong tile, if they have.
+    /// [`SessionError::Outvoted`] with the card's wrong tile, if other cards have outvoted the card.
     pub fn check_card(&self, card: CardNumber) -> Result<(), SessionError> {
         let lie = self.scheduler().lie_of(card);
         lie.map_or(Ok(()), |tile| Err(SessionError::Outvoted { tile }))

@@ -1,8 +1,8 @@
 //! Access to cards: byte links, the host's end of the protocol, and the assignment of tiles.
 //!
 //! A [`Session`](session::Session) performs no I/O: it consumes the bytes that a [`link`] received, and
-//! supplies those to send. The [`Scheduler`](scheduler::Scheduler) deals tiles, and a
-//! [`Dispatcher`](dispatcher::Dispatcher) hands finished ones to their sinks.
+//! supplies the bytes to send. The [`Scheduler`](scheduler::Scheduler) assigns tiles to cards, and a
+//! [`Dispatcher`](dispatcher::Dispatcher) passes finished tiles to their sinks.
 //!
 //! | modules | contents |
 //! |---|---|

@@ -1,10 +1,10 @@
 //! Scenes all of whose detail is in a small part of a plane ground, such as a product on a ground of many
 //! kilometres.
 //!
-//! Photons are stored in this part and its surroundings only: of 20 bits, their coordinates on a ground of
-//! 10 km would be multiples of 1 cm, and few photons of the sky would reach a product of 10 cm. Triangles
-//! that are larger than their distance from the middle of the part are split, because a computed point of a
-//! triangle is as exact as its corners' coordinates are.
+//! Photons are stored only in this part and its surroundings. Their coordinates have 20 bits, so that on a
+//! ground of 10 km they would be multiples of 1 cm, and few photons of the sky would reach a product of 10
+//! cm. Triangles that are larger than their distance from the middle of the part are split, because a
+//! computed point of a triangle is only as exact as the coordinates of the triangle's corners.
 
 use glam::{Vec2, Vec3, Vec4};
 use photoncard_scene::{NO_ATTRIBUTES, NO_TANGENTS, Scene, SceneContents, Triangle, VertexAttributes};
@@ -19,12 +19,14 @@ const SIZES_AROUND: f32 = 256.0;
 const MAX_HEIGHT: f32 = 1.0 / 64.0;
 /// Maximum number of triangles of the ground, which are split.
 const MAX_GROUND: usize = 1024;
-/// Minimum size of the part, relative to the scene's size. Depths, whose unit is a cell of the part's photon
-/// grid, then fit 64 bits for eyes within the scene.
+/// Minimum size of the part of a scene in which photons are stored, relative to the scene's size. Depths,
+/// whose unit is a cell of the photon grid, then fit 64 bits for cameras within the scene.
 const MIN_SHARE: f32 = 1.0 / 8192.0;
-/// Margin of the part for rounding, relative to the distance up to which photons are stored.
+/// Margin for rounding around the part of a scene in which photons are stored, relative to the distance up to
+/// which photons around the detail are stored.
 const MARGIN: f32 = 1e-3;
-/// Maximum size of a triangle near the centre of the part, relative to the part's size.
+/// Maximum size of a triangle near the centre of the part of a scene in which photons are stored, relative to
+/// the size of this part.
 const SHARE_OF_PART: f32 = 1.0 / 32.0;
 
 /// Lower and upper corner of the box around all detail of a scene and its surroundings, metres; `None` unless
@@ -67,7 +69,8 @@ pub(crate) fn split_around(scene: &Scene, [lower, upper]: [Vec3; 2]) -> Scene {
     let is_large = |vertices: &[Vec3; 3]| {
         let [low, high] = ends(vertices);
         let distance = centre.distance(centre.clamp(low, high));
-        // Beyond the precision of coordinates, halves are as large as the whole.
+        // If the middle of an edge is rounded to one of its ends, one half is the whole triangle and
+        // splitting would never end.
         let is_divisible = || !halves(longest_edge(vertices), *vertices, Vec3::midpoint).contains(vertices);
         (high - low).max_element() > least.max(distance) && is_divisible()
     };
@@ -116,7 +119,8 @@ fn halves_of(scene: &mut SceneContents, triangle: &Triangle) -> [Triangle; 2] {
     [0, 1].map(|half: usize| Triangle { vertices: vertices[half], attributes: attributes[half], ..*triangle })
 }
 
-/// Index of the corner at which a triangle's longest edge begins, by the maximum norm.
+/// Returns the index of the corner at which a triangle's longest edge begins. Lengths are by the maximum
+/// norm.
 fn longest_edge(vertices: &[Vec3; 3]) -> usize {
     let length = |edge: usize| (vertices[edge] - vertices[(edge + 1) % 3]).abs().max_element();
     (0..3).max_by(|&a, &b| length(a).total_cmp(&length(b))).unwrap_or(0)

@@ -20,20 +20,20 @@ struct Part<L, B> {
     bounds: B,
     leaf: Option<L>,
     parts: Option<Box<[Self; 2]>>,
-    /// Distribution of children. If the part becomes at most `i + 1` children of a wide node, `first[i]` of
-    /// them come from its first child; 0 if the whole part is one child.
+    /// Distribution of children. If this subtree becomes at most `i + 1` children of a wide node, `first[i]`
+    /// of them come from the first of [`Self::parts`]; 0 if the whole subtree becomes one child.
     first: [u8; NODE_CHILDREN],
 }
 
 impl<L, B: Copy> Tree<L, B> {
-    /// Leaf whose visit has the cost `cost`.
+    /// Creates a tree of one leaf, whose visit has the cost `cost`.
     pub(crate) fn leaf(leaf: L, bounds: B, cost: f32) -> Self {
         let part = Part { bounds, leaf: Some(leaf), parts: None, first: [0; NODE_CHILDREN] };
         Self { part, costs: [cost; NODE_CHILDREN] }
     }
 
-    /// Node with two children. `node` is the cost of visiting it as a wide node; `leaf` is the leaf that it
-    /// can become, with the cost of its visit.
+    /// Creates a tree whose root has two children. `node` is the cost of a visit of the root as a wide node;
+    /// `leaf` is the leaf that the tree can become, with the cost of its visit.
     pub(crate) fn node(parts: [Self; 2], bounds: B, node: f32, leaf: Option<(L, f32)>) -> Self {
         let (mut costs, mut first) = cheapest_pairs(parts.each_ref().map(|tree| &tree.costs));
         // As a wide node of its own it may be split differently than among the children of its parent.
@@ -47,8 +47,8 @@ impl<L, B: Copy> Tree<L, B> {
         // The last entry is read only when the node becomes a wide node of its own.
         first[NODE_CHILDREN - 1] = opened;
         let leaf = leaf.map(|(leaf, _)| leaf);
-        // A node that is always a leaf drops what is below it, so that the memory is free. A root of so few
-        // triangles has one leaf then.
+        // A node that always becomes a leaf drops its subtrees, to free their memory. If the root is such a
+        // node, the folded tree has one leaf.
         let is_opened = leaf.is_none() || first[..NODE_CHILDREN - 1].iter().any(|&first| first > 0);
         let parts = is_opened.then(|| Box::new(parts.map(|tree| tree.part)));
         Self { part: Part { bounds, leaf, parts, first }, costs }
@@ -65,10 +65,12 @@ impl<L, B: Copy> Tree<L, B> {
     }
 }
 
-/// Costs of two trees as at most 1 to [`NODE_CHILDREN`] children in all, infinite for one, and how many of
-/// them come from the first tree: of equally cheap numbers the smallest.
+/// Returns the costs of two trees as at most 1 to [`NODE_CHILDREN`] children in all (infinite for one child),
+/// and for each of these maxima the number of children that come from the first tree: of equally cheap
+/// numbers the smallest.
 fn cheapest_pairs([below, above]: [&[f32; NODE_CHILDREN]; 2]) -> ([f32; NODE_CHILDREN], [u8; NODE_CHILDREN]) {
-    // Lanes past the end, so that each number of the first tree's children is one pass over all lanes.
+    // The arrays are longer than the result, so that each number of the first tree's children takes one pass
+    // over all lanes.
     let (mut costs, mut first) = ([f32::INFINITY; 2 * NODE_CHILDREN], [0_u32; 2 * NODE_CHILDREN]);
     for (children, below) in (1..NODE_CHILDREN).zip(below) {
         for (index, above) in (children..).zip(above) {
@@ -82,7 +84,7 @@ fn cheapest_pairs([below, above]: [&[f32; NODE_CHILDREN]; 2]) -> ([f32; NODE_CHI
 }
 
 impl<L, B: Copy> Part<L, B> {
-    /// Appends the part to the children of a wide node, as at most `most` children.
+    /// Appends this subtree to the children of a wide node, as at most `most` children.
     fn unfold(self, most: usize, children: &mut Vec<Self>) {
         let first = self.first[most - 1] as usize;
         match self.parts {
@@ -121,7 +123,7 @@ impl<L, B: Copy> Folded<L, B> {
         while let Some((node, above)) = waiting.pop_front() {
             let mut children = Vec::with_capacity(NODE_CHILDREN);
             node.unfold(NODE_CHILDREN, &mut children);
-            // Stable: children that are near in space stay near.
+            // The sort is stable: children that are near in space stay near.
             children.sort_by_key(|child| child.leaf.is_none());
             // A descent pops the node before it pushes the children.
             let below = above + children.len() - 1;

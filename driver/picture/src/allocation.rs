@@ -12,7 +12,7 @@ pub struct OutOfMemory {
 }
 
 impl OutOfMemory {
-    /// Error of a list with `elements` elements that cannot grow to twice that number.
+    /// Creates the error of a list with `elements` elements that cannot grow to twice that number.
     pub fn doubling<T>(elements: usize) -> Self {
         Self { bytes: 2 * (elements * size_of::<T>()) as u64 }
     }

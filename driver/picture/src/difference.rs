@@ -117,8 +117,8 @@ pub enum DifferenceError {
 /// Compares `image` with `reference` in blocks of `block` x `block` pixels.
 ///
 /// With `exclude`, a block is excluded from all results if any channel of any of its reference pixels exceeds
-/// that radiance: it sees an emitter, whose radiance would outweigh everything else. Only the sizes of the
-/// data windows matter, not their positions.
+/// that radiance: such a block shows an emitter, whose radiance would outweigh everything else. Only the
+/// sizes of the data windows matter, not their positions.
 ///
 /// # Errors
 /// If the sizes differ, a pixel is not finite, `block` is 0, or `exclude` is NaN or excludes every block.
@@ -349,7 +349,7 @@ mod tests {
         let difference = compare(&reference, &image, 4, Some(5.0)).unwrap();
         assert_eq!((difference.blocks.count, difference.blocks.excluded, difference.pixel_count), (1, 1, 16));
         assert_eq!((difference.pixels.mse, difference.mean_image), (1.0, 2.0));
-        // The limit itself is not excluded.
+        // A block whose radiance equals the limit is not excluded.
         assert_eq!(compare(&reference, &image, 4, Some(10.0)).unwrap().blocks.excluded, 0);
         let all = compare(&reference, &image, 4, Some(0.5));
         assert_eq!(all, Err(DifferenceError::AllExcluded { limit: 0.5 }));

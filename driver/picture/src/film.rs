@@ -105,7 +105,7 @@ pub enum FilmError {
         "the samples of a film of another window, other layers or other units cannot be added; render all with equal settings"
     )]
     Other,
-    /// The film of earlier samples has as many as the picture already, or lacks pixels.
+    /// The film of earlier samples lacks pixels, or has as many samples as the picture is to have, or more.
     #[error("a complete film of {samples} samples a pixel is no part of a picture of {asked}")]
     NoMore {
         /// Number of samples of the film.

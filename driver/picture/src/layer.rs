@@ -145,7 +145,8 @@ impl Layers {
         self.iter().any(Layer::is_of_chip)
     }
 
-    /// Layers that chips send only on request: all four of them if one is among these layers, otherwise none.
+    /// Returns all four layers that chips send only on request if at least one of these layers is among them,
+    /// otherwise none.
     pub fn of_chip(&self) -> Self {
         let are_of_chip = self.are_of_chip();
         Self(Layer::ALL.into_iter().filter(|layer| are_of_chip && layer.is_of_chip()).collect())

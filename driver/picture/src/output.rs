@@ -64,7 +64,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
 }
 
 /// Temporary file that [`Self::commit`] renames to the output's path. It is removed if the value is dropped
-/// before.
+/// without a commit.
 #[derive(Debug)]
 pub struct PendingFile {
     file: NamedTempFile,

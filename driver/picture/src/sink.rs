@@ -9,8 +9,7 @@ use crate::sums::{FilmPixel, SumFormat};
 #[derive(Clone, Debug, PartialEq)]
 pub struct FinishedTile {
     tile: Tile,
-    /// Encoded [`PixelSums`] in the wire format, row by row. Equal bytes are pixels that are equal bit for
-    /// bit.
+    /// Encoded [`PixelSums`] in the wire format, row by row. Pixels with equal bytes are equal bit for bit.
     records: Vec<u8>,
     format: SumFormat,
     /// Work counters of the chip.

@@ -83,14 +83,14 @@ impl SumFormat {
         sums.light.into_iter().any(|light| light > most)
     }
 
-    /// Sums whose values are nearest to `pixel`.
+    /// Sums whose values are nearest to those of a pixel.
     pub fn sums(&self, FilmPixel { pixel, layers }: &FilmPixel) -> PixelSums {
         let sums = PixelSums::nearest(pixel, self.count(), &self.scale);
         if self.layers { sums.with_nearest_layers(layers, self.count(), &self.scale) } else { sums }
     }
 
-    /// Format of sums over the samples of both; `None` if units or layers differ, or the number of samples
-    /// overflows.
+    /// Format of sums over the samples of this format and of `more`; `None` if units or layers differ, or the
+    /// number of samples overflows.
     pub fn plus(&self, more: &Self) -> Option<Self> {
         let is_alike = self.layers == more.layers && self.scale == more.scale;
         let samples = self.samples.checked_add(more.samples)?;

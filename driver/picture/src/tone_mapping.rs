@@ -191,7 +191,7 @@ fn texts(path: &Path) -> Option<Vec<(String, String)>> {
     Some(chunks.iter().map(|chunk| (chunk.keyword.clone(), chunk.text.clone())).collect())
 }
 
-/// Returns whether a file is a PNG that is neither truncated nor damaged. An unreadable file is not.
+/// Returns whether a file is a PNG that is neither truncated nor damaged; false if it cannot be read.
 pub fn is_intact(path: &Path) -> bool {
     std::fs::read(path).is_ok_and(|bytes| intact::is_intact_png(&bytes))
 }

@@ -62,7 +62,7 @@ fn written(format: SampleFormat, provenance: &str) -> (tempfile::TempDir, std::p
 #[test]
 fn a_file_is_intact_only_as_it_was_written() {
     for format in [SampleFormat::Float, SampleFormat::Half] {
-        // The provenance has the text of the checksum itself.
+        // The provenance contains the same text as the attribute with the checksum.
         let (_folder, path) = written(format, r#"{"name": "photoncard checksum 00000000"}"#);
         let bytes = fs::read(&path).unwrap();
         assert!(is_intact(&path));

@@ -26,7 +26,7 @@ pub enum CardAddress {
     Remote(RemoteAddress),
 }
 
-/// Memory for which a scene is loaded that a remote card renders, bytes.
+/// Memory of a remote card that is assumed while a scene is loaded for it, bytes.
 const REMOTE_DRAM_BYTES: u64 = 4 << 30;
 /// Maximum number of chips that one process emulates.
 const MAX_CHIPS: usize = 1024;
@@ -48,8 +48,8 @@ impl CardAddress {
         Self::Emulated { kind, chips, memory: kind.budget().dram_bytes }
     }
 
-    /// Replaces the kind of emulated chips by `change` of the kind, and their memory by that of the new kind.
-    /// The address of a remote card does not change.
+    /// Applies `change` to the kind of emulated chips, and sets their memory to that of the new kind. The
+    /// address of a remote card does not change.
     #[must_use]
     pub fn of_kind(self, change: impl Fn(EmulatedKind) -> EmulatedKind) -> Self {
         match self {
@@ -96,8 +96,8 @@ impl CardAddress {
         }
     }
 
-    /// Memory for which a scene is loaded that a card at this address renders, bytes. A remote card states
-    /// its own later; until then 4 GB bound what a file may cost.
+    /// Memory of a card at this address that is assumed while a scene is loaded for the card, bytes. A remote
+    /// card states its memory later; until then 4 GiB limit the memory that a scene file may take.
     pub fn dram_bytes(&self) -> u64 {
         match *self {
             Self::Emulated { memory, .. } => memory,

@@ -305,8 +305,8 @@ impl Cards {
     }
 }
 
-/// Runs each piece of work on its own thread. Returns the results in the order of the work. Panics if one of
-/// them panics.
+/// Runs each piece of work on its own thread. Returns the results in the order of the work. Panics if a piece
+/// of work panics.
 fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) -> Vec<T> {
     std::thread::scope(|scope| {
         let threads: Vec<_> = works.map(|work| scope.spawn(work)).collect();
@@ -315,11 +315,11 @@ fn on_threads<W: FnOnce() -> T + Send, T: Send>(works: impl Iterator<Item = W>) 
     })
 }
 
-/// Latest time when a card was loaded.
+/// Returns the latest of the times at which the cards were loaded.
 ///
 /// # Errors
-/// The first failure other than [`RenderError::Stopped`], which it made the other cards return; else
-/// [`RenderError::Stopped`].
+/// The first failure other than [`RenderError::Stopped`]; without such a failure [`RenderError::Stopped`],
+/// which the threads of all cards return when the render is stopped.
 fn latest(results: Vec<Result<Duration, RenderError>>) -> Result<Duration, RenderError> {
     let mut latest = Duration::ZERO;
     let mut is_stopped = false;
@@ -365,7 +365,8 @@ impl RenderSettings {
     /// Creates the scheduler of the tiles for `cards` cards. With modelled memory no tile is rendered twice,
     /// because all reads count.
     pub(super) fn scheduler(&self, tiles: Vec<Tile>, cards: usize) -> Scheduler {
-        // The counts of modelled caches depend on the order of the tiles: it is that of the picture.
+        // The counts of modelled caches depend on the order of the tiles, so the tiles keep the picture's
+        // order.
         if self.modelled_caches().is_some() {
             return Scheduler::new(tiles, cards);
         }

@@ -20,8 +20,8 @@ pub(super) struct Crew<'a> {
     pub(super) failed: AtomicBool,
 }
 
-/// Guard that stops the threads of the other cards if its own thread panics. They would wait for the tiles of
-/// that thread forever.
+/// Guard that stops the threads of the other cards if its own thread panics. Without the guard they would
+/// wait forever for the tiles of that thread.
 pub(super) struct EndOthersOnPanic<'a>(pub(super) &'a AtomicBool);
 
 impl Drop for EndOthersOnPanic<'_> {

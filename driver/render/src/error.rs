@@ -36,7 +36,7 @@ pub enum CardError {
     Budget {
         /// Description of the part that does not fit.
         reason: String,
-        /// Remedy.
+        /// Suggestion how to make the picture fit the card.
         remedy: String,
     },
     /// The card was reset during its self-test.
@@ -69,9 +69,9 @@ pub enum RenderError {
         field: &'static str,
         /// Value of the field.
         value: String,
-        /// Description of the fault.
+        /// Reason why the value is not possible.
         reason: String,
-        /// Remedy.
+        /// Suggestion how to correct the setting.
         remedy: String,
     },
     /// The scene has no such camera.

@@ -111,7 +111,7 @@ pub(super) fn greet(
     Ok(GreetedCard { card, session, budget, counted: LinkBytes::default(), tiles: Vec::new() })
 }
 
-/// Does [`greet`] on any port.
+/// Greets the card at the other end of a port, as [`greet`] does.
 pub(super) fn greet_port(
     port: &mut impl Port,
     start: Instant,

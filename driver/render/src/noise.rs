@@ -20,8 +20,8 @@ const RATIO: f64 = 0.45;
 pub(super) struct NoiseEstimate {
     /// Number of samples after the last pass that doubled them.
     samples: f64,
-    /// Squared noise after that pass, relative to the squared mean of the picture; `None` before the first
-    /// such pass.
+    /// Squared noise after the last pass that doubled the samples, relative to the squared mean of the
+    /// picture; `None` before the first such pass.
     squared: Option<f64>,
     /// Number of samples after the last pass.
     all: f64,
@@ -66,8 +66,8 @@ impl NoiseEstimate {
 
     /// Noise of the last picture, relative to its mean; `None` before a pass has doubled the samples.
     pub(super) fn noise(&self) -> Option<f64> {
-        // The squared noise is linear from one doubling to the next: the last samples of the sequence are not
-        // stratified against the first.
+        // The squared noise is assumed to fall linearly from one doubling to the next, because the last
+        // samples of the sequence are not stratified against the first.
         let doubled = (self.all / self.samples - 1.0).min(1.0);
         Some((self.squared? * (1.0 - doubled * (1.0 - RATIO))).sqrt())
     }

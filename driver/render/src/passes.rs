@@ -170,7 +170,8 @@ impl Pace {
         let Some((samples, time)) = self.last[1] else { return u32::from(seconds > 0.0) };
         let slope = self.last[0].filter(|(before, _)| *before != samples);
         let slope = slope.map(|(before, other)| (time - other) / (samples - before));
-        // The time per sample is at most that without a constant part of a pass, and at least a fourth of it.
+        // The time per sample is at most the time of the whole pass divided by its samples, and at least a
+        // fourth of that.
         let most = time / samples;
         let each = slope.unwrap_or(most).clamp(0.25 * most, most).max(f64::MIN_POSITIVE);
         let fixed = time - each * samples;
@@ -187,7 +188,7 @@ mod tests {
         let mut pace = Pace::default();
         pace.add(1, 3.0);
         assert_eq!(pace.samples_in(9.5), 3);
-        // Two seconds, and one for each sample.
+        // A pass takes two seconds, and one more for each sample.
         pace.add(2, 4.0);
         assert_eq!((pace.samples_in(10.0), pace.samples_in(2.9), pace.samples_in(-1.0)), (8, 0, 0));
         pace.add(2, 0.0);

@@ -46,8 +46,8 @@ pub struct Statistics {
     /// Number of tiles with light far above that of the scene's surfaces that no second card verified,
     /// including tiles kept from an earlier render.
     pub dazzling_tiles: usize,
-    /// Names of the cards that rendered the [`dazzling_tiles`](Self::dazzling_tiles); [`EARLIER_RENDER`] for
-    /// kept ones.
+    /// Names of the cards that rendered the [`dazzling_tiles`](Self::dazzling_tiles), and [`EARLIER_RENDER`]
+    /// if an earlier render did.
     #[serde(skip)]
     pub dazzling_cards: Vec<String>,
     /// Number of tiles rendered again because their card was outvoted. The other counts include such a tile
@@ -70,7 +70,8 @@ pub struct Statistics {
     pub records: u64,
     /// Number of irradiance records reused from an earlier pass.
     pub kept_records: u64,
-    /// Fraction of the samples that see a surface with a Lambertian part whose irradiance was interpolated.
+    /// Fraction of samples with interpolated irradiance among those that see a surface with a Lambertian
+    /// part.
     pub interpolated_share: f64,
     /// Number of photons whose distance was computed.
     pub photons_tested: u64,
@@ -182,11 +183,11 @@ pub struct Rays {
     /// Number of eye rays: two per sample, more for samples that see their surface through specular ones, and
     /// those to lattice points of the irradiance cache.
     pub eye: u64,
-    /// Shadow rays.
+    /// Number of shadow rays.
     pub shadow: u64,
-    /// Final gather rays.
+    /// Number of final gather rays.
     pub gather: u64,
-    /// Rays that survey the surroundings of irradiance records.
+    /// Number of rays that survey the surroundings of irradiance records.
     pub survey: u64,
     /// Number of rays from specular surfaces that continue rays of the other kinds, except shadow rays.
     pub specular: u64,
@@ -197,7 +198,7 @@ pub struct Rays {
 pub struct LinkStatistics {
     /// Bytes of card image lines sent to each card. Only lines that the card lacked are sent.
     pub image_bytes: Vec<u64>,
-    /// Bytes of card image lines and pixels.
+    /// Bytes of card image lines sent and of pixels received.
     pub payload_bytes: u64,
     /// Total number of bytes in both directions.
     pub wire_bytes: u64,

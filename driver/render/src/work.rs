@@ -139,7 +139,7 @@ pub struct Times {
     pub load: f64,
     /// Time of rendering, after the last card was loaded.
     pub render: f64,
-    /// Time of the denoiser; 0 without one. The library leaves it to its caller, like `scene`.
+    /// Time of the denoiser; 0 without one. The caller of the library sets it, as it sets `scene`.
     pub denoise: f64,
     /// Total time.
     pub total: f64,

@@ -26,7 +26,8 @@ impl Scene {
     /// # Errors
     /// If the process cannot have the memory.
     pub(crate) fn lift_lamps(&mut self) -> Result<(), OutOfMemory> {
-        // The factor 4: a list's capacity may be twice its length, and a split copies half of the list.
+        // The factor is 4, because a list's capacity may be twice its length, and a split copies half of the
+        // list.
         allocation::check(4 * (self.emitters().count() * size_of::<Lamp>()) as u64)?;
         let lamps: Vec<Lamp> = self.emitters().map(|(index, triangle)| Lamp::new(index, triangle)).collect();
         if lamps.is_empty() {
@@ -84,8 +85,8 @@ struct Box3 {
 }
 
 impl Box3 {
-    /// Bounding box of a triangle, enlarged by the tolerance of [`SHARED`] so that it meets those of coplanar
-    /// surfaces.
+    /// Bounding box of a triangle, enlarged by the tolerance of [`SHARED`] so that it overlaps the boxes of
+    /// coplanar surfaces.
     fn of(triangle: &Triangle) -> Self {
         let [a, b, c] = triangle.vertices.map(DVec3::from);
         let room = SHARED * f64::from(f32::EPSILON) * magnitude(triangle);

@@ -56,7 +56,7 @@ impl Environment {
         Self::load_with_notice(path).map(|(environment, _)| environment)
     }
 
-    /// [`Self::load`] that also returns a sentence about clamped texels, if there are any.
+    /// Does what [`Self::load`] does, and also returns a sentence about clamped texels, if there are any.
     ///
     /// # Errors
     /// As [`Self::load`].

@@ -14,9 +14,9 @@ use thiserror::Error;
 pub struct Excerpt {
     /// Name of the file.
     pub name: String,
-    /// Text of the part.
+    /// Text of this part of the line.
     pub part: String,
-    /// Line of the file, and offset of the part in that line, bytes; both from 0.
+    /// Index of the line in the file, and offset of the part in that line, bytes; both from 0.
     pub place: [usize; 2],
 }
 
@@ -159,7 +159,7 @@ pub enum SceneError {
         location: Location,
         /// Description of the violation.
         reason: String,
-        /// Remedy.
+        /// Remedy, which is shown as the help of the error.
         remedy: &'static str,
     },
 
@@ -171,7 +171,7 @@ pub enum SceneError {
         location: Location,
         /// Description of the fault.
         reason: String,
-        /// Remedy.
+        /// Remedy, which is shown as the help of the error.
         remedy: &'static str,
     },
 
@@ -183,7 +183,7 @@ pub enum SceneError {
         location: Location,
         /// Description of the fault.
         reason: String,
-        /// Remedy.
+        /// Remedy, which is shown as the help of the error.
         remedy: &'static str,
     },
 
@@ -195,7 +195,7 @@ pub enum SceneError {
         file: PathBuf,
         /// Description of the fault.
         reason: String,
-        /// Remedy.
+        /// Remedy, which is shown as the help of the error.
         remedy: &'static str,
     },
 
@@ -286,7 +286,7 @@ pub enum SceneError {
         material: String,
         /// Description of the fault.
         reason: String,
-        /// Remedy.
+        /// Remedy, which is shown as the help of the error.
         remedy: &'static str,
     },
 
@@ -323,7 +323,7 @@ pub enum SceneError {
     OnlyZeroArea {
         /// Path of the file.
         file: PathBuf,
-        /// Number of triangles.
+        /// Number of triangles, all of zero area.
         skipped: usize,
     },
 
@@ -331,7 +331,7 @@ pub enum SceneError {
     #[error("the scene has no light")]
     #[diagnostic(code(scene::no_light), help("{remedy}"))]
     NoLight {
-        /// Remedy.
+        /// Remedy, which is shown as the help of the error.
         remedy: &'static str,
     },
 
@@ -395,7 +395,7 @@ pub enum SceneError {
         assignment: String,
         /// Description of the fault.
         reason: String,
-        /// Remedy.
+        /// Remedy, which is shown as the help of the error.
         remedy: &'static str,
     },
 }

@@ -72,7 +72,7 @@ pub struct DiffuseTransmission {
     pub factor: f32,
     /// Colour of the transmitted light, 0 to 1.
     pub colour: Vec3,
-    /// Texture of the share, in alpha.
+    /// Texture of the transmitted share, in alpha.
     pub factor_texture: Option<u32>,
     /// Texture of the colour (sRGB).
     pub colour_texture: Option<u32>,

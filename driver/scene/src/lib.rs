@@ -71,7 +71,7 @@ pub struct Scene {
 /// Properties of a scene that take a pass over all triangles and texels, computed when first used.
 #[derive(Clone, Debug, Default)]
 struct Known {
-    /// [`SceneContents::bulk_checksum`].
+    /// Result of [`SceneContents::bulk_checksum`].
     bulk: OnceLock<Checksum>,
     checksum: OnceLock<String>,
     without_cameras: OnceLock<String>,
@@ -132,7 +132,8 @@ impl Scene {
         self.known.checksum.get_or_init(|| self.contents.checksum(self.bulk_checksum(), &self.cameras))
     }
 
-    /// [`Self::checksum`] without the cameras. It covers everything that the card image depends on.
+    /// CRC-32C of all contents that a render reads except the cameras, as eight hexadecimal digits. It covers
+    /// everything that the card image depends on.
     pub fn checksum_without_cameras(&self) -> &str {
         self.known.without_cameras.get_or_init(|| self.contents.checksum(self.bulk_checksum(), &[]))
     }
@@ -152,8 +153,8 @@ impl Scene {
     /// Converts a position from the scene's coordinates to the file's, metres. Without an offset the result
     /// prints as the argument does.
     pub fn in_file(&self, place: Vec3) -> DVec3 {
-        // Of all double-precision numbers that round to a coordinate the one with its shortest decimal form
-        // is meant.
+        // Of the double-precision numbers that round to a coordinate, the one that equals the coordinate's
+        // shortest decimal form is taken.
         let decimal = |value: f32| value.to_string().parse().unwrap_or(f64::from(value));
         DVec3::from_array(place.to_array().map(decimal)) + self.offset
     }

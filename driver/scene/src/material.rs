@@ -50,9 +50,9 @@ pub struct Material {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reflection {
     /// Lambertian reflection with one Phong cosine lobe: `f = diffuse / pi + specular (exponent + 2) / (2 pi)
-    /// max(0, cos alpha)^exponent`; alpha is the angle to the mirror direction. A file states it in `extras`.
-    /// Materials that are neither metallic, transmissive nor layered, and have a `specularFactor` of 0,
-    /// become one without a lobe.
+    /// max(0, cos alpha)^exponent`; alpha is the angle to the mirror direction. A file states this model in
+    /// `extras`. Materials that are neither metallic, transmissive nor layered, and have a `specularFactor`
+    /// of 0, get this model without a lobe.
     Phong {
         /// Lambertian albedo, 0 to 1.
         diffuse: Vec3,

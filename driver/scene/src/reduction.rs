@@ -15,9 +15,9 @@ pub(crate) fn reduced_size(size: [u32; 2], limit: u32) -> [u32; 2] {
     size.map(|side| side.div_ceil(factor))
 }
 
-/// Means of the texels of an image of size `from`, in linear light, on a grid of size `to`. Each texel has a
-/// part in one mean. Colour and alpha have means of their own, as in a GPU's mipmaps: colour of alpha 0
-/// counts.
+/// Means of the texels of an image of size `from`, in linear light, on a grid of size `to`. Each texel
+/// contributes to one mean. Colour and alpha are averaged separately, as in a GPU's mipmaps, so that the
+/// colour of a texel of alpha 0 counts.
 pub(crate) fn reduced(texels: &[[u8; 4]], encoding: Encoding, from: [u32; 2], to: [u32; 2]) -> Vec<[u8; 4]> {
     let code = Code { encoding, srgb: Srgb::new() };
     let [width, _] = from;
@@ -35,7 +35,7 @@ pub(crate) fn reduced(texels: &[[u8; 4]], encoding: Encoding, from: [u32; 2], to
     (0..to[1]).flat_map(|y| (0..to[0]).map(move |x| (x, y))).map(|(x, y)| mean(x, y)).collect()
 }
 
-/// Texels as linear values.
+/// Conversion of texels to linear values and back.
 struct Code {
     encoding: Encoding,
     srgb: Srgb,

@@ -45,7 +45,7 @@ pub enum AxisError {
     #[error("{factors} values make more than {MAX_POINTS} points")]
     #[diagnostic(help("vary fewer settings, or over fewer values"))]
     TooManyPoints {
-        /// Numbers of values of the axes, as a product.
+        /// Numbers of values of the axes, joined as a product such as `512 x 2`.
         factors: String,
     },
 }
@@ -88,7 +88,8 @@ impl Axes {
         &self.0
     }
 
-    /// Combinations of values in the order of their points, each as the index of the value on each axis.
+    /// Returns the combinations of values in the order of the sweep's points. A combination has the index of
+    /// a value for each axis.
     pub(super) fn combinations(&self) -> impl Iterator<Item = Vec<usize>> {
         let count = self.0.iter().map(|axis| axis.values.len()).product();
         (0..count).map(|point| self.combination(point))
@@ -107,12 +108,12 @@ impl Axes {
         indices
     }
 
-    /// Number of the point with a combination of values.
+    /// Returns the index of the sweep's point whose combination of values is `indices`, one index per axis.
     pub(super) fn point(&self, indices: &[usize]) -> usize {
         self.0.iter().zip(indices).fold(0, |point, (axis, index)| point * axis.values.len() + index)
     }
 
-    /// Name and value of each axis for a combination.
+    /// Returns the name and the value of each axis. `indices` has the index of the value on each axis.
     pub(super) fn values(&self, indices: &[usize]) -> Vec<(&str, &str)> {
         let pairs = self.0.iter().zip(indices);
         pairs.map(|(axis, &index)| (axis.name.as_str(), axis.values[index].as_str())).collect()

@@ -16,11 +16,12 @@ use super::scale::Scale;
 
 /// Scene of [`check`].
 const SCENE: &str = "cornell.gltf";
-/// Scale of [`check`], which takes about a second.
+/// Scale of [`check`]. At this scale the check takes about a second.
 const SCALE: Scale = Scale { side: 64, photons: 20_000, gather_rays: 25, ..Scale::QUICK };
 
 /// Measures figures on which all other figures depend: the versions of program and card image layout, and the
-/// exact bytes of two small renders. A difference shows that another version of the program made a file.
+/// exact number of bytes that two small renders fetch from DRAM. If these figures differ between two files,
+/// different versions of the program made the files.
 ///
 /// # Errors
 /// If the scene is missing, or a point cannot be measured or stored.
@@ -44,8 +45,8 @@ pub fn check(laboratory: &mut Laboratory) -> Result<Vec<Figure>, StudyError> {
     Ok(figures)
 }
 
-/// Writes a file with the figures of the check, the settings that all points share, and the figures of
-/// studies. A trial has a figure `trial`.
+/// Writes `figures.csv` into `folder`: the figures `check` that [`check`] measured, the settings that all
+/// points share, and the figures of studies. If `scale` has a banner, the figure `trial` has its text.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -1,5 +1,5 @@
-//! Measures the host's work for a frame with other photons: its time, and the changed lines of the card
-//! image.
+//! Measures the host's work for a frame whose photons differ from those of the previous frame: its time, and
+//! the changed lines of the card image.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -25,7 +25,7 @@ use super::store::PointStore;
 /// Displacement of moving lights, as a fraction of the scene's diagonal.
 pub(crate) const LIGHT_STEP: f32 = 0.01;
 
-/// Host's work for the photon map of one scene, and the effects of changes of its light.
+/// Host's work for the photon map of one scene, and the effects of changes of the scene's light.
 #[derive(Clone, Debug, Deserialize, Serialize)]
 pub(crate) struct HostFrame {
     /// Size of the card image, bytes.
@@ -40,12 +40,12 @@ pub(crate) struct HostFrame {
     pub(crate) building: f64,
     /// Time to measure the maximum distance of gathers and the disc fractions, seconds.
     pub(crate) measuring: f64,
-    /// Effects of the measured changes.
+    /// Effects of changes of the scene's light on the card image.
     pub(crate) changes: Vec<Changed>,
 }
 
 impl HostFrame {
-    /// Total time, seconds.
+    /// Total time of tracing, building and measuring, seconds.
     pub(crate) fn seconds(&self) -> f64 {
         self.tracing + self.building + self.measuring
     }
@@ -96,7 +96,8 @@ impl<'a> HostBench<'a> {
         Ok(Self { scenes: scenes.to_owned(), store: PointStore::open(folder)?, pool, observer })
     }
 
-    /// Measures a frame of a scene with settings, and the effects of changes.
+    /// Measures the host's work for a frame of the scene in `file`, and the effects of `changes` on the card
+    /// image. If the store has the result, it is returned instead.
     ///
     /// # Errors
     /// If the scene cannot be read, its photons cannot be mapped, the result cannot be stored, or the
@@ -200,7 +201,7 @@ fn move_lights(scene: &mut Scene) {
     }
 }
 
-/// Size of the lines of `after` that are not equal in `before`, bytes.
+/// Returns the size of the lines of `after` that differ from those of `before`, bytes.
 fn differing_bytes(before: &CardImage, after: &CardImage) -> u64 {
     let differ: usize = changed_runs(before.lines(), after.lines()).iter().map(ExactSizeIterator::len).sum();
     (differ * LINE_BYTES) as u64

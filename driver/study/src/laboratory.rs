@@ -86,7 +86,7 @@ pub struct Laboratory<'a> {
     loaded: HashMap<String, Scene>,
     /// Card image of the last point. The next point may share it.
     last: Option<LastImage>,
-    /// Reference of the last quality point, which the next one may share.
+    /// Reference of the last point with [`Task::Quality`]. The next such point may share it.
     reference: Option<SceneReference>,
 }
 
@@ -96,7 +96,8 @@ struct LastImage {
     mapped: MappedImage,
 }
 
-/// A reference, and the inputs other than settings that it depends on.
+/// A reference, and its inputs other than settings: the name of the scene, and the assignments to the scene's
+/// materials.
 struct SceneReference {
     scene: String,
     assignments: Vec<String>,
@@ -154,7 +155,7 @@ impl<'a> Laboratory<'a> {
         Ok(Results::new(results))
     }
 
-    /// Adds a scene, which replaces the file of this name in the folder of scenes.
+    /// Adds a scene under `name`. It is used instead of the file of this name in the folder of scenes.
     pub fn add(&mut self, name: &str, scene: Scene) {
         self.loaded.insert(name.to_owned(), scene);
     }
@@ -226,8 +227,8 @@ impl<'a> Laboratory<'a> {
         Ok(outcome)
     }
 
-    /// Returns the card image for a point: the previous point's if their image keys are equal, else a new
-    /// one.
+    /// Returns the card image for a point. It is that of the previous point if the image keys of both points
+    /// are equal, otherwise a new one.
     fn image(&mut self, point: &Point) -> Result<LastImage, StudyError> {
         let key = point.image_key();
         if let Some(last) = self.last.take_if(|last| last.key == key) {

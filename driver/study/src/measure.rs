@@ -131,14 +131,15 @@ pub(crate) struct Bench<'a> {
     pub(crate) scene: &'a Scene,
     /// Card image of the scene, with its photon map.
     pub(crate) mapped: &'a MappedImage,
-    /// Threads, each of which emulates one chip. Their stacks must have room for a chip while it is built.
+    /// Threads, each of which emulates one chip. Their stacks must be large enough for a chip while it is
+    /// built.
     pub(crate) pool: &'a ThreadPool,
     /// Function that returns whether to stop. It is polled before each tile.
     pub(crate) is_stopped: &'a (dyn Fn() -> bool + Sync),
 }
 
 impl Bench<'_> {
-    /// Frame parameters for these settings.
+    /// Returns the parameters of a frame with `settings`.
     ///
     /// # Errors
     /// If the settings' camera is not possible in the scene.
@@ -147,8 +148,8 @@ impl Bench<'_> {
         Ok(settings.frame(&camera, self.mapped.max_distance, self.mapped.caustics))
     }
 
-    /// Renders tiles on chips of a kind. With `caches` the memory of each tile is modelled, and its caches
-    /// are empty at first.
+    /// Renders `tiles` on chips of the kind `chip`. With `caches` the memory is modelled, and the caches are
+    /// empty when a tile begins.
     ///
     /// # Errors
     /// If the card image is malformed, or the bench is stopped.
@@ -246,7 +247,7 @@ impl Bench<'_> {
     }
 }
 
-/// All tiles of a picture on chips of a kind.
+/// Returns all tiles of a picture that chips of the kind `chip` render with `settings`.
 fn all_tiles(settings: &RenderSettings, chip: EmulatedKind) -> Vec<Tile> {
     tiles(settings.window(), settings.tile_side(&[chip.budget()]), settings.schedule.order)
 }

@@ -15,7 +15,7 @@ const MAX_SCENE_NAME: usize = 60;
 /// Name of the order of gathers along one curve through the whole frame.
 pub const ALONG_CURVE: &str = "hilbert";
 
-/// A measurement of a scene.
+/// A measurement of a scene, with all settings that its result depends on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// Name of the scene in the laboratory: its file in the folder of scenes.
@@ -25,7 +25,8 @@ pub struct Point {
     /// Settings of the render.
     pub settings: RenderSettings,
     /// True to do all gathers of the frame along one Hilbert curve instead of in the order of the settings.
-    /// No chip has room for all gathers: the curve is the bound with which orders are compared.
+    /// No chip can hold all gathers of a frame: the traffic along the curve is a bound with which the orders
+    /// of chips are compared.
     pub is_along_curve: bool,
     /// Quantity to measure.
     pub task: Task,
@@ -67,7 +68,7 @@ impl Point {
     /// Checks the settings against each other, and against the kind of chip.
     ///
     /// # Errors
-    /// The first setting that is not possible.
+    /// If a setting is not possible. The error describes the first such setting.
     pub fn check(&self) -> Result<(), RenderError> {
         if self.is_along_curve && self.chip() != EmulatedKind::Reference {
             return Err(RenderError::Setting {
@@ -143,8 +144,8 @@ impl Point {
     }
 }
 
-/// Everything that pixels depend on: settings as stated, program, card image layout, and the checksum `scene`
-/// of the scene.
+/// Everything that pixels depend on: the settings that change pixels, the versions of program and card image
+/// layout, and the checksum `scene` of the scene.
 pub(super) fn identity(settings: &RenderSettings, scene: &str) -> NamedSettings {
     let mut identity = settings.of_pixels();
     identity.insert("program".to_owned(), json!(PROGRAM));

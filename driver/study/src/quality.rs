@@ -1,8 +1,8 @@
 //! Error of indirect light against a reference with many more gather rays.
 //!
 //! Sampling, the number of gather rays, the irradiance cache and precomputed irradiance change pixels. The
-//! order of gathers, tiles, the layout of the photon map and caches do not. Only the light that the former
-//! change is compared, which gather rays bring from the photon map:
+//! order of gathers, tiles, the layout of the photon map and caches do not. The light that is compared is
+//! that which gather rays bring from the photon map:
 //!
 //! ```text
 //! L_indirect(x, w) = integral of f(x, w', w) L_map(y, -w') cos(theta') dw'
@@ -11,7 +11,8 @@
 //! where `y` is the surface point that the ray from `x` in the direction `w'` hits, and `L_map` is the
 //! radiance at `y` estimated from photons. Direct light is excluded, because shadow rays add noise to it, and
 //! because gather rays and irradiance records contribute parts of it that depend on the number of rays. The
-//! card image therefore has no emission: its layer of indirect light is `L_indirect` for every technique.
+//! renders therefore use a card image without emission, so that their layer of indirect light is `L_indirect`
+//! for every technique.
 
 use photoncard_cards::scheduler::{GatherOrder, tiles};
 use photoncard_map::photon_map::MappedImage;
@@ -55,7 +56,7 @@ impl Quality {
         self.relative((squares - noise).max(0.0))
     }
 
-    /// Root mean square of the reference's noise, relative to its mean.
+    /// Root mean square of the reference's noise, relative to the reference's mean.
     pub(crate) fn reference_noise(&self) -> f64 {
         self.relative(self.total().noise)
     }
@@ -66,7 +67,7 @@ impl Quality {
         sum / reference
     }
 
-    /// Omits one tile.
+    /// Returns the errors of all tiles except the tile with index `tile`.
     #[must_use]
     pub(crate) fn without(&self, tile: usize) -> Self {
         let others = self.tiles.iter().enumerate().filter(|(index, _)| *index != tile);
@@ -180,7 +181,8 @@ impl Reference {
 }
 
 impl ReferencePixel {
-    /// Mean of two renders with these numbers of rays, and its noise.
+    /// Creates a pixel from its light in two renders: the mean of `lights`, weighted by the numbers of rays
+    /// `rays`, and the noise of this mean.
     fn new(lights: [[f64; 3]; 2], rays: [u32; 2]) -> Self {
         let [first, second] = lights;
         let share = f64::from(rays[0]) / f64::from(rays[0] + rays[1]);
@@ -205,8 +207,8 @@ fn error(reference: &[Option<ReferencePixel>], pixels: &[[f64; 3]]) -> TileDevia
     error
 }
 
-/// Replaces settings that do not change indirect light: tiles, order and queues, by the fastest order, and
-/// shadow rays, by none.
+/// Returns `settings` with other values where these do not change indirect light: tiles of 16x16 pixels,
+/// sorted gathers with the chip's own queue, and no shadow rays.
 fn comparable(settings: &RenderSettings) -> RenderSettings {
     let mut comparable = RenderSettings {
         schedule: Schedule {
@@ -243,8 +245,8 @@ fn emitted(bench: &Bench, settings: &RenderSettings, count: usize) -> Result<Til
     pixels(bench, settings, false, count, |pixel| pixel.pixel.radiance)
 }
 
-/// Renders `count` tiles. `light` is applied to the values of each pixel; `layers` states whether the frame
-/// has layers.
+/// Renders `count` tiles, and returns the colour that `light` selects from the values of each pixel. `layers`
+/// states whether the frame has layers.
 fn pixels(
     bench: &Bench,
     settings: &RenderSettings,
@@ -331,7 +333,7 @@ mod tests {
         let [few, more] = [error(8, 512), error(64, 512)];
         assert!(more.rmse() < 0.5 * few.rmse(), "{} {}", few.rmse(), more.rmse());
         assert!((more.mean() - 1.0).abs() < 0.05, "{}", more.mean());
-        // A noisier reference shows in the difference and not in the error.
+        // The noise of a noisier reference increases the squared differences, but not the RMSE.
         let rough = error(8, 48);
         assert!(rough.reference_noise() > 2.0 * few.reference_noise());
         assert!((rough.rmse() / few.rmse() - 1.0).abs() < 0.1, "{} {}", few.rmse(), rough.rmse());

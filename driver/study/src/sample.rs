@@ -147,8 +147,9 @@ impl Ratio {
     /// Ratio of an estimate to itself.
     pub(super) const ONE: Self = Self { value: 1.0, lower: 1.0, upper: 1.0 };
 
-    /// Ratio of two independent estimates. The half-width of its logarithm is the root of the sum of the
-    /// squares of both relative half-widths and of `further`, all of which are independent.
+    /// Ratio of two independent estimates. If `n` and `d` are the half-widths of numerator and denominator
+    /// divided by their values, the half-width of the interval of the ratio's logarithm is `sqrt(n^2 + d^2 +
+    /// further^2)`, where `further` is the half-width of a third, independent error of the logarithm.
     pub(super) fn new(numerator: Estimate, denominator: Estimate, further: f64) -> Self {
         let relative = |estimate: Estimate| estimate.half_width / estimate.value;
         let spread = relative(numerator).hypot(relative(denominator)).hypot(further).exp();
@@ -157,8 +158,9 @@ impl Ratio {
     }
 }
 
-/// Half-width of the 95 % confidence interval of a statistic, by the jackknife (Tukey 1958). `without_one`
-/// has the statistic without each of the observations. Infinite for fewer than two.
+/// Half-width of the 95 % confidence interval of a statistic, by the jackknife (Tukey 1958). For each
+/// observation, `without_one` has the statistic of all other observations. The half-width is infinite for
+/// fewer than two observations.
 pub(super) fn jackknife_half_width(without_one: &[f64]) -> f64 {
     if without_one.len() < 2 {
         return f64::INFINITY;

@@ -1,5 +1,5 @@
-//! Scale of a study: the settings that its renders have in common, and the number of values over which it
-//! varies others.
+//! Scale of a study: the settings that all of its renders have in common, and whether it varies other
+//! settings over many values or few.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;
@@ -83,7 +83,7 @@ impl Scale {
         frame(self) == frame(&Self::FULL)
     }
 
-    /// Text that marks figures as not being of the nominal frame; `None` if they are.
+    /// Text that marks figures as those of a trial; `None` if the scale is that of the nominal frame.
     pub fn banner(&self) -> Option<String> {
         let Self { side, photons, neighbors, gather_rays, .. } = self;
         let Self { side: nominal_side, photons: nominal_photons, .. } = Self::FULL;
@@ -96,12 +96,13 @@ impl Scale {
         })
     }
 
-    /// Replaces the fraction of the tiles.
+    /// Replaces the fraction of the tiles that is rendered.
     pub fn with_sample(self, sample: SampleRate) -> Self {
         Self { sample, ..self }
     }
 
-    /// Replaces the machine for times and numbers of chips. No point depends on it.
+    /// Replaces the machine for which times and numbers of chips are computed. No point depends on the
+    /// machine.
     pub fn on(self, machine: Machine) -> Self {
         Self { machine, ..self }
     }
@@ -211,8 +212,8 @@ impl Scale {
         rows.into_iter().chain([machine_row(&self.machine)]).collect()
     }
 
-    /// Number of gathers of a frame in which every gather ray of every pixel ends in one: `side^2 N_FG`, 26.2
-    /// million at the nominal values.
+    /// Number of gathers of a frame in which every gather ray of every pixel ends in a gather: `side^2 N_FG`,
+    /// 26.2 million at the nominal values.
     pub(crate) fn nominal_gathers(&self) -> f64 {
         f64::from(self.side) * f64::from(self.side) * f64::from(self.gather_rays)
     }

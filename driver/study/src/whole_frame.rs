@@ -127,7 +127,7 @@ impl WholeFrame<'_> {
         Ok(FrameOutcome { tiles, counters: all.counters, traffic: all.traffic })
     }
 
-    /// Casts the rays of tiles.
+    /// Casts the rays of `tiles`, and collects their gathers.
     fn cast(&self, tiles: &[Tile]) -> Result<Vec<CastTile>, RenderError> {
         let &Self { image, frame, caches, .. } = self;
         let cast_one = |chip: &mut EmulatedChip, &tile: &Tile| {
@@ -214,8 +214,8 @@ impl Frame {
         Ok(all)
     }
 
-    /// Adds the sums and gathers of tiles. Only gathers of glossy lobes beside an irradiance cache, and of
-    /// several paths per sample, can exceed the reserved memory.
+    /// Adds the sums and gathers of tiles. The gathers can exceed the reserved memory only if glossy lobes
+    /// are gathered beside an irradiance cache, or if samples have several paths.
     fn add(&mut self, frame: &FrameParameters, tiles: Vec<CastTile>) -> Result<(), RenderError> {
         for CastTile { tile, waiting } in tiles {
             let gathers = (self.waiting.len() + waiting.len()) as u64;
@@ -238,7 +238,7 @@ impl Frame {
 
 /// Results of some gathers.
 struct Gathered {
-    /// Light to be added, with the indices of its sums.
+    /// Light that each gather brings, with the index in [`Frame::sums`] of the sum to which it is added.
     brought: Vec<(u32, Vec3)>,
     counters: Counters,
     traffic: MemoryTraffic,

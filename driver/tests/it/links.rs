@@ -165,7 +165,7 @@ fn a_port_waits_no_longer_than_it_is_told() {
     let (other, _): (TcpStream, _) = listener.accept().unwrap();
     assert_eq!(port.read(&mut [0; 8], Duration::ZERO), Ok(0));
     assert_eq!(port.read(&mut [0; 8], SOON), Ok(0));
-    // Until the system's buffers are full.
+    // Writes until the system's buffers are full.
     while port.write(&[0; 1 << 16], SOON).unwrap() > 0 {}
     assert_eq!(port.write(&[0; 8], Duration::ZERO), Ok(0));
     drop(other);

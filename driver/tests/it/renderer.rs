@@ -1,5 +1,5 @@
-//! Pictures one after another on the same cards are those of new cards, and cards receive the lines that have
-//! changed.
+//! Pictures rendered one after another on the same cards equal those of new cards, and cards receive only the
+//! lines that have changed.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -131,7 +131,8 @@ fn a_new_camera_sends_no_line_and_traces_no_photon() {
     assert_eq!((second.time_s.photons, second.photon_paths), (0.0, first.photon_paths));
 }
 
-/// Pictures of a scene whose checksums are known are those of a scene that is read anew, provenance included.
+/// Pictures of a scene whose checksums are known equal those of a scene that is read anew, provenance
+/// included.
 #[test]
 fn a_kept_scene_gives_the_pictures_of_a_new_one() {
     let base = base();

@@ -244,7 +244,7 @@ fn environments_are_read_from_hdr_and_exr() {
     let expected =
         Environment { width: 2, height: 1, texels: vec![[1.0, 0.5, 0.25], [0.0, 0.0, 4.0]], strength: 1.0 };
     assert_eq!(Environment::load(&write(folder.path(), "sky.hdr", HDR)).unwrap(), expected);
-    // The first bytes count, not the name.
+    // The first bytes of a file determine its format, not its name.
     let path = folder.path().join("sky.bin");
     exr(&folder.path().join("sky.exr"), &expected.texels);
     fs::rename(folder.path().join("sky.exr"), &path).unwrap();
@@ -302,7 +302,7 @@ fn environments_are_turned_counter_clockwise_seen_from_above() {
         sky.clone().turned(degrees).texels.iter().map(|texel| texel[0]).collect()
     };
     assert_eq!(red(0.0), [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]);
-    // The east, +x, which is three quarters to the right, comes to the middle, the north.
+    // The east, +x, at three quarters of the width, moves to the middle, the north.
     assert_eq!(red(90.0), [1.0, 2.0, 3.0, 0.0, 5.0, 6.0, 7.0, 4.0]);
     assert_eq!((red(-270.0), red(450.0)), (red(90.0), red(90.0)));
     let rows = vec![[1.0; 3], [1.0; 3], [2.0; 3], [2.0; 3]];

@@ -118,7 +118,7 @@ fn all_moments_have_the_offset_of_the_scene_at_rest() {
     std::fs::write(&path, glb(file.json, &file.bytes)).unwrap();
     let moment = |seconds| Moment { animations: Vec::new(), seconds };
     let file = SceneFile::open(&path, &LoadSettings::default()).unwrap();
-    // Cameras first: the offset does not depend on what is asked for first.
+    // The cameras are read first, because the offset must not depend on what is read first.
     assert_eq!(file.cameras_at(&moment(1.0)).unwrap()[0].origin, Vec3::new(0.25, 0.25, 3.0));
     for (seconds, x) in [(1.0, 500.0), (0.0, 0.0), (0.5, 250.0)] {
         let scene = file.at(&moment(seconds)).unwrap();

@@ -48,7 +48,7 @@ impl Board for Mps2An386 {
     fn start() {
         TIMER_RELOAD.write(CYCLES - 1);
         TIMER_VALUE.write(0);
-        // Enabled, with interrupt, on the processor's clock.
+        // Enables the timer and its interrupt; the timer counts cycles of the processor.
         TIMER_CONTROL.write(7);
         UART_DIVISOR.write(MIN_DIVISOR);
         Self::listen(true);
@@ -56,7 +56,7 @@ impl Board for Mps2An386 {
     }
 
     fn receive() -> Option<u8> {
-        // Cleared before the byte is read, so that the next byte interrupts again.
+        // The interrupt is cleared before the byte is read, so that the next byte interrupts again.
         UART_INTERRUPT.write(INTERRUPT_RECEIVED);
         (UART_STATE.read() & STATE_RECEIVED != 0).then(|| UART_DATA.read() as u8)
     }

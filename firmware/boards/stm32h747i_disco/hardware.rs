@@ -83,7 +83,8 @@ impl Board for Disco {
         let mut memory = sdram::controller(chip.FMC, ports, clocks.peripheral.FMC, &clocks.clocks);
         let mut delay = core.SYST.delay(clocks.clocks);
         let _: *mut u32 = memory.init(&mut delay);
-        // After `init`: the processor may prefetch normal memory, and SDRAM does not answer before `init`.
+        // Card memory is made cacheable after `init`, because the processor may prefetch normal memory, and
+        // SDRAM does not answer before `init`.
         Self::make_cacheable(&core.MPU, &mut core.SCB);
         let gpioa = chip.GPIOA.split(clocks.peripheral.GPIOA);
         let pins = (gpioa.pa9.into_alternate(), gpioa.pa10.into_alternate());

@@ -56,7 +56,7 @@ impl Paths {
     }
 }
 
-/// Sums of a pixel's probes by channel: of their light, W/(sr m^2), and of its square.
+/// Sums over a pixel's probes, by channel: of the light, W/(sr m^2), and of the squared light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Probes {
     sum: Vec3,

@@ -27,8 +27,8 @@ impl<K: ChipKind> Shared<K> {
         }
     }
 
-    /// Sets the capacities that the types leave open: for gather points to `points`, all others by the
-    /// budget.
+    /// Sets the capacities that the types leave open: room for `points` gather points, and for the budget's
+    /// numbers of sums, candidates and queued gathers.
     pub(super) fn reserve(&mut self, budget: &Budget, points: usize) {
         self.points.reserve(points);
         self.sums.reserve(budget.tile_pixels as usize);

@@ -177,8 +177,8 @@ impl Completion {
         }
     }
 
-    /// Ends the current path: adds its light to the probes if the path is one. `unit` is the radiance unit,
-    /// W/(sr m^2).
+    /// Ends the current path: adds its light to the sums of the probes if its sample is a probe. `unit` is
+    /// the radiance unit, W/(sr m^2).
     fn end_light(&mut self, unit: f32) {
         let light = core::mem::replace(&mut self.of_path, Vec3::ZERO);
         if self.sample < PROBES {
@@ -222,11 +222,12 @@ fn light_path<K: ChipKind, M: MemoryPort>(
         return Ok(true);
     }
     if has_rays {
-        // Not from photons, which would take a search.
+        // The directions do not follow photons, which would take a search.
         point.directions = DirectionTable::of_reflection(&point.reflector());
     }
     context.memory.enter(Stage::Shadow);
-    // The last bits of a surface depend on how it is read: here as by [`Pass::Direct`].
+    // The last bits of a surface's values depend on how the surface is read. It is read here as in
+    // [`Pass::Direct`].
     if let Some(seen) = &view.seen {
         eye::surface(context, view.film, seen, &mut point.surface)?;
     }

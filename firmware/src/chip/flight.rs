@@ -33,8 +33,8 @@ pub(super) struct Flight<K: ChipKind> {
     /// Number of queued gathers that belong to the block.
     pub(super) waiting: u32,
     pub(super) cache: IrradianceCache<K::IrradianceRecords>,
-    /// For each pixel of the block, its number in the tile's run of [`super::pixel_sums::PixelSums`]; or
-    /// [`PLAIN`], or [`UNSUMMED`].
+    /// For each pixel of the block, its number among the tile's pixels in [`super::pixel_sums::PixelSums`];
+    /// or [`PLAIN`], or [`UNSUMMED`].
     sums: <K::TilePixels as Capacity>::Buffer<u16>,
     /// Number of paths per sample, by pixel of the block.
     paths: <K::TilePixels as Capacity>::Buffer<Paths>,
@@ -86,7 +86,8 @@ impl<K: ChipKind> Flight<K> {
         self.position.pass
     }
 
-    /// Returns true if pixels of the block are being completed, or can be because none of its gathers waits.
+    /// Returns true if pixels of the block are being completed, or can be completed because no gather of the
+    /// block waits.
     pub(super) fn is_completable(&self) -> bool {
         match self.pass() {
             Pass::CompletePlain | Pass::Complete => true,
@@ -182,7 +183,7 @@ impl<K: ChipKind> Flight<K> {
         row * self.tile.width + column
     }
 
-    /// Number of the block's pixel `index` in the tile's run of sums; `None` if the pixel has no sum.
+    /// Number of the block's pixel `index` among the tile's pixels with sums; `None` if the pixel has no sum.
     pub(super) fn sum(&self, index: u32) -> Option<u16> {
         self.sums.values().get(index as usize).copied().filter(|&number| number < UNSUMMED)
     }
@@ -199,7 +200,7 @@ impl<K: ChipKind> Flight<K> {
         self.set_sum(index, UNSUMMED)
     }
 
-    /// Sets the number of the block's pixel `index` in the tile's run of sums.
+    /// Sets the number of the block's pixel `index` among the tile's pixels with sums.
     pub(super) fn set_sum(&mut self, index: u32, number: u16) -> Result<(), Fault> {
         let sum = self.sums.values_mut().get_mut(index as usize);
         *sum.ok_or(Invariant::Pixels.fault())? = number;

@@ -77,8 +77,8 @@ impl<C: Capacity, Q: Capacity> Gathers<C, Q> {
         self.queue.push(request).is_ok()
     }
 
-    /// Begins a drain. Returns the number of waiting gathers, and the one that is done first; `None` if none
-    /// waits.
+    /// Begins a drain. Returns the number of waiting gathers, and the first gather of the drain; `None` if no
+    /// gather waits.
     pub(super) fn begin_drain(&mut self, drain: Drain) -> Option<(usize, &GatherRequest)> {
         if self.queue.is_empty() {
             return None;

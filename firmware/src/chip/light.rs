@@ -16,7 +16,7 @@ pub enum Component {
     /// pixel's own gather rays.
     Direct,
     /// Paths `L (S|D)* D S* D S* E`: radiance estimates at the ends of gather rays, and interpolated
-    /// irradiance. The latter includes emission that rays of the irradiance records hit.
+    /// irradiance. Interpolated irradiance includes emission that gather rays of irradiance records hit.
     Indirect,
     /// Paths `L S+ D S* E`: radiance estimates in the caustic map.
     Caustic,
@@ -42,7 +42,7 @@ pub struct PixelLight([ColourSum; SUMS_WITH_LAYERS as usize]);
 impl PixelLight {
     pub(super) const NONE: Self = Self([ColourSum::ZERO; SUMS_WITH_LAYERS as usize]);
 
-    /// Creates the light of a pixel from its stored sums, at most [`SUMS_WITH_LAYERS`]; missing ones are 0.
+    /// Creates the light of a pixel from its stored sums, at most [`SUMS_WITH_LAYERS`]; missing sums are 0.
     pub(super) fn of(sums: &[ColourSum]) -> Self {
         let mut light = Self::NONE;
         light.0.iter_mut().zip(sums).for_each(|(sum, stored)| *sum = *stored);

@@ -134,7 +134,8 @@ impl<K: ChipKind> Chip<K> {
         &self.kind
     }
 
-    /// Maximum number of pixels of a tile in `frame`: a fourth if the frame has layers.
+    /// Maximum number of pixels of a tile in `frame`: the budget's, or a fourth of it if the frame has
+    /// layers.
     pub fn tile_pixels(&self, frame: &FrameParameters) -> u64 {
         u64::from(self.kind.budget().pixels_of_tile(frame.layers))
     }
@@ -256,8 +257,9 @@ impl<K: ChipKind> Chip<K> {
         Ok(Progress::Busy)
     }
 
-    /// Begins, for a tile in flight, the passes of a block's pixels with gather rays, or else its next block.
-    /// Without such a tile, begins a drain if there is no room for another tile; otherwise the chip is idle.
+    /// Begins, for a tile in flight, the passes of a block's pixels with gather rays or, if no tile waits for
+    /// these, the next block. If no tile waits for either, begins a drain if there is no room for another
+    /// tile; otherwise the chip is idle.
     fn go_on(&mut self, frame: &FrameParameters) -> Result<Progress, Fault> {
         let of_pass = |pass| self.find(|flight| flight.pass() == pass);
         if let Some(number) = of_pass(Pass::NextPixels).or_else(|| of_pass(Pass::NextBlock)) {

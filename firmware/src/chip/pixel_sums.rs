@@ -1,8 +1,8 @@
 //! Sums of light of the pixels with gather rays, for all tiles in flight.
 //!
-//! Only these pixels receive light before they are completed: from gather rays, shadow rays and caustics. The
-//! sums are in a ring buffer. Those of a block's pixels are consecutive, a run, which grows while the block's
-//! eye rays are cast and ends when its pixels are complete.
+//! Only pixels with gather rays receive light before they are completed: from gather rays, shadow rays and
+//! caustics. The sums are in a ring buffer. The sums of a block's pixels are consecutive there: a run, which
+//! grows while the block's eye rays are cast and ends when the block's pixels are complete.
 
 use core::num::NonZeroU32;
 
@@ -57,7 +57,7 @@ impl<C: Capacity> PixelSums<C> {
     pub(super) fn begin(&mut self, flight: usize) {
         // Always fits: the buffer's own capacity.
         let _ = self.sums.resize(self.sums.capacity(), ColourSum::ZERO);
-        // A frame with layers has fewer places, so that `end` may be past them.
+        // In a frame with layers the ring has room for fewer pixels, so that `end` may be past the last.
         if self.runs.iter().all(|run| run.count == 0) {
             self.end = 0;
         }
@@ -79,8 +79,8 @@ impl<C: Capacity> PixelSums<C> {
         !self.runs.iter().any(|run| run.holds(self.end, places))
     }
 
-    /// Appends a pixel without light to the run of tile in flight `flight`, which must have begun last.
-    /// Returns the pixel's number in the run. [`Self::has_room`] must be true.
+    /// Appends a pixel without light to the run of tile in flight `flight`, which must be the run that was
+    /// begun last. Returns the pixel's number in the run. [`Self::has_room`] must be true.
     pub(super) fn push(&mut self, frame: &FrameParameters, flight: usize) -> Result<u16, Fault> {
         let (count, places) = (sums_of_pixel(frame.layers) as usize, self.places(frame));
         let first = self.end as usize * count;
@@ -165,7 +165,7 @@ mod tests {
                     held[flight].push(light);
                 }
             }
-            // A tile alone has all places.
+            // A single tile has room for all pixels of the ring.
             (0..3).for_each(|flight| sums.end(flight));
             sums.begin(1);
             for number in 0..places {

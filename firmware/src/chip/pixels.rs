@@ -29,8 +29,8 @@ pub(super) fn pixel_point(
     paths: u32,
 ) -> GatherPoint {
     let pattern = pattern(frame, at);
-    // The frame's number of gather rays is that of a whole pixel with the irradiance cache, of a sample
-    // without.
+    // The frame's number of gather rays is, with the irradiance cache, that of a whole pixel; without it,
+    // that of a sample.
     let is_of_pixel = allowed_error(frame).is_some();
     let samples = if is_of_pixel { frame.planned_samples.max(1) } else { 1 };
     // The paths of a Lambertian surface share the gather rays of a sample. On other surfaces each path has
@@ -72,7 +72,8 @@ fn gather_point<M, R: Capacity>(
 }
 
 impl<K: ChipKind> Flight<K> {
-    /// Number of pixels of the stripe, at most `points`: one for each gather point that can be stored.
+    /// Number of pixels of the stripe, the pixels whose gather points are stored together: at most `points`,
+    /// the number of gather points that can be stored.
     fn stripe(&self, points: u32) -> u32 {
         self.block.pixels().saturating_sub(self.position.first).min(points)
     }

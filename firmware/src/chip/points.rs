@@ -14,8 +14,8 @@ use crate::sampler::Pattern;
 pub(super) struct Points<C: Capacity> {
     points: C::Buffer<StoredPoint>,
     owners: C::Buffer<u16>,
-    /// Direction bin of each point's next ray; after the last ray, the bin of that ray. A separate array,
-    /// because most points have no ray in the current bin and are passed over.
+    /// Direction bin of each point's next ray; after the last ray, the bin of that ray. The bins are in an
+    /// array of their own, because most points have no ray in the current bin and are passed over.
     bins: C::Buffer<u8>,
 }
 

@@ -59,11 +59,11 @@ pub(super) enum Pass {
     ReadKept,
     /// Survey: placement of irradiance records, level by level of the lattice.
     Survey,
-    /// Choice of the direction tables of the records.
+    /// Choice of the direction tables of the irradiance records.
     RecordPoints,
-    /// Gather rays of the records, by direction bin.
+    /// Gather rays of the irradiance records, by direction bin.
     RecordRays,
-    /// The gathers of the records wait.
+    /// Gathers of the irradiance records wait in the queue.
     WaitForRecords,
     /// Completion of the pixels without gather rays. Pixels with gather rays are found and left for later.
     CompletePlain,
@@ -77,7 +77,7 @@ pub(super) enum Pass {
     Direct,
     /// Gather rays of the stripe's paths, by direction bin.
     Rays,
-    /// All rays are cast; the gathers wait.
+    /// All gather rays of the block's pixels are cast; gathers wait in the queue.
     Wait,
     /// Completion of the pixels with gather rays, when none of their gathers waits any more.
     Complete,
@@ -99,7 +99,7 @@ pub(super) struct Position {
     /// Index of the current pixel in the stripe or block, of the current lattice point, or of the current
     /// gather point.
     pub(super) index: u32,
-    /// Number of rays already cast in the current bin.
+    /// Number of rays of the current gather point that were already cast in the current bin.
     rays: u32,
 }
 

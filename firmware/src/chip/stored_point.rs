@@ -18,9 +18,9 @@ const RAYS_PER_STEP: u32 = 64;
 /// computed again in each bin.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoredPoint {
-    /// For a pixel, the triangle and the position on it, or [`Seen::ELSEWHERE`] if only the eye path leads
-    /// there again: through perfectly specular surfaces, or to one of several material layers. Unused for an
-    /// irradiance record.
+    /// For a pixel, the triangle and the position on it, or [`Seen::ELSEWHERE`] if the surface can be read
+    /// again only by tracing the eye path, because the path passes perfectly specular surfaces or chooses a
+    /// material layer at random. Unused for an irradiance record.
     pub(super) seen: Seen,
     pub(super) directions: DirectionTable,
     /// Number of rays to cast, and their purpose.
@@ -100,7 +100,8 @@ impl StoredPoint {
         }
     }
 
-    /// Reads the surface at a pixel's gather point into `surface`. `at` is the path whose point it is.
+    /// Reads the surface at a pixel's gather point into `surface`. `at` is the eye path that ends at the
+    /// point.
     ///
     /// # Errors
     /// If the card image is invalid, or the eye path ends at no surface.

@@ -31,7 +31,7 @@ pub struct GatherTarget {
 /// Index of a gather point in a tile in flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PointIndex {
-    /// Number of a pixel in the tile's run of pixel sums.
+    /// Number of a pixel among the tile's pixels with sums.
     Pixel(u16),
     /// Index of an irradiance record in the tile's cache.
     Record(u16),

@@ -2,11 +2,12 @@
 //! direction tables that follow from it.
 //!
 //! Photons straight from a light are excluded, because shadow rays account for that light. With k = 100
-//! photons a cell has a few, and its flux is uncertain by half. Where light comes from all around, a table of
-//! raw sums would add more variance than it removes. The sums are therefore shrunk towards their mean (James,
-//! Stein 1961, *Estimation with quadratic loss*) by the factor `max(0, 1 - noise / spread)`: `spread` is the
-//! sum of squared deviations, `noise` its expectation for uniform flux, given the photons' number and powers.
-//! Pure noise gives the cosine's table; light through few cells keeps its distribution.
+//! photons, only a few pass through each cell, and the flux of a cell is uncertain by half. Where light comes
+//! from all around, a table of these sums would add more variance than it removes. The sums are therefore
+//! shrunk towards their mean (James, Stein 1961, *Estimation with quadratic loss*) by the factor `max(0, 1 -
+//! noise / spread)`: `spread` is the sum of squared deviations, `noise` its expectation for uniform flux,
+//! given the photons' number and powers. Pure noise thus gives all cells the same flux; light through few
+//! cells keeps its distribution.
 
 use glam::Vec3;
 use photoncard_shared::layout::decode_direction;

@@ -16,7 +16,8 @@ pub const ENTRIES: usize = CELLS + 1;
 /// Index of the lobe's entry.
 const LOBE: usize = CELLS;
 
-/// Shares of the gather rays in each entry, 34 bytes. They are integers, so that densities are exact.
+/// Shares of the gather rays that go through each cell of the hemisphere, and of those that are sampled from
+/// the lobe; 34 bytes. The shares are integers, so that densities are exact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct DirectionTable {
     cells: [u8; CELLS],
@@ -83,7 +84,7 @@ impl DirectionTable {
         }
         let place = bin * ENTRIES as u32;
         let (entry, part) = ((place / bins) as usize, place % bins);
-        // At least 1 in every table, which the compiler cannot prove.
+        // The total is at least 1 in every table, which the compiler cannot prove.
         let total = (self.total() * bins).max(1);
         // Sum of the shares before the bin, times `bins`, so that it is an integer.
         let beginning = self.before(entry) * bins + self.share(entry) * part;
@@ -179,7 +180,7 @@ impl DirectionTable {
             direction_in(*normal, entry as u8, point)
         };
         let cosine = normal.dot(direction);
-        // The cell of the entry, not of the rounded direction.
+        // The cell is that of the entry, because the rounded direction may lie in another cell.
         let cell = if entry == LOBE { cell_of(*normal, direction)? } else { entry as u8 };
         if cosine <= 0.0 {
             return None;
@@ -270,7 +271,7 @@ fn sum(shares: &[u8]) -> u32 {
     let (words, rest) = shares.as_chunks::<4>();
     let pairs = words.iter().fold(0, |pairs, &word| {
         let word = u32::from_le_bytes(word);
-        // At most eight words: a half does not overflow.
+        // There are at most eight words, so that no 16-bit half overflows.
         pairs + (word & 0x00ff_00ff) + (word >> 8 & 0x00ff_00ff)
     });
     (pairs & 0xffff) + (pairs >> 16) + rest.iter().map(|&share| share as u32).sum::<u32>()

@@ -77,7 +77,7 @@ impl<R: Capacity> IrradianceCache<R> {
     /// Weights of the records for a sample; `None` if their sum is below [`MIN_WEIGHT`].
     fn weights(&self, sample: &SeenSample, allowed: f32) -> Option<Weights> {
         let SeenSample { pixel, film, surface } = *sample;
-        // By pixel, as the filter may move `film` out of the pixel.
+        // The cell is that of the pixel, because the pixel filter may move `film` out of the pixel.
         let cell = self.undivided_cell(pixel)?;
         let part = |at: f32, from: u32| min(max((at - from as f32) / cell.side() as f32, 0.0), 1.0);
         let [x, y] = [part(film[0], cell.corner.x), part(film[1], cell.corner.y)];
@@ -86,7 +86,7 @@ impl<R: Capacity> IrradianceCache<R> {
         let errors = corners.errors(allowed, surface.position, surface.normal);
         let mut weights = bilinear;
         for (weight, error) in weights.iter_mut().zip(errors) {
-            // Continuous: 0 at the error bound.
+            // The weight falls continuously to 0 at the error bound.
             *weight *= if error < allowed { 1.0 - error / allowed } else { 0.0 };
         }
         (weights.iter().sum::<f32>() >= MIN_WEIGHT).then_some(Weights { cell, weights })

@@ -18,9 +18,9 @@ const fn side(level: u32) -> u32 {
 /// Corner of a lattice cell, pixels from the picture's upper left corner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct LatticePoint {
-    /// Distance to the right, pixels.
+    /// Distance from the picture's left edge, pixels.
     pub x: u32,
-    /// Distance downwards, pixels.
+    /// Distance from the picture's upper edge, pixels.
     pub y: u32,
 }
 

@@ -2,10 +2,10 @@
 //! interpolated between them (Ward, Rubinstein, Clear 1988; Ward, Heckbert 1992). Radii of validity are
 //! clamped by those of neighbours, among the corners of a cell (Křivánek 2006).
 //!
-//! The published caches are filled on demand, so that each pixel depends on the pixels before it. The
-//! dissertation makes the cache parallel by removing this dependence, without giving the method; this module
-//! is a reconstruction. The positions of the records depend only on the geometry seen in one cell of a
-//! lattice over the picture:
+//! The published caches are filled on demand, so that each pixel depends on the pixels before it.
+//! Steinhurst's dissertation (2007) makes the cache parallel by removing this dependence, but does not give
+//! the method; this module reconstructs it. The positions of the records depend only on the geometry seen in
+//! one cell of a lattice over the picture:
 //!
 //! - Records are at the corners of the cells, 16 pixels apart. A survey determines the surface that the eye
 //!   sees at each corner, and the harmonic mean of the distances to surrounding surfaces along a few rays,
@@ -13,7 +13,7 @@
 //! - A cell is divided in four, down to a side of 2 pixels, unless its corners cover it: every corner, and
 //!   every point that a division would add, is within the allowed error of all four corner records.
 //! - A sample interpolates those of the four corner records of its undivided cell that are valid at the
-//!   surface it sees. Weights are continuous across cells of one size. A sample at which they sum to too
+//!   surface it sees. Weights are continuous across cells of one size. A sample whose weights sum to too
 //!   little casts gather rays.
 //! - All records are gathered. The survey determines the coefficients of their gradients, so that gathers of
 //!   records can be reordered like all others and wait together with those of pixels. Geometry alone decides
@@ -28,7 +28,7 @@
 //! memory.
 //!
 //! Direct light is divided between shadow rays and gather rays ([`crate::render::direct`]). The records
-//! contain the part of the gather rays, mostly light of large emitters.
+//! contain the part that gather rays find, mostly light of large emitters.
 
 mod gradient;
 mod interpolation;

@@ -35,9 +35,9 @@ pub(super) struct GatherSums {
     rotation: [ColourSum; 2],
 }
 
-/// Strongest term of a record's sums, and the strength, the sum of channels, of the second strongest; both
-/// independent of the order of the terms. Without alignment the bytes fit beside the tag of [`Content`] and
-/// take no memory of their own.
+/// Strongest term of a record's sums, and the strength (sum of channels) of the second strongest term.
+/// Neither depends on the order of the terms. The type has an alignment of 1 byte, so that it fits beside the
+/// tag of [`Content`] and enlarges no record.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Strongest {
     light: Rgbe,
@@ -49,7 +49,7 @@ pub(super) struct Strongest {
 const _: () = assert!(size_of::<Content>() == size_of::<GatherSums>() + align_of::<GatherSums>());
 
 impl Strongest {
-    /// No term.
+    /// Value before the first term.
     pub(super) const NONE: Self = Self { light: Rgbe([0; 4]), cell: 0, second: [0; 2] };
 
     /// Takes account of a term: the weighted radiance of a gather ray in cell `cell` of the hemisphere.
@@ -79,9 +79,9 @@ impl Strongest {
     }
 }
 
-/// Maximum of a single strong term, divided by the sum of the others. A small bright place that the direction
-/// table does not favour is hit by a ray of one record in many, and would show as a disc of that record's
-/// radius.
+/// Maximum of a single strong term, divided by the sum of the others. A small bright surface that the
+/// direction table does not favour is hit by a ray of only one record in many, and would show as a disc of
+/// that record's radius.
 const LONE_SHARE: f32 = 0.25;
 
 impl GatherSums {
@@ -119,8 +119,9 @@ impl GatherSums {
         }
     }
 
-    /// Limits the strongest term to the second strongest or, if more, to [`LONE_SHARE`] of the sum of the
-    /// others. By rounding it may exceed the limit by 1/128 of itself. A record's only term is kept.
+    /// Limits the strongest term to the greater of the second strongest and [`LONE_SHARE`] times the sum of
+    /// the others. By rounding, the limited term may exceed this limit by 1/128. A record's only term is
+    /// kept.
     pub(super) fn limited(mut self, strongest: &Strongest) -> Self {
         let [strength, second] = [strongest.light().element_sum(), from_upper_half(strongest.second())];
         let others = self.mean.value().element_sum() - strength;

@@ -30,15 +30,15 @@ const DIRECTORY_LINES: u32 = 128;
 /// Upper bound of the length of a frame's encoded parameters, bytes.
 const KEY_BYTES: usize = 128;
 
-/// Encoded parameters of a frame, those that no record depends on replaced by constants. Floats are compared
-/// by their bits.
+/// Encoded parameters of a frame, with constants in place of the parameters that no record depends on. Floats
+/// are compared by their bits.
 type Key = [u8; KEY_BYTES];
 
 /// Location of the kept records of one picture in the lines past the card image.
 pub struct RecordStore {
     /// Key of the picture; `None` if no records may be kept.
     key: Option<Key>,
-    /// First line past the card image; `limit` is the line past the last one.
+    /// First line that may hold kept records; `limit` is the line past the last such line.
     first: u32,
     limit: u32,
     /// End of the lines in use; equal to `first` if there is no directory.
@@ -56,9 +56,10 @@ pub enum Recalled {
     Nothing,
 }
 
-// Not inlined: the lines in these functions would enlarge the stack frames of rays and gathers.
+// Functions are not inlined, because the lines that they hold would enlarge the stack frames of rays and
+// gathers.
 impl RecordStore {
-    /// Store without lines.
+    /// Store that keeps no records.
     pub const EMPTY: Self = Self { key: None, first: 0, limit: 0, end: 0 };
 
     /// Begins a frame with the lines `room` past the card image. Keeps the records of earlier frames if these
@@ -138,7 +139,8 @@ impl RecordStore {
         let _ = self.append(memory, &head, core::iter::empty());
     }
 
-    /// Finds a window's block. Returns its head and the head's line address; `None` if it is not kept.
+    /// Finds a window's block. Returns the line address of the block's head, and the head; `None` if the
+    /// block is not kept.
     fn find<M: MemoryPort>(
         &self,
         memory: &mut M,

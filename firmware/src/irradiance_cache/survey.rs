@@ -24,8 +24,8 @@ use crate::vector::min;
 /// Minimum distance up to which a record is valid, pixels: radius of validity times `sqrt(allowed error)`. It
 /// bounds the number of records in corners of a scene.
 const MIN_REACH: f32 = 3.0;
-/// Error bound below which [`MIN_REACH`] shrinks in proportion, so that with the bound the picture converges
-/// to that without records.
+/// Error bound below which [`MIN_REACH`] shrinks in proportion to the bound, so that the picture converges to
+/// the picture without records as the bound approaches 0.
 const ERROR_OF_MIN_REACH: f32 = 0.1;
 
 impl<R: Capacity> IrradianceCache<R> {

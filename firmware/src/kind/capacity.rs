@@ -1,4 +1,5 @@
-//! Families of containers of one capacity, which is a type on a board and a value where chips are emulated.
+//! Families of containers of one capacity. On a board the capacity is part of the containers' types; where
+//! chips are emulated, it is a value.
 
 use core::hash::Hash;
 
@@ -120,7 +121,7 @@ impl<T, const N: usize> Buffer<T> for Vec<T, N> {
     }
 }
 
-/// A large value that is initialised where it stays: its type has a constant initial value.
+/// A type with a constant initial value, so that large values are initialised in place.
 pub trait Vacant {
     /// Initial value: not in use.
     const VACANT: Self;

@@ -1,4 +1,4 @@
-//! The reference chip, which has the sizes of the dissertation.
+//! The reference chip, which has the cache sizes of Steinhurst's dissertation (2007).
 
 use photoncard_shared::budget::{Budget, MAX_GATHER_RAYS, REFERENCE_DRAM_BYTES, gather_candidates};
 

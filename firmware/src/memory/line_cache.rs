@@ -142,7 +142,8 @@ pub struct LineCache<E, L> {
     /// True if the cache is known to be empty. The thousands of writes that load a card image then need not
     /// invalidate lines.
     is_clear: bool,
-    /// End of the memory, lines, once a fill of a cache line across it has found it; `u32::MAX` before.
+    /// Number of lines of the memory, once a cache line that extends past the last of them was filled;
+    /// `u32::MAX` before.
     end: u32,
 }
 

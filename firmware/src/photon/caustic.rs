@@ -33,7 +33,7 @@ pub struct Caustics {
     pub normals_decoded: u32,
 }
 
-/// Photons that light a lobe. The Lambertian part is lit by all.
+/// Photons that light a lobe. All photons light the Lambertian part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LitBy {
     /// All photons.
@@ -77,8 +77,8 @@ const MAX_SHADING: f32 = 4.0;
 /// Maximum distance of a box that a search visits, cells of the photon grid. It allows for rounding at the
 /// borders of the scene.
 const MARGIN_CELLS: f32 = 2.0;
-/// Slope against the tangent plane that the direction to a photon may always have, as coded normals are
-/// inexact.
+/// Slope of the direction to a photon, against the tangent plane, that is allowed for the rounding of coded
+/// normals.
 const FLAT_SLOPE: f32 = 0.15;
 /// Unit of a photon's factor `(1 - d^2 / h^2) / s` in the sums, where `s` is the disc's area over the maximum
 /// area. Fifty photons with the smallest disc stay below the limit of a [`ColourSum`], and one with the
@@ -128,8 +128,7 @@ struct Sums<'a> {
     lit_by: LitBy,
     normals: [Vec3; 2],
     surface: SameSurface,
-    /// Set of the classes of normals ([`SameSurface::classes`]) that the surface's photons have, one bit
-    /// each.
+    /// Bit mask of the classes of normals that photons of the surface can have ([`SameSurface::classes`]).
     classes: u16,
     /// Sum of power times kernel factor, in units of [`FACTOR_UNIT`].
     power: ColourSum,
@@ -139,7 +138,7 @@ struct Sums<'a> {
 }
 
 impl Sums<'_> {
-    /// Adds a photon; `way` is the vector from it to the position, metres.
+    /// Adds a photon; `way` is the vector from the photon to the position, metres.
     #[inline(always)]
     fn add(&mut self, photon: &Candidate, way: Vec3) {
         let share = kernel_share(photon.disc());
@@ -163,9 +162,9 @@ impl Sums<'_> {
         }
     }
 
-    /// Returns whether a photon may be on the surface; `cosine` is that of the two normals. Two points of a
-    /// sphere whose normals are at an angle `t` lie in a direction at `t / 2` to the tangent plane. Photons
-    /// farther off the plane are on another sheet, such as the far side of a wall.
+    /// Returns whether a photon may be on the surface; `cosine` is the cosine between the normals of photon
+    /// and surface. Two points of a sphere whose normals are at an angle `t` lie in a direction at `t / 2` to
+    /// the tangent plane. Photons farther off the plane are on another sheet, such as the far side of a wall.
     #[inline(always)]
     fn is_on_surface(&self, distance_squared: f32, way: Vec3, cosine: f32) -> bool {
         let [_, geometric] = self.normals;

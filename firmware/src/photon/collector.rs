@@ -14,7 +14,7 @@ pub(super) trait Collector {
     #[inline(always)]
     fn narrow(&mut self, _photon_share: f32) {}
 
-    /// Bit mask of the children of a node of whose photons the collector needs none.
+    /// Bit mask of those children of a node whose photons the collector does not need.
     #[inline(always)]
     fn skipped(&self, _node: PhotonNode) -> u16 {
         0

@@ -51,8 +51,8 @@ impl PhotonMap {
     }
 }
 
-/// Collects in `nearest` the photons of a map nearest to `position`. Both layouts of the map give equal sets.
-/// Returns the number of photons tested.
+/// Collects in `nearest` the photons of a map nearest to `position`. The result is the same in both layouts
+/// of the map. Returns the number of photons tested.
 ///
 /// # Errors
 /// If the card image is invalid.
@@ -100,7 +100,7 @@ pub struct GatherLimits {
     pub free_within: f32,
 }
 
-/// Maximum reach of a visible region divided by the distance of the k-th photon of an unrestricted search.
+/// Maximum radius of a visible region, divided by the distance of the k-th photon of an unrestricted search.
 /// Visible photons are farther away where most photons are hidden.
 const MAX_REACH: f32 = 2.0;
 
@@ -158,7 +158,7 @@ pub struct Search<'s, 'n, M> {
     pub map: PhotonMap,
     /// Query position, metres.
     pub position: Vec3,
-    /// The set that collects the nearest photons.
+    /// Collector of the nearest photons.
     pub nearest: &'s mut NearestPhotons<'n>,
 }
 

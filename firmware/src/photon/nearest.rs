@@ -60,15 +60,15 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Limits the squared search radius of an empty set to `limit`, m^2, because there are no photons beyond.
-    /// [`Self::max_distance_squared`] stays.
+    /// Limits the squared search radius to `limit`, m^2, because no photons beyond it are accepted. Must be
+    /// called before candidates are added. [`Self::max_distance_squared`] does not change.
     pub(super) fn limit_to(&mut self, limit: f32) {
         self.widest = if limit < self.widest { limit } else { self.widest };
         self.limit = if self.widest < self.limit { self.widest } else { self.limit };
     }
 
-    /// Narrows the squared search radius of an empty set to `limit`, m^2, because there are most likely
-    /// enough photons within. Later calls have no effect.
+    /// Narrows the squared search radius to `limit`, m^2, because there are most likely k photons within it.
+    /// Has no effect after the first call, or after candidates were added.
     #[inline(always)]
     pub(super) fn narrow_to(&mut self, limit: f32) {
         // False for NaN.
@@ -78,8 +78,8 @@ impl<'a> NearestPhotons<'a> {
         }
     }
 
-    /// Empties the set and enlarges the search radius if a narrowed search has found fewer than k photons.
-    /// Returns whether it has: the search must then be repeated.
+    /// Drops all candidates and enlarges the search radius if a narrowed search has found fewer than k
+    /// photons. Returns whether it did so; the search must then be repeated.
     #[inline(always)]
     pub(super) fn widen(&mut self) -> bool {
         let is_short = self.is_narrowed && !self.is_full() && self.limit < self.widest;

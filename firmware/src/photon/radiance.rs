@@ -9,11 +9,11 @@
 //!   and r is that distance.
 //! - Photons of another surface are excluded by their normals: photons on the other side of a thin wall, and
 //!   on the adjacent wall of a corner.
-//! - `c` is the area of the surface whose photons are in the sum, divided by the disc's area. Without it
-//!   edges and corners would darken, and stacked surfaces would be too bright. The host measures it for each
-//!   photon, within about the photon's distance to its k-th neighbour. A gather uses the c of the nearest
-//!   photon of its surface, at a distance of about r / sqrt(k), over which c hardly changes. Where walls hide
-//!   photons, area and photons are those of the region that the point sees ([`super::region`]).
+//! - `c` is the area of the surface whose photons are in the sum, divided by the disc's area. Without `c`,
+//!   edges and corners would darken, and stacked surfaces would be too bright. The host measures `c` for each
+//!   photon, within about the photon's distance to its k-th neighbour. A gather uses the `c` of the nearest
+//!   photon of its surface, at a distance of about `r / sqrt(k)`, over which `c` hardly changes. Where walls
+//!   hide photons, area and photons are those of the region that the point sees ([`super::region`]).
 //!
 //! The remaining bias is blur: the radiance is a mean over the disc.
 
@@ -41,7 +41,7 @@ pub struct Reflected {
     pub normals_decoded: u32,
     /// The closest photon of the point's surface.
     pub closest: Option<Candidate>,
-    /// Visibility of the photons from the point, as the closest photon states it.
+    /// Visibility of the photons from the point, as the disc fraction of the closest photon tells it.
     pub sight: Sight,
 }
 
@@ -127,8 +127,8 @@ impl Kernel for Estimate<'_, '_> {
     }
 }
 
-/// Candidate with the distance that `choose` prefers to all others; among equal distances, the one that
-/// `is_better`.
+/// Candidate with the distance that `choose` prefers to all others; among equal distances, the candidate that
+/// `is_better` prefers.
 #[inline(always)]
 fn extreme(
     nearest: &NearestPhotons,

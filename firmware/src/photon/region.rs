@@ -78,13 +78,14 @@ impl Sectors {
         Self { limits: self.limits.map(|limit| limit * per_unit), lift_squared: self.lift_squared * per_unit }
     }
 
-    /// Area of the sectors within a radius, given squared, in the tangent plane.
+    /// Area, in the tangent plane, of the sectors' part within a radius whose square is `radius_squared`;
+    /// both in m^2, or in squares of the unit of [`Self::scaled`].
     pub fn area(&self, radius_squared: f32) -> f32 {
         let squares: f32 = self.limits.iter().map(|limit| min(*limit, radius_squared)).sum();
         squares * (PI / SECTORS as f32)
     }
 
-    /// Squared distance of the region's farthest point.
+    /// Squared distance of the region's farthest point from its centre, m^2.
     pub(super) fn reach_squared(&self) -> f32 {
         let greatest = self.limits.iter().copied().fold(0.0, max);
         greatest * (1.0 + MAX_SLOPE * MAX_SLOPE) + self.lift_squared
@@ -227,8 +228,8 @@ fn lift(scene: &SceneImage, radius: f32) -> f32 {
     LIFT * radius + scene.header.photon_grid.cell
 }
 
-/// Returns true if something covers a point so closely that a gather of radius `radius` may mistake its
-/// photons for the surface's. The code of the surface's normal is `normal`.
+/// Returns true if something covers a point so closely that a gather of radius `radius`, metres, may mistake
+/// the photons on it for the surface's. The code of the surface's normal is `normal`.
 ///
 /// # Errors
 /// If the card image is invalid.

@@ -3,7 +3,8 @@
 use glam::Vec3;
 use photoncard_shared::layout::{decode_normal, normal_class};
 
-/// Minimum cosine between the normals of a photon and of the query at which both are taken as of one surface.
+/// Minimum cosine between the normals of a photon and of a surface at which the photon is taken to lie on the
+/// surface.
 pub const MIN_NORMAL_COSINE: f32 = 0.75;
 
 /// Number of codes of a normal.
@@ -28,8 +29,8 @@ const fn computed_normal(code: u8) -> Vec3 {
     Vec3::new(x * inverse, y * inverse, z * inverse)
 }
 
-/// For the normal of each code, set of the classes ([`normal_class`]) of all normals that are taken as of one
-/// surface with it, one bit each.
+/// For each code of a normal, bit mask of the classes ([`normal_class`]) of all normals whose cosine to that
+/// normal is at least [`MIN_NORMAL_COSINE`].
 #[expect(clippy::indexing_slicing, reason = "computed at compile time")]
 static CLASSES: [u16; CODES] = {
     let mut classes = [0; CODES];

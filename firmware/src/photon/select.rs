@@ -57,9 +57,9 @@ fn comparisons(length: usize, passes: u32, between: usize) -> u32 {
     length as u32 * (1 + 2 * passes) + (between * (BETWEEN + 1)) as u32
 }
 
-/// Guesses an interval `low <= d < high` of squared distances, as bits, that contains the `count`-th and at
-/// most [`BETWEEN`] in all. Returns the interval, `None` if [`GUESSES`] guesses find none, and the number of
-/// guesses.
+/// Guesses an interval `low <= d < high` of squared distances, as bits, that contains the `count`-th distance
+/// and at most [`BETWEEN`] distances in all. Returns the interval, `None` if [`GUESSES`] guesses find none,
+/// and the number of guesses.
 #[inline(always)]
 fn guess(distances: &[u32], count: usize) -> Option<(Option<[u32; 2]>, u32)> {
     let farthest = distances.iter().copied().max()?;
@@ -196,8 +196,8 @@ impl Aside {
         Some(last)
     }
 
-    /// Index of the candidate with exactly `rank` nearer ones; `None` if it shares its distance with another
-    /// candidate.
+    /// Index of the candidate with exactly `rank` nearer candidates; `None` if it shares its distance with
+    /// another candidate.
     #[inline(always)]
     fn only_one_at(&self, rank: usize) -> Option<usize> {
         let all: &[u32; BETWEEN] = self.distances.first_chunk()?;

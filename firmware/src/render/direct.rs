@@ -7,11 +7,11 @@
 //! technique and `m` rays of density `q` in the other, a path has the weight `n p / (n p + m q)` in the
 //! first. The two weights of a path add up to 1, so that direct light is counted once.
 //!
-//! Emission that rays of an irradiance record hit is interpolated for the samples around the record; their
-//! shadow rays add the remainder. Rays of both kinds must compute equal weights. The record's density is
-//! therefore replaced by `cos(theta) / pi`, because samples do not know its direction table, and the number
-//! of shadow rays is that of all planned samples of a pixel. The power heuristic leaves small emitters, which
-//! would make a record noisy, to shadow rays, and a sky to records.
+//! Emission that rays of an irradiance record hit is interpolated for the samples around the record; the
+//! samples' shadow rays add the remainder. Rays of both kinds must compute equal weights. The record's
+//! density is therefore replaced by `cos(theta) / pi`, because samples do not know its direction table, and
+//! the number of shadow rays is that of all planned samples of a pixel. The power heuristic leaves small
+//! emitters, which would make a record noisy, to shadow rays, and a sky to records.
 //!
 //! No gather ray hits point, spot and distant lights, so that only shadow rays contribute their light.
 //!

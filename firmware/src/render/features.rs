@@ -1,8 +1,8 @@
 //! Features of a sample, which guide a denoiser: albedo and normal of the surface that the sample shows.
 //!
-//! An eye path ends at the first surface that is not perfectly specular, whose features these are. If that
-//! surface has a sharp lobe, one ray sampled from the lobe finds another surface, whose features count
-//! instead, as in Cycles.
+//! The features are those of the surface at which the eye path ends: the first that is not perfectly
+//! specular. If that surface has a sharp lobe, one ray sampled from the lobe finds another surface, whose
+//! features count instead, as in Cycles.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -14,7 +14,8 @@ use crate::memory::MemoryPort;
 use crate::sampler::Dimension;
 use crate::scene::{Ray, ReflectedDirection, Surface, closest_hit, read_surface};
 
-/// Minimum fraction of a surface's albedo that a sharp lobe has where features are those of what it reflects.
+/// Minimum of a sharp lobe's fraction of its surface's albedo at which the features are those of the surface
+/// that the lobe reflects.
 const MIN_SHARP_SHARE: f32 = 0.75;
 
 /// Features of a sample.
@@ -45,7 +46,8 @@ pub fn features<M: MemoryPort>(
     view: &View,
 ) -> Result<Features, Fault> {
     let surface = &view.surface;
-    // A coat's or a bump's lobe is drawn as a reflection of its own, with the probability of its share.
+    // A lobe that was chosen at random, such as that of a coat, is alone in the reflection; its share of the
+    // whole surface's albedo is about the probability of the choice.
     if surface.probability * surface.reflection.sharp_share() < MIN_SHARP_SHARE {
         return Ok(Features::of(surface));
     }

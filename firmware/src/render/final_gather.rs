@@ -43,8 +43,8 @@ pub fn bundles(rays: Range<u32>) -> impl Iterator<Item = Range<u32>> {
 }
 
 /// Casts at most [`BUNDLE_RAYS`] rays of a gather point and stores their contributions in `ends`. Rays that
-/// hit neither a surface nor the environment have none. A contribution is a term of the mean over the point's
-/// rays. `target` is the sum to which the gathers' results are to be added.
+/// hit neither a surface nor the environment have no contribution. A contribution is a term of the mean over
+/// the point's rays. `target` is the sum to which the gathers' results are to be added.
 ///
 /// # Errors
 /// If the card image is invalid, or there are more than [`BUNDLE_RAYS`] rays.
@@ -89,7 +89,7 @@ fn arrive<M: MemoryPort>(
     (ray, hit): (&Ray, &mut Option<Hit>),
 ) -> Result<Option<GatherRayEnd>, Fault> {
     let mut path = SpecularPath::new(*ray, Carried::Radiance, Passes::NarrowLobes);
-    // Divided by the number of rays here, so that sums stay within the fixed-point range.
+    // The weight is divided by the number of rays here, so that sums stay within the fixed-point range.
     let weight = sampled.weight * (point.weight / point.rays as f32);
     let Some(hit) = hit else {
         return escaped(context, point, &path, sampled, weight);

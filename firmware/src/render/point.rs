@@ -22,7 +22,7 @@ pub struct GatherPoint {
     pub rays: u32,
     /// Direction table from which the rays are sampled.
     pub directions: DirectionTable,
-    /// The purpose of the rays.
+    /// Light that the rays gather.
     pub purpose: Purpose,
     /// Weight with which the light of the rays is added to its sum.
     pub weight: f32,
@@ -85,7 +85,8 @@ impl GatherPoint {
         }
     }
 
-    /// Reflection whose light the rays gather, the whole or the lobe alone, seen from the eye.
+    /// Reflection whose light the rays gather: the surface's whole reflection or, for [`Purpose::Lobe`], its
+    /// lobe alone.
     #[inline(always)]
     pub fn reflector(&self) -> Reflector {
         let reflector = self.surface.reflector();

@@ -83,8 +83,8 @@ pub enum Arrival {
     Ends,
     /// The path continues along a new ray.
     GoesOn,
-    /// The path contributes nothing, because it has passed too many specular surfaces, or reached one that
-    /// absorbs everything.
+    /// The path contributes nothing, because it has passed too many specular surfaces, or reached a surface
+    /// that absorbs all light.
     Lost,
     /// The path contributes nothing, because the sampled direction of a narrow lobe lies below the surface.
     Absorbed,
@@ -133,8 +133,9 @@ impl SpecularPath {
 
     /// Continues or ends the path at a surface. The first of the three numbers in `random`, in [0, 1),
     /// chooses the continuation, the others the direction in a lobe. A lobe that the path passes is removed
-    /// from the surface, for the case that the path ends there. If a photon goes on by a lobe, the surface's
-    /// `outgoing` becomes the direction that the photon is taken to come from ([`Reflector::sample_photon`]).
+    /// from the surface, for the case that the path ends there. If a photon continues in a direction sampled
+    /// from a lobe, the surface's `outgoing` becomes the direction that the photon is taken to come from
+    /// ([`Reflector::sample_photon`]).
     #[inline(always)]
     pub fn arrive(&mut self, surface: &mut Surface, random: [f32; 3]) -> Arrival {
         if !self.may_pass(surface) && self.absorption == Vec3::ZERO {
@@ -175,8 +176,8 @@ impl SpecularPath {
         if goes <= 0.0 {
             return if stays > 0.0 { Arrival::Ends } else { Arrival::Lost };
         }
-        // A minimum of the probability of ending here bounds the weight of the path: no fireflies. At an
-        // emitter the minimum is one half.
+        // A minimum of the probability of ending here bounds the weight of the path, which prevents
+        // fireflies. At an emitter the minimum is one half.
         let stays = if stays > 0.0 { max(stays, goes * MIN_STAY) } else { 0.0 };
         let stays = if max_component(surface.emission) > 0.0 { max(stays, goes) } else { stays };
         let all = goes + stays;

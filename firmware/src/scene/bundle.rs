@@ -25,7 +25,8 @@ use crate::wide_tree::{BEYOND, Descent, Order};
 pub const BUNDLE_RAYS: usize = LANES;
 
 /// Mask of the lower half of the 32 bits that are pushed with a child: one bit per ray of the bundle. The
-/// upper half is that of the `f32` bits of the least distance at which a ray enters the child's box.
+/// upper half of the 32 bits holds the upper half of the `f32` bits of the least distance at which a ray
+/// enters the child's box.
 const RAYS: u32 = (1 << BUNDLE_RAYS) - 1;
 
 /// Finds [`closest_hit`] for each of up to [`BUNDLE_RAYS`] rays and stores it in `hits`, which must be `None`

@@ -184,7 +184,7 @@ fn descend<S: Search>(
                 if sheared.may_meet == 0 {
                     continue;
                 }
-                // A copy, because reading textures of cut-outs borrows the memory too.
+                // The line is copied, because reading textures of cut-outs borrows the memory too.
                 let line = *line;
                 let place = (ray, &frame, leaf);
                 match meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)? {

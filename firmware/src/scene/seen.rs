@@ -18,8 +18,8 @@ pub struct Seen {
 impl Seen {
     /// Arbitrary initial value.
     pub const NOWHERE: Self = Self { triangle: 0, weights: [0.0; 2] };
-    /// Marks a point that cannot be stored: it lies behind specular surfaces or on a random layer, and its
-    /// eye path must be traced again.
+    /// Marks a point that cannot be stored, because it lies behind specular surfaces or on a layer chosen at
+    /// random. Its eye path must be traced again.
     pub const ELSEWHERE: Self = Self { triangle: u32::MAX, ..Self::NOWHERE };
 
     /// Returns true for [`Self::ELSEWHERE`].

@@ -25,8 +25,8 @@ pub(super) fn turned(normal: Vec3, outgoing: Vec3, geometric_normal: Vec3) -> Ve
     if turned.dot(geometric_normal) > 0.0 { turned } else { geometric_normal }
 }
 
-/// Moves a shading normal towards the [`bent`] one by the fraction `share` of the way. `share` is the lobe's
-/// fraction of the albedo: the Lambertian remainder needs the normal itself.
+/// Moves a shading normal towards the [`bent`] normal by the fraction `share` of their difference. `share` is
+/// the lobe's fraction of the albedo: the Lambertian remainder needs the normal itself.
 #[inline(always)]
 pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_normal: Vec3) -> Vec3 {
     if share <= 0.0 || normal == geometric_normal {
@@ -36,9 +36,9 @@ pub(super) fn bent_by_share(normal: Vec3, share: f32, outgoing: Vec3, geometric_
     if bent == normal { normal } else { unit(normal + (bent - normal) * min(share, 1.0)) }
 }
 
-/// Bends a unit shading normal towards the triangle's normal until the mirror direction of `outgoing`, which
-/// lies above the triangle, does so too. The cosine of the mirror direction to the triangle's normal becomes
-/// at least 0.01, or at grazing views 0.9 times that of `outgoing`.
+/// Bends a unit shading normal towards the triangle's normal until the mirror direction of `outgoing` lies
+/// above the triangle. `outgoing` itself must lie above the triangle. The cosine of the mirror direction to
+/// the triangle's normal becomes at least 0.01, or at grazing views 0.9 times that of `outgoing`.
 ///
 /// Let `r (sin b, cos b)` be the projection of `outgoing` onto the plane of the two normals, at the angle `b`
 /// from the triangle's. A shading normal at the angle `a` from the triangle's gives the mirror direction the

@@ -178,8 +178,8 @@ pub(super) fn surface_of(
     let front_normal = unit((b - a).cross(c - a));
     let is_front = front_normal.dot(ray.direction) < 0.0;
     let normal = if is_front { front_normal } else { -front_normal };
-    // Interpolated from the corners instead of computed along the ray, so that the rounding error is relative
-    // to the corners.
+    // The position is interpolated from the corners instead of computed along the ray, so that its rounding
+    // error is relative to the corners' coordinates.
     let position = a * u + b * v + c * w;
     *surface = Surface::white(position, normal, magnitude(&[a, b, c, ray.origin]));
     surface.outgoing = -ray.direction;
@@ -254,8 +254,8 @@ fn finish(
 /// them.
 const MIN_PART: f32 = 1.0 / 8.0;
 
-/// Sets the shading normal of a surface, which has that of its corners or of a normal map. The Lambertian
-/// part keeps this normal; a lobe or a mirror needs the [`bent`] one. If a narrow lobe and the Lambertian
+/// Adapts the shading normal of a surface, which comes from the corners or from a normal map. The Lambertian
+/// part keeps this normal; a lobe or a mirror needs the [`bent`] normal. If a narrow lobe and the Lambertian
 /// part need different normals, `random`, in [0, 1), chooses one of the parts, and its reflection is divided
 /// by the probability. A wide lobe, for which photons are stored, and the Lambertian part share a normal in
 /// between ([`bent_by_share`]).
@@ -272,8 +272,8 @@ fn shade_by_parts(surface: &mut Surface, view: &View, random: f32) {
         return;
     }
     let bent = bent(turned, outgoing, geometric_normal);
-    // Not decided by `bent == normal`, which depends on rounding: a stored hit that is read again must lead
-    // to the same decision.
+    // The decision does not compare `bent` with `normal`, because the result would depend on rounding: a
+    // stored hit that is read again must lead to the same decision.
     if bent == turned && !points_away(normal, outgoing) {
         return;
     }

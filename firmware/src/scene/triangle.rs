@@ -2,8 +2,8 @@
 //! intersection*).
 //!
 //! A ray that passes an edge shared by two triangles hits at least one of them. Coordinates are sheared so
-//! that the ray runs along +z; the signs of three edge functions decide. An edge function that is zero in
-//! `f32` is computed again in `f64`, in which the products are exact.
+//! that the ray runs along +z; the signs of three edge functions decide whether the ray hits the triangle. An
+//! edge function that is zero in `f32` is computed again in `f64`, in which the products are exact.
 
 use glam::Vec3;
 use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, Triangle, VERTEX_LANES};

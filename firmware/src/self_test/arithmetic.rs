@@ -31,8 +31,8 @@ pub const EXPRESSIONS: [&str; RESULTS] = [
     "a < b, a = b, a > b",
 ];
 
-/// Bits of a result. All NaNs become one, because processors differ in the NaN that an operation returns, on
-/// which no pixel depends.
+/// Bits of a result. All NaNs are mapped to the same bits, because processors differ in the NaN that an
+/// operation returns, and no pixel depends on these bits.
 fn bits(value: f32) -> u32 {
     if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() }
 }

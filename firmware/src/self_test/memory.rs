@@ -71,8 +71,8 @@ impl MemoryTester {
         Ok(Self { progress: MemoryTest { lines, pattern, written: 0, checked: 0, wrong } })
     }
 
-    /// Writes or reads back the next lines. Returns the progress after each megabyte and at the end of the
-    /// memory, when it is to be reported.
+    /// Writes or reads back the next lines. Returns the progress whenever it is to be reported: after each
+    /// megabyte and at the end of the memory.
     ///
     /// # Errors
     /// [`FaultCode::LineRange`] if the memory has fewer lines than it reports.

@@ -19,7 +19,8 @@ pub trait Isa: Copy {
     /// lanes of `packed` are meaningless.
     fn pack(self, mask: u32, values: &[u32; LANES], packed: &mut [u32; LANES]);
 
-    /// [`Isa::pack`] for 64-bit lanes.
+    /// Copies the 64-bit lanes of `values` that are set in `mask` to the front of `packed`, as [`Isa::pack`]
+    /// does for 32-bit lanes.
     fn pack_long(self, mask: u32, values: &[u64; LANES], packed: &mut [u64; LANES]);
 
     /// Permutation: the values at `indices`. Only the lower four bits of an index count.

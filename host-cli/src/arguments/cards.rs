@@ -29,27 +29,30 @@ pub(crate) struct CardOptions {
     pub(super) chip: ChipOption,
     #[command(flatten)]
     pub(super) memory: MemoryOption,
-    /// Share of the tiles, above 0 and at most 1, that two cards render and that are compared bit for bit
+    /// Share of the tiles, above 0 and at most 1, that are rendered by two cards each and compared bit for
+    /// bit
     ///
-    /// Of three cards the outvoted one is given up, and others render its tiles.
+    /// If the two differ, a third card decides: the outvoted card is given up, and other cards render its
+    /// unconfirmed tiles again.
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, hide_short_help = true)]
     verify: Option<f64>,
-    /// Inject faults into the links to the cards, to test their repair: rates per byte as
-    /// flips=1e-5,drops=1e-6,repeats=1e-6,delays=1e-4,seed=1
+    /// Inject faults into the links to the cards, to test that the links repair them: rates per byte and a
+    /// seed, such as flips=1e-5,drops=1e-6,repeats=1e-6,delays=1e-4,seed=1
     #[arg(long, value_name = "FAULTS", hide_short_help = true)]
     pub(super) faults: Option<LineFaults>,
-    /// Model the memory of emulated chips, and report its reads in the statistics
+    /// Model the caches and the DRAM of emulated chips, and report their reads in the statistics
     #[arg(long, hide_short_help = true)]
     counters: bool,
-    /// Caches of the modelled memory, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=...
-    /// [default: the sizes of the first card's kind, such as photon=128K/128/4,scene=75K/128/4]
+    /// Caches of the memory model, SIZE/LINE/WAYS each: photon=...,scene=...[,index=hash] or unified=...;
+    /// implies --counters [default: the caches of the first card's kind, such as
+    /// photon=128K/128/4,scene=75K/128/4]
     #[arg(long, value_name = "CACHES", hide_short_help = true)]
     cache: Option<CacheSettings>,
-    /// Write every read of an emulated chip for a simulator of caches or of DRAM, compressed by gzip; a frame
-    /// has billions: use --crop
+    /// Write every memory read of an emulated chip to a file for a simulator of caches or of DRAM, compressed
+    /// by gzip; a large picture has billions of reads: use --crop
     #[arg(long, value_name = "OUT.gz", value_parser = file(), hide_short_help = true)]
     pub(crate) trace: Option<PathBuf>,
-    /// Reads and format of the trace
+    /// Which reads are in the trace, and its format
     #[arg(
         long,
         default_value = TraceFormat::default().name(),
@@ -58,14 +61,14 @@ pub(crate) struct CardOptions {
         hide_short_help = true
     )]
     trace_format: TraceFormat,
-    /// Follow each read of a trace for Dinero by its structure, its stage and its number of bytes, which
-    /// Dinero ignores
+    /// Add the structure, the stage and the number of bytes to each read in a trace for Dinero, which ignores
+    /// them
     #[arg(long, requires = "trace", hide_short_help = true)]
     trace_labels: bool,
 }
 
 impl CardOptions {
-    /// Returns the cards that these options state, or one emulated reference chip.
+    /// Returns the cards that these options state; by default emulated reference chips, one per core.
     pub(super) fn settings(&self) -> CardSet {
         let emulated = || vec![CardAddress::emulated(EmulatedKind::Reference)];
         let addresses = if self.cards.is_empty() { emulated() } else { self.cards.clone() };
@@ -109,16 +112,17 @@ impl ChipOption {
 
 #[derive(Args)]
 pub(crate) struct MemoryOption {
-    /// Memory of each emulated card: bytes, or with K, M or G [default: a quarter of the machine's free
-    /// memory, at least 512M; that of emulated-micro and of --chip is their own]
+    /// Memory of each emulated card, in bytes or with the suffix K, M or G [default: a quarter of the
+    /// machine's free memory, at least 512M; emulated-micro and chips of --chip have the memory of their
+    /// kind]
     #[arg(long, value_name = "SIZE", value_parser = memory_size, help_heading = "Cards", hide_short_help = true)]
     card_memory: Option<u64>,
 }
 
 impl MemoryOption {
-    /// Address of cards with the stated memory, or else that of their kind. The reference and the large chip
-    /// have a quarter of the machine's free memory, if that is more: the host takes up to four times what a
-    /// card does.
+    /// Returns `address` with the stated memory for emulated cards. Without a stated memory, cards have the
+    /// memory of their kind; the reference and the large chip have a quarter of the machine's free memory if
+    /// that is more, as the host takes up to four times as much memory as a card.
     pub(super) fn of(&self, address: CardAddress) -> CardAddress {
         self.with_free(free_memory(), address)
     }
@@ -143,7 +147,8 @@ impl MemoryOption {
     }
 }
 
-/// Parses a number of bytes, with K, M or G for powers of 1024. A part of a line is left out.
+/// Parses a number of bytes, with an optional suffix K, M or G for powers of 1024. The number is rounded down
+/// to whole lines of 128 bytes.
 pub(super) fn memory_size(text: &str) -> Result<u64, String> {
     let suffixes = [("K", 10), ("M", 20), ("G", 30)];
     let suffix = suffixes.into_iter().find_map(|(suffix, shift)| Some((text.strip_suffix(suffix)?, shift)));

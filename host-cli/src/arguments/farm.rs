@@ -11,7 +11,7 @@ pub(crate) enum FarmCommand {
     Openjd(Box<FarmOptions>),
     /// Print a script that submits the job to Slurm
     Slurm(Box<FarmOptions>),
-    /// Print a job type of Flamenco, of this one job
+    /// Print a job type for Flamenco that renders this one job
     Flamenco(Box<FarmOptions>),
     /// Print a script that runs the job by GNU parallel
     Parallel(Box<FarmOptions>),
@@ -21,7 +21,7 @@ pub(crate) enum FarmCommand {
 pub(crate) struct FarmOptions {
     #[command(flatten)]
     pub(crate) render: RenderOptions,
-    /// Number of parts of a picture, each of which is a task
+    /// Number of parts that each picture is divided into; each part is a task
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_PARTS)), help_heading = "Farm")]
     pub(crate) parts: u32,
 }

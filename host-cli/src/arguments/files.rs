@@ -74,7 +74,7 @@ const OTHER_FORMATS: [(&[&str], &str, &str); 8] = [
     (&["card"], "a prepared scene", "SCENE.card to photoncard prepare"),
 ];
 
-/// Error of a suffix that is not that of a picture format, with a remedy.
+/// Message about a file suffix of which no picture is written, with a remedy.
 fn other_format(ending: Option<&str>) -> String {
     let other =
         OTHER_FORMATS.iter().find(|(endings, ..)| ending.is_some_and(|ending| endings.contains(&ending)));

@@ -12,20 +12,21 @@ use serde_json::json;
 const FPS: f64 = 24.0;
 /// Maximum frames per second.
 const MAX_FPS: f64 = 100_000.0;
-/// Maximum number of a frame.
+/// Maximum frame number.
 const MAX_FRAME: u32 = 999_999;
 
 #[derive(Args)]
 #[command(next_help_heading = "Frames")]
 pub(crate) struct FrameOptions {
-    /// Frames of the scene's animations: 1-240, several ranges 1-10,20, or every tenth frame 1-240x10
+    /// Frames of the scene's animations: a range such as 1-240, several such as 1-10,20, or every tenth
+    /// frame: 1-240x10
     ///
-    /// Frame N is the scene N / --fps seconds after the begin of its animations. Names of outputs have a run
-    /// of #, which the frame's number replaces: out.####.exr. The settings that --quality finds are those of
-    /// the scene as it stands, for all frames.
+    /// Frame N is the scene N / --fps seconds after the start of its animations. Names of outputs have a run
+    /// of #, which the frame's number replaces: out.####.exr. All frames have the settings that --quality
+    /// chooses for the scene at rest.
     #[arg(long, value_name = "RANGES", value_parser = frames)]
     frames: Option<Frames>,
-    /// Animation that plays, by its name; may be repeated [default: all of the file]
+    /// Name of an animation that plays; may be repeated [default: all animations of the file]
     #[arg(long = "animation", value_name = "NAME", requires = "frames", hide_short_help = true)]
     animations: Vec<String>,
     /// Frames per second [default: 24]
@@ -71,8 +72,9 @@ impl FrameOptions {
     }
 }
 
-/// Path of the last existing file with a number up to `frame` in place of the pattern's last run of `#`. A
-/// pattern without `#` is returned as it is.
+/// Path of an existing file that has a number in place of the pattern's last run of `#`: the file with the
+/// greatest number up to `frame`. `None` if there is no such file. A pattern without `#` is returned as it
+/// is.
 pub(crate) fn last_numbered(pattern: &Path, frame: u32) -> Option<PathBuf> {
     if numbered(pattern, frame).is_none() {
         return Some(pattern.to_owned());

@@ -13,8 +13,8 @@ pub(crate) struct IntegratorOptions {
     /// Seed of all random numbers
     #[arg(long, default_value_t = Integrator::default().seed, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) seed: u32,
-    /// Final gather rays per sample; with the irradiance cache per record, and per pixel where none is
-    /// [default: by --quality, for the scene]
+    /// Final gather rays per sample; with the irradiance cache, per irradiance record, and per pixel on
+    /// surfaces without records [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true)]
     gather_rays: Option<u32>,
     /// Shadow rays per sample [default: by --quality, for the scene]
@@ -23,14 +23,15 @@ pub(crate) struct IntegratorOptions {
     /// Samples per pixel [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true)]
     spp: Option<u32>,
-    /// Samples per pixel of the finished picture, by which the irradiance cache divides the gather rays of a
-    /// pixel [default: --spp]
+    /// Samples per pixel of the finished picture: with the irradiance cache, the gather rays of a pixel are
+    /// divided among this number of samples [default: --spp]
     ///
-    /// With --resume this number, and photons and rays that are not stated, are those of the kept samples.
+    /// With --resume, this number and the numbers of photons and rays that are not stated are those of the
+    /// kept samples.
     #[arg(long, value_name = "SPP", allow_negative_numbers = true, hide_short_help = true)]
     pub(super) planned_spp: Option<u32>,
     /// Sampling density of the directions of gather rays; it never changes the picture's expected value.
-    /// Points of fewer than eight rays have that of brdf
+    /// Points with fewer than eight gather rays always have the density brdf
     #[arg(long, default_value = Integrator::default().sampling.name(), value_parser = choice::<Sampling>(), hide_short_help = true)]
     pub(super) sampling: Sampling,
     /// Gather the indirect light of Lambertian surfaces at sparse points, and interpolate between them
@@ -40,12 +41,12 @@ pub(crate) struct IntegratorOptions {
     /// Maximum relative error of interpolated irradiance [default: by --quality, 0.025 for paper]
     #[arg(long, value_name = "ERROR", value_parser = ic_error, allow_negative_numbers = true, hide_short_help = true)]
     pub(super) ic_error: Option<f32>,
-    /// Give pixels whose first four samples differ up to 16 paths per sample; smaller thresholds give more
-    /// [default: by --quality]
+    /// Trace up to 16 paths per sample in pixels whose first four samples differ; a smaller threshold gives
+    /// more paths [default: by --quality]
     ///
-    /// A pixel has s / (THRESHOLD sqrt(L)) paths per sample, by the deviation s and the mean L of its first
-    /// four. By default the pilot chooses the threshold for the scene; adaptive sampling is off where all
-    /// other settings of samples and rays are stated.
+    /// A pixel has s / (THRESHOLD sqrt(L)) paths per sample, where s is the standard deviation and L the mean
+    /// of its first four samples. By default a pilot render chooses the threshold for the scene; adaptive
+    /// sampling is off if all other settings of samples and rays are stated.
     #[arg(long, value_name = "THRESHOLD|off", value_parser = adaptive, allow_negative_numbers = true, hide_short_help = true)]
     adaptive: Option<Adaptive>,
 }
@@ -99,8 +100,8 @@ impl IntegratorOptions {
         self.irradiance_cache.unwrap_or(base.irradiance_error.is_some())
     }
 
-    /// Calls `add` for each option that other options can make useless. Its arguments are whether they do,
-    /// the option's name and the reason.
+    /// Calls `add` for each option that other options can make useless. The arguments of `add` are: true if
+    /// the option is useless, the option's name, and the reason.
     pub(super) fn without_effect(&self, base: &Integrator, add: &mut impl FnMut(bool, &str, &str)) {
         let is_cached = self.is_cached(base);
         let not_cached = "without --irradiance-cache on";

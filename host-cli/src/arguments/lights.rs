@@ -8,7 +8,8 @@ use super::choice::choice;
 
 #[derive(Args, Clone)]
 pub(crate) struct LightOptions {
-    /// Units of the file's point, spot and directional lights, beside emission in W/(sr m^2)
+    /// Units of the intensities of the file's point, spot and directional lights; the emission of materials
+    /// is always in W/(sr m^2)
     #[arg(
         long,
         value_name = "UNITS",

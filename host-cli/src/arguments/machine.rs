@@ -6,7 +6,8 @@ use std::str::FromStr;
 use clap::Args;
 use photoncard_driver::cost_model::Machine;
 
-/// Rates of the machine of a study's times. What is measured does not depend on them.
+/// Rates of the machine for which a study computes times. The measured numbers of reads and operations do not
+/// depend on these rates.
 #[derive(Args)]
 #[command(next_help_heading = "Chip of the report's times")]
 pub(crate) struct RateOptions {
@@ -18,16 +19,19 @@ pub(crate) struct RateOptions {
     flops: f64,
 }
 
-/// Machine of a study's times and numbers of chips. What is measured does not depend on it.
+/// Machine for which a study computes times and numbers of chips. The measured numbers of reads and
+/// operations do not depend on this machine.
 #[derive(Args)]
 #[command(next_help_heading = "Chip of the report's times")]
 pub(crate) struct MachineOptions {
     #[command(flatten)]
     rates: RateOptions,
-    /// Latency of a read from DRAM, nanoseconds, in the times of reordering and interactive
+    /// Latency of a read from DRAM, nanoseconds; the studies reordering and interactive use it for their
+    /// times
     #[arg(long, value_name = "NS", default_value = "100", value_parser = latency, allow_negative_numbers = true)]
     latency: f64,
-    /// Tasks in flight of each unit of a chip, rays or gathers, in the times of reordering and interactive
+    /// Number of rays or gathers in flight in each unit of a chip; the studies reordering and interactive use
+    /// it for their times
     #[arg(long, value_name = "N", default_value = "128", value_parser = tasks, allow_negative_numbers = true)]
     tasks: u32,
 }

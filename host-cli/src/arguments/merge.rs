@@ -19,7 +19,7 @@ pub(crate) struct MergeOptions {
     /// The picture to write: OUT.exr, linear radiance, or OUT.png, tone-mapped; may be repeated
     #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", required = true, value_parser = picture())]
     pub(crate) pictures: Vec<PictureOutput>,
-    /// Type of the EXR's samples; Z and gathers are always float
+    /// Type of the EXR's samples; the layers Z and gathers are always float
     #[arg(long, default_value = SampleFormat::Float.name(), value_parser = choice::<SampleFormat>())]
     pub(crate) sample_type: SampleFormat,
     #[command(flatten)]
@@ -27,7 +27,7 @@ pub(crate) struct MergeOptions {
     /// Remove noise by Open Image Denoise, as photoncard render --denoise does
     #[arg(long)]
     pub(crate) denoise: bool,
-    /// Form of the progress, and of the message of a failure
+    /// Form in which progress and a failure are reported
     #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     pub(crate) progress: ProgressForm,
 }

@@ -133,12 +133,12 @@ pub(crate) enum Command {
     Render(Box<RenderOptions>),
     /// Prepare a scene: write its card image, with photon map and settings, for photoncard render --prepared
     Prepare(Box<PrepareOptions>),
-    /// Merge the parts of a picture, EXR or PNG, which renders with --part have written
+    /// Merge the parts of a picture, which renders with --part have written, to an EXR or a PNG
     Merge(MergeOptions),
-    /// Print the job of a render for the engine of a farm: preparation, parts, merge
+    /// Print a render job for the engine of a render farm: preparation, parts, merge
     #[command(subcommand)]
     Farm(FarmCommand),
-    /// Walk through a scene: a page of the browser shows it while it is rendered
+    /// Walk through a scene: a page in the browser shows the scene while it is rendered
     #[command(mut_arg("size", |size| {
         let help = "Width and height of the picture, pixels [default: those of the page's window]";
         size.help(help).long_help(help)
@@ -149,28 +149,28 @@ pub(crate) enum Command {
     /// Print information on a scene
     #[command(subcommand)]
     Scene(SceneCommand),
-    /// Query a card, or list serial ports
+    /// Query or test a card, or list serial ports
     #[command(subcommand)]
     Card(CardCommand),
     /// Serve an emulated card to other processes, one host at a time, until interrupted
     Emulate(EmulateOptions),
     /// Compare a picture with a reference
     Diff(DiffOptions),
-    /// Print the completions of a shell: source them, or put them where it looks for them
+    /// Print the completion script for a shell: source it, or save it where the shell looks for completions
     Completions {
         /// The shell
         shell: Shell,
     },
-    /// Write manual pages, one for each command, for man
+    /// Write a manual page for each command, for the program man
     Man {
-        /// The folder; it is made if it is missing
+        /// Folder for the pages; it is made if it is missing
         folder: PathBuf,
     },
     /// Measure how memory traffic and time depend on orders, caches, techniques and chips
     #[cfg(feature = "study")]
     Study(StudyArguments),
     /// Measure how memory traffic and time depend on orders, caches, techniques and chips: this program was
-    /// built without it
+    /// built without this command
     #[cfg(not(feature = "study"))]
     Study {
         #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
@@ -184,7 +184,7 @@ pub(crate) enum SceneCommand {
     Info {
         /// A glTF 2.0 file, .gltf or .glb
         scene: PathBuf,
-        /// Print them as JSON
+        /// Print the contents as JSON
         #[arg(long)]
         json: bool,
         #[command(flatten)]
@@ -211,7 +211,8 @@ pub(crate) enum CardCommand {
         #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..))]
         count: u16,
     },
-    /// Test the arithmetic and the whole memory of a card, which forgets its scene; status 1 if it fails
+    /// Test the arithmetic and the whole memory of a card, which overwrites its scene; exit status 1 if a
+    /// test fails
     Selftest {
         #[arg(long, default_value_t, help = format!("The card: {}", CardAddress::forms()))]
         card: CardAddress,
@@ -224,7 +225,7 @@ pub(crate) enum CardCommand {
 #[derive(Args)]
 pub(crate) struct EmulateOptions {
     /// Address to listen on: pty, tcp:PORT on this machine alone, tcp:ADDRESS:PORT or unix:PATH; port 0 for
-    /// any
+    /// any free port
     #[arg(long, value_name = "ADDRESS")]
     pub(crate) listen: ListenAddress,
     /// The kind of card
@@ -232,7 +233,7 @@ pub(crate) struct EmulateOptions {
     pub(crate) card: EmulatedKind,
     #[command(flatten)]
     pub(crate) chip: ChipOption,
-    /// Memory of the card: bytes, or with K, M or G [default: that of its kind]
+    /// Memory of the card, in bytes or with the suffix K, M or G [default: that of its kind]
     #[arg(long, value_name = "SIZE", value_parser = memory_size)]
     pub(crate) card_memory: Option<u64>,
 }

@@ -20,29 +20,30 @@ pub(crate) struct OutputOptions {
     /// SCENE's name with .png]
     ///
     /// The EXR has linear RGB radiance and the layers of --aov. One render writes all pictures. With --part
-    /// the file is OUT.part, for photoncard merge. - is a PNG on standard output.
+    /// the file is OUT.part, for photoncard merge. With --frames, OUT.mp4, .mov, .mkv or .webm is a video,
+    /// which the program ffmpeg encodes. The name - is a PNG on standard output.
     #[arg(short = 'o', long = "output", value_name = "OUT.exr|OUT.png", value_parser = picture())]
     pub(crate) pictures: Vec<PictureOutput>,
     /// Continue a render that was stopped or has failed
     ///
     /// Finished tiles are kept beside the picture, in OUT.exr.partial, until the picture is written. Without
-    /// this option such a file is refused: remove it to begin anew. Frames whose files are there, whole and
-    /// of these settings, are not rendered again.
+    /// this option such a file is refused: remove it to begin anew. Frames whose files exist, are complete
+    /// and have these settings are not rendered again.
     #[arg(long)]
     pub(crate) resume: bool,
-    /// Type of the EXR's samples; Z and gathers are always float [default: float]
+    /// Type of the EXR's samples; the layers Z and gathers are always float [default: float]
     #[arg(long, value_parser = choice::<SampleFormat>(), hide_short_help = true)]
     sample_type: Option<SampleFormat>,
     #[command(flatten)]
     pub(crate) tone: ToneOptions,
-    /// Remove noise by Open Image Denoise, a library that is found at run time
+    /// Remove noise by Open Image Denoise, a library that is looked for at run time
     ///
     /// The PNG shows the denoised picture. The EXR keeps the rendered one, and has the denoised one in the
-    /// layer denoised. The quality takes fewer samples and rays, 12 photons a gather, and no irradiance
-    /// cache.
+    /// layer denoised. With this option --quality chooses fewer samples and rays, 12 photons per gather, and
+    /// no irradiance cache.
     #[arg(long)]
     pub(crate) denoise: bool,
-    /// Show tiles as they are finished, in tev or another viewer that speaks its protocol [default port:
+    /// Show finished tiles during the render, in tev or another viewer that has tev's protocol [default port:
     /// 14158]
     #[arg(long, value_name = "HOST:PORT", hide_short_help = true)]
     display_server: Option<DisplayAddress>,
@@ -57,7 +58,8 @@ impl OutputOptions {
         self.resume
     }
 
-    /// Options with a PNG beside the scene, numbered if there are frames; `None` if a picture is stated.
+    /// Returns the options with a PNG beside the scene file as the output, whose name has a run of `#` if
+    /// there are frames. `None` if an output is stated.
     pub(crate) fn beside(&self, scene: &Path, has_frames: bool) -> Option<Self> {
         if !self.pictures.is_empty() {
             return None;
@@ -106,7 +108,8 @@ impl OutputOptions {
         self.sample_type.unwrap_or(SampleFormat::Float)
     }
 
-    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
+    /// Calls `add` for each option that can be useless. The arguments of `add` are: true if the option is
+    /// useless, the option's name, and the reason.
     pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
         let [no_exr, no_png] = [PictureFormat::Exr, PictureFormat::Png].map(|format| !self.has(format));
         add(self.tone.exposure.is_some() && no_png, "--exposure", "without -o OUT.png");
@@ -124,8 +127,8 @@ impl OutputOptions {
         self.pictures.iter().any(|picture| picture.format == format)
     }
 
-    /// Picture that names the partial file and the picture on a display: the first EXR, else the first
-    /// picture.
+    /// Picture whose file name gives the names of the partial file and of the picture on a display server:
+    /// the first EXR, else the first picture.
     pub(crate) fn main(&self) -> Option<&PictureOutput> {
         let exr = self.pictures.iter().find(|picture| picture.format == PictureFormat::Exr);
         exr.or(self.pictures.first())

@@ -11,30 +11,31 @@ use super::choice::choice;
 #[derive(Args)]
 #[command(next_help_heading = "Photon maps")]
 pub(crate) struct PhotonOptions {
-    /// Photons stored in the map [default: by --quality, for the scene]
+    /// Photons stored in the photon map [default: by --quality, for the scene]
     #[arg(long, allow_negative_numbers = true)]
     photons: Option<usize>,
     /// Layout of the photon map in card memory; it never changes the picture
     #[arg(long, default_value = PhotonMaps::default().layout.name(), value_parser = choice::<PhotonLayout>(), hide_short_help = true)]
     photon_map: PhotonLayout,
-    /// Photons that a gather searches for [default: by --quality]
+    /// Number of nearest photons that a gather searches for [default: by --quality]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     neighbors: Option<u32>,
-    /// Photons of the caustic map: light focused by mirrors, glass and glossy surfaces [default: by
-    /// --quality, if the scene has any]
+    /// Photons stored in the caustic map, which has the light that mirrors, glass and glossy surfaces focus
+    /// [default: by --quality, if the scene has such surfaces]
     ///
-    /// With 0 gather rays carry this light, with more noise, and that of punctual lights is lost.
+    /// With 0, gather rays carry this light, with more noise, and the focused light of punctual lights is
+    /// lost.
     #[arg(long, value_name = "N", allow_negative_numbers = true, hide_short_help = true)]
     caustic_photons: Option<usize>,
-    /// Photons that a gather of caustics searches for, at least 8: fewer are sharper, more are smoother
-    /// [default: 50]
+    /// Number of nearest photons that a gather in the caustic map searches for, at least 8: fewer give
+    /// sharper caustics, more give smoother ones [default: 50]
     #[arg(long, value_name = "K", allow_negative_numbers = true, hide_short_help = true)]
     caustic_neighbors: Option<u32>,
-    /// Maximum distance of a gather in metres, or auto: by the density of the photons
+    /// Maximum distance of the photons in a gather, metres, or auto: derived from the density of the photons
     #[arg(long, default_value = "auto", value_parser = max_distance, allow_negative_numbers = true, hide_short_help = true)]
     max_distance: MaxDistance,
-    /// Estimate of the radiance of a Lambertian surface at the end of a gather ray; one with a Phong lobe
-    /// always uses density
+    /// Estimate of the radiance of a Lambertian surface at the end of a gather ray; a surface with a Phong
+    /// lobe always has the estimate density
     #[arg(long, default_value = PhotonMaps::default().radiance.name(), value_parser = choice::<Radiance>(), hide_short_help = true)]
     radiance: Radiance,
 }
@@ -52,7 +53,8 @@ impl PhotonOptions {
         Stated { photons, caustic_photons, neighbors: self.neighbors.is_some(), ..others }
     }
 
-    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
+    /// Calls `add` for each option that can be useless. The arguments of `add` are: true if the option is
+    /// useless, the option's name, and the reason.
     pub(super) fn without_effect(
         &self,
         is_specular: bool,

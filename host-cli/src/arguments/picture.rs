@@ -42,29 +42,32 @@ impl Size {
 #[derive(Args)]
 #[command(next_help_heading = "Picture and camera")]
 pub(crate) struct PictureOptions {
-    /// Width and height of the picture, pixels; or 800 on the longer side, 1080p, or 50% [default: 512 on the
-    /// longer side]
+    /// Width and height of the picture, pixels; or the longer side alone, such as 800; or 1080p, 4k or 50%
+    /// [default: 512 on the longer side]
     ///
-    /// Where not both are stated the picture has the aspect ratio that the file states for the camera. If it
-    /// states none, the picture is square, and 16 to 9 by 1080p. A percentage is of the default.
+    /// If width and height are not both stated, the picture has the aspect ratio that the file states for the
+    /// camera. If the file states none, the picture is square, or 16 to 9 for a video format such as 1080p. A
+    /// percentage is of the default longer side.
     #[arg(long, value_name = "WxH", value_parser = size, allow_hyphen_values = true)]
     size: Option<Size>,
-    /// Render only the columns X0 up to X1 and the rows Y0 up to Y1
+    /// Render only the columns from X0 to X1 - 1 and the rows from Y0 to Y1 - 1, counted from 0 at the top
+    /// left
     #[arg(long, value_name = "X0,X1,Y0,Y1", value_parser = crop, allow_hyphen_values = true, hide_short_help = true)]
     crop: Option<Window>,
     /// Name of the camera [default: the first of the file]
     #[arg(long)]
     camera: Option<String>,
-    /// Place of the camera in the scene file's coordinates, metres [default: the camera's own]
+    /// Position of the camera in the scene file's coordinates, metres [default: the camera's own]
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     camera_at: Option<[f64; 3]>,
-    /// Place in the middle of the picture, metres [default: in the camera's own direction]
+    /// Point in the middle of the picture, in the scene file's coordinates, metres [default: a point in the
+    /// camera's own direction]
     ///
-    /// The top of the picture is towards +y. Straight up and straight down the right is +x, so that the top
-    /// is +z and -z.
+    /// The top of the picture is towards +y. If the camera looks straight up or straight down, the right of
+    /// the picture is towards +x, so that the top is towards +z or -z, respectively.
     #[arg(long, value_name = "X,Y,Z", value_parser = place, allow_hyphen_values = true)]
     look_at: Option<[f64; 3]>,
-    /// Vertical field of view [default: the camera's own]
+    /// Vertical field of view, degrees [default: the camera's own]
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true)]
     fov: Option<f32>,
     #[arg(

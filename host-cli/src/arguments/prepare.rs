@@ -25,9 +25,9 @@ pub(crate) struct PrepareOptions {
     pub(crate) scene: SceneOptions,
     /// The file to write, for photoncard render --prepared
     ///
-    /// Frames in which nothing but cameras moves share a file. Where meshes or lights move, a frame that
-    /// differs from the one before has a file of its own: the name has a run of #, which the frame's number
-    /// replaces.
+    /// Frames in which nothing but cameras moves share a file. If meshes or lights move, each frame that
+    /// differs from the frame before has a file of its own: the name must then have a run of #, which the
+    /// frame's number replaces.
     #[arg(short, long, value_name = "OUT.card", value_parser = file())]
     pub(crate) output: PathBuf,
     /// Quality of the pictures, by which the options that are not stated are chosen
@@ -35,7 +35,8 @@ pub(crate) struct PrepareOptions {
     pub(crate) quality: Quality,
     /// Prepare for pictures that are denoised, by photoncard render --denoise or photoncard merge --denoise
     ///
-    /// The quality takes fewer samples and rays, 12 photons a gather, and no irradiance cache.
+    /// With this option --quality chooses fewer samples and rays, 12 photons per gather, and no irradiance
+    /// cache.
     #[arg(long)]
     denoise: bool,
     #[command(flatten)]
@@ -56,10 +57,10 @@ pub(crate) struct PrepareOptions {
     /// Threads for the work [default: one per core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true, hide_short_help = true)]
     pub(crate) threads: Option<usize>,
-    /// Show no progress; what is ignored or missing in the scene is told
+    /// Show no progress; contents of the scene that are ignored or missing are still reported
     #[arg(long)]
     pub(crate) quiet: bool,
-    /// Form of the progress, and of the message of a failure
+    /// Form in which progress and a failure are reported
     #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     pub(crate) progress: ProgressForm,
 }
@@ -86,7 +87,8 @@ impl PrepareOptions {
         Finish::new(self.denoise)
     }
 
-    /// Settings of these options. Others are the quality's defaults, before a pilot.
+    /// Settings of these options. Settings that no option states are the quality's defaults, which a pilot
+    /// may change.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings_for(self.finish());
         RenderSettings {

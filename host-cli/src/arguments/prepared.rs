@@ -1,4 +1,4 @@
-//! Steps of a farm's job that take an option, and `--prepared`.
+//! Steps of a farm's job that take a given option of `photoncard render`, and the option `--prepared`.
 
 use clap::error::{ContextKind, ContextValue, Error, ErrorKind};
 use clap::{Arg, Args, Command, Id};
@@ -65,14 +65,14 @@ fn of_preparation() -> impl Iterator<Item = Id> {
 pub(crate) struct PreparedOption {
     /// SCENE is a file that photoncard prepare has written: no glTF file is read, and no photon is traced
     ///
-    /// The scene, its photons, rays and samples are those that were stated to photoncard prepare. Options of
-    /// the picture and of its camera are stated as for a glTF file. Of frames that were prepared --frames
-    /// states those to render, and SCENE has a run of # where there is a file for each.
+    /// The scene and the settings of photons, rays and samples are those of photoncard prepare. Options of
+    /// the picture and of its camera are stated as for a glTF file. If frames were prepared, --frames selects
+    /// those to render, and SCENE has a run of # if several files were written.
     #[arg(long, help_heading = "Scene", conflicts_with_all = of_preparation())]
     pub(crate) prepared: bool,
 }
 
-/// Adds a remedy to the error of an option of `photoncard prepare` beside `--prepared`.
+/// Adds a remedy to the error that `--prepared` excludes an option of `photoncard prepare`.
 pub(super) fn with_remedy(mut error: Error) -> Error {
     let names = |option: &str| {
         [ContextKind::InvalidArg, ContextKind::PriorArg].into_iter().any(|kind| match error.get(kind) {

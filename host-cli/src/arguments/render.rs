@@ -43,12 +43,13 @@ pub(crate) struct RenderOptions {
     pub(crate) picture: PictureOptions,
     #[command(flatten)]
     pub(super) photons: PhotonOptions,
-    /// Guide photons to the whole scene, or to what this camera uses
+    /// Distribute photons over the whole scene, or guide them to where this camera uses them
     ///
-    /// By the camera more photons are where the picture uses them: light through a window wastes fewer on the
-    /// outside of a house. The picture's expected value stays. With auto a pilot finds what that gains,
-    /// unless all that it would choose is stated. Pictures of several cameras, such as frames and prepared
-    /// scenes, share photons for the scene.
+    /// Photons that are guided to the camera are denser where the picture uses them: the light of a window,
+    /// for example, wastes fewer photons on the outside of a house. The picture's expected value stays the
+    /// same. With auto a pilot render measures the gain and decides, unless all settings that it would choose
+    /// are stated. Frames and prepared scenes, which may have several cameras, always have photons for the
+    /// whole scene.
     #[arg(long, value_name = "CAMERAS", default_value = PhotonsFor::Auto.name(), value_parser = choice::<PhotonsFor>(), conflicts_with_all = ["frames", "prepared"], help_heading = "Photon maps", hide_short_help = true)]
     photons_for: PhotonsFor,
     #[command(flatten)]
@@ -66,15 +67,15 @@ pub(crate) struct RenderOptions {
     /// Threads for the host's own work [default: one per core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true, help_heading = "Order of the work", hide_short_help = true)]
     pub(crate) threads: Option<usize>,
-    /// Show no progress; what is ignored or missing in the scene is told
+    /// Show no progress; contents of the scene that are ignored or missing are still reported
     #[arg(long)]
     pub(crate) quiet: bool,
-    /// Form of the progress, and of the message of a failure
+    /// Form in which progress and a failure are reported
     #[arg(long, value_enum, default_value_t, hide_short_help = true)]
     pub(crate) progress: ProgressForm,
 }
 
-/// Settings before a pilot, which changes those that are not stated.
+/// Settings before a pilot render, which then chooses those that are not stated.
 pub(crate) struct Unfitted {
     pub(crate) settings: RenderSettings,
     /// Settings that are stated or taken from kept samples.
@@ -94,8 +95,8 @@ impl RenderOptions {
         self.integrator.planned_spp.is_some()
     }
 
-    /// Settings before a pilot. If the render adds to kept samples, their settings replace those of
-    /// `settings` that no option states.
+    /// Returns the settings before a pilot. If the render adds to kept samples, the settings of these samples
+    /// replace those of `settings` that no option states.
     ///
     /// # Errors
     /// If the file of kept samples cannot be read.
@@ -107,7 +108,7 @@ impl RenderOptions {
         Ok(Unfitted { settings, stated: Stated { samples: stated.samples, ..Stated::ALL }, are_kept: true })
     }
 
-    /// Chooses settings for a scene by a pilot; `None` if none is left to choose.
+    /// Chooses settings for a scene by a pilot; `None` if no setting is left to choose.
     ///
     /// # Errors
     /// As [`Quality::fit`].
@@ -132,8 +133,8 @@ impl RenderOptions {
         Ok(fit.map(by_noise).map(by_time))
     }
 
-    /// Aim of the passes of a picture, after `elapsed`: their time is what is left of `aim`, without that of
-    /// a denoiser.
+    /// Returns the aim of a picture's passes. The time in it is that of `aim` less the expected time of a
+    /// denoiser and less `elapsed`, the time that was spent before the passes.
     pub(crate) fn aim_of_passes(&self, aim: Aim, settings: &RenderSettings, elapsed: Duration) -> Aim {
         let left = |time: Duration| {
             let picture = self.time_of_picture(time, settings);
@@ -154,7 +155,8 @@ impl RenderOptions {
         }
     }
 
-    /// Settings of these options. Others are the quality's defaults, before a pilot.
+    /// Settings of these options. Settings that no option states are the quality's defaults, which a pilot
+    /// may change.
     pub(crate) fn settings(&self) -> RenderSettings {
         self.settings_of(self.quality)
     }

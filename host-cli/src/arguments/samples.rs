@@ -8,18 +8,18 @@ use photoncard_driver::render::Aim;
 #[derive(Args)]
 #[command(next_help_heading = "Rays and samples")]
 pub(crate) struct SampleOptions {
-    /// Add samples until so much time has passed since the start: 90, 60s, 5m or 2h
+    /// Add samples until this time has passed since the start: 90 or 90s (seconds), 5m or 2h
     ///
-    /// Passes double the number of samples; the last one is as long as the time allows. A short time also has
-    /// fewer photons and gather rays, where they are not stated. With --noise, whichever comes first ends the
-    /// render.
+    /// Each pass doubles the number of samples; the last pass is as long as the time allows. If the time is
+    /// short, the numbers of photons and gather rays that are not stated are reduced too. With --noise, the
+    /// aim that is reached first ends the render.
     #[arg(long, value_name = "TIME", value_parser = time, conflicts_with_all = NOT_BY_PASSES)]
     time: Option<Duration>,
     /// Add samples until the estimated standard error of the pixels is below this share of the picture's mean
     ///
-    /// The estimate is the root mean square over all pixels, by the difference of passes. It is of the noise
-    /// of samples alone: photons and rays of irradiance records, where they are not stated, are as many as
-    /// keep their errors small beside it.
+    /// The estimate is the root mean square over all pixels, from the differences between passes. It measures
+    /// only the noise of the samples: the numbers of photons and of rays of irradiance records that are not
+    /// stated are chosen so high that their errors are small in comparison.
     #[arg(long, value_name = "ERROR", value_parser = noise, allow_negative_numbers = true, conflicts_with_all = NOT_BY_PASSES)]
     noise: Option<f64>,
     /// Keep the samples beside the finished picture, in OUT.exr.partial: --resume with a greater --spp adds

@@ -29,16 +29,16 @@ pub(crate) struct SceneOptions {
     /// Variant of the scene's materials, by its name [default: the materials that its meshes state]
     #[arg(long, value_name = "NAME", help_heading = "Scene", hide_short_help = true)]
     pub(crate) variant: Option<String>,
-    /// Scale images down to at most this width and height, texels, by means in linear light
+    /// Scale images down to at most this width and height, texels, by averaging in linear light
     #[arg(long, value_name = "TEXELS", value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIDE)), help_heading = "Scene", hide_short_help = true)]
     pub(crate) texture_limit: Option<u32>,
     #[command(flatten)]
     pub(crate) lights: LightOptions,
     /// Light from infinitely far: an equirectangular map, .hdr or .exr, or a constant radiance
     ///
-    /// The top of the map is +y. Its middle is -z, and +x in files of Blender, as there. Of an EXR of DWA
-    /// compression the last bits depend on the vector instructions of the processor: for a farm of several
-    /// kinds store it with ZIP.
+    /// The top of the map is +y. Its middle is -z, or +x for scenes that Blender has exported, as in Blender.
+    /// The last bits of an EXR with DWA compression depend on the vector instructions of the processor: for a
+    /// farm with several kinds of processors, store the map with ZIP compression.
     #[arg(long, value_name = "FILE|R,G,B", allow_hyphen_values = true, help_heading = "Scene")]
     pub(crate) environment: Option<EnvironmentOption>,
     /// Turn the environment map about +y, counter-clockwise seen from above [default: 0]
@@ -52,7 +52,8 @@ pub(crate) struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
+    /// Calls `add` for each option that can be useless. The arguments of `add` are: true if the option is
+    /// useless, the option's name, and the reason.
     pub(super) fn without_effect(&self, scene: &Scene, add: &mut impl FnMut(bool, &str, &str)) {
         let has_lobe =
             |material: &Material| matches!(material.reflection, Reflection::MetallicRoughness { .. });

@@ -11,20 +11,21 @@ use super::choice::choice;
 #[derive(Args)]
 #[command(next_help_heading = "Order of the work")]
 pub(crate) struct ScheduleOptions {
-    /// Side of a tile, pixels [default: the widest that all cards have room for, for several cards halved
-    /// until each has four tiles, down to 16]
+    /// Side of a tile, pixels [default: the greatest that all cards can hold; with several cards it is halved
+    /// until each card has four tiles, but not below 16]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     tile: Option<u32>,
     /// Order of the photon gathers; it never changes the picture
     #[arg(long, default_value = Schedule::default().order.name(), value_parser = choice::<GatherOrder>(), hide_short_help = true)]
     pub(super) order: GatherOrder,
-    /// Direction bins of the gather rays, for orders with bins [default: 99]
+    /// Number of direction bins of the gather rays, for orders with bins [default: 99]
     #[arg(long, hide_short_help = true)]
     bins: Option<u32>,
-    /// Gathers that may wait on a chip, for orders with a queue [default: the chip's capacity]
+    /// Maximum number of gathers that wait on a chip, for orders with a queue [default: the chip's capacity]
     #[arg(long, hide_short_help = true)]
     queue: Option<u32>,
-    /// Tiles in flight on a chip, whose gathers may wait in the queue together [default: the chip's capacity]
+    /// Maximum number of tiles in flight on a chip, whose gathers wait together in the queue [default: the
+    /// chip's capacity]
     #[arg(long, allow_negative_numbers = true, hide_short_help = true)]
     in_flight: Option<u32>,
 }
@@ -32,17 +33,18 @@ pub(crate) struct ScheduleOptions {
 #[derive(Args)]
 #[command(next_help_heading = "Order of the work")]
 pub(crate) struct PartOptions {
-    /// Render the K-th of N parts of the picture alone, to -o OUT.part; photoncard merge makes the picture of
-    /// all
+    /// Render only the K-th of N parts of the picture, to -o OUT.part; photoncard merge makes the picture
+    /// from all parts
     ///
-    /// Parts cost about alike, and may be rendered by any machines and cards, in any order. The picture is,
-    /// to the bit, that of one render.
+    /// All parts take about the same work, and may be rendered by any machines and cards, in any order. The
+    /// merged picture is bit for bit that of one render.
     #[arg(long, value_name = "K/N", conflicts_with_all = ["time", "noise", "keep_samples"])]
     pub(crate) part: Option<Part>,
 }
 
 impl ScheduleOptions {
-    /// Calls `add` for options that others may make useless, with: true if it is so, option, reason.
+    /// Calls `add` for each option that can be useless. The arguments of `add` are: true if the option is
+    /// useless, the option's name, and the reason.
     pub(super) fn without_effect(&self, add: &mut impl FnMut(bool, &str, &str)) {
         let Self { order, bins, queue, in_flight, tile: _ } = self;
         let no_bins = format!("with --order {}, which has no direction bins", order.name());

@@ -12,17 +12,17 @@ use super::machine::MachineOptions;
 use super::study_output::StudyOutput;
 use super::sweep::SweepArguments;
 
-/// A study that ships, or one of the user's own.
+/// Arguments of `photoncard study`: the name of a built-in study, or the command `sweep`.
 #[derive(Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
 pub(crate) struct StudyArguments {
     #[command(subcommand)]
     pub(crate) own: Option<StudyCommand>,
     /// Study to run
-    // Required without a command.
+    // The name is required unless a command is stated.
     #[arg(value_name = "NAME", value_parser = Selection::parser(), required = true)]
     pub(crate) name: Option<Selection>,
-    /// A small picture and few values: about a minute a study
+    /// Measure small pictures and few values: about a minute per study
     #[arg(long)]
     pub(crate) quick: bool,
     /// The folder of photoncard's own scenes
@@ -30,7 +30,7 @@ pub(crate) struct StudyArguments {
     pub(crate) scenes: PathBuf,
     #[command(flatten)]
     pub(crate) output: Option<StudyOutput>,
-    // Not in the output: an optional group cannot hold another.
+    // The machine is not a part of `StudyOutput`: an optional group of options cannot contain another group.
     #[command(flatten)]
     pub(crate) machine: MachineOptions,
 }

@@ -7,16 +7,16 @@ use photoncard_driver::study::SampleRate;
 
 use super::threads::threads;
 
-/// Output of a study, and extent of its work.
+/// Folder of a study's output, and options that limit its work.
 #[derive(Args)]
 pub(crate) struct StudyOutput {
     /// The folder for reports and finished points; it is made if it is missing
     #[arg(short, long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// The share of the tiles that is rendered where not all are needed
+    /// Share of the tiles that is rendered where a study does not need all tiles
     #[arg(long, value_name = "SHARE", default_value = "1/17", allow_hyphen_values = true)]
     pub(crate) sample: SampleRate,
-    /// Threads, an emulated chip on each [default: a thread a core]
+    /// Number of threads, each of which runs an emulated chip [default: one per core]
     #[arg(long, value_parser = threads, allow_negative_numbers = true)]
     pub(crate) threads: Option<usize>,
     /// Show no progress

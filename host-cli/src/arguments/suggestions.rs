@@ -12,9 +12,8 @@ const PICTURE: &[&str] = &["render", "prepare", "view", "study sweep", "farm"];
 /// Commands that write pictures in several formats.
 const WRITE: &[&str] = &["render", "merge", "farm"];
 
-/// Option of another renderer with its remedy here. If `commands` is not empty, only these have the options
-/// that the remedy names.
-/// without commands it is valid for all.
+/// Options of other renderers, with a remedy that names the options of this program. Only the commands in
+/// `commands` have the latter options; an empty list means that the remedy is valid for all commands.
 pub(super) struct Word {
     options: &'static [&'static str],
     pub(super) remedy: &'static str,
@@ -109,8 +108,8 @@ const VERBOSE: &[&str] = &["--verbose", "-v", "--log-level"];
 /// Suffixes of picture files.
 const PICTURES: [&str; 5] = [".png", ".exr", ".jpg", ".jpeg", ".part"];
 
-/// Replaces clap's suggestion for an unknown argument by the remedy, if the argument is known here. `given`
-/// are all arguments of the process, with the program's name.
+/// Replaces clap's suggestion for an unknown argument by a remedy, if the argument is an option of another
+/// renderer or the name of a picture. `given` are all arguments of the process, with the program's name.
 pub(super) fn with_suggestion(mut error: Error, program: Command, given: &[String]) -> Error {
     if error.kind() != ErrorKind::UnknownArgument {
         return error;

@@ -60,8 +60,8 @@ struct SweepSettings {
     card: EmulatedKind,
     #[command(flatten)]
     chip: ChipOption,
-    /// Caches of the modelled memory, as of a render; several are varied [default:
-    /// photon=128K/128/4,scene=75K/128/4]
+    /// Caches of the memory model, written as for photoncard render --cache; state the option several times
+    /// to compare caches [default: those of the chip, such as photon=128K/128/4,scene=75K/128/4]
     #[arg(long = "cache", value_name = "CACHES", help_heading = "Cards")]
     caches: Vec<CacheSettings>,
 }
@@ -80,7 +80,8 @@ impl SweepArguments {
         self.vary.iter().cloned().chain(several).collect()
     }
 
-    /// Point of these options, with the first of the caches. `name` is that of the scene.
+    /// Point of the sweep that has the settings of these options and the first of the stated caches. `name`
+    /// is the name of the scene.
     pub(crate) fn point(&self, name: &str) -> Point {
         let SweepSettings { quality, picture, photons, integrator, schedule, card, chip, caches } =
             &self.settings;

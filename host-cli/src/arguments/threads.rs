@@ -1,6 +1,6 @@
 //! Parser of thread counts.
 
-/// Maximum number of threads: a system without room for more ends the process while they start.
+/// Maximum number of threads. A start of more threads than the system can hold would end the process.
 const MAX_THREADS: usize = 1024;
 
 /// Parses a number of threads.

@@ -21,21 +21,23 @@ use super::threads::threads;
 pub(crate) struct ViewOptions {
     #[command(flatten)]
     pub(crate) scene: SceneOptions,
-    /// Address of the page, this machine's own alone by default; port 0 is any free one
+    /// Address of the page, by default one that only this machine reaches; port 0 is any free port
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:8080", value_parser = listen, help_heading = "Page")]
     pub(crate) listen: SocketAddr,
     /// Open the page in the browser of this machine
     #[arg(long, help_heading = "Page")]
     pub(crate) open: bool,
-    /// Folder in which the page may save pictures; without it, it may save none
+    /// Folder in which the page may save pictures; without this option it cannot save any
     #[arg(long, value_name = "DIR", help_heading = "Page")]
     pub(crate) out: Option<PathBuf>,
-    /// Quality of the settled picture, by which the options that are not stated are chosen
+    /// Quality of the settled picture, the final one of each camera position, by which the options that are
+    /// not stated are chosen
     #[arg(long, default_value = Quality::default().name(), value_parser = choice::<Quality>())]
     pub(crate) quality: Quality,
     /// Denoise the settled picture by Open Image Denoise, as photoncard render --denoise does
     ///
-    /// The quality takes fewer samples and rays, 12 photons a gather, and no irradiance cache.
+    /// With this option --quality chooses fewer samples and rays, 12 photons per gather, and no irradiance
+    /// cache.
     #[arg(long)]
     pub(crate) denoise: bool,
     #[command(flatten)]
@@ -67,7 +69,8 @@ impl ViewOptions {
         Finish::new(self.denoise)
     }
 
-    /// Settings of these options. Others are the quality's defaults, before a pilot.
+    /// Settings of these options. Settings that no option states are the quality's defaults, which a pilot
+    /// may change.
     pub(crate) fn settings(&self) -> RenderSettings {
         let base = self.quality.settings_for(self.finish());
         RenderSettings {

@@ -1,4 +1,4 @@
-//! Notices about options that have no effect because an option that they need is missing.
+//! Notices about options that have no effect because of other options or of the scene's contents.
 
 use photoncard_driver::render::CardAddress;
 use photoncard_driver::scene::Scene;

@@ -5,8 +5,8 @@ use super::job::{Frames, Job};
 use crate::shell::quoted;
 
 /// Returns the definitions of the shell functions `prepare`, `part`, `merge` and `task`, which work in the
-/// job's home. `task N` renders task N, from 0. `extra` is added to each `photoncard` command, such as `
-/// --progress openjd`.
+/// job's home. `task N` renders task N, from 0. `extra` is text such as ` --progress openjd`, which is
+/// appended to each `photoncard` command.
 pub(super) fn functions(job: &Job, extra: &str) -> String {
     let parts = job.parts;
     let (folder, prepare) = (word(&job.folder), prepare(job, extra));
@@ -34,19 +34,20 @@ fn words(words: &[String]) -> String {
     words.iter().map(|each| format!(" {}", word(each))).collect()
 }
 
-/// Quoted word. Adjacent braces are separated, because double ones enclose expressions of Open Job
-/// Description.
+/// Word quoted for a shell. An empty string (`''`) follows each brace, because double braces enclose
+/// expressions of Open Job Description.
 fn word(word: &str) -> String {
     quoted(word).replace('{', "{''").replace('}', "}''")
 }
 
-/// File name of a prepared scene; a run of `#` stands for the number of the frame.
+/// File name of a prepared scene. For frames it has a run of `#`, which the frame's number replaces.
 fn card(job: &Job) -> &'static str {
     if job.frames.is_some() { "######.card" } else { "scene.card" }
 }
 
-/// Function `prepare`, which prepares the scene in a new folder. If the result differs from the existing one,
-/// it takes its place, and existing parts are removed.
+/// Definition of the shell function `prepare`, which prepares the scene in a new folder. If the files there
+/// differ from those of an earlier preparation, the new files replace the earlier ones, and the existing
+/// parts are removed.
 fn prepare(job: &Job, extra: &str) -> String {
     let words = [&job.words.scene, &job.words.prepare, &job.words.both].map(|list| words(list)).concat();
     let frames =
@@ -82,8 +83,8 @@ fn part(job: &Job, extra: &str) -> String {
     )
 }
 
-/// Function `part` of a job with frames: `part K N` renders part K of frame N, and `part K A-B` of frames A
-/// to B.
+/// Definition of the shell function `part` for a job with frames: `part K N` renders part K of frame N, and
+/// `part K A-B` renders part K of each of the frames A to B.
 fn part_of_frames(job: &Job, extra: &str) -> String {
     let parts = job.parts;
     let render = render(job, extra);

@@ -33,7 +33,8 @@ pub(crate) struct Progress {
     percent: Option<Percent>,
 }
 
-/// Time for which a phase before the tiles prints no line, seconds, without a terminal.
+/// Without a terminal, a phase before the tiles prints nothing but its last line during this time from its
+/// start, seconds.
 const SILENT_SECONDS: f64 = 1.0;
 
 struct Display {
@@ -67,7 +68,8 @@ impl Progress {
         Ok(Self { stopped, kept, failed: Mutex::default(), display, percent: None })
     }
 
-    /// Sets the form of the progress. Open Job Description is told the percentage of `phase` alone.
+    /// Sets the form of the progress. In the form of Open Job Description, only the percentage of `phase` is
+    /// printed.
     pub(crate) fn in_form(self, form: ProgressForm, phase: Phase) -> Self {
         match form {
             ProgressForm::Text => self,

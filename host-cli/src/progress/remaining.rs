@@ -107,7 +107,8 @@ mod tests {
     }
 
     /// Checks that the estimate, after a fifth of the time and before the last `tail` seconds, has a relative
-    /// error of at most `share`, and that a next estimate, counted down, differs by at most `share`.
+    /// error of at most `share`, and that each estimate differs by at most the same share from the estimate
+    /// before, counted down to the same time.
     fn check_steady(estimates: &[(f64, Option<f64>, f64)], share: f64, tail: f64) {
         let end = estimates[0].2;
         let mut previous: Option<(f64, f64)> = None;

@@ -5,7 +5,7 @@ use photoncard_driver::scene::{Camera, Scene};
 
 use crate::console::say;
 
-/// Fraction of the pixels that show a surface which must be black for a message.
+/// Minimum fraction of black pixels, among the pixels that show a surface, for a message.
 const MANY: f64 = 0.5;
 
 /// Facts about a scene and its view that explain darkness.

@@ -56,7 +56,7 @@ fn percent(share: f64) -> String {
 pub(super) fn at_once(options: &RenderOptions, statistics: &Statistics, is_fitted: bool) -> String {
     let (stated, pixels) = (options.stated(), &statistics.provenance.pixels);
     let is_timed = is_fitted && options.samples.aim().is_some_and(|aim| aim.time.is_some());
-    // Options with their use, and the words for a setting without a value.
+    // Each option with whether it is needed, and the words that replace it if its setting has no value.
     let options_of_settings = [
         ("spp", true, ""),
         ("planned-spp", !options.states_planned_samples(), ""),

@@ -126,7 +126,7 @@ impl<'a> Sequence<'a> {
         finish(self.options, outputs, finished)
     }
 
-    /// Chooses the settings before the first frame: finished frames are recognised by them.
+    /// Chooses the settings before the first frame, because finished frames are recognised by their settings.
     fn settle(&mut self, settings: &mut RenderSettings) -> Result<(), Failure> {
         let Self { options, rest, progress, .. } = self;
         let Some(rest) = rest.take() else { return Ok(()) };
@@ -139,8 +139,8 @@ impl<'a> Sequence<'a> {
         Ok(())
     }
 
-    /// Renders the picture of the scene as it is moved. The first call chooses the settings, for the scene at
-    /// rest.
+    /// Renders the picture of the frame that the scene was moved to. The first call chooses the settings, for
+    /// the scene at rest.
     fn picture(&mut self, settings: &mut RenderSettings) -> Result<(Rendering, Option<Fit>), RenderError> {
         let Self { options, moments, rest, renderer, progress, .. } = self;
         let scene = moments.scene();

@@ -18,8 +18,9 @@ use crate::failure::Failure;
 use crate::notices::{self, Uses};
 use crate::progress::duration;
 
-/// Prints loaded contents, ignored contents and options without effect; ignored contents alone with
-/// `--quiet`.
+/// Prints the loaded contents, the ignored contents, the options without effect, and `misfit`, a notice that
+/// the picture has another aspect ratio than the camera. With `--quiet` only the ignored contents are
+/// printed.
 ///
 /// # Errors
 /// If contents are ignored and `--strict` is given.
@@ -58,7 +59,7 @@ pub(super) fn say_sparse(statistics: &Statistics) {
     }
 }
 
-/// Prints a warning about tiles far brighter than any surface that no second card has confirmed.
+/// Prints a warning about tiles that are far brighter than any surface and that no second card has verified.
 pub(super) fn say_dazzling(statistics: &Statistics) {
     let Statistics { dazzling_tiles, dazzling_cards, .. } = statistics;
     if *dazzling_tiles > 0 {
@@ -88,7 +89,8 @@ pub(super) fn say_prepared(path: &Path, settings: &RenderSettings, inputs: &Name
     ));
 }
 
-/// Says that a scene was prepared for pictures of another finish.
+/// Prints a notice if a scene was prepared for denoised pictures and the picture is not denoised, or the
+/// reverse. Nothing is printed with the quality `paper`.
 pub(super) fn say_other_finish(path: &Path, quality: Quality, prepared: Finish, wanted: Finish) {
     let text = match (prepared, wanted) {
         _ if quality == Quality::Paper => return,
@@ -108,8 +110,8 @@ pub(super) fn by_quality(quality: Quality) -> String {
     format!("quality {}", quality.name())
 }
 
-/// Text about the settings that a pilot has chosen or kept samples have. `are_planned` is true if `--time` or
-/// `--noise` decides the number of samples.
+/// Text about the settings that a pilot has chosen or that are taken from kept samples. `are_planned` is true
+/// if `--time` or `--noise` decides the number of samples.
 pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     let RenderSettings { photons, integrator, .. } = settings;
     let (interpolated, of) = match integrator.irradiance_error {
@@ -133,8 +135,9 @@ pub(super) fn chosen(settings: &RenderSettings, are_planned: bool) -> String {
     )
 }
 
-/// Messages of a pilot about settings that no option states: the squared error with photons for the camera,
-/// over that without; and photons or gather rays that the quality's bounds have reduced.
+/// Messages about a pilot's results for settings that no option states: the ratio of the squared errors with
+/// photons that are guided to the camera and without; and numbers of photons or gather rays that the bounds
+/// of the quality or of `--time` have reduced.
 pub(super) fn fitted(fit: &Fit, settings: &RenderSettings, stated: Stated) -> Vec<String> {
     let gain = fit.measured.photons_for_camera.map(|ratio| {
         let taken = if fit.photons_for == PhotonsFor::Camera { "taken" } else { "left" };
@@ -210,12 +213,13 @@ pub(super) fn say_finished(outputs: &OutputOptions, number: u32) {
     say(format_args!("photoncard: {}: frame {number} is finished", path.display()));
 }
 
-/// Prints that a file of a frame is damaged and is rendered again.
+/// Prints that a file of a frame is damaged and that the frame is rendered again.
 pub(super) fn say_damaged(path: &Path) {
     say(format_args!("photoncard: {} is not as it was written: its frame is rendered again", path.display()));
 }
 
-/// Text about a frame's time: in all, of each preparing phase from 5 ms on, of sending and of tiles.
+/// Text about the time of a frame: the total, each preparing phase that took at least 5 ms, the bytes sent to
+/// cards with their time, the tiles, and the denoiser if there is one.
 fn cost(statistics: &Statistics) -> String {
     let Statistics { time_s, link, .. } = statistics;
     let Times { total, scene, pilot, photons, pack, load, render, denoise, .. } = time_s;
@@ -227,7 +231,8 @@ fn cost(statistics: &Statistics) -> String {
     format!("{total:.2} s: {phases}{sent} bytes sent in {load:.2} s, tiles {render:.2} s{denoised}")
 }
 
-/// Text about the time of a picture, its longest phase, its samples and, from 0.1 % on, its lost paths.
+/// Text about a picture: its time, the longest phase, the number of samples and, if it is at least 0.1 %, the
+/// percentage of lost paths.
 fn summary(statistics: &Statistics, pixels: usize) -> String {
     let Statistics { samples, rays, lost_paths, time_s, .. } = statistics;
     let total = if time_s.total < 10.0 { format!("{:.1} s", time_s.total) } else { duration(time_s.total) };
@@ -259,7 +264,8 @@ fn longest(times: &Times) -> (&'static str, f64) {
     phases.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or_default()
 }
 
-/// Prints reads of card memory: a table of photon map and scene, DRAM bytes for a gather and for a ray.
+/// Prints the modelled reads of card memory: a table for photon map and scene, and the DRAM bytes per gather
+/// and per ray.
 fn say_memory(memory: &MemoryStatistics, statistics: &Statistics) {
     let gathers = statistics.gathers;
     let rays = &statistics.rays;

@@ -13,7 +13,8 @@ pub(super) struct Moments<'a> {
     options: &'a SceneOptions,
     frames: &'a FrameOptions,
     input: Input,
-    /// Scene of the last frame; before the first one at rest if only cameras move, else empty.
+    /// Scene at the frame of the last call of `move_to`. Before the first call it is the scene at rest if
+    /// only cameras move, else an empty scene.
     scene: Scene,
     is_still: bool,
 }
@@ -33,12 +34,12 @@ impl<'a> Moments<'a> {
         Ok((Self { options, frames, input, scene, is_still }, rest))
     }
 
-    /// Returns whether geometry and lights are equal in all frames.
+    /// Returns whether only cameras move: geometry and lights are equal in all frames.
     pub(super) fn is_still(&self) -> bool {
         self.is_still
     }
 
-    /// Scene of the last frame.
+    /// Scene at the frame of the last call of [`Self::move_to`].
     pub(super) fn scene(&self) -> &Scene {
         &self.scene
     }

@@ -156,8 +156,8 @@ impl<'a> Preparation<'a> {
     }
 }
 
-/// Metadata that renders of a prepared scene read: quality, finish, inputs, and settings that all frames
-/// share.
+/// Metadata that renders of a prepared scene read: the quality, whether pictures will be denoised, and the
+/// inputs with the settings that all frames share.
 fn notes(options: &PrepareOptions) -> Map<String, Value> {
     let mut inputs = input::provenance(&options.scene);
     if options.frames.numbers().is_some() {

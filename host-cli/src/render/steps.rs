@@ -38,7 +38,7 @@ pub(super) struct Finished {
     pub(super) rendering: Rendering,
     /// Time of reading the scene, seconds.
     pub(super) scene_seconds: f64,
-    /// Names of the scene's inputs, with the number and time of a frame.
+    /// File names and options that determine the scene, with the number of a frame.
     pub(super) inputs: NamedSettings,
     pub(super) quality: Quality,
     /// Settings that the quality has found for the scene; `None` without a pilot.
@@ -77,8 +77,8 @@ pub(super) fn finish(
     Ok(())
 }
 
-/// Returns photons and integrator: those of a pilot, except where options or kept samples state them. Prints
-/// them.
+/// Returns the settings of photons and integrator: those that a pilot has chosen, except where options or
+/// kept samples state them. Prints the settings, unless `--quiet` is given.
 pub(super) fn chosen(
     options: &RenderOptions,
     unfitted: Unfitted,

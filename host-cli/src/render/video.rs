@@ -22,8 +22,8 @@ pub(super) struct Video {
 /// Replaces each video among the outputs by the PNG pictures that it is encoded from, and returns the videos.
 ///
 /// # Errors
-/// If no frames are stated, a video's name contains `#` or is that of an input, a picture of that name is not
-/// photoncard's, or ffmpeg cannot be started.
+/// If no frames are stated, a video's name contains `#` or is that of an input, a file at the path of one of
+/// the PNG pictures was not written by photoncard, or ffmpeg cannot be started.
 pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     let mut videos = Vec::new();
     for output in options.outputs.pictures.iter_mut().filter(|output| output.format == PictureFormat::Video) {
@@ -54,7 +54,7 @@ pub(super) fn take(options: &mut RenderOptions) -> Result<Vec<Video>, Failure> {
     Ok(videos)
 }
 
-/// Error of a video whose name contains a run of `#`, which stands for a frame's number.
+/// Error of a video whose name contains a run of `#`, the placeholder of a frame's number.
 fn of_each_frame(path: &Path) -> Failure {
     let text = format!(
         "{} is one video of all frames, and a run of # in its name stands for the number of each",
@@ -83,7 +83,8 @@ impl Video {
     /// Encodes the video from rendered frames.
     ///
     /// # Errors
-    /// If ffmpeg fails. The error contains its last line and the command.
+    /// If a file cannot be read or written, or ffmpeg fails. The error of ffmpeg contains the last line that
+    /// it printed, and its command.
     pub(super) fn write(&self, options: &RenderOptions) -> Result<(), Failure> {
         let pictures = options.frames.numbers().into_iter().flatten();
         let pictures: Vec<PathBuf> = pictures.filter_map(|number| numbered(&self.pictures, number)).collect();

@@ -162,7 +162,7 @@ impl Display {
         }
     }
 
-    /// Starts the progress bar of a study, at its `done` points stored earlier.
+    /// Starts the progress bar of a study, of whose points `done` are stored from an earlier run.
     fn begin(&mut self, study: &str, done: usize, total: usize) {
         self.bar.finish_and_clear();
         study.clone_into(&mut self.study);

@@ -47,7 +47,8 @@ pub(super) fn options(arguments: &SweepArguments, provenance: Provenance) -> Res
     Ok(SweepOptions { sweep, name, scene, out, threads, machine, provenance })
 }
 
-/// Returns the point with these values. If no size is stated, the picture has the camera's aspect ratio.
+/// Returns the point with these values, and adds notices about it to `notices`. If no size is stated, the
+/// picture has the camera's aspect ratio.
 fn point(
     arguments: &SweepArguments,
     values: &[Value],

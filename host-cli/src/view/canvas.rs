@@ -1,4 +1,5 @@
 //! Tiles that pages are sent: those of the newest wish that has a tile, numbered in the order of completion.
+//! A wish is the picture that pages request: settings, camera and changes of the scene.
 //!
 //! A page remembers only the number of its next tile; outdated tiles are dropped before the page is sent
 //! them. A slow page therefore receives fewer and newer tiles, and needs no buffer.
@@ -87,7 +88,7 @@ pub(super) struct Patch {
     work: TileWork,
 }
 
-/// Stands for an unknown count in the header of a tile.
+/// Value of an unknown count in the header of a tile.
 const UNKNOWN: u32 = u32::MAX;
 /// Size of a tile's header in a message to a page, bytes.
 const HEADER: usize = 44;
@@ -99,7 +100,8 @@ impl Patch {
         Self { origin, card, tile, denoised: None, work }
     }
 
-    /// Copy with denoised radiance; `at(x, y)` is that of a pixel of the picture.
+    /// Copy of the tile with denoised radiance; `at(x, y)` is the denoised radiance of a pixel of the
+    /// picture.
     fn denoised(&self, at: &dyn Fn(u32, u32) -> [f32; 3]) -> Self {
         let denoised = Some(self.tile.pixels().map(|((x, y), _)| at(x, y)).collect());
         Self { tile: self.tile.clone(), denoised, ..*self }
@@ -173,8 +175,8 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    /// Adds a tile, with the work on the samples that an earlier tile of its area has. Drops tiles of older
-    /// wishes.
+    /// Adds a tile. If the same area has an earlier tile with fewer samples of the same picture, the work of
+    /// the earlier tile is added to that of the new one. Drops tiles of older wishes.
     pub(super) fn put(&mut self, mut patch: Patch) {
         let version = patch.origin.version;
         if self.patches.front().is_some_and(|(_, oldest)| oldest.origin.version < version) {

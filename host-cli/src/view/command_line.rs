@@ -1,4 +1,5 @@
-//! Command line that renders a settled picture, with every option that its pixels or its work depend on.
+//! Command line that renders the settled (final) picture of a wish, with every option that the pixels or the
+//! work of the picture depend on.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::quality::{Finish, Quality};

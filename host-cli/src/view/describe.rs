@@ -24,7 +24,7 @@ impl SceneFacts {
         Self { name, low, high }
     }
 
-    /// First message to a page. `scene` has the materials and lights that pages have not changed.
+    /// First message to a page. `scene` has the materials and lights before any change by a page.
     pub(super) fn hello(&self, scene: &Scene, out: Option<&str>, steers: bool) -> Value {
         let layers = ["radiance"].into_iter().chain(Layer::ALL.map(Layer::name));
         let cameras = scene.cameras.iter().map(|camera| {
@@ -117,7 +117,8 @@ fn properties(material: &Material) -> Map<String, Value> {
     properties
 }
 
-/// Changes of materials and lights that pages have made.
+/// Changes of materials and lights that pages have made, in a wish (the settings, camera and changes that
+/// pages request).
 pub(super) fn changes(wish: &Wish) -> Value {
     let change = |(name, value): &(String, Vec<f64>)| match value[..] {
         [value] => json!({"name": name, "value": value}),
@@ -157,7 +158,8 @@ pub(super) struct Cost {
 }
 
 impl Cost {
-    /// Takes the cost of a finished pass; that of the card image only from a pass that traced photons.
+    /// Takes over the cost of a finished pass. The times of photons, packing and loading, and the bytes sent,
+    /// are taken over only from a pass that traced photons.
     pub(super) fn add(&mut self, statistics: &Statistics) {
         let times = &statistics.time_s;
         if times.photons > 0.0 {

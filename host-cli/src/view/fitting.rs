@@ -1,5 +1,6 @@
-//! Pilot renders by which a quality chooses settings. They run on a thread of their own: the painter renders
-//! a new wish meanwhile.
+//! Pilot renders (small test renders by which a quality chooses settings). They run on a thread of their own,
+//! so that the painter can meanwhile render a newer wish: the picture that pages request by settings, camera
+//! and changes of the scene.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,7 +25,8 @@ pub(super) struct Fitting {
 }
 
 impl Fitting {
-    /// Starts pilot renders for the camera of `settings`, on `threads` threads, or on all if `None`.
+    /// Starts pilot renders for the camera of `settings`, on a pool of `threads` threads; on rayon's global
+    /// pool if `None`.
     ///
     /// # Errors
     /// If the thread cannot be started.

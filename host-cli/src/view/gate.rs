@@ -52,8 +52,8 @@ impl Gate {
     /// Checks a request and returns what it is granted.
     ///
     /// # Errors
-    /// The refusal of a request for another host, from another site, without the token, or for nothing that
-    /// exists.
+    /// The refusal of a request for another host, from another site, without the token, or for a path that
+    /// does not exist.
     pub(super) fn check(&self, head: &Head) -> Result<Resource, Refusal> {
         if head.method != "GET" {
             return Err(Refusal::new(405, "Method Not Allowed", "only GET is answered"));

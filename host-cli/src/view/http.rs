@@ -10,7 +10,7 @@ use super::page_files::PageFile;
 const MAX_HEAD: usize = 8 << 10;
 /// Maximum number of headers.
 const MAX_HEADERS: usize = 64;
-/// Time limit for a request's head.
+/// Time limit for reading a request's head, and for each write of a response.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Head of a request.

@@ -19,7 +19,7 @@ use crate::arguments::{PictureFormat, PictureOutput};
 use crate::console::printable_json;
 use crate::render::files::{Form, write_picture};
 
-/// Settled picture, which pages can save.
+/// Settled picture, which pages can save: the final picture of a wish, equal to that of `photoncard render`.
 pub(super) struct Settled {
     pub(super) version: u32,
     pub(super) rendering: Rendering,
@@ -63,7 +63,7 @@ impl Hub {
         self.view.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the state, at the time since the start, and notifies all threads.
+    /// Changes the state by `act`, which is given the time since the start, and notifies all threads.
     pub(super) fn change<T>(&self, act: impl FnOnce(&mut View, Duration) -> T) -> T {
         let mut view = self.lock();
         let result = act(&mut view, self.start.elapsed());
@@ -148,7 +148,8 @@ impl Hub {
         drop(self.folder.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
-    /// Waits for the next message to a page; `None` after `longest`, or once the page or the view has gone.
+    /// Waits for the next message to a page; `None` after the time `longest`, or once the page is
+    /// disconnected or the view is over.
     pub(super) fn next_message(
         &self,
         page: PageNumber,

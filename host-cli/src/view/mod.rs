@@ -1,8 +1,8 @@
 //! `photoncard view`: a page in the browser that shows a scene while it is rendered.
 //!
-//! - `wish`, `command_line`: the picture that pages request (settings, camera, changes of the scene), and the
-//!   command that renders it.
-//! - `refinement`: the order of the passes for a wish, as a state machine.
+//! - `wish`, `command_line`: the wish, which is the picture that pages request (settings, camera, changes of
+//!   the scene), and the command that renders it.
+//! - `refinement`: the order of the passes that render a wish, as a state machine.
 //! - `canvas`, `pages`, `cards`: tiles of the newest wish; the next message to each page; states of the
 //!   cards.
 //! - `request`, `describe`: messages from a page, and messages to it.
@@ -215,8 +215,8 @@ fn open_in_browser(url: &str) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Greets lost cards again until the view is over, each after pauses that double, and reports those that
-/// answer.
+/// Tries to reconnect lost cards until the view is over, each card after pauses that double, and reports to
+/// the hub each card that answers.
 fn look_for_cards(hub: &Hub) {
     while !hub.is_over() {
         std::thread::sleep(LOOK);

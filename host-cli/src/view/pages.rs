@@ -1,11 +1,13 @@
-//! Messages to pages: the next one for each page, in bounded memory.
+//! Messages to pages: selection of the next message to each page, in bounded memory. Tiles belong to a wish:
+//! the picture that pages request by settings, camera and changes of the scene.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::canvas::{Canvas, Patch, Shown};
 
-/// Maximum total size of unacknowledged tiles, bytes. With none on the way, a larger tile is sent too.
+/// Maximum total size of unacknowledged tiles, bytes. If a page has acknowledged all tiles, a larger tile is
+/// sent as well.
 const MAX_ON_THE_WAY: u64 = 4 << 20;
 /// Maximum number of answers that wait for a page. Older ones are dropped.
 const MAX_REPLIES: usize = 64;

@@ -1,4 +1,5 @@
-//! Thread that renders a view's pictures, one after another, on the same cards.
+//! Thread that renders a view's pictures, one after another, on the same cards. Each picture is that of a
+//! wish: settings, camera and changes of the scene that pages request.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -31,9 +32,11 @@ pub(super) struct Painter<'a> {
     renderer: Renderer,
     threads: Option<usize>,
     scene: Arc<Scene>,
-    /// Pilot renders that a new wish has interrupted: they run on beside pictures.
+    /// Pilot renders that continue in the background, because a newer request of a page (a wish) came before
+    /// they ended.
     fitting: Option<Fitting>,
-    /// Assignments that `scene` has; `None` before the first picture, and after one failed.
+    /// Assignments (`--set`, and those of pages) that were applied to `scene`; `None` before the first
+    /// picture, and after an assignment has failed.
     assigned: Option<Vec<String>>,
 }
 
@@ -95,8 +98,8 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Waits for pilot renders. A new wish interrupts the wait; the pilot renders continue, for the camera
-    /// that they were started with.
+    /// Starts pilot renders unless some are in progress, and waits for their result. A newer wish interrupts
+    /// the wait; the pilot renders continue for the camera with which they were started.
     fn fit(&mut self, task: &Task) -> Result<(), RenderError> {
         let by = (self.quality, self.finish);
         let begin = || Fitting::start(self.scene.clone(), by, task.settings.clone(), self.threads);
@@ -136,7 +139,8 @@ impl<'a> Painter<'a> {
         Ok(())
     }
 
-    /// Denoises the settled picture, if the view denoises. Pages are sent the result, or the error.
+    /// Denoises the settled picture (the final one of a wish), if the view denoises. Pages are sent the
+    /// result, or the error.
     fn denoise(&self, task: &Task, film: &Film) -> Result<Option<Vec<[f32; 3]>>, RenderError> {
         let Some(denoiser) = self.denoiser else { return Ok(None) };
         let denoised = denoiser.radiance(film, self.threads, &|| self.hub.must_stop());

@@ -1,5 +1,5 @@
 //! Interface between a view's state and the painter: the next pass with its settings, finished tiles, and
-//! ends of passes.
+//! ends of passes. A pass renders a wish: settings, camera and changes of the scene that pages request.
 
 use std::time::Duration;
 
@@ -89,8 +89,8 @@ impl View {
         self.revisions = Revisions { state: self.revisions.state + 1, cards: self.revisions.cards + 1 };
     }
 
-    /// Records that a task's wish cannot be rendered. If it is the newest, it takes the settings of the last
-    /// settled picture, unless it has them already.
+    /// Records that a task's wish cannot be rendered. The newest wish is replaced by one with the settings of
+    /// the last settled picture, unless it has these settings already or they cannot be rendered either.
     pub(super) fn refuse(&mut self, task: &Task, reason: &str, now: Duration) {
         self.tell_error(reason);
         self.finish(task, Outcome::Refused, None, now);

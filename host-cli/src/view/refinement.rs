@@ -1,5 +1,7 @@
-//! Order of a view's passes, from the coarsest picture of a new camera to the picture of `photoncard render`:
-//! a state machine without threads, clock or pixels.
+//! Order of a view's passes, from the coarsest picture to the settled one, which is that of
+//! `photoncard render`: a state machine without threads, clock or pixels.
+//!
+//! A wish is the picture that pages request: settings, camera and changes of the scene.
 //!
 //! A newer wish stops the running pass of an older one, with two exceptions. If the first pass of a wish was
 //! stopped, the next first pass runs to its end: pages are shown pictures however fast wishes follow each
@@ -15,7 +17,7 @@ const FIRST_PAUSE: Duration = Duration::from_millis(500);
 /// Maximum pause after a failure.
 const MAX_PAUSE: Duration = Duration::from_secs(8);
 
-/// Side of the squares of pixels that the first pass has one pixel for.
+/// Side of the squares of pixels for each of which the first pass renders one pixel.
 pub(super) const COARSEST: u32 = 8;
 /// If the pass with every pixel is expected to take at most this time, it directly follows the first pass:
 /// pictures in between would hardly be seen.

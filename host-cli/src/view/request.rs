@@ -163,7 +163,7 @@ impl Fields<'_> {
         number.ok_or_else(|| format!("{name:?} is a whole number from 0 to {most}"))
     }
 
-    /// One number or three of a field, each finite as `f32`.
+    /// Returns the value of a field, which is a number or a list of three numbers, each finite as `f32`.
     fn values(&self, name: &str) -> Result<Vec<f64>, String> {
         let number = |value: &Value| value.as_f64().filter(|number| (*number as f32).is_finite());
         let values = match self.field(name)? {

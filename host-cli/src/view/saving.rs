@@ -1,4 +1,4 @@
-//! Pictures that pages save, under plain names in one folder. A file that is not of this view is never
+//! Pictures that pages save, under plain names in one folder. A file that this view did not write is never
 //! replaced.
 
 use std::collections::BTreeMap;
@@ -63,8 +63,8 @@ impl Folder {
     /// Saves a picture and returns its path. `write` writes it completely or not at all.
     ///
     /// # Errors
-    /// If the name is not plain or has another suffix than `.exr` and `.png`, if a file of this name is not
-    /// of this view, or if the picture cannot be written.
+    /// If the name is not plain or has another suffix than `.exr` and `.png`, if a file of this name exists
+    /// that this view did not write, or if the picture cannot be written.
     pub(super) fn save(
         &mut self,
         name: &str,
@@ -84,7 +84,9 @@ impl Folder {
     }
 }
 
-/// Format by a picture's suffix. The name must be plain.
+/// Returns the format that the suffix of a picture's name states. The name must be plain: ASCII letters,
+/// digits, spaces and `_-.` alone, with a letter, a digit or `_` at the beginning, and no name of a device on
+/// Windows.
 fn format_of(name: &str) -> Result<PictureFormat, String> {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-. ".contains(&byte);
     let begins_plainly =

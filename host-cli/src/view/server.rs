@@ -2,8 +2,8 @@
 //! is bounded.
 //!
 //! A connection is a stranger until its request's head is read. There is a maximum number of strangers:
-//! beyond it a new one closes the oldest. Silent strangers therefore cannot keep pages out, nor pages
-//! strangers.
+//! beyond it, each new stranger makes the server close the connection of the oldest. Silent strangers
+//! therefore cannot keep pages out, and connections of pages do not count as strangers.
 
 use std::collections::VecDeque;
 use std::net::{Shutdown, TcpListener, TcpStream};
@@ -82,7 +82,8 @@ impl Drop for Stranger {
     }
 }
 
-/// Unit of the count of accepted connections, given back when this is dropped.
+/// One accepted connection in the count of these connections, from which it is subtracted when this guard is
+/// dropped.
 struct Place(Arc<AtomicUsize>);
 
 impl Place {

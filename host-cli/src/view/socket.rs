@@ -1,4 +1,5 @@
-//! WebSocket of a page, with a reading and a writing thread. Both write whole frames, under a lock.
+//! WebSocket of a page, with a reading and a writing thread. Both threads write whole WebSocket frames, under
+//! a lock: the reading thread answers pings.
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, TcpStream};

@@ -1,5 +1,5 @@
-//! State of a view: wishes, their pictures, and pages. Threads, clock, input and output are in
-//! [`super::hub`].
+//! State of a view: wishes (the pictures that pages request: settings, camera and changes of the scene),
+//! their tiles, and the connected pages. Threads, clock, input and output are in [`super::hub`].
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -252,7 +252,7 @@ impl View {
         Ok(())
     }
 
-    /// Makes `wish` the newest wish, if it differs from that.
+    /// Makes `wish` the newest wish, if it differs from the present one.
     pub(super) fn wish_for(&mut self, wish: Wish) -> Result<(), RenderError> {
         if wish == self.wish {
             // A new state tells the page that its message was received.
@@ -282,8 +282,8 @@ impl View {
         self.revisions.state += 1;
     }
 
-    /// Number of the wish whose running pass is shown: it must not stop, and its picture has the present
-    /// size.
+    /// Number of the wish whose running pass is shown to pages: a pass that must not stop, and whose picture
+    /// has the present size. `None` without such a pass.
     pub(super) fn spared(&self) -> Option<u32> {
         self.refinement.spares().filter(|version| *version >= self.of_size)
     }

@@ -52,7 +52,8 @@ impl Wish {
         (picture.camera_at, picture.look_at, picture.fov) = (Some(position), Some(look_at), Some(fov));
     }
 
-    /// Sets a property. Its new value takes the place of an earlier one, in the order of assignments.
+    /// Sets a property. If it was set before, the new value replaces the earlier value at the same position
+    /// in the order of assignments.
     pub(super) fn set(&mut self, name: String, value: Vec<f64>) {
         match self.edits.iter_mut().find(|(edited, _)| *edited == name) {
             Some((_, earlier)) => *earlier = value,
@@ -103,7 +104,8 @@ impl Wish {
         Self { settings, stated: other.stated, ..self.clone() }
     }
 
-    /// Requests all layers, unless the picture has layers of the chips already. Returns whether it did.
+    /// Requests all layers, unless the picture already has a layer that chips render only on request. Returns
+    /// whether the layers have changed.
     pub(super) fn add_layers(&mut self) -> bool {
         let layers = &mut self.settings.picture.layers;
         !layers.are_of_chip() && {
@@ -117,7 +119,8 @@ impl Wish {
         fit.apply(&mut self.settings, self.stated);
     }
 
-    /// Returns whether another wish has another scene or other photons.
+    /// Returns whether another wish differs in the scene or in the settings of the photons, so that photons
+    /// must be traced again.
     pub(super) fn is_other_edition(&self, other: &Self) -> bool {
         let photons = |wish: &Self| (wish.settings.photons.clone(), wish.settings.integrator.seed);
         self.given != other.given || self.edits != other.edits || photons(self) != photons(other)

@@ -1,4 +1,4 @@
-//! Small files that stand for large contents are refused with a remedy, or rendered in 4 GB of address space
+//! Small files that describe large contents are refused with a remedy, or rendered in 4 GB of address space
 //! and some seconds (docs/architecture.md, "What a file may cost").
 #![cfg(unix)]
 

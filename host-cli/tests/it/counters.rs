@@ -256,7 +256,7 @@ fn invalid_caches_are_refused_with_the_valid_form() {
     }
 }
 
-/// The shell's limit of file sizes is reached by the trace first.
+/// The trace is the first file that reaches the shell's limit of file sizes.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_trace_that_cannot_be_written_ends_the_render() {

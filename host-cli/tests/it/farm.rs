@@ -1,4 +1,5 @@
-//! Farm jobs are run, without their engines if need be; the picture has the bytes of a single render's.
+//! Farm jobs are run, some without their engines. Their picture has the bytes of the picture of a single
+//! render.
 #![cfg(unix)]
 
 use std::process::Command;
@@ -272,7 +273,7 @@ fn progress_and_failure_are_lines_of_open_job_description() {
 fn frames_of_a_job_equal_those_of_one_render() {
     let (room, _) = room();
     std::fs::copy(shipped("cornell-moving.glb"), room.path(FOLDER).join(SCENE)).unwrap();
-    // A pilot of each.
+    // Both the single render and the job run a pilot, as no option states its results.
     let options = &OPTIONS[..OPTIONS.len() - 2];
     let frames = [&["--frames", "8-10", "--fps", "12"], options].concat();
     let whole = run(&room, &[&["render", SCENE, "-o", "whole.##.exr"], &frames[..]].concat());

@@ -77,7 +77,7 @@ fn options_of_other_renderers_and_other_files_get_a_remedy() {
     }
 }
 
-/// An environment map is black in the red channel but for one column.
+/// The environment map is black in the red channel, except in one column.
 #[test]
 fn environments_are_turned_by_the_option_and_by_blenders_convention() {
     let room = Room::new();

@@ -59,8 +59,8 @@ fn a_moving_camera_takes_one_photon_pass_and_one_load() {
     }
 }
 
-/// A card may be loaded only in a later frame: the others had rendered the frames before it had the card
-/// image.
+/// A card may receive the card image only in a later frame, after the other cards have rendered the frames
+/// before.
 #[test]
 fn no_card_is_loaded_twice_for_cameras_that_move() {
     let room = Room::new();

@@ -1,4 +1,4 @@
-//! Options without effect for want of another option: a notice reports them.
+//! Options that have no effect because another option is missing: a notice reports them.
 
 use crate::support::{Room, scene, shipped};
 

@@ -42,7 +42,7 @@ fn layers_are_requested_by_name_and_do_not_change_the_picture() {
 fn a_render_writes_pictures_and_statistics() {
     let room = Room::new();
     let cornell = shipped("cornell.gltf");
-    // With one card the sums are exact. Of several, one may still have bytes under way at the end.
+    // With one card the sums are exact. With several, bytes may still be under way to one of them at the end.
     let files = ["-o", "a.exr", "-o", "a.png", "--stats", "a.json", "--card", "emulated:1"];
     let outcome = room.rendered(&cornell, &files);
     assert_eq!(room.names(), ["a.exr", "a.json", "a.png"]);

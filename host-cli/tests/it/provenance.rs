@@ -79,7 +79,7 @@ const OTHERS: [&[&str]; 25] = [
 /// Options of storage, which the file itself states, of denoising, which adds a layer, and of messages.
 const OF_THE_FILE: [&str; 6] = ["--output", "--sample-type", "--denoise", "--quiet", "--progress", "--help"];
 
-/// Option that pixels depend on, for scenes with variants, of which none ships.
+/// Option that pixels depend on, for scenes with variants. No shipped scene has variants.
 const OF_SCENES_WITH_VARIANTS: &str = "--variant";
 
 /// Options of frames, which another test checks.

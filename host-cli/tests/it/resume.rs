@@ -48,8 +48,8 @@ fn begun(room: &Room, options: &[&str], tiles: u64) -> Child {
     host
 }
 
-/// Signal of a closed terminal. If the tests run without one, hang-ups are ignored, and the signal is
-/// SIGTERM.
+/// Option of `kill` for the signal of a closed terminal, SIGHUP. If this process ignores SIGHUP, the signal
+/// is SIGTERM.
 fn hang_up() -> &'static str {
     #[cfg(target_os = "linux")]
     if hang_up::is_ignored() == Some(false) {

@@ -35,7 +35,7 @@ pub(super) fn curtain_rod() -> Mesh {
     mesh
 }
 
-/// Banner over the handrail that hangs in front of the gallery's edge.
+/// Banner that lies over the handrail and hangs down in front of the gallery's edge.
 pub(super) fn banner() -> Mesh {
     const PER_SPAN: usize = 2;
     const COLUMNS: usize = 25;
@@ -59,7 +59,8 @@ pub(super) fn banner() -> Mesh {
         let span = (row / PER_SPAN).min(path.len() - 2);
         let within = (row - span * PER_SPAN) as f32 / PER_SPAN as f32;
         let [z, y] = [0, 1].map(|axis| path[span][axis] + (path[span + 1][axis] - path[span][axis]) * within);
-        // Folds begin where the cloth leaves the rail, and only away from the wall.
+        // Folds begin where the cloth leaves the rail on the side of the court. The end behind the rail is
+        // flat.
         let fall = (5.6 - y).clamp(0.0, 2.0) / 2.0 * if row > 4 * PER_SPAN { 1.0 } else { 0.0 };
         let wave = on_circle(column, 8);
         let s = column as f32 / (COLUMNS - 1) as f32 - 0.5;

@@ -9,8 +9,8 @@ use glam::Vec3;
 
 use crate::mesh::Mesh;
 
-/// Half the width of the sky; heights of its foot, which is within the roof, and of its top; its south and
-/// north end; all metres.
+/// Extent of the sky, metres: half its width in x, the heights of its foot, which is within the roof, and of
+/// its top, and the z of its south and its north end.
 const SKY_X: f32 = 13.3;
 const SKY_Y: [f32; 2] = [9.2, 12.9];
 const SKY_Z: [f32; 2] = [-7.4, 5.6];

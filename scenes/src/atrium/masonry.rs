@@ -69,7 +69,8 @@ impl ArchedPanel {
         if let Some(crown) = right.last_mut() {
             crown[0].x = 0.0;
         }
-        // Mirrored rather than computed, so that neighbours meet bit for bit.
+        // The left half is the exact mirror image of the right half, so that adjacent panels meet bit for
+        // bit.
         let left: Vec<_> =
             right.iter().rev().skip(1).map(|pair| pair.map(|p| Vec2::new(-p.x, p.y))).collect();
         right.into_iter().chain(left).collect()
@@ -90,7 +91,7 @@ pub(super) fn arch_moulding(springing: f32, radii: [f32; 2], offsets: [f32; 2], 
         [inner, back],
     ];
     let mut mesh = Mesh::default();
-    // One more station at either end takes the feet down into their supports.
+    // One more station at either end extends the feet of the moulding down into their supports.
     mesh.grid([segments + 3, profile.len()], [false, true], |station, row| {
         let [radius, offset] = profile[row];
         let drop = if station == 0 || station == segments + 2 { EMBED + 0.01 } else { 0.0 };
@@ -105,7 +106,8 @@ pub(super) fn arch_moulding(springing: f32, radii: [f32; 2], offsets: [f32; 2], 
 /// The vault extends into the walls at both ends of z and, with `all_round`, also of x.
 pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh {
     const STEPS: usize = 10;
-    // Position and height of a cylinder's lines, at equal angles, so that its facets are equal.
+    // Position and height of the lines between a cylinder's facets. Their angles are equidistant, so that the
+    // facets are equal.
     let line = |index: usize| on_circle(STEPS - index, 2 * STEPS) * radius;
     let walled = |index: usize| match index {
         0 => Vec2::new(-radius - EMBED, 0.0),
@@ -122,7 +124,7 @@ pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh 
             let (u, v) = (across(column), walled(row));
             Vec3::new(u.x, springing + u.y.max(v.y).max(0.0), v.x)
         },
-        // The cut follows the groin.
+        // Each cell that a groin crosses is divided along the groin.
         |column, row| (column < columns / 2) != (row < (STEPS + 2) / 2),
     );
     mesh
@@ -133,7 +135,7 @@ pub(super) fn groin_vault(springing: f32, radius: f32, all_round: bool) -> Mesh 
 /// `profile` is a closed polygon of offset and height, counter-clockwise if offsets point to the right.
 pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
     const STEPS: [usize; 2] = [16, 6];
-    // Corners around the court, the first two along +x on the side of +z.
+    // Corners of the court in units of its half size. The first side leads from -x to +x at +z.
     let corners = [Vec2::new(-1.0, 1.0), Vec2::ONE, Vec2::new(1.0, -1.0), Vec2::NEG_ONE];
     let stations: Vec<Vec2> = (0..4)
         .flat_map(|side| {
@@ -150,7 +152,8 @@ pub(super) fn ring(profile: &[[f32; 2]]) -> Mesh {
     mesh
 }
 
-/// Square slabs of side `size` on y = 0, from column and row `min` to `max`, where `chosen` returns true.
+/// Square slabs of side `size`, metres, on y = 0. There is a slab in each column and row, from `min` to
+/// before `max`, for which `chosen` returns true.
 pub(super) fn paving(min: [i32; 2], max: [i32; 2], size: f32, chosen: impl Fn(i32, i32) -> bool) -> Mesh {
     let mut mesh = Mesh::default();
     for column in min[0]..max[0] {

@@ -20,7 +20,7 @@ use side::Plan;
 
 pub(crate) use self::walk::walk;
 
-/// Vertical field of view and aspect ratio of the cameras, which give a horizontal field of view of 73
+/// Vertical field of view, radians, and aspect ratio of the cameras. The horizontal field of view is 73
 /// degrees.
 const LENS: (f64, f64) = (0.789, 16.0 / 9.0);
 

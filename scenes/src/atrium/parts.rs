@@ -153,7 +153,7 @@ fn upper_moulding() -> Mesh {
     arch_moulding(UPPER_SPRINGING, [radius + 0.015, radius + 0.12], offsets, 12)
 }
 
-/// Arch across the corridor between two vaults, slightly lower than they are.
+/// Arch across the corridor between two vaults, slightly lower than the vaults.
 fn rib() -> Mesh {
     let radius = BAY / 2.0;
     let arch = arch_moulding(GROUND_SPRINGING, [radius - 0.11, radius + 0.05], [-0.18, 0.18], 16);

@@ -14,7 +14,8 @@ pub(super) type Hangings = &'static [(usize, usize)];
 pub(super) struct Plan {
     pub(super) name: &'static str,
     pub(super) bays: usize,
-    /// Local x axis in world space. Axes are quarter turns of the world's, so that nothing is rounded.
+    /// Local x axis in world space. It is parallel to an axis of world space, so that no coordinate is
+    /// rounded.
     pub(super) x_axis: [f32; 3],
     /// Local z axis in world space.
     pub(super) z_axis: [f32; 3],
@@ -45,7 +46,7 @@ pub(super) fn build(scene: &mut SceneBuilder, parts: &Parts, plan: &Plan) {
 struct Side<'a> {
     scene: &'a mut SceneBuilder,
     parts: &'a Parts,
-    /// Half the length of the arcade.
+    /// Half the length of the arcade, metres.
     half: f32,
     bays: usize,
     children: Vec<usize>,
@@ -130,7 +131,8 @@ impl Side<'_> {
     }
 }
 
-/// Adds a free-standing mesh at a position in world space, scaled.
+/// Adds a root node with the mesh of index `mesh` at `place` in world space, metres. The mesh is scaled by
+/// `scale`.
 pub(super) fn stand(scene: &mut SceneBuilder, name: &str, mesh: usize, place: Vec3, scale: f32) {
     let scale = (scale != 1.0).then_some([scale; 3]);
     let translation = Some(place.to_array());

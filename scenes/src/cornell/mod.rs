@@ -23,7 +23,8 @@ const BACK: Quad = [[-1.0, -1.0, -1.0], [1.0, -1.0, -1.0], [1.0, 1.0, -1.0], [-1
 const GREEN_WALL: Quad = [[1.0, -1.0, -1.0], [1.0, -1.0, 1.0], [1.0, 1.0, 1.0], [1.0, 1.0, -1.0]];
 const RED_WALL: Quad = [[-1.0, -1.0, 1.0], [-1.0, -1.0, -1.0], [-1.0, 1.0, -1.0], [-1.0, 1.0, 1.0]];
 
-/// Box that stands on the floor or slightly in it: x and z of its four corners, bottom and top.
+/// Box that stands on the floor or slightly in it: x and z of its four corners, and the heights of its bottom
+/// and top, metres.
 struct StandingBox {
     footprint: [[f32; 2]; 4],
     bottom: f32,
@@ -62,8 +63,8 @@ const LIGHT_RADIANCE: [f64; 3] = [18.387, 13.9873, 6.75357];
 const UPLIGHT: Quad = [[-0.12, 0.72, 0.12], [0.12, 0.72, 0.12], [0.12, 0.72, -0.12], [-0.12, 0.72, -0.12]];
 const CUP: (f32, f32, f32) = (0.14, 0.7, 0.86);
 const CUP_ALBEDO: [f64; 3] = [0.1; 3];
-/// Radiance of the upward lamp, W/(sr m^2). With a third of the area it emits the power of the ceiling's
-/// lamp.
+/// Radiance of the upward lamp, W/(sr m^2). This lamp has a third of the area of the lamp in the ceiling, and
+/// emits the same power.
 const UPLIGHT_RADIANCE: [f64; 3] = [56.0, 42.6, 20.6];
 
 /// Centres and radius of the balls, metres. They float slightly above the floor.
@@ -99,7 +100,8 @@ fn standing_box(shape: &StandingBox) -> Mesh {
     mesh
 }
 
-/// Box with a material on its floor (by default that of the white walls), its blocks, and a lamp.
+/// Creates the box with its blocks and a lamp. The floor has the material `floor`, by default that of the
+/// white walls.
 fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> SceneBuilder {
     let (mut scene, white) = empty_box(floor, add_lamp);
     scene.object("small-box", &standing_box(&SMALL_BOX), white);
@@ -108,7 +110,7 @@ fn cornell_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> Sce
     scene
 }
 
-/// Box without blocks. Returns it with the index of the white walls' material.
+/// Creates the box with a lamp and without blocks. Returns it with the index of the white walls' material.
 fn empty_box(floor: Option<&Material>, add_lamp: fn(&mut SceneBuilder)) -> (SceneBuilder, usize) {
     let mut scene = SceneBuilder::default();
     let white = scene.material(&Material::diffuse("white", WHITE));

@@ -4,7 +4,7 @@ use core::f32::consts::TAU;
 
 use super::picture::Picture;
 
-/// Hash of two numbers, 0 to 255.
+/// Hash of two numbers. The hash is from 0 to 255.
 fn hash(a: u32, b: u32) -> u32 {
     let mut value = a.wrapping_mul(0x9e37_79b1) ^ b.wrapping_mul(0x85eb_ca77);
     value = (value ^ (value >> 15)).wrapping_mul(0x2c1b_3c6d);
@@ -36,7 +36,7 @@ pub(super) fn planks() -> Picture {
     })
 }
 
-/// Five-petalled flowers that are off-centre, beside a stripe, on a ground that darkens downwards.
+/// Five-petalled flower off the centre, beside a stripe, on a ground that darkens downwards.
 pub(super) fn wallpaper() -> Picture {
     const SIDE: u32 = 256;
     Picture::new([SIDE, SIDE], |column, row| {

@@ -2,7 +2,7 @@
 
 use super::{Record, read_f32, read_u32, write_f32, write_u32};
 
-/// Value of [`LeafAttributes`] that marks a leaf without attributes.
+/// Encoded [`LeafAttributes`] of a leaf without attributes.
 pub const NO_ATTRIBUTES: u32 = u32::MAX;
 
 const NO_NORMALS: u32 = u32::MAX;
@@ -32,7 +32,7 @@ impl LeafAttributes {
         (entry != NO_ATTRIBUTES).then_some(Self { first: entry & !TWO_SETS, two_sets })
     }
 
-    /// Encodes the entry of the leaf.
+    /// Encodes the entry that [`Self::read`] decodes.
     pub fn to_entry(self) -> u32 {
         self.first | if self.two_sets { TWO_SETS } else { 0 }
     }
@@ -53,7 +53,7 @@ impl LeafAttributes {
 /// | 0..12 | unit normals, 32 bits each: octahedral, 16 bits per axis |
 /// | 12..36 | texture coordinates, two `f32` each |
 /// | 36..60 | colours, linear RGBA, 16 bits per channel |
-/// | 60..64 | index of its emitter |
+/// | 60..64 | index of the triangle's emitter; 2^32 - 1 for none |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attributes {
     /// Shading normals at the corners, on the front side; `None` if the triangle is shaded with its geometric

@@ -1,6 +1,7 @@
 //! Leaves of the bounding volume hierarchy: neighbouring triangles in one line, which are tested together.
 //!
-//! A shared vertex is stored once, so that a line holds eight triangles of a mesh or three separate ones.
+//! A shared vertex is stored once, so that a line holds up to eight triangles of a mesh, or three triangles
+//! without common vertices.
 
 use core::ops::Range;
 
@@ -63,8 +64,8 @@ pub struct Triangle {
 }
 
 impl BvhLeaf<'_> {
-    /// Bytes of the line that a reader of one triangle needs if its slot is known: all but the last byte,
-    /// which holds the numbers of triangles and vertices.
+    /// Bytes of the line that are needed to read a triangle whose slot is known: all but the last byte, which
+    /// holds the numbers of triangles and vertices.
     pub const OF_TRIANGLE: Range<u32> = 0..LINE_BYTES as u32 - 1;
 
     /// Number of triangles, at most [`LEAF_TRIANGLES`].
@@ -98,7 +99,8 @@ impl BvhLeaf<'_> {
     fn corners(&self, corner: usize) -> [u32; LEAF_TRIANGLES] {
         let vertices = read_u32(self.0, CORNERS + 4 * corner);
         let mut corners = [0; LEAF_TRIANGLES];
-        // A loop: compilers leave `from_fn` without the vector instructions of the caller.
+        // A loop, because compilers compile `from_fn` without the vector instructions that the caller
+        // enables.
         for (slot, corner) in (0_u32..).zip(&mut corners) {
             // An index above the maximum occurs in unsound card images only.
             *corner = (vertices >> (4 * slot) & 15).min(LEAF_VERTICES as u32 - 1);
@@ -186,8 +188,8 @@ impl BvhLeaf<'_> {
         let mut materials = Distinct::<u32, LEAF_MATERIALS>::new();
         for (slot, triangle) in triangles.iter().enumerate() {
             for (corner, vertex) in triangle.vertices.iter().enumerate() {
-                // Compared as bits: a vertex with -0 must not replace an equal one with 0, or hits would
-                // depend on the order of triangles.
+                // Coordinates are compared as bits: a vertex with -0 must not replace an equal one with 0, or
+                // hits would depend on the order of triangles.
                 let vertex = vertices.index(vertex.map(f32::to_bits))?;
                 let at = CORNERS + 4 * corner;
                 let before = read_u32(&line, at);

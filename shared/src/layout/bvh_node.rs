@@ -9,8 +9,8 @@ use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides}
 use super::{read_vector, write_f32};
 use crate::address::LINE_BYTES;
 
-/// An inner node of the bounding volume hierarchy, one line. It is a [`WideNode`] with further fields; sides
-/// of boxes are in the node's units, from the node's corner.
+/// An inner node of the bounding volume hierarchy, one line. It is a [`WideNode`] with the further fields
+/// below. The sides of the children's boxes are in the node's units, counted from the node's corner.
 ///
 /// | bytes | contents |
 /// |---|---|

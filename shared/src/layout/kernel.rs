@@ -1,5 +1,5 @@
-//! Kernel radii of caustic photons. Their code takes the five bits that hold the disc fraction of other
-//! photons.
+//! Kernels of caustic photons. The code of a kernel's area takes the five bits that hold the disc fraction of
+//! a photon of the photon map.
 
 use super::photon::DISC_CODES;
 

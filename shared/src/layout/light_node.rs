@@ -16,7 +16,7 @@ pub const LIGHT_TREE_LEVELS: usize = 16;
 /// |---|---|
 /// | 0..12 | centre of the bounding sphere, metres |
 /// | 12..16 | radius of the bounding sphere, metres |
-/// | 16..20 | emitted power as a fraction of the node's |
+/// | 16..20 | emitted power as a fraction of the node's power |
 /// | 20..24 | axis of the bounding cone of the emission normals: octahedral, 16 bits per axis |
 /// | 24..28 | cosine of the cone's half angle |
 /// | 28..32 | index of an emitter, with the highest bit set, or of a node; 2^32 - 1 for an absent child |
@@ -31,7 +31,7 @@ pub struct LightChild {
     /// Axis of the bounding cone of the emission normals, of length 0.57 to 1.
     pub axis: [f32; 3],
     /// Cosine of the half angle of the bounding cone. It is -1, for all directions, if there are point lights
-    /// or double-sided triangles.
+    /// or double-sided triangles below the child.
     pub cosine: f32,
     /// Index of the child: a node or an emitter.
     pub link: LightLink,

@@ -5,7 +5,7 @@ use super::{Record, read_f32, read_u32, read_vector, write_f32, write_u32, write
 /// Flag of [`Material::flags`]: the back reflects and emits like the front (glTF `doubleSided`).
 pub const DOUBLE_SIDED: u32 = 1;
 /// Flag of [`Material::flags`] for [`Reflectance::Glass`]: a thin wall, which transmits light without
-/// refraction. In glTF it has no `KHR_materials_volume`, or one of thickness 0.
+/// refraction. A glTF material is thin-walled if it has no `KHR_materials_volume`, or one of thickness 0.
 pub const THIN_WALLED: u32 = 2;
 /// Flag of [`Material::flags`]: some triangles of the material have [`super::Attributes`].
 pub const HAS_ATTRIBUTES: u32 = 4;
@@ -59,7 +59,7 @@ pub struct Material {
     /// [`COMPENSATED`] and [`PANE`].
     pub flags: u32,
     /// glTF's `alphaCutoff`: a triangle with cut-outs is absent where alpha, the product of base texture and
-    /// vertex alpha, is below it. With [`BLENDS`], coverage is `cutoff` times alpha.
+    /// vertex alpha, is below `cutoff`. With [`BLENDS`], coverage is `cutoff` times alpha.
     pub cutoff: f32,
     /// Indices of three textures: base colour or diffuse albedo; metallic-roughness, with roughness in green
     /// and metalness in blue; emission. [`NO_TEXTURE`] if absent.

@@ -20,8 +20,8 @@
 //! | [`DistantLight`] | 32 | 4 |
 //! | threshold of the environment's distribution | 4 | 32 |
 //!
-//! Colours and vectors are three `f32`; lengths are metres, powers watts per channel divided by the card
-//! image's photon power unit, radiances W/(sr m^2).
+//! Colours and vectors are three `f32`. Lengths are in metres, radiances in W/(sr m^2), and photon powers in
+//! units of the card image's photon power unit, which is in watts.
 
 use crate::address::LINE_BYTES;
 

@@ -14,12 +14,12 @@ pub const PHOTON_CONTENT_BYTES: usize = 8;
 /// | 16..18 | incoming direction, from the surface towards the origin of the photon, [`super::encode_direction`] |
 /// | 18..20 | flags: bits 0-1 splitting axis, 2-9 surface normal ([`super::encode_normal`]), 10-14 disc fraction, 15 direct |
 ///
-/// The *disc fraction* is a ratio of areas: the surfaces whose photons a gather around this photon adds up,
-/// over the flat disc `pi r^2` of the gather's radius. It is 1 on a plain wall, less at edges and in corners,
-/// more where surfaces are stacked. The density estimate divides by `pi r^2` times this fraction. Where walls
-/// hide parts of the disc from the photon ([`is_of_region`]), a gather counts only photons of the region that
-/// its point sees, and divides by that region's area in the plane times the fraction. The fraction is stored
-/// as a code of [`disc_fraction`].
+/// The *disc fraction* is the area of the surfaces whose photons a gather around this photon adds up, divided
+/// by the area `pi r^2` of a flat disc of the gather's radius `r`. It is 1 on a flat wall, less at edges and
+/// in corners, more where surfaces are stacked. The density estimate divides by `pi r^2` times this fraction.
+/// Where walls hide parts of the disc from the photon ([`is_of_region`]), a gather counts only photons of the
+/// region that the gather's point sees, and divides by the area of that region in the plane times the
+/// fraction. The fraction is stored as a code of [`disc_fraction`].
 ///
 /// In the caustic map these five bits hold the radius of the photon's kernel, as a code of
 /// [`super::kernel_share`].

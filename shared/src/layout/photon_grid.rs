@@ -6,9 +6,9 @@ pub(super) const GRID_MASK: u32 = (1 << GRID_BITS) - 1;
 /// Maximum magnitude of `origin + q`. Integers up to 2^24 are exact in `f32`.
 const MAX_COORDINATE: f64 = (1 << 24) as f64;
 
-/// Grid of the photons' positions: grid coordinates `q` below 2^20 stand for the position `(origin + q) *
-/// cell`, exact in `f32`. The longest side of the covered box takes at least half of the 2^20 cells, or fewer
-/// far from the origin, where `f32` is coarser.
+/// Grid of the photons' positions: the position with the grid coordinates `q`, each below 2^20, is `(origin +
+/// q) * cell`, which is exact in `f32`. The longest side of the covered box takes at least half of the 2^20
+/// cells, or fewer far from the origin, where `f32` is coarser.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhotonGrid {
     /// Minimum corner of the grid, in cells.

@@ -77,7 +77,7 @@ impl<'a> PhotonLeaf<'a> {
         let mut bit = AXES_BITS + COUNT_BITS;
         let mut first = HEADER_BYTES as u32;
         let mut axes = [LeafAxis { corner: 0, first: 0, mask: 0 }; 3];
-        // A loop: compilers may leave `map` as a call.
+        // A loop, because compilers may leave `map` as a function call.
         for (axis, read) in (0..).zip(&mut axes) {
             let varies = (header >> axis) as u32 & 1;
             let rounding = varies * CORNER_ROUNDING;
@@ -133,8 +133,8 @@ impl<'a> PhotonLeaf<'a> {
         self.contents().iter().nth_back(index as usize).copied().unwrap_or_default()
     }
 
-    /// Returns for each axis whether the coordinates of photons in a bounding box vary; true for at least one
-    /// axis.
+    /// Returns for each axis whether a leaf whose photons have this bounding box stores offsets on it. It
+    /// stores them on the axes where coordinates vary, or on x if none vary.
     fn varying(bounds: &GridBox) -> [bool; 3] {
         let ([a, b, c], [x, y, z]) = (bounds.lower, bounds.upper);
         let varies = [a != x, b != y, c != z];

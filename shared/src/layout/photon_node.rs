@@ -9,15 +9,15 @@ use super::wide_node::{Links, NODE_CHILDREN, WideNode, write_links, write_sides}
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
 
-/// An inner node of a photon map, one line. It is a [`WideNode`] with further fields; sides of boxes are in
-/// the node's units, from the node's corner.
+/// An inner node of a photon map, one line. It is a [`WideNode`] with the further fields below. The sides of
+/// the children's boxes are in the node's units, counted from the node's corner.
 ///
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | x, y, z of the corner: bits 0-23 grid coordinate, 24-31 exponent of the unit on this axis |
 /// | 22..24 | photon map: upper half of the bits of [`Self::photon_share`] |
-/// | 22..24 | caustic map: one bit per child, set if its photons have normals of one class |
-/// | 24..32 | caustic map: four bits per child, this class ([`normal_class`](super::normal_class)) |
+/// | 22..24 | caustic map: one bit per child, set if the normals of all photons below it are of one class |
+/// | 24..32 | caustic map: four bits per child, the normals' class ([`normal_class`](super::normal_class)) |
 #[derive(Clone, Copy)]
 pub struct PhotonNode<'a>(pub &'a [u8; LINE_BYTES]);
 
@@ -55,9 +55,10 @@ pub struct NodeCoordinates<'a> {
 }
 
 impl<'a> PhotonNode<'a> {
-    /// Squared radius, m^2, divided by k, to which a search for the k nearest photons is narrowed if this is
-    /// the first node with leaves that it visits. The host chooses the radius such that most of these
-    /// searches find k photons. 0 in a node without leaves, and where the host has no estimate.
+    /// Returns `r^2 / k`, m^2, where `r` is the radius to which a search for the k nearest photons is
+    /// narrowed if this node is the first node with leaves that the search visits. The host chooses `r` such
+    /// that most of these searches find k photons. The value is 0 in a node without leaves, and where the
+    /// host has no estimate.
     #[inline(always)]
     pub fn photon_share(&self) -> f32 {
         let [low, high] = [SHARE, SHARE + 1].map(|at| u32::from(WideNode(self.0).byte(at)));
@@ -85,9 +86,9 @@ impl<'a> PhotonNode<'a> {
         of_one & without
     }
 
-    /// Stores the classes ([`normal_class`](super::normal_class)) below each child of a caustic map:
-    /// `children` has a bit mask of them for each. A child of several classes is in no result of
-    /// [`Self::children_without`].
+    /// Stores the classes ([`normal_class`](super::normal_class)) of the normals below each child of a node
+    /// of a caustic map. `children` has one bit mask of classes per child. A child of several classes is in
+    /// no result of [`Self::children_without`].
     pub fn set_classes(line: &mut [u8; LINE_BYTES], children: impl IntoIterator<Item = u16>) {
         let (mut of_one, mut codes) = (0_u16, 0_u64);
         for (child, classes) in children.into_iter().enumerate().take(NODE_CHILDREN) {

@@ -12,7 +12,7 @@ const SIGNS: usize = 12;
 /// | bytes | contents |
 /// |---|---|
 /// | 0..12 | tangents, 32 bits each: octahedral, 16 bits per axis; all ones for none |
-/// | 12..16 | bits 0 to 2: the corner's sign is -1 |
+/// | 12..16 | bit `i`, 0 to 2: set if the sign of corner `i` is -1 |
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tangents {
     /// Tangents, of length 0.57 to 1. A corner without a tangent has zero: a normal map has no effect there.

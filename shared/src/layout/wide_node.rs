@@ -1,5 +1,5 @@
 //! Common part of [`super::BvhNode`] and [`super::PhotonNode`]: an inner node with up to sixteen children.
-//! Leaves come before inner nodes; the indices of each kind are consecutive.
+//! Among its children, leaves come before inner nodes, and the indices of each kind are consecutive.
 
 use super::{read_u32, write_u32};
 use crate::address::LINE_BYTES;
@@ -38,7 +38,7 @@ pub struct WideNode<'a>(pub &'a [u8; LINE_BYTES]);
 /// Indices of the children of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Links {
-    /// Number of children that are leaves. Leaves come before inner nodes.
+    /// Number of children that are leaves. These children come before the inner nodes.
     pub leaves: u32,
     /// Index of the first child that is a leaf.
     pub first_leaf: u32,
@@ -93,7 +93,8 @@ impl Links {
     }
 }
 
-/// Writes the indices of the children into the line of a node; `None` if there are no children or too many.
+/// Writes the indices of the children into the line of a node; `None` if there are no children, too many, or
+/// fewer than `links` has leaves.
 pub(super) fn write_links(line: &mut [u8; LINE_BYTES], children: usize, links: Links) -> Option<()> {
     if children == 0 || children > NODE_CHILDREN || links.leaves as usize > children {
         return None;

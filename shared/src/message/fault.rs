@@ -25,9 +25,10 @@ pub enum FaultCode {
     /// The data of a write is not whole lines, exceeds the card image, or has too many lines; detail: number
     /// of the first line.
     Lines,
-    /// Chunks were requested that are not written, or too many; detail: number of the first chunk.
+    /// Checksums were requested of no chunks, of too many, or of chunks that were not written; detail: number
+    /// of the first chunk.
     Chunks,
-    /// The card image's checksum differs; detail: the lower half of the checksum found.
+    /// The card image's checksum is not the announced one; detail: the lower half of the checksum found.
     ImageChecksum,
     /// The card image's header is invalid; detail: the card image's layout version if that is wrong, else 0.
     ImageHeader,
@@ -45,14 +46,15 @@ pub enum FaultCode {
     /// A bounding volume hierarchy, photon map or light tree is deeper than a chip's stack allows, or is not
     /// a tree; detail: index of a node.
     Depth,
-    /// The operands are not whole triples, none, or too many; detail: their length, bytes.
+    /// The operands are not a whole number of triples, or there are none or too many; detail: their length,
+    /// bytes.
     Operands,
     /// The chip's program or its on-chip memory is defective; detail: number of the [`Invariant`].
     Internal,
 }
 
-/// Conditions that hold in a correct chip, numbered as in [`FaultCode::Internal`]. If one is violated, the
-/// card sends a fault instead of losing light.
+/// Conditions that hold in a correct chip, numbered as in the detail of [`FaultCode::Internal`]. If a
+/// condition is violated, the card sends a fault instead of losing light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Invariant {
@@ -64,7 +66,7 @@ pub enum Invariant {
     Halves,
     /// The buffers of a tile must have room for all pixels of a block.
     Pixels,
-    /// A pixel with gather rays must have a place in the buffer of sums.
+    /// The buffer of sums must have room for each pixel with gather rays.
     Sums,
     /// The buffer of gather points must have room for each point of a pass, and each point must have rays.
     Points,
@@ -74,7 +76,7 @@ pub enum Invariant {
     Waiting,
     /// An eye path that ended at a surface must end at a surface when it is traced again.
     Surface,
-    /// A bundle must have room for each of its rays.
+    /// A bundle, rays that are cast together, must have room for each of its rays.
     Bundle,
     /// A reply must have room for each pixel, checksum or result that is added to it.
     Reply,
@@ -87,7 +89,8 @@ impl Invariant {
     }
 }
 
-/// Fields of [`FrameParameters`](super::FrameParameters), numbered as in [`FaultCode::Parameter`].
+/// Fields of [`FrameParameters`](super::FrameParameters), numbered as in the detail of
+/// [`FaultCode::Parameter`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Parameter {

@@ -121,8 +121,8 @@ pub struct FrameParameters {
     /// Parameters of gathers in the caustic map. With `None`, a gather ray that reaches an emitter through
     /// specular surfaces counts the emitter's emission.
     pub caustics: Option<CausticGather>,
-    /// True if the card sends [`LayerSums`] with each pixel. The radiance of pixels is the same without;
-    /// tiles have fewer pixels ([`Budget::pixels_of_tile`]).
+    /// True if the card sends [`LayerSums`] with each pixel. The radiance of a pixel is the same with and
+    /// without layers. With layers, a tile has fewer pixels ([`Budget::pixels_of_tile`]).
     pub layers: bool,
     /// Pixel filter.
     pub filter: Filter,
@@ -178,14 +178,15 @@ pub struct CausticGather {
 /// with fewer than eight rays use [`Self::Reflection`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sampling {
-    /// In proportion to the BRDF times the cosine.
+    /// Directions are chosen in proportion to the BRDF times the cosine.
     #[default]
     Reflection,
-    /// In proportion to the flux of the photons at the point.
+    /// Directions are chosen in proportion to the flux of the photons around the gather point.
     Photon,
-    /// In proportion to the product of BRDF and flux.
+    /// Directions are chosen in proportion to the product of the BRDF and the photons' flux.
     Product,
-    /// In proportion to the mean of the densities of BRDF and flux.
+    /// Directions are chosen in proportion to the mean of the densities of [`Self::Reflection`] and
+    /// [`Self::Photon`].
     Mixture,
 }
 
@@ -295,8 +296,8 @@ pub enum Command<'a> {
 /// Message from a card to the host.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Reply<'a> {
-    /// Answer to [`Command::Hello`]. Its first fields are the versions, in all versions of the protocol
-    /// ([`hello_versions`]).
+    /// Answer to [`Command::Hello`]. In all versions of the protocol, its first fields are the versions of
+    /// protocol and layout ([`hello_versions`]).
     Hello {
         /// The card's [`PROTOCOL_VERSION`].
         protocol: u16,

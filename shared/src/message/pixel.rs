@@ -256,7 +256,7 @@ impl PixelSums {
     }
 
     /// Adds the layer sums for which [`Self::pixel_layers`] returns the values nearest to `layers`. The light
-    /// becomes their sum.
+    /// becomes the sum of the layers.
     #[must_use]
     pub fn with_nearest_layers(self, layers: &PixelLayers, count: SampleCount, scale: &SumScale) -> Self {
         let [direct, indirect, caustic] =

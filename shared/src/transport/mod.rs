@@ -10,12 +10,13 @@
 //! - Messages are numbered from 0 in each direction. At most [`WINDOW`] are in flight: sent and not
 //!   acknowledged.
 //! - Every frame carries the number of messages of the other direction that were taken (`acknowledged`), and
-//!   which of the next ones have arrived (`held`). A link keeps the order of its bytes: a message is lost if
-//!   one that was sent after it has arrived. Only lost messages are repeated.
+//!   which of the next ones have arrived (`held`). A link keeps the order of its bytes: a message that has
+//!   not arrived is lost if a message that was sent after it has arrived. Only lost messages are repeated.
 //! - Only a clock reveals that the last messages were lost. The host has one: after some silence it sends a
 //!   [`FrameKind::Probe`] with the number of this transmission. The card's [`FrameKind::Answer`] returns that
 //!   number: host messages sent before the probe that have not arrived are lost. The answer also carries the
-//!   number of messages that the card has sent; missing ones are lost, as the host's next probe states.
+//!   number of messages that the card has sent; those that have not arrived are lost, and the host's next
+//!   probe says so.
 
 mod session;
 
@@ -115,8 +116,8 @@ impl Transport {
         self.session.take()
     }
 
-    /// Acknowledges the messages taken since the last frame was sent. To be called before an end waits or
-    /// works.
+    /// Acknowledges the messages taken since the last frame was sent. Must be called before this end waits,
+    /// or works for a long time.
     pub fn acknowledge(&mut self) {
         if self.session.has_unacknowledged() {
             self.session.ask_for(Control::Acknowledge);

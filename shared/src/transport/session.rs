@@ -36,11 +36,11 @@ pub enum Event {
 /// Delivery state of an outgoing message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Passage {
-    /// To be sent; `again` if it was sent before.
+    /// The message is to be sent; `again` is true if it was sent before.
     Waiting { again: bool },
-    /// Sent, by the transmission with this number.
+    /// The message was sent by the transmission with this number.
     Sent { transmission: u16 },
-    /// Arrived at the other end, but not taken there.
+    /// The message has arrived at the other end, but is not taken there.
     Held,
 }
 
@@ -89,7 +89,7 @@ pub(super) struct LinkSession {
     /// Number of transmissions so far: frames with messages, and probes.
     transmissions: u16,
     /// Number of messages that the other end had sent when it sent its last answer, if some of them are
-    /// missing. These are lost, as the next probe states.
+    /// missing. The missing ones are lost, and the next probe says so.
     lost_below: Option<u16>,
     /// Payload of the other end's last probe, which the answer returns.
     asked: [u8; 2],
@@ -301,8 +301,8 @@ impl LinkSession {
         Some(Event::Heard)
     }
 
-    /// Processes the acknowledgements of a header. Marks as lost the messages that were sent before one that
-    /// has arrived, and have not arrived.
+    /// Processes the acknowledgements of a header. Marks as lost each message that has not arrived although a
+    /// message sent after it has.
     fn learn(&mut self, header: &FrameHeader) {
         let taken = header.acknowledged.wrapping_sub(self.oldest);
         if taken > self.on_their_way() {
@@ -331,8 +331,9 @@ impl LinkSession {
         }
     }
 
-    /// Marks lost messages by an answer: those sent before the probe that have not arrived at the other end,
-    /// and those sent by the other end before the answer that have not arrived here.
+    /// Marks as lost, after an answer to a probe, the messages sent before the probe that have not arrived at
+    /// the other end. Requests a probe that reports as lost the other end's messages sent before the answer
+    /// that have not arrived here.
     fn conclude(&mut self, probe: u16, sent: u16) {
         self.lose(|_, transmission| is_before(transmission, probe));
         let count = sent.wrapping_sub(self.expected).min(WINDOW as u16);

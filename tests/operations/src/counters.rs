@@ -9,7 +9,7 @@ use core::arch::global_asm;
 /// libm's other functions.
 pub(crate) const KINDS: usize = 8;
 
-/// Maximum size of the program's code for which tables have room, bytes.
+/// Maximum size of the program's code, bytes. Each table of counts has an entry for each of these bytes.
 pub(crate) const CODE_BYTES: usize = 4 << 20;
 
 /// Counts of each kind at each position in the code.
@@ -21,7 +21,7 @@ pub(crate) static mut OPERATION_COUNTS: [[u64; CODE_BYTES]; KINDS] = [[0; CODE_B
 #[unsafe(no_mangle)]
 static mut OPERATION_PLACE: u64 = 0;
 
-// The place of a call is its return address.
+// The position of a call is its return address.
 global_asm!(
     ".macro count kind",
     "mov rax, qword ptr [rip + OPERATION_PLACE]",
@@ -49,7 +49,8 @@ global_asm!(
     "arithmetic __subdf3, 0, subsd",
     "arithmetic __muldf3, 1, mulsd",
     "arithmetic __divdf3, 2, divsd",
-    // The sign of a comparison. `unordered` is what is added if an operand is no number, to -1.
+    // A comparison returns a number with the sign of the first operand minus the second. If an operand is
+    // NaN, the result is `unordered - 1`.
     ".macro comparison name, instruction, unordered",
     ".globl \\name",
     "\\name:",
@@ -93,7 +94,7 @@ global_asm!(
     ".endm",
     "unordered __unordsf2, ucomiss",
     "unordered __unorddf2, ucomisd",
-    // minNum and maxNum of IEEE 754-2008: the other operand if one is no number.
+    // minNum and maxNum of IEEE 754-2008: if one operand is NaN, the result is the other.
     ".macro extreme name, instruction",
     ".globl \\name",
     "\\name:",
@@ -110,7 +111,7 @@ global_asm!(
     ".endm",
     "extreme fminf, minss",
     "extreme fmaxf, maxss",
-    // A number of one type as one of another.
+    // Conversion of a number to another type.
     ".macro conversion name, in, out, instruction",
     ".globl \\name",
     "\\name:",
@@ -134,7 +135,8 @@ global_asm!(
     "conversion __fixdfsi, \"movq xmm0, rdi\", \"\", \"cvttsd2si eax, xmm0\"",
     "conversion __fixunsdfsi, \"movq xmm0, rdi\", \"\", \"cvttsd2si rax, xmm0\"",
     "conversion __fixdfdi, \"movq xmm0, rdi\", \"\", \"cvttsd2si rax, xmm0\"",
-    // Functions of libm: the call is counted, and all that it does at the place of the call.
+    // Functions of libm: the call is counted, and all operations in the function are counted at the position
+    // of the call.
     ".macro function name",
     ".globl counted_\\name",
     "counted_\\name:",
@@ -152,7 +154,7 @@ global_asm!(
     "function expf",
     "function powf",
     "function atan2f",
-    // Square root, and whole numbers below (9) and above (10).
+    // Square root, and rounding down (mode 9) and up (mode 10) to an integer.
     ".macro one name, kind, instruction",
     ".globl counted_\\name",
     "counted_\\name:",

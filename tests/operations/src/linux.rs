@@ -23,7 +23,7 @@ pub(crate) fn address(place: usize) -> u64 {
 unsafe fn call(number: usize, arguments: [usize; 6]) -> isize {
     let [a, b, c, d, e, f] = arguments;
     let result;
-    // SAFETY: the caller's; the kernel changes the registers rcx and r11 alone.
+    // SAFETY: the caller meets the call's requirements; the kernel changes the registers rcx and r11 alone.
     unsafe {
         asm!("syscall", inlateout("rax") number => result, in("rdi") a, in("rsi") b, in("rdx") c, in("r10") d, in("r8") e,
             in("r9") f, lateout("rcx") _, lateout("r11") _);
@@ -52,7 +52,7 @@ pub(crate) fn standard_input() -> Option<&'static [Line]> {
 /// Writes all bytes to standard output.
 pub(crate) fn write(mut bytes: &[u8]) -> Option<()> {
     while !bytes.is_empty() {
-        // SAFETY: the bytes are there to be read.
+        // SAFETY: the kernel only reads the bytes, which are borrowed during the call.
         let written = unsafe { call(1, [1, bytes.as_ptr().addr(), bytes.len(), 0, 0, 0]) };
         bytes = bytes.get(usize::try_from(written).ok().filter(|&written| written > 0)?..)?;
     }

@@ -68,7 +68,7 @@ impl Target for Streams {
         let (text, streams) = random.pick(&self.scenes);
         let mut edited = streams.clone();
         mutation::edit(&mut edited, &self.streams, random);
-        // The JSON states the ranges of the streams: the binary chunk keeps its length.
+        // The JSON states the ranges of the streams, so that the binary chunk must keep its length.
         edited.resize(streams.len(), 0);
         glb(text, &edited)
     }

@@ -130,7 +130,7 @@ impl Scenes {
     }
 }
 
-/// Makes few edits: most single ones already make a scene invalid.
+/// Makes few edits of a scene's JSON, because most single edits already make the scene invalid.
 fn edit_json(text: &mut Vec<u8>, random: &mut Random) {
     for _ in 0..1 + random.edits() / 3 {
         mutation::edit_json(text, random);

@@ -17,8 +17,8 @@ use super::random::Random;
 use super::target::{Target, write_anew};
 use crate::everything::everything;
 
-/// Maximum number of bytes in use for a file: its head may state the largest picture, whose patches take
-/// memory although the file lacks them.
+/// Maximum number of bytes in use for a small file. The file's head may state the largest picture, whose
+/// patches take memory even if the file lacks them.
 const BOUND: usize = 256 << 20;
 /// Alignment of a prepared scene's lines in its file, bytes.
 const PAGE: usize = 4096;
@@ -34,7 +34,7 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// Creates the target for parts. The seeds are a part that is the whole picture, and one of three.
+    /// Creates the target for parts. The seeds are a part that is the whole picture, and one of three parts.
     pub(super) fn parts() -> Self {
         let folder = tempfile::tempdir().expect("there is room for a folder");
         let settings = settings();

@@ -87,7 +87,7 @@ impl Image {
     }
 }
 
-/// Makes one edit of an image. Most edits keep all lines in their places.
+/// Makes one edit of an image. Most edits do not move lines.
 fn edit(image: &mut Vec<u8>, seeds: &[Vec<u8>], random: &mut Random) {
     let lines = image.len() / LINE_BYTES;
     if lines == 0 {

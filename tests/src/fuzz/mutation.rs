@@ -68,7 +68,7 @@ pub(crate) fn put_word(bytes: &mut [u8], place: usize, random: &mut Random) {
         u64::from(random.pick(&FLOATS).to_bits())
     } else {
         let word = *random.pick(&WORDS);
-        // One of four is up to 63 less than the listed number.
+        // One of four numbers is the listed number minus 0 to 63.
         if random.once_in(4) { word.wrapping_sub(random.below(64) as u64) } else { word }
     };
     let mut word = word.to_le_bytes();

@@ -39,7 +39,7 @@ pub struct Settings {
     pub time: Option<Duration>,
     /// Time limit of one input.
     pub patience: Duration,
-    /// Folder for the bytes of failing inputs, and for the number of the present one.
+    /// Folder for the bytes of failing inputs, and for a file with the number of the present input.
     pub folder: PathBuf,
 }
 
@@ -117,8 +117,8 @@ pub fn fuzz(target: &Arc<dyn Target>, settings: &Settings) -> Report {
     report
 }
 
-/// Waits for the worker's report, or until an input exceeds `patience`. A thread cannot be killed: that of
-/// such an input runs on.
+/// Waits for the worker's report, or until an input exceeds `patience`. A thread cannot be killed, so that
+/// the thread with such an input continues to run.
 fn watch(reports: &Receiver<Report>, at: &AtomicU64, patience: Duration) -> Report {
     let (mut last, mut since) = (at.load(Ordering::Relaxed), Instant::now());
     loop {

@@ -35,8 +35,9 @@ const MAX_FRAMES: usize = 64;
 /// Maximum number of steps until a session with a silent card has failed.
 const MAX_STEPS: usize = 400;
 
-/// Action in the first byte of a record of an input. Actions other than this and [`WAIT`] send the reply in
-/// the record. The first byte of an input says whether the frame has layers.
+/// First byte of a record in which the card is reset. With any other first byte except [`WAIT`], the card
+/// sends the reply in the record. An input has one more byte before its records, which states whether the
+/// frame has layers.
 const RESET: u8 = 0xff;
 const WAIT: u8 = 0xfe;
 

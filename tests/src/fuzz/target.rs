@@ -28,7 +28,7 @@ pub(super) const fn bound(input: usize, for_each: usize) -> usize {
     (64 << 20) + input * for_each
 }
 
-/// Removes the file of the input before, and writes a new one. Some file systems write a truncated file to
+/// Removes the file of the previous input, and writes a new file. Some file systems write a truncated file to
 /// disk when it is closed, which takes milliseconds.
 ///
 /// # Panics

@@ -16,7 +16,7 @@ pub(super) struct Textures {
     folder: TempDir,
 }
 
-/// Images, of PNG one of each colour type: no edit of a byte would add a palette.
+/// Image files. The PNG files have several colour types, because no edit of a byte would add a palette.
 const SEEDS: [&[u8]; 14] = [
     include_bytes!("../../../driver/scene/tests/it/images/texel.png"),
     include_bytes!("../../../driver/scene/tests/it/images/palette.png"),
@@ -34,8 +34,8 @@ const SEEDS: [&[u8]; 14] = [
     include_bytes!("../../../driver/scene/tests/it/images/uastc-zstd.ktx2"),
 ];
 
-/// Memory of the card, bytes. It limits the number of texels, which in WebP and in KTX2 with ETC1S may take
-/// no bytes of the file.
+/// Memory of the card, bytes. It limits the number of texels, because a texel of WebP, or of KTX2 with ETC1S,
+/// may take no bytes of the file.
 const DRAM_BYTES: u64 = 2 << 20;
 
 /// glTF of a triangle whose base colour is the image in the second buffer view, of `image_bytes` bytes.

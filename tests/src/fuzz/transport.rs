@@ -76,8 +76,8 @@ fn wire(header: &FrameHeader, payload: &[u8]) -> Vec<u8> {
     wire.to_vec()
 }
 
-/// Reads all frames; a valid one must encode to the bytes that were read. Returns whether there was a valid
-/// one.
+/// Reads all frames, `step` bytes at a time. A valid frame that is encoded again must be read as an equal
+/// frame. Returns whether there was a valid frame.
 fn read_frames(input: &[u8], step: usize) -> bool {
     let mut reader = FrameReader::new();
     let mut is_whole = false;
@@ -138,7 +138,7 @@ fn feed(end: &mut Transport, input: &[u8], step: usize) {
     }
 }
 
-/// Checks that the card accepts a new session of the host, whatever the card has received before.
+/// Returns whether the card accepts a new session of the host, whatever the card has received before.
 fn is_heard(card: &mut Transport) -> bool {
     card.receive(&[0]);
     (SESSION + 1000..).take(2).any(|session| {

@@ -60,7 +60,8 @@ const IMAGES: [&str; 18] = [
 ];
 
 impl Inputs {
-    /// Reads files of the repository, and generates pictures. Of [kept](Kind::Kept) files there are none.
+    /// Reads files of the repository, and generates pictures. There are no inputs of [kept](Kind::Kept)
+    /// files.
     ///
     /// # Panics
     /// If a file is missing.

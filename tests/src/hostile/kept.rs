@@ -44,7 +44,8 @@ struct Bench<'s> {
     program: &'s Path,
     folder: PathBuf,
     works: Vec<Work>,
-    /// Right results: what each command line renders from the undamaged files of either, and without any.
+    /// Valid results: the pictures that each command line renders from its own undamaged files, from those of
+    /// the other command line, and without files.
     right: Vec<Files>,
 }
 
@@ -76,7 +77,7 @@ impl Kept {
                 [1, 2, 3].map(part).into_iter().chain([merge]).collect()
             }
             Self::Partials => {
-                // The second takes photons and rays from the partial file.
+                // The second command takes the numbers of photons and rays from the partial file.
                 let render = format!("render {scene} -o a.exr --quality draft --neighbors 10 {PICTURE}");
                 let (photons, samples) = (200 + 100 * seed, 4 >> seed);
                 vec![
@@ -186,7 +187,7 @@ impl<'s> Bench<'s> {
             .map_or(String::new(), |text| String::from_utf8_lossy(&text).into_owned())
     }
 
-    /// Replaces all files of the folder by these.
+    /// Replaces all files of the folder by `files`.
     fn fill(&self, files: &Files) -> io::Result<()> {
         self.files()?.keys().try_for_each(|name| fs::remove_file(self.folder.join(name)))?;
         files.iter().try_for_each(|(name, bytes)| fs::write(self.folder.join(name), bytes))
@@ -348,7 +349,8 @@ fn block(length: usize, random: &mut Random) -> Range<usize> {
     start.min(length)..(start + size).min(length)
 }
 
-/// Random start of a block or of a record, at which a file may continue as another.
+/// Random position in a file at which a damaged file may continue as another one: the start of a block or of
+/// a record.
 fn boundary(bytes: &[u8], random: &mut Random) -> usize {
     let records: Vec<usize> = (0..bytes.len()).filter(|&place| bytes[place..].starts_with(RECORD)).collect();
     if records.is_empty() || random.once_in(2) {

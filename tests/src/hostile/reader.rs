@@ -14,8 +14,8 @@ use super::inputs::as_file;
 use super::{Inputs, Settings};
 use crate::fuzz::gltf::load;
 
-/// Maximum number of triangles of a scene that is always rendered. Larger ones are loaded, and one in fifty
-/// is packed.
+/// Maximum number of triangles of a scene that is always rendered. Larger scenes are only loaded, except that
+/// one in fifty is also packed.
 const MAX_RENDERED: usize = 3000;
 
 /// Maximum number of pixels of a picture that is compared; a larger one is only read.

@@ -35,7 +35,7 @@ pub struct Report {
     pub statuses: [u64; 3],
     /// Maximum time of an input, with the input's number.
     pub slowest: (Duration, u64),
-    /// Inputs that a process ended on by a panic, an abort or a signal, or that exceeded the time limit.
+    /// Inputs on which a process ended by a panic, an abort or a signal, or exceeded the time limit.
     pub findings: Vec<Finding>,
 }
 

@@ -56,7 +56,8 @@ impl Run {
         }
         let mut steps = counted.steps;
         let work = Work::new(&counters, &contents, f64::from(frame.gather_rays));
-        // Comparisons of bits are no calls of the program: the chip and its memory model count them.
+        // The program makes no calls for comparisons of bits. They are counted by the chip and its memory
+        // model.
         let compared = Step::ALL.iter().position(|&step| step == Step::Compared).expect("it is one of all");
         steps[compared].compare = Step::Compared.count(&work);
         Self { counters, work, steps }
@@ -76,8 +77,8 @@ impl Run {
     }
 }
 
-/// Mean operations of one step of each kind in some runs. Steps that none has keep the values of
-/// [`OPERATIONS`].
+/// Mean operations of one step of each kind in some runs. Kinds of steps that occur in no run keep the values
+/// of [`OPERATIONS`].
 pub fn means(runs: &[Run]) -> [Operations; STEPS] {
     let mut means = OPERATIONS;
     for (index, (step, mean)) in Step::ALL.iter().zip(&mut means).enumerate() {

@@ -1,4 +1,5 @@
-//! Assigns operations to the cost model's steps, by the functions of the firmware that their code is of.
+//! Assigns operations to the cost model's steps, by the functions of the firmware that contain the
+//! operations.
 
 use photoncard_driver::cost_model::arithmetic::Step;
 

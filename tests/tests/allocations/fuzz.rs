@@ -61,7 +61,7 @@ mod no_input_panics_hangs_or_takes_much_memory {
     }
 }
 
-/// Target that fails in every way, as the number in its input says.
+/// Target that panics, allocates too much or hangs, or does not fail, depending on the number in its input.
 struct Faulty;
 
 impl Target for Faulty {

@@ -77,7 +77,7 @@ fn a_photon_takes_at_most_forty_bytes_and_cards_share_the_image() {
     let (with_four, _) = rendering(&scene, 4);
     println!("{with_one} bytes with one chip, {with_four} with four, an image of {image}");
     assert!(with_one >= image);
-    // Each chip has all that the first has, without a copy of the card image.
+    // Each chip takes as much memory as the first, without a copy of the card image.
     let chip = with_one - image;
     assert!(
         with_four < image + 4 * chip + image / 2,

@@ -58,7 +58,8 @@ fn mean_and_variance(values: &[f64]) -> [f64; 3] {
     [number, mean, values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / (number - 1.0)]
 }
 
-/// Checks that two means differ by less than four standard errors, and that these are small enough to tell.
+/// Checks that two means differ by less than four standard errors, and that four standard errors are less
+/// than 8 % of the mean.
 fn check_means([even, even_error, _]: [f64; 3], [adaptive, error, _]: [f64; 3]) {
     let allowed = 4.0 * even_error.hypot(error);
     assert!((adaptive - even).abs() < allowed, "{adaptive} beside {even}, {allowed} allowed");

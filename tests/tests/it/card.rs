@@ -109,7 +109,7 @@ fn a_card_with_room_for_another_tile_in_flight_waits_for_it_or_for_a_flush() {
         assert_eq!(wire.say(&begin(2)), [Answer::FrameAccepted]);
         assert_eq!(wire.say(&Command::Flush), []);
         assert!(!wire.card.is_busy());
-        // With the second tile all places are taken: both are completed before a third could come.
+        // With the second tile, the maximum number of tiles is in flight: both are completed without a third.
         assert_eq!(wire.say(&tile(3)), []);
         assert_eq!(wire.say(&tile(4)), [done(3), done(4)].concat());
         assert_eq!(wire.say(&tile(5)), []);

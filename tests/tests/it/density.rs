@@ -263,7 +263,8 @@ fn light_on_one_side_of_a_thin_wall_does_not_show_on_the_other() {
     assert_eq!(lower, 0.0);
 }
 
-/// The back of the board faces as the lit side of the wall does; the wall is between them.
+/// A board is behind a wall. The board's side towards the wall has the normal of the wall's lit side, but the
+/// wall keeps all light from the board.
 #[test]
 fn light_on_a_wall_does_not_show_on_the_back_of_furniture_behind_it() {
     let lamp = Material { emission: Vec3::ONE, ..lambertian("lamp", 0.0) };
@@ -376,7 +377,8 @@ fn a_sheet_close_before_a_wall_is_as_bright_as_the_wall() {
     }
 }
 
-/// Between two white sheets a path has hundreds of hits close together: its photons alone give no density.
+/// Between two white sheets a path has hundreds of hits close together: the photons of a single path do not
+/// give the density.
 #[test]
 fn sheets_that_nearly_touch_have_no_bright_spot() {
     const GAP: f32 = 0.001;

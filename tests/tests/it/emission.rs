@@ -13,7 +13,7 @@ use photoncard_firmware::scene::light::{environment_direction, environment_radia
 use photoncard_tests::{camera, lambertian, quad, room, scene};
 
 const PHOTONS: usize = 200_000;
-/// Albedo of surfaces that are nearly black, and store photons all the same.
+/// Albedo of surfaces that are nearly black, but store photons.
 const BLACK: f32 = 0.001;
 
 /// Power of all stored photons per channel, W.
@@ -130,7 +130,7 @@ fn received(cube: &Scene) -> [f64; 3] {
 
 #[test]
 fn a_panel_with_a_texture_emits_its_mean_and_all_lights_together_their_sum() {
-    // A panel of whose emissive texture one corner glows, at first without a point light.
+    // One corner of the panel's emissive texture glows. At first there is no point light.
     let mut texels = vec![[0, 0, 0, 255]; 16 * 16];
     for row in 2..6 {
         texels[row * 16 + 3..][..5].fill([255; 4]);
@@ -280,8 +280,8 @@ fn sun_over_a_mirror(lamp: f32) -> Scene {
     scene(triangles, materials, camera(Vec3::Y, Vec3::Y)).with(|scene| scene.lights = vec![sun, spot])
 }
 
-/// If caustics contribute almost no light, few paths are traced for them. The stored photons have the full
-/// power of the caustics all the same.
+/// If caustics contribute almost no light, few paths are traced for them. The stored photons nevertheless
+/// have the full power of the caustics.
 #[test]
 fn rare_caustics_have_few_paths_and_their_full_power() {
     const SEEDS: u32 = 16;

@@ -36,7 +36,7 @@ const LAMP: f64 = std::f64::consts::PI * 0.64 * 2.0;
 #[test]
 fn a_closed_room_stores_the_emitted_power_over_one_minus_the_albedo() {
     let emission = Vec3::new(3.0, 2.0, 0.5);
-    // An albedo of 0.001 stands for black: surfaces without reflection store no photons.
+    // An albedo of 0.001 is used instead of 0, because surfaces without reflection store no photons.
     for albedo in [[0.001; 3], [0.2; 3], [0.5; 3], [0.8; 3], [0.7, 0.3, 0.1]] {
         let walls = Material::lambertian("wall", albedo.into());
         let stored = stored_power(&pass(&lit_room(walls, emission), 3));
@@ -50,7 +50,8 @@ fn a_closed_room_stores_the_emitted_power_over_one_minus_the_albedo() {
 
 #[test]
 fn a_room_with_one_reflecting_wall_stores_its_share() {
-    // Form factor of the lamp, a square of side 0.8, and the ceiling, a square of side 2 at distance 0.7.
+    // The expected share of the power that the lamp emits upwards is the form factor from the lamp, a square
+    // of side 0.8, to the ceiling, a square of side 2 at a distance of 0.7.
     let mut scene = lit_room(lambertian("black", 0.0), Vec3::ONE);
     scene.materials.push(lambertian("floor", 0.001));
     for triangle in &mut scene.triangles {

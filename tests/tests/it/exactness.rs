@@ -127,7 +127,7 @@ fn check_variants_of(scene: &Scene, settings_of: &RenderSettings) {
             })
         };
         let expected = sums(&render_or_panic(scene, &with(settings())).film);
-        // A single sample has its pixels' records alone: three variants, of two kinds of chips.
+        // For a single sample per pixel, only three variants are rendered, with two kinds of chips.
         for variant in variants().into_iter().step_by(if samples == 1 { 8 } else { 1 }) {
             let variant = with(variant);
             let film = render_or_panic(scene, &variant).film;
@@ -257,8 +257,8 @@ fn adaptive_sampling_is_exact() {
             settings.with(|s| {
                 (s.picture.width, s.picture.height) = (17, 9);
                 (s.photons.count, s.photons.caustic_photons) = (3000, Some(500));
-                // Of the rays of a sample each path has eight or more: enough for a direction table from
-                // photons.
+                // Each path of a sample has eight or more of the sample's rays, which are enough for a
+                // direction table from photons.
                 s.integrator.gather_rays = if irradiance_error.is_some() { 128 } else { 24 };
                 s.integrator.irradiance_error = irradiance_error;
                 (s.integrator.samples, s.integrator.adaptive_threshold) = (5, Some(0.03));
@@ -269,7 +269,7 @@ fn adaptive_sampling_is_exact() {
         let even = with(settings()).with(|s| s.integrator.adaptive_threshold = None);
         let of_even = render_or_panic(&scene, &even).statistics.rays.eye;
         assert!(adaptive.statistics.rays.eye > 2 * of_even, "pixels have several paths a sample");
-        // Each variant is with the cache or without it, and so is each kind of chip.
+        // Each variant is rendered either with the irradiance cache or without it.
         let is_here = |index: usize| index / 2 % 2 == usize::from(irradiance_error.is_some());
         for (_, variant) in variants().into_iter().enumerate().filter(|(index, _)| is_here(*index)) {
             let variant = with(variant);

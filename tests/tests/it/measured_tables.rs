@@ -4,7 +4,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Line of `docs/quality.csv`: a scene, by photoncard with some settings or by another renderer.
+/// Line of `docs/quality.csv`: measurements of a scene that was rendered by photoncard with some settings, or
+/// by another renderer.
 struct Row {
     scene: String,
     settings: String,
@@ -32,7 +33,8 @@ impl Row {
         })
     }
 
-    /// CPU time times squared error: for independent samples, their number has no influence.
+    /// CPU time times squared error. It does not depend on the number of samples if the samples are
+    /// independent.
     fn cost(&self) -> f64 {
         self.seconds * self.error * self.error
     }

@@ -1,5 +1,5 @@
 //! Operations per step of the cost model equal those counted in the firmware, but for the rays and tests of
-//! visible regions and for rays that search covers, for which the model has no steps.
+//! visible regions and for rays that search for covers, for which the model has no steps.
 
 use photoncard_driver::choice::Choice;
 use photoncard_driver::cost_model::arithmetic::{OPERATIONS, Operations, Step, Unit};

@@ -75,7 +75,7 @@ impl Pictures {
 fn photons_for_the_scene_and_for_the_camera_give_a_dark_corridor_equal_means() {
     let scene = corridor(0.8);
     let of_scene = Pictures::new(&scene, PhotonsFor::Scene, 16);
-    // Each takes several times as long.
+    // A picture with photons for the camera takes several times as long, so that fewer of them are rendered.
     let of_camera = Pictures::new(&scene, PhotonsFor::Camera, 10);
     let error = of_scene.error.hypot(of_camera.error);
     println!("{} +- {}, {} +- {}", of_scene.mean, of_scene.error, of_camera.mean, of_camera.error);

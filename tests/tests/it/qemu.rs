@@ -169,7 +169,7 @@ fn renders_as_the_emulated_card(name: &str) {
         if number == 0 && !is_full() {
             check_page("card image, 4,000 photons, bytes", name, statistics.image_bytes as u32);
         }
-        // Only the second render has the card image of the one before, of which nothing is sent.
+        // Only the second render has the card image of the previous render, of which no line is sent again.
         assert_eq!(statistics.link.payload_bytes < statistics.image_bytes, number == 1);
     }
     passes_the_self_test(name, &address);
@@ -179,8 +179,8 @@ fn renders_as_the_emulated_card(name: &str) {
     drop(machine);
 }
 
-/// Runs the self-test: arithmetic equals the host's, and all memory is there. The next scene is loaded
-/// completely.
+/// Runs the self-test: arithmetic equals the host's, and the memory has its full size. Afterwards, the next
+/// scene is loaded completely.
 fn passes_the_self_test(name: &str, address: &CardAddress) {
     let test = card_self_test(address, &Unobserved).expect("the card answers");
     for PatternTest { pattern, write, check, .. } in &test.patterns {

@@ -37,8 +37,8 @@ fn candidates() -> impl Strategy<Value = Vec<Candidate>> {
         .prop_map(|pairs| pairs.into_iter().map(|(distance, content)| candidate(distance, content)).collect())
 }
 
-/// The `count`-th nearest candidate, and the nearest `count`; `None` and all if there are fewer. All
-/// instruction sets must agree.
+/// The `count`-th nearest candidate, and the nearest `count`; `None` and all candidates if `count` is 0 or
+/// greater than their number. All instruction sets must agree.
 fn select(candidates: &[Candidate], count: usize) -> (Option<Candidate>, Vec<Candidate>) {
     let mut results = Level::ALL.iter().filter_map(|level| {
         let mut buffer = CandidateBuffer::<600>::new();

@@ -155,8 +155,8 @@ fn roughness_and_metalness_follow_their_texture() {
     assert!((albedo(37) - dull).abs().max_element() < 0.005, "{}", albedo(37));
 }
 
-/// By a texture of metalness 0, a material with the factors of a mirror is a dielectric: photons are stored
-/// on it, and their disc fractions are measured. By a texture of metalness 1 it stays a mirror.
+/// With a texture of metalness 0, a material with the factors of a mirror is a dielectric: photons are stored
+/// on it, and their disc fractions are measured. With a texture of metalness 1 it stays a mirror.
 #[test]
 fn a_texture_decides_where_a_material_is_a_mirror() {
     let film = |metallic, texture: Option<u8>| {
@@ -241,7 +241,8 @@ fn an_alpha_of_a_half_lets_half_of_the_light_through() {
     }
 }
 
-/// The picture has alpha of the sheet's emission, and 1 - alpha of the lamp behind it.
+/// The picture shows alpha times the sheet's emission plus 1 - alpha times the emission of the lamp behind
+/// it.
 #[test]
 fn a_sheet_shows_alpha_of_itself_and_the_rest_of_the_background() {
     let sheet = Material {

@@ -15,19 +15,20 @@ use photoncard_shared::link::{Port, PortError};
 /// Probabilities of faults per byte of a line, 0 to 0.1 each, and the seed that selects the bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LineFaults {
-    /// Rate of bytes with one inverted bit.
+    /// Probability that one bit of a byte is inverted, 0 to 0.1.
     pub flips: f64,
-    /// Rate of lost bytes.
+    /// Probability that a byte is lost, 0 to 0.1.
     pub drops: f64,
-    /// Rate of bytes that arrive twice.
+    /// Probability that a byte arrives twice, 0 to 0.1.
     pub repeats: f64,
-    /// Rate of delays towards the host. A delay holds a byte and all later ones back for some milliseconds.
+    /// Probability that a byte towards the host is delayed, 0 to 0.1. A delay of 1 to 20 ms holds the byte
+    /// and all later ones back.
     pub delays: f64,
     /// Seed of the random numbers.
     pub seed: u32,
 }
 
-/// Maximum rate. A higher one destroys every frame.
+/// Maximum probability of a fault per byte. At a higher one hardly any frame would arrive intact.
 const MOST: f64 = 0.1;
 
 impl FromStr for LineFaults {
@@ -183,7 +184,7 @@ impl FaultInjector {
         Ok(self.release(buffer))
     }
 
-    /// Copies bytes that are not held back to `buffer`. Returns their number.
+    /// Copies to `buffer` the incoming bytes that are no longer held back. Returns their number.
     fn release(&mut self, buffer: &mut [u8]) -> usize {
         let mut count = 0;
         while let (Some(target), Some(next)) = (buffer.get_mut(count), self.incoming.bytes.front_mut()) {

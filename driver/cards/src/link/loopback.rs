@@ -1,5 +1,5 @@
-//! Link within the process: two bounded queues of bytes. They fill up more readily than hardware, which tests
-//! flow control.
+//! Link within the process: two bounded queues of bytes. The queues fill up more readily than those of
+//! hardware, which tests flow control.
 //!
 //! A card writes a frame of some hundred bytes at a time, and a wake-up per frame would take longer than the
 //! host's work on it. A [patient](LoopbackPort::patient) port therefore wakes its reader once for many
@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 
 use photoncard_shared::link::{Port, PortError};
 
-/// Maximum age of an unreported write: the first call of a patient port after it wakes the reader.
+/// Time for which a patient port may leave a write unreported: its first call after that time wakes the
+/// reader.
 const PATIENCE: Duration = Duration::from_micros(500);
 
 /// One direction of the link.
@@ -77,9 +78,9 @@ pub fn loopback(capacity: usize) -> (LoopbackPort, LoopbackPort) {
 }
 
 impl LoopbackPort {
-    /// Delays wake-ups of the reader until `wakes_at` bytes are in transit, some time has passed, or this
-    /// port waits for bytes itself. The writer must keep calling the port while it has work, and before it
-    /// waits.
+    /// Delays wake-ups of the reader until `wakes_at` bytes are in transit, the oldest unreported write is
+    /// 500 µs old, or this port waits for bytes itself. Only calls of the port wake the reader, so its owner
+    /// must keep calling it while it has work, and before it waits.
     #[must_use]
     pub fn patient(mut self, wakes_at: usize) -> Self {
         self.wakes_at = wakes_at.min(self.capacity);

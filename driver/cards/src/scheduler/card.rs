@@ -25,8 +25,8 @@ pub(super) struct Card {
     pub(super) standing: Standing,
     /// Tile of which the card sent wrong pixels; `None` if it sent none.
     pub(super) lie: Option<Tile>,
-    /// Indices of the tiles assigned to the card. It works on the first ones, up to its number of tiles in
-    /// flight.
+    /// Indices of the tiles assigned to the card. The card works on the first of them, up to its number of
+    /// tiles in flight.
     pub(super) tiles: Vec<usize>,
     /// Indices of the waiting tiles reserved for the card, which rendered them in an earlier pass.
     pub(super) at_home: VecDeque<usize>,

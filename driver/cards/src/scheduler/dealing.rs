@@ -14,8 +14,8 @@ use crate::session::Assignment;
 const HELP_AFTER: u32 = 2;
 /// Time after which an idle card duplicates another card's tile before any tile is done.
 const HELP_WITHOUT_MEAN: Duration = Duration::from_secs(1);
-/// A card takes another tile while more tiles wait than this number times its own tiles times the number of
-/// other cards.
+/// Factor in the number of waiting tiles above which a card takes another tile: a card with n tiles and m
+/// other living cards takes one while more than `PLENTY * n * m` tiles wait.
 const PLENTY: usize = 4;
 /// Number of tiles awaiting comparison among which a card seeks one to verify before it takes a waiting tile.
 pub(super) const COMPARED_AT_ONCE: usize = 256;
@@ -49,9 +49,9 @@ impl Scheduler {
         !self.entries[index].crashes.is_empty()
     }
 
-    /// Returns whether a card may take another tile. A card without tiles may; another one may while enough
-    /// tiles wait for the other cards. Otherwise tiles would wait behind a slow tile, and near the end idle
-    /// cards could not take them.
+    /// Returns whether a card may take another tile. A card without tiles may, and a card with tiles may
+    /// while enough tiles wait for the other cards. Without this limit, tiles would wait behind a slow tile,
+    /// and near the end idle cards could not take them.
     fn has_share(&self, card: CardNumber) -> bool {
         let others = self.living().filter(|&other| other != card).count();
         self.waiting_anywhere() > PLENTY * self.cards[card].tiles.len() * others
@@ -86,8 +86,8 @@ impl Scheduler {
         entry.is_open() && entry.copies.is_empty() && !entry.has_answer_of(card)
     }
 
-    /// Takes a tile that is set apart, once all others are done: one at which no living card has crashed less
-    /// often than this one.
+    /// Takes a tile that was set apart because cards crashed at it, once all other tiles are done. No living
+    /// card may have crashed at the tile less often than `card`.
     fn next_set_apart(&mut self, card: CardNumber) -> Option<usize> {
         if self.set_apart.is_empty() || self.open_entries().any(|entry| entry.crashes.len() < CRASHES_APART) {
             return None;
@@ -117,8 +117,8 @@ impl Scheduler {
         self.times.mean().map_or(HELP_WITHOUT_MEAN, |mean| mean.saturating_mul(HELP_AFTER))
     }
 
-    /// Tile that an idle card duplicates because other cards have had it for too long: the oldest of those
-    /// with the fewest copies.
+    /// Selects a tile that an idle card duplicates because other cards have had it for too long: among the
+    /// tiles with the fewest copies, the one assigned first.
     fn next_to_help(&mut self, card: CardNumber, now: Duration) -> Option<usize> {
         if !self.has_helpers || !self.cards[card].tiles.is_empty() || now < self.next_help {
             return None;
@@ -183,8 +183,8 @@ impl Scheduler {
         self.waiting.extend(tiles);
     }
 
-    /// Takes the last reserved tile of the card with the most of them; `None` if that card will soon render
-    /// the tile itself.
+    /// Takes the last reserved tile of the card that has the most reserved tiles; `None` if that card will
+    /// soon render the tile itself.
     pub(super) fn next_of_others(&mut self, now: Duration) -> Option<usize> {
         let patience = self.patience();
         let has_most = |card: &CardNumber| self.cards[*card].at_home.len();

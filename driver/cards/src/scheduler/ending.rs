@@ -9,7 +9,7 @@ use super::dealing::COMPARED_AT_ONCE;
 use super::entry::{Entry, Progress};
 use super::{CRASHES_APART, Scheduler, SchedulerError};
 
-/// Time for which lost cards are awaited when no other card can continue.
+/// Time for which the render waits for lost cards when no other card can continue.
 const WAIT_FOR_LOST: Duration = Duration::from_secs(30);
 
 impl Scheduler {
@@ -31,7 +31,8 @@ impl Scheduler {
         if !is_any(Standing::Living) || may_come_back { Ok(()) } else { Err(self.what_is_left()) }
     }
 
-    /// Error of a tile that cards render differently, with no card left to decide.
+    /// Returns the error of a tile that cards render differently when no card is left to decide; `None` if
+    /// there is no such tile.
     fn undecidable(&self) -> Option<SchedulerError> {
         let disputed = self.compared.iter().take(COMPARED_AT_ONCE).map(|&index| &self.entries[index]);
         let can_decide = |entry: &Entry| {
@@ -43,7 +44,8 @@ impl Scheduler {
         Some(SchedulerError::Disagreement { tile: entry.tile, sources })
     }
 
-    /// Returns whether a tile is in transit to the sinks, or a card is working or can take a tile.
+    /// Returns whether the render is complete or can continue: a tile waits or is in transit to the sinks, or
+    /// a card is working or can take a tile.
     fn can_go_on(&self) -> bool {
         let is_at_work = || self.cards.iter().any(|card| !card.tiles.is_empty());
         // A found tile is not done yet, but needs no card: another thread passes it to the sinks.
@@ -58,7 +60,7 @@ impl Scheduler {
         !self.set_apart.is_empty() && self.living().next().is_some() || can_compare()
     }
 
-    /// Error that names the reason why the remaining tiles cannot be rendered.
+    /// Returns the error that names the reason why the remaining tiles cannot be rendered.
     fn what_is_left(&self) -> SchedulerError {
         match self.open_entries().find(|entry| !entry.answers.is_empty()) {
             Some(entry) if entry.is_disputed() => {
@@ -70,7 +72,8 @@ impl Scheduler {
         }
     }
 
-    /// Returns the remaining tiles if all are set apart because cards have crashed at them, else none.
+    /// Returns the remaining tiles if all are set apart because cards have crashed at them, otherwise an
+    /// empty list.
     pub fn crashed_at(&self) -> Vec<Tile> {
         let left = || self.entries.iter().filter(|entry| !matches!(entry.progress, Progress::Done(_)));
         if left().any(|entry| entry.crashes.len() < CRASHES_APART) {

@@ -14,9 +14,11 @@ use super::error::Source;
 pub(super) enum Progress {
     /// Not rendered, or not verified yet.
     Open,
-    /// Rendered, and in transit to the sinks. Holds the card, or `None` if two cards agree on the tile.
+    /// The tile is rendered and in transit to the sinks. The value is the card whose answer was accepted;
+    /// `None` if two cards agree on the tile.
     Found(Option<CardNumber>),
-    /// Stored by all sinks. Holds the card, or `None` if two cards agree on the tile.
+    /// All sinks have the tile. The value is the card whose answer was accepted; `None` if two cards agree on
+    /// the tile, or an earlier render completed it.
     Done(Option<CardNumber>),
     /// Given up after five crashes.
     Abandoned,
@@ -92,7 +94,7 @@ impl Entry {
         self.answers.iter().any(|answer| answer.source == Source::Card(card))
     }
 
-    /// Earliest time at which a card can have started its copy.
+    /// Returns the earliest time at which `card` can have started its copy; `None` if it has no copy.
     pub(super) fn since(&self, card: CardNumber) -> Option<Duration> {
         self.copies.iter().find(|copy| copy.card == card).map(|copy| copy.since)
     }
@@ -107,7 +109,8 @@ impl Entry {
         pairs.into_iter().find(|&[first, second]| self.answers[first].agrees_with(&self.answers[second]))
     }
 
-    /// Returns whether there are several answers. They differ pairwise, because two that agree are removed.
+    /// Returns whether the tile is open and has several answers. They differ pairwise: once two agree, the
+    /// tile is accepted.
     pub(super) fn is_disputed(&self) -> bool {
         self.is_open() && self.answers.len() > 1
     }
@@ -152,6 +155,6 @@ pub(super) enum Agreement {
     OfCards,
     /// A card agrees with the partial file, which contains the tile already.
     WithKept,
-    /// The tile of this card is not dazzling, and the other one is.
+    /// The answer of this card is not dazzling, and the only other answer is.
     ByLight(CardNumber),
 }

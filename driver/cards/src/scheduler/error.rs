@@ -33,7 +33,7 @@ pub enum SchedulerError {
     Disagreement {
         /// The disputed tile.
         tile: Tile,
-        /// Sources of its answers.
+        /// Cards or partial file that rendered the disputed tile.
         sources: Vec<Source>,
     },
     /// Error of a tile in a partial file that differs from the one on which two cards agree.
@@ -51,7 +51,7 @@ pub enum SchedulerError {
     /// Error of tiles at which cards have crashed. All other tiles are done.
     #[error("cards crash at the tiles {}", rectangles(tiles))]
     Unrendered {
-        /// The tiles.
+        /// The tiles that are left.
         tiles: Vec<Tile>,
     },
 }

@@ -1,18 +1,20 @@
 //! Assignment of tiles to cards.
 //!
-//! Tiles wait in one queue. A card with a free credit takes the next one, unless so few are left that other
-//! cards would have none. No card waits for another, and results arrive in any order. The pixels of a tile
-//! depend neither on its card nor on time.
+//! Tiles wait in one queue. A card with a free credit takes the next tile, unless so few tiles are left that
+//! other cards would have none. No card waits for another, and results arrive in any order. The pixels of a
+//! tile depend neither on its card nor on time.
 //!
-//! - A second card renders a tile that requires verification, as soon as a card is free. If the two differ, a
-//!   third decides. All tiles of the outvoted card that no other card has confirmed are rendered again.
-//! - A dazzling tile is verified as well, if there is another card. A tile is dazzling if its radiance is
-//!   higher than any source but a lamp next to a surface explains. If exactly one of two answers is dazzling,
-//!   the other one is accepted. The dazzling tiles of a single card are accepted and counted.
+//! - A second card renders a tile that requires verification, as soon as a card is free. If the two answers
+//!   differ, a third card decides. All tiles of the outvoted card that no other card has confirmed are
+//!   rendered again.
+//! - A dazzling tile is verified as well, if there is another card. A tile is dazzling if its radiance is so
+//!   high that only a lamp next to a surface could explain it. If exactly one of two answers is dazzling, the
+//!   other one is accepted. The dazzling tiles of a single card are accepted and counted.
 //! - A tile at which cards have crashed twice is set apart until all others are done. It then goes to the
 //!   cards with the fewest crashes at it, and is abandoned after five crashes.
 //! - In a render by passes, a tile is reserved for the card that rendered it before and holds its irradiance
-//!   records. Idle cards take reserved tiles of other cards from the end, unless these will be rendered soon.
+//!   records. Idle cards take reserved tiles of other cards from the end, unless those cards will soon render
+//!   them.
 //! - If no tile waits, an idle card duplicates the tile that another card has had for the longest time, once
 //!   that exceeds twice the mean time of a tile. The first answer counts.
 //!
@@ -62,7 +64,7 @@ pub struct Scheduler {
     by_id: HashMap<u32, usize>,
     /// Queue of the waiting tiles' indices, without reserved tiles.
     waiting: VecDeque<usize>,
-    /// Indices of the tiles with an answer that await another one.
+    /// Indices of the tiles that have an answer and await another one for comparison.
     compared: VecDeque<usize>,
     /// Indices of the unfinished tiles with several crashes, which wait until all others are done.
     set_apart: Vec<usize>,
@@ -70,7 +72,7 @@ pub struct Scheduler {
     has_helpers: bool,
     /// Time before which no tile can be due for duplication.
     next_help: Duration,
-    /// Time since which no card can continue an incomplete render; `None` while one can.
+    /// Time since which no card can continue an incomplete render; `None` while a card can.
     stuck_since: Option<Duration>,
     times: TileTimes,
     /// Sum of the counters of the tiles on which two cards agree.
@@ -94,7 +96,7 @@ pub struct TileCounts {
     pub revoked: usize,
 }
 
-/// Consequences of an answer.
+/// Consequences of a card's answer to a tile.
 #[derive(Debug, Default)]
 pub struct Answered {
     /// Tile to store in the sinks, to be confirmed by [`Scheduler::complete`].
@@ -131,8 +133,8 @@ impl Scheduler {
         Self { has_helpers: true, ..self }
     }
 
-    /// Verifies a share of the tiles (at least one) on a second card; a hash of seed and tile number selects
-    /// them.
+    /// Requires that a second card verify a share (0 to 1) of the tiles, at least one tile. A hash of seed
+    /// and tile number selects them.
     #[must_use]
     pub fn verifying(mut self, share: f64, seed: u32) -> Self {
         let chance = |entry: &Entry| hash(hash(seed) ^ entry.tile.id);
@@ -144,8 +146,8 @@ impl Scheduler {
         self
     }
 
-    /// Takes over the tiles of a film from an earlier render. Those to be verified are compared with the
-    /// answer of one card.
+    /// Takes over the tiles of a film from an earlier render. Tiles that require verification are compared
+    /// with the answer of one card.
     #[must_use]
     pub fn with_kept(mut self, film: &Film) -> Self {
         for (index, entry) in self.entries.iter_mut().enumerate() {
@@ -196,7 +198,8 @@ impl Scheduler {
         self.judge(index)
     }
 
-    /// Compares the answers to a tile, and accepts one if they decide.
+    /// Compares the answers to a tile. Accepts one of them if two agree, or if exactly one of two is
+    /// dazzling.
     fn judge(&mut self, index: usize) -> Answered {
         let entry = &mut self.entries[index];
         let Some(Judgement { tile, agreed, liars }) = entry.judge() else { return Answered::default() };
@@ -233,8 +236,8 @@ impl Scheduler {
         }
     }
 
-    /// Takes an unfinished tile from a card and puts it at the front of the queue; after several crashes the
-    /// tile is set apart or abandoned. `has_crashed`: the card was working on the tile.
+    /// Takes an unfinished tile from a card and puts it at the front of the queue. After several crashes the
+    /// tile is set apart or abandoned instead. `has_crashed` is true if the card was working on the tile.
     pub fn give_back(&mut self, card: CardNumber, id: u32, has_crashed: bool, now: Duration) {
         let Some((index, _)) = self.remove_copy(card, id, now) else { return };
         let entry = &mut self.entries[index];
@@ -276,7 +279,7 @@ impl Scheduler {
         Some((index, since))
     }
 
-    /// Sets the availability of a card. A card that was given up stays so.
+    /// Sets the availability of a card. A card that was given up stays given up.
     pub fn set_standing(&mut self, card: CardNumber, standing: Standing) {
         if self.cards[card].standing != Standing::GivenUp {
             self.cards[card].standing = standing;
@@ -313,7 +316,7 @@ impl Scheduler {
         self.living().next().is_some()
     }
 
-    /// Tile at which a card was outvoted; `None` if there is none.
+    /// Tile of which a card sent wrong pixels; `None` if there is no such tile.
     pub fn lie_of(&self, card: CardNumber) -> Option<Tile> {
         self.cards[card].lie
     }
@@ -346,8 +349,8 @@ impl Scheduler {
         revoked
     }
 
-    /// Time limit per ray or gather of a card, seconds, from the times of rendered tiles; `None` before the
-    /// first tile of any card.
+    /// Time limit per ray or gather of a card, seconds, from the times of rendered tiles; `None` before any
+    /// card has rendered a tile.
     pub fn slowest(&self, card: CardNumber) -> Option<f64> {
         let before = self.cards[card].slowest.map(|seconds| seconds * SLOWER_THAN_BEFORE);
         let others = self.cards.iter().filter_map(|card| card.slowest).reduce(f64::max);

@@ -70,7 +70,7 @@ fn the_last_tiles_go_singly_to_idle_cards() {
     let taken = |scheduler: &mut Scheduler, card| {
         std::iter::from_fn(|| take(scheduler, card, Duration::ZERO)).count()
     };
-    // 19 wait after the first tile, more than 4 for each of three other cards.
+    // 19 tiles wait after the first is assigned, more than 4 for each of the three other cards.
     assert_eq!([0, 1, 2, 3].map(|card| taken(&mut scheduler, card)), [2, 2, 2, 2]);
     for id in 0..8 {
         answer(&mut scheduler, id as CardNumber / 2, id, 0, SECOND);
@@ -172,8 +172,8 @@ fn two_cards_that_differ_end_the_render() {
     assert_eq!(scheduler.check(SECOND), Err(SchedulerError::Disagreement { tile: tile(0), sources }));
 }
 
-/// One card alone is believed. Of two that differ, the one that is not dazzling is believed. Two that agree
-/// are believed.
+/// The answer of a single card is accepted. Of two different answers, the one that is not dazzling is
+/// accepted. Two equal answers are accepted.
 #[test]
 fn dazzling_tiles_are_verified_if_there_is_another_card() {
     let dazzling = 1 << 57;
@@ -346,7 +346,7 @@ fn a_card_takes_the_tiles_that_it_has_rendered_before() {
         assert_eq!(take(&mut second, 0, Duration::ZERO), Some(id));
         answer(&mut second, 0, id, 0, SECOND);
     }
-    // A tile that no card has rendered is any card's.
+    // A tile that no card has rendered before is available to every card.
     assert_eq!(take(&mut second, 0, SECOND), Some(30));
 }
 
@@ -358,7 +358,7 @@ fn an_idle_card_takes_the_last_of_many_tiles_of_another() {
         assert_eq!(take(&mut scheduler, 0, SECOND / 2), Some(id));
         answer(&mut scheduler, 0, id, 0, SECOND);
     }
-    // Four are left at home.
+    // Four reserved tiles are left to the other card.
     assert_eq!(take(&mut scheduler, 0, SECOND / 2), None);
     // The other card has been at its tile for twice the mean time.
     assert_eq!(take(&mut scheduler, 0, 2 * SECOND), Some(4));

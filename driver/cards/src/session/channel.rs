@@ -77,7 +77,7 @@ impl Channel {
 pub struct LinkBytes {
     /// Bytes of card image lines sent.
     pub image: u64,
-    /// Bytes of card image lines and pixels.
+    /// Bytes of card image lines sent and of pixels received.
     pub payload: u64,
     /// All bytes in both directions.
     pub wire: u64,

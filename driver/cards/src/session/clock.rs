@@ -1,5 +1,5 @@
-//! Limits of a session: time of silence and of missing progress, with the times of probes, and the number of
-//! a card's failures.
+//! Limits of a session: the times of silence and without progress after which it fails, the times of probes,
+//! and the number of a card's failures.
 
 use std::time::Duration;
 
@@ -14,8 +14,8 @@ const MAX_PATIENCE: Duration = Duration::from_secs(1);
 const GREETING: Duration = Duration::from_secs(5);
 /// Minimum time limit of a tile if times of rendered tiles are known.
 const TILE: Duration = Duration::from_secs(30);
-/// Maximum time without progress, except for tiles. The longest step is the check of a received image, which
-/// takes seconds.
+/// Maximum time without progress while no tile is rendered. The longest step is the check of a received
+/// image, which takes seconds.
 const STANDSTILL: Duration = Duration::from_secs(120);
 /// Time per ray or gather that is added to [`STANDSTILL`] while a tile is rendered and no times are known,
 /// because all pixels may arrive at the end of a tile. It is some fifty times that of the slowest chip
@@ -34,7 +34,7 @@ pub(super) struct Clock {
     since: Duration,
     /// Time of the last delivered message, in either direction.
     passed: Duration,
-    /// Time from which the wait for the present answer counts.
+    /// Start of the wait for the present answer.
     asked: Duration,
     patience: Duration,
     /// Time of the last poll.
@@ -97,7 +97,8 @@ impl Clock {
         must_ask
     }
 
-    /// Returns whether the card has answered for too long without a hello.
+    /// Returns whether more than [`GREETING`] has passed since the first frame of a card that has not said
+    /// hello.
     pub(super) fn is_greeted_in_vain(&self, now: Duration) -> bool {
         self.heard.is_some_and(|heard| now.saturating_sub(heard) > GREETING)
     }
@@ -155,8 +156,8 @@ impl Failures {
         self.written_lines = 0;
     }
 
-    /// Compares the number of written lines in a hello with the last one. Returns whether the card was reset
-    /// since it was loaded.
+    /// Compares the number of written lines in a hello with the last known number. Returns whether the card
+    /// was reset since it was loaded.
     pub(super) fn says_hello(&mut self, written_lines: u32) -> bool {
         std::mem::replace(&mut self.written_lines, written_lines) > written_lines
     }

@@ -14,18 +14,18 @@ pub enum SessionError {
     #[error("the card speaks protocol {card}, this program {host}")]
     #[diagnostic(help("install the firmware and the program of one release"))]
     Protocol {
-        /// Version of the card.
+        /// Protocol version that the card speaks.
         card: u16,
-        /// Version of this program.
+        /// Protocol version that this program speaks.
         host: u16,
     },
     /// Error of a card with another version of the card image layout.
     #[error("the card reads card images of layout {card}, this program writes {host}")]
     #[diagnostic(help("install the firmware and the program of one release"))]
     Layout {
-        /// Version of the card.
+        /// Layout version of the card images that the card reads.
         card: u16,
-        /// Version of this program.
+        /// Layout version of the card images that this program writes.
         host: u16,
     },
     /// Error of a card whose budget has room for no tile command.
@@ -60,9 +60,9 @@ pub enum SessionError {
          writes log text on this line, or another device or program is at the address, or the cable is bad"
     ))]
     Garbled {
-        /// Time without a frame.
+        /// Time without a valid frame.
         time: Duration,
-        /// Number of bytes since the last frame.
+        /// Number of bytes since the last valid frame.
         bytes: u64,
     },
     /// Error of a card that answers without progress.
@@ -79,7 +79,7 @@ pub enum SessionError {
          watch the card's own messages, check the cable; then try another card, or `picture.crop`"
     ))]
     Failures(u32),
-    /// Error of the link.
+    /// Error of a link that was closed, or whose device failed.
     #[error("the link to the card {}", ending(.0))]
     #[diagnostic(help(
         "the card's process or the machine between has ended, another host has taken the card, or a cable \
@@ -104,7 +104,7 @@ pub enum SessionError {
         y: u32,
         /// Name of the channel.
         channel: &'static str,
-        /// Wrong value.
+        /// Value that no chip can produce.
         value: f64,
     },
     /// Error of a tile that other cards render differently.
@@ -121,7 +121,7 @@ pub enum SessionError {
     },
 }
 
-/// Verb phrase for the cause of a link's end; its subject is the name of the link.
+/// Returns a verb phrase for the cause of a link's end; its subject is the name of the link.
 fn ending(error: &PortError) -> String {
     match error {
         PortError::Closed => "was closed by the other end".to_owned(),
@@ -153,8 +153,8 @@ pub(super) fn check_budget(budget: &Budget, first: Option<&Budget>) -> Result<()
 }
 
 impl SessionError {
-    /// Tile of which the card sent wrong pixels, if this is the error. None of the card's pixels can be
-    /// trusted.
+    /// Tile of which the card sent wrong pixels; `None` for other errors. If there is such a tile, none of
+    /// the card's pixels can be trusted.
     pub fn lie(&self) -> Option<Tile> {
         match *self {
             Self::Value { tile, .. } | Self::Outvoted { tile } => Some(tile),

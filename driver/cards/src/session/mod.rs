@@ -3,7 +3,7 @@
 //! A session greets the card, sends the parts of the card image that the card lacks, sets the frame, requests
 //! tiles and checks their pixels. It reports [`Event`]s. A card that was reset is greeted and loaded again,
 //! and its tiles are returned. Threads, ports, time, scheduler and sinks are outside: `photoncard_render`
-//! runs one session per thread, a simulator many in one.
+//! runs one session per thread, and a simulator runs many sessions in one thread.
 
 mod channel;
 mod clock;
@@ -191,8 +191,8 @@ impl Session {
         self.send(&Command::RenderTile(assignment.tile));
     }
 
-    /// Makes the card do the gathers of its tiles in flight ([`Command::Flush`]). Sent at most once between
-    /// two tiles. [`Self::wants_tile`] must be true.
+    /// Makes the card do the gathers of its tiles in flight ([`Command::Flush`]). The command is sent at most
+    /// once between two tiles. [`Self::wants_tile`] must be true.
     pub fn flush(&mut self) {
         if !self.tiles.is_empty() && !std::mem::replace(&mut self.is_flushed, true) {
             self.send(&Command::Flush);
@@ -286,7 +286,7 @@ impl Session {
     /// Processes bytes from the card.
     ///
     /// # Errors
-    /// If they violate the protocol, report a fault of the card, or show that it has failed too often.
+    /// If the bytes violate the protocol, report a fault of the card, or show that it has failed too often.
     pub fn receive(&mut self, mut bytes: &[u8], now: Duration) -> Result<(), SessionError> {
         self.channel.bytes.wire += bytes.len() as u64;
         self.unheard_bytes += bytes.len() as u64;

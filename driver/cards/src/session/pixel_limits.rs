@@ -18,10 +18,11 @@ const DEPTH_ROUNDING: f32 = 1.0 / (1 << 19) as f32;
 /// | light, direct, indirect, caustic | at least 0; beside a lamp without extent there is no upper limit |
 /// | albedo | 0 to s |
 /// | normals | length 0 to s (1 + 2^-19) |
-/// | depths | 0 to s times the distance from the eye to the farthest corner of the scene's reach, see below |
+/// | depths | 0 to s times the distance from the eye to the farthest corner of `[-reach, reach]^3` |
 /// | surfaces s, gathers | 0 to n |
 ///
-/// Depths have a tolerance of 2^-19 of the coordinates, and of one step a sample.
+/// The maximum magnitude of a coordinate of the scene is `reach` (`Header::reach`), metres. Depths have a
+/// tolerance of 2^-19 of the coordinates, and of one step a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PixelLimits {
     format: SumFormat,
@@ -86,7 +87,7 @@ impl PixelLimits {
 }
 
 /// Upper bound of depths, metres: distance from the eye to the farthest corner of the cube of coordinates up
-/// to the scene's reach, times the length of the view vector if that exceeds 1.
+/// to `header.reach`, times the length of the view vector if that exceeds 1.
 fn farthest_corner(header: &Header, frame: &FrameParameters) -> f64 {
     let length = |vector: [f64; 3]| vector.iter().map(|component| component * component).sum::<f64>().sqrt();
     let ways = frame.camera.origin.map(|eye| f64::from(eye.abs()) + f64::from(header.reach));

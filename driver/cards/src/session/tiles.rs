@@ -34,8 +34,7 @@ impl TilesInFlight {
         self.0.push(TileInFlight { assignment, records: Vec::new(), is_received: Vec::new() });
     }
 
-    /// Returns whether the card's tile is one at which cards have crashed before. Such a tile is assigned
-    /// alone.
+    /// Returns whether cards have crashed before at the card's first tile. Such a tile is assigned alone.
     pub(super) fn is_at_suspect(&self) -> bool {
         self.0.first().is_some_and(|in_flight| in_flight.assignment.is_suspect)
     }

@@ -1,6 +1,6 @@
-//! Card image as it is sent to cards, with checksums that are computed once for all of them; and its load
-//! into a card, which sends only runs of lines that the card lacks. These lines follow from the card image
-//! that the card holds or, if that is unknown, from the checksums of the chunks in its memory.
+//! Card image as it is sent to cards, with checksums that are computed once for all cards, and the progress
+//! of sending it to one card. Only runs of lines that the card lacks are sent. They follow from the card
+//! image that the card holds or, if that is unknown, from the checksums of the chunks in its memory.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -22,9 +22,9 @@ type SharedLines = Arc<dyn AsRef<[Line]> + Send + Sync>;
 pub struct Upload {
     lines: SharedLines,
     checksum: u64,
-    /// Checksums of all whole chunks, computed when a card's are first compared with them.
+    /// Checksums of all whole chunks, computed when they are first compared with those of a card.
     chunks: OnceLock<Vec<u64>>,
-    /// Checksum of the previous image, and the runs of lines in which this one differs from it.
+    /// Checksum of the previous card image, and the runs of lines in which the present image differs from it.
     change: Option<(u64, Runs)>,
 }
 
@@ -68,7 +68,8 @@ impl Upload {
     }
 }
 
-/// Runs of the lines of `after` that differ from the line of `before` at the same index, or have none there.
+/// Returns the runs of lines of `after` that differ from the line of `before` at the same index, or lie
+/// beyond the end of `before`.
 pub fn changed_runs(before: &[Line], after: &[Line]) -> Vec<Range<usize>> {
     let mut runs = Vec::new();
     for (index, line) in after.iter().enumerate() {

@@ -89,7 +89,8 @@ const MAX_CONCENTRIC: usize = 64;
 /// Fractions of the nodes that the two calls of [`reinsertion::optimize`] try to reinsert in their first
 /// rounds.
 const REINSERTED: [f32; 2] = [0.2, 0.4];
-/// Number of the builder's passes, counted from the leaves, that join only adjacent parts.
+/// Number of the builder's first passes, those nearest to the leaves, that join only boxes adjacent in its
+/// sort order.
 const SEARCH_DEPTH: usize = 2;
 
 /// Builds the hierarchy of at least one triangle. The result depends neither on the machine nor on threads.
@@ -147,8 +148,9 @@ fn binary(boxes: &[Aabb]) -> Bvh2 {
 /// Input of the builder: one box for many triangles whose boxes have a common centre, and one box for each
 /// other triangle.
 ///
-/// Of nested boxes, each has an equal cost (the area of the union) with all smaller ones. Hardly two of them
-/// are each other's nearest, so that the builder would search all of them for each pair that it joins.
+/// The builder joins a box with the one for which the area of the union is least. For nested boxes this area
+/// is the same with every smaller box, so that hardly any two boxes are each other's nearest, and the builder
+/// would search all of them for each pair that it joins.
 struct Parts {
     crowds: Vec<Vec<u32>>,
     singles: Vec<u32>,
@@ -166,7 +168,7 @@ impl Parts {
         Self { crowds, singles: (0..).zip(is_single).filter_map(|(index, is)| is.then_some(index)).collect() }
     }
 
-    /// Triangles of each part.
+    /// Returns the triangle indices of each box that the builder receives.
     fn iter(&self) -> impl Iterator<Item = &[u32]> {
         self.crowds.iter().map(Vec::as_slice).chain(self.singles.chunks(1))
     }
@@ -217,7 +219,7 @@ fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafT
         let with_parts: Vec<_> = with_parts.collect();
         let trees = with_parts.into_par_iter().with_min_len(SEQUENTIAL).map(|(node, parts_below)| {
             let Some(parts_below) = parts_below else {
-                // The leaf holds one part.
+                // A leaf of the builder's tree holds one of its input boxes.
                 let part = binary.primitive_indices[node.first_index as usize];
                 return halves(&mut parts.triangles(part).to_vec(), boxes, mesh);
             };
@@ -231,7 +233,7 @@ fn tree(binary: &Bvh2, parts: &Parts, boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafT
     below.pop().unwrap_or_else(missing)
 }
 
-/// Nodes by depth, from the root. Nodes with one parent are adjacent.
+/// Returns the nodes of each depth, from the root downwards. Nodes with one parent are adjacent.
 fn depths(binary: &Bvh2) -> Vec<Vec<&Bvh2Node>> {
     let mut depths = Vec::new();
     let mut nodes = vec![&binary.nodes[0]];
@@ -261,7 +263,7 @@ fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangle
     Tree::node(parts, node_box, area, None)
 }
 
-/// Triangles of two leaves together, if they fit in one leaf.
+/// Returns the triangles of two leaves together, or `None` if they do not fit in one leaf.
 fn both(parts: &[Tree<LeafTriangles, NodeBox>; 2], mesh: &Mesh) -> Option<LeafTriangles> {
     let mut indices = LeafTriangles::new();
     for part in parts {
@@ -376,7 +378,7 @@ mod tests {
         }
     }
 
-    /// Given singly, nested boxes would make the builder search all of them for each pair that it joins.
+    /// If the builder received nested boxes singly, it would search all of them for each pair that it joins.
     #[test]
     fn concentric_triangles_reach_the_builder_as_one_part() {
         for step in [0.0, 1e-5] {

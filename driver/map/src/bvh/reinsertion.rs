@@ -1,23 +1,25 @@
-//! Optimization of a binary tree by reinsertion: parts are removed and inserted where the tree's surface area
-//! becomes least (Meister, Bittner 2017, *Parallel reinsertion for bounding volume hierarchy optimization*).
+//! Optimization of a binary tree by reinsertion: subtrees are removed and inserted where the tree's surface
+//! area becomes least (Meister, Bittner 2017, *Parallel reinsertion for bounding volume hierarchy
+//! optimization*).
 //!
-//! Rounds, order and results are those of obvhs, whose search for the best position is called here for many
-//! parts in parallel. The tree does not depend on the number of threads.
+//! The rounds, the order of insertion and the results are those of obvhs. Its search for the best position is
+//! called here for many subtrees in parallel. The tree does not depend on the number of threads.
 
 use obvhs::bvh2::reinsertion::{Reinsertion, find_reinsertion, reinsert_node};
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 use rayon::prelude::*;
 use rdst::{RadixKey, RadixSort};
 
-/// Number of rounds. Round n, counted from 0, tries `1 / (2 n + 1)` of the number of parts that round 0
+/// Number of rounds. Round n, counted from 0, tries `1 / (2 n + 1)` of the number of subtrees that round 0
 /// tries.
 const ROUNDS: usize = 16;
 
-/// Maximum number of parts that a round tries. The nodes with the largest areas make most of a tree's cost:
-/// with twice the time for all parts of a million triangles, rays read 2 % less.
+/// Maximum number of subtrees that a round tries. The nodes with the largest areas make most of a tree's
+/// cost: a round that tried all subtrees of a million triangles would take twice the time, and rays would
+/// read 2 % less.
 const MAX_TRIED: usize = 100_000;
 
-/// Part of a tree that can be reinserted.
+/// Subtree that can be reinserted.
 #[derive(Clone, Copy)]
 struct Candidate {
     area: f32,
@@ -52,7 +54,7 @@ pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
             let [from, to] = [from, to].map(|node| node as usize);
             let parents = [to, from].map(|node| tree.parents[node] as usize);
             let moved = [to, from, Bvh2Node::get_sibling_id(from), parents[0], parents[1]];
-            // A part beside one that has moved in this round may have another best place now.
+            // A subtree beside one that has moved in this round may now have another best position.
             if moved.iter().all(|&node| !touched[node]) {
                 moved.iter().for_each(|&node| touched[node] = true);
                 reinsert_node(tree, from, to);
@@ -61,7 +63,8 @@ pub(super) fn optimize(tree: &mut Bvh2, share: f32) {
     }
 }
 
-/// Best positions for the `count` nodes with the largest areas, sorted by descending gain of area.
+/// Finds the best positions for `count` nodes with large areas. Returns those that decrease the tree's area,
+/// sorted by descending decrease.
 fn reinsertions(tree: &Bvh2, count: usize) -> Vec<Reinsertion> {
     let first = tree.nodes.iter().zip(0..).take(2 * (count + 1)).skip(1);
     let mut candidates: Vec<Candidate> =

@@ -11,7 +11,7 @@ use photoncard_shared::message::{Fault, FaultCode};
 
 use super::lanes::{cross, dot, greatest, least, minus};
 
-/// Ball around photons, in metres.
+/// Ball around photons. The coordinates and the radius are in metres.
 #[derive(Clone, Copy)]
 pub(super) struct Ball {
     pub(super) centre: Vec3,
@@ -119,7 +119,7 @@ pub(super) fn for_each_near(
     let Ball { centre, radius } = ball;
     stack.clear();
     stack.push(Child::Node(0));
-    // In a sound tree each part is visited at most once; more visits mean a cycle.
+    // In a sound tree each node and leaf is visited at most once; more visits mean a cycle.
     let parts = [SectionKind::Nodes, SectionKind::Triangles].map(|kind| scene.header.section(kind).records);
     let mut visits_left = u64::from(parts[0]) + u64::from(parts[1]);
     while let Some(part) = stack.pop() {

@@ -26,8 +26,8 @@ impl Block {
     }
 }
 
-/// Normals of the planes through a point and each edge of a triangle, and six times the signed volume of the
-/// tetrahedron.
+/// Returns the normals of the planes through a point and each edge of a triangle, and six times the signed
+/// volume of the tetrahedron of the point and the triangle.
 ///
 /// Two triangles that share an edge have exactly opposite normals for it, so that no ray passes between them.
 #[inline(always)]
@@ -46,7 +46,7 @@ pub(super) struct FirstOnWay<'a> {
 }
 
 impl Kernel for FirstOnWay<'_> {
-    /// Distance and corners of the nearest triangle.
+    /// Distance of the nearest triangle, in units of the direction's length, and the triangle's corners.
     type Output = Option<(f32, [Vec3; 3])>;
 
     #[inline(always)]

@@ -1,8 +1,8 @@
 //! Parallel chords of a ball.
 //!
 //! The area of a surface is its projected area divided by the cosine between the normals, `A = A_p / cos`.
-//! Evenly spread chords measure it: each stands for an equal part of the disc perpendicular to them, and each
-//! crossing for that part divided by its cosine.
+//! Evenly spread chords measure it: each chord represents an equal part of the area of the disc perpendicular
+//! to the chords, and each crossing of a chord with a surface represents that part divided by the cosine.
 
 use glam::Vec3;
 use photoncard_firmware::simd::LANES;
@@ -59,8 +59,8 @@ pub(super) struct Chords {
 }
 
 impl Chords {
-    /// Chords over a disc of radius 1, by the sunflower spiral (Vogel 1979). Each chord stands for an equal
-    /// area.
+    /// Chords over a disc of radius 1, by the sunflower spiral (Vogel 1979). Each chord represents an equal
+    /// part of the disc's area.
     pub(super) fn new() -> Self {
         let mut points: Vec<[f32; 2]> = (0..CHORDS)
             .map(|index| {

@@ -38,15 +38,15 @@ pub(super) struct Evidence {
     /// Positions of photons whose normals are near the chords' direction, relative to the ball's centre, in
     /// radii along the frame's axes. Unused lanes are infinitely far away.
     along: Vec<LaneVector>,
-    /// Squared distances of the photons on the measured photon's own surface, m^2.
+    /// Squared distances, along the surface, from the measured photon to the photons on its own surface, m^2.
     own: Vec<f32>,
     /// Squared distance perpendicular to the chords within which a photon is evidence, in square radii of the
     /// ball.
     near: f32,
 }
 
-/// Number of photons of a surface expected near a chord. If the surface is as bright as the measured one, one
-/// chord in 150 has none.
+/// Expected number of photons near a chord's crossing with a lit surface. If that surface is as bright as the
+/// measured photon's, one crossing in 150 has no photon near it.
 const SEVERAL: usize = 5;
 /// Maximum tangent of the angle between a photon's surface and the direction to another photon on it.
 const OWN_SLOPE: f32 = 0.25;
@@ -62,7 +62,7 @@ impl Evidence {
         let sections = [SectionKind::PhotonNodes, SectionKind::PhotonLeaves];
         let [nodes, leaves] = sections.map(|kind| scene.header.section(kind).records);
         self.stack.push(if nodes > 0 { Child::Node(0) } else { Child::Leaf(0) });
-        // In a sound tree each part is visited at most once; more visits mean a cycle.
+        // In a sound tree each node and leaf is visited at most once; more visits mean a cycle.
         let mut visits_left = u64::from(nodes) + u64::from(leaves);
         while let Some(part) = self.stack.pop() {
             let cycle = Fault { code: FaultCode::Depth, detail: 0 };
@@ -106,8 +106,8 @@ impl Evidence {
     }
 
     /// Chooses the photons whose normals are near the direction of a frame's chords, and the distance within
-    /// which they are evidence: that of the neighbour number [`SEVERAL`] of `photon` on its own surface, at
-    /// most `most` metres.
+    /// which they are evidence: the distance from `photon` to its [`SEVERAL`]-th neighbour on its own
+    /// surface, at most `most` metres.
     pub(super) fn choose(&mut self, ball: Ball, frame: &ChordFrame, (photon, most): (Vec3, f32)) {
         self.along.clear();
         self.own.clear();

@@ -23,7 +23,8 @@ pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -
     Ok(Some(Met { distance: hit.intersection.distance, normal, triangle: hit.index }))
 }
 
-/// Finds all triangles on the segment between two points. After each hit the ray continues `step` behind it.
+/// Finds all triangles on the segment between two points. After each hit the ray continues `step` metres
+/// behind the hit.
 pub(super) fn all_on_way(
     scene: &SceneImage,
     memory: Lines,

@@ -13,7 +13,8 @@ use rayon::prelude::*;
 use crate::pack::CardImage;
 use crate::photon::Importons;
 
-/// Squared radius with which searches in a node start, divided by the squared distance of the node's sample.
+/// Squared radius with which searches in a node start, divided by the squared distance of the k-th neighbour
+/// of the node's sampled photon.
 const MOST: f32 = 1.4;
 /// Fraction of the sampled photons whose k-th neighbour lies within the usual distance.
 const USUAL_SHARE: f64 = 0.95;
@@ -111,8 +112,8 @@ impl SampledDistances {
         }
     }
 
-    /// Distances of gathers, from the samples near importons if there are importons, else from all. Without
-    /// samples it is the scene's diagonal.
+    /// Returns the distances of gathers. They follow from the samples near importons or, without importons,
+    /// from all samples. If there is no such sample, they are the scene's diagonal.
     pub(crate) fn of_gathers(&self, image: &CardImage, importons: Option<&Importons>) -> GatherDistances {
         let is_used = |sample: &&Sample| {
             importons.is_none_or(|importons| importons.indirect.is_used(sample.position, sample.normal))

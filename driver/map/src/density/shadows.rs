@@ -100,8 +100,8 @@ impl Shadows {
             let ([x, y, _], [p, q, _]) = (&self.corners[edge], &self.corners[(edge + 1) % 3]);
             let [a, b, c] = &mut self.edges[edge];
             for lane in 0..LANES {
-                // In the two triangles of a shared edge these coefficients are equal except for the sign, to
-                // the last bit: both test one line.
+                // For the two triangles of a shared edge these coefficients are equal, to the last bit,
+                // except for the sign, so that both triangles test the same line.
                 let sign = if self.is_front[lane] != 0.0 { 1.0 } else { -1.0 };
                 a[lane] = (y[lane] - q[lane]) * sign;
                 b[lane] = (p[lane] - x[lane]) * sign;
@@ -173,8 +173,8 @@ impl Shadows {
         isa.below(&apart, 1)
     }
 
-    /// Heights at which the chords of a batch hit the plane of a triangle; and 0 for the chords that hit the
-    /// triangle within the ball, else 1.
+    /// Returns, for each chord of a batch, the height at which it hits the plane of a triangle, and 0 if it
+    /// hits the triangle within the ball, else 1.
     #[inline(always)]
     fn cross(&self, triangle: usize, batch: &Batch) -> (Lane, [u32; LANES]) {
         let edges = [0, 1, 2].map(|edge: usize| at(&self.edges[edge], triangle));

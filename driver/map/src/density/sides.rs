@@ -113,7 +113,8 @@ impl SideTable {
     /// Marks double-sided triangles that form closed surfaces as solid, because no light enters, unless they
     /// emit or transmit light. A surface is closed if each edge of its triangles is shared with one other
     /// triangle, which has the edge in the opposite direction. Where meshes touch and more than two triangles
-    /// share an edge, neighbours by angle, with no other solid between them, bound a solid together.
+    /// share an edge, two triangles bound a solid together if they are neighbours by angle around the edge
+    /// and no other solid lies between them.
     fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -195,9 +196,9 @@ impl Sides {
     }
 }
 
-/// Returns for each triangle at an edge its index, and the index of the next triangle by angle on its back
-/// side if the two can bound a solid; `None` if the back is open. Items of `triangles`: whether the triangle
-/// has the edge in its given direction, index, corners.
+/// Returns, for each triangle at an edge, its index and the index of the next triangle by angle on its back
+/// side, or `None` instead if the two cannot bound a solid. An item of `triangles` is whether the triangle
+/// has the edge in the given direction, the triangle's index, and its corners.
 fn around_edge(
     edge: [[u32; 3]; 2],
     triangles: impl Iterator<Item = (bool, usize, [[u32; 3]; 3])>,
@@ -213,8 +214,8 @@ fn around_edge(
             (libm::atan2(way.dot(y), way.dot(x)), is_forward, index)
         })
         .collect();
-    // By ascending angle, a solid begins at a triangle with the reversed edge and ends at one with the edge.
-    // At equal angles one solid ends before another begins.
+    // By ascending angle, a solid begins at a triangle that has the edge in reverse and ends at one that has
+    // it in the given direction. At equal angles one solid ends before another begins.
     around.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1)).then(a.2.cmp(&b.2)));
     let count = around.len();
     let other = |index: usize| {

@@ -35,7 +35,7 @@ impl SameSurfaces {
     }
 }
 
-/// Points on surfaces outside all solids. Each stands for a chord's part of the area.
+/// Points on surfaces outside all solids. Each point represents its chord's part of the surface area.
 #[derive(Default)]
 pub(super) struct OpenSurfaces {
     places: Vec<SurfaceLanes>,
@@ -48,7 +48,7 @@ struct SurfaceLanes {
     places: [Lane; 3],
     slopes: Lane,
     normals: [u8; LANES],
-    /// Slope if the point belongs to the chosen surface, else 0.
+    /// For each point, [`Self::slopes`] if it belongs to the chosen surface, else 0.
     areas: Lane,
 }
 
@@ -124,7 +124,7 @@ impl Kernel for FractionWithin<'_> {
     }
 }
 
-/// Areas of the chosen surface around a photon.
+/// Areas, around a photon, of the surface that [`OpenSurfaces::choose`] has chosen.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Areas {
     /// Area within the photon's sphere, divided by the area of its disc.

@@ -46,7 +46,7 @@ pub(crate) struct Cells {
     /// Weights of the cells in row-major order, W/m^2: radiance averaged over channels, times solid angle.
     /// All are above 0.
     pub(crate) weights: Vec<f64>,
-    /// Subdivided cells, in the order of their numbers.
+    /// Parts of the subdivided cells, sorted by [`Parts::cell`].
     pub(crate) divided: Vec<Parts>,
 }
 

@@ -140,7 +140,7 @@ impl Lights {
             distant: self.shares.distant,
             radiance: environment.map_or([0.0; 3], |map| map.radiance),
             texture: environment.map(|_| texture),
-            // At most 128 columns and 64 rows.
+            // The grid has at most 128 columns and 64 rows.
             cells: cells.map(|cells| cells as u16),
         }
     }

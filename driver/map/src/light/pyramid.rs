@@ -8,7 +8,7 @@ use photoncard_scene::{Encoding, Image};
 /// Number of cells along each axis that are combined to one cell of the next level.
 const STEP: u32 = 4;
 
-/// Image at several resolutions below its own.
+/// Means of an image at several resolutions below the image's own.
 pub(super) struct Pyramid {
     /// Levels from fine to coarse. The last level is one cell.
     pub(super) levels: Vec<Level>,
@@ -31,8 +31,8 @@ impl Level {
     /// the only one that emits.
     pub(super) const OUTSIDE: f64 = 1.0 / 16.0;
 
-    /// Level above a finer grid of `finer_size` columns and rows. `finer` returns a cell of that grid by
-    /// index.
+    /// Creates the level above a finer grid of `finer_size` columns and rows. `finer` returns a cell of that
+    /// grid by index.
     fn new(finer_size: [u32; 2], finer: impl Fn(usize) -> Vec3) -> Self {
         let size = finer_size.map(|side| side.div_ceil(STEP));
         let range = |axis: usize, cell: u32| {

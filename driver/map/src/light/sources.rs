@@ -52,8 +52,8 @@ pub(crate) struct Sources {
     /// Power of all sources, watts, averaged over channels; 0 if photons can be aimed.
     pub(crate) power: f64,
     /// Maximum over the sources of the power in the strongest channel divided by the probability, watts. The
-    /// unit of photon powers is derived from it. Beside aimed photons, those that are not aimed can be
-    /// stronger.
+    /// unit of photon powers is derived from it. If a fraction of the photons is aimed, the other photons are
+    /// stronger, and so is this maximum.
     pub(crate) strongest: f32,
 }
 
@@ -86,13 +86,13 @@ impl Sources {
     }
 
     /// Returns sources most of whose photons are aimed at the scene's surfaces other than lamps, which may be
-    /// far from the lights; `None` if there are none.
+    /// far from the lights; `None` if there are no such surfaces.
     pub(crate) fn aimed(scene: &Scene, lights: &Lights, part: Option<[Vec3; 2]>) -> Option<Self> {
         let targets = Targets::lit(scene);
         (!targets.is_empty()).then(|| Self::towards(scene, lights, part, targets))
     }
 
-    /// Variant of these sources whose photons are partly aimed at other targets.
+    /// Returns these sources with a fraction of their photons aimed at `targets`.
     pub(crate) fn aimed_at(&self, targets: Targets) -> Self {
         let strongest = self.strongest / (1.0 - targets.share);
         Self { targets, strongest, power: 0.0, ..self.clone() }

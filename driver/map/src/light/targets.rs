@@ -37,7 +37,8 @@ pub(crate) struct Aim {
     pub(crate) measure: f32,
 }
 
-/// Fraction of the photons that are aimed, where photons may be needed elsewhere too.
+/// Fraction of the photons that [`Targets::lit`] aims. The other photons are for surfaces outside the
+/// targets.
 const AIMED_SHARE: f32 = 0.9;
 /// Fraction of the photons that are aimed at boxes.
 const BOX_SHARE: f32 = 0.5;
@@ -280,12 +281,13 @@ impl Part {
         Some(Self { triangles, sphere: Sphere { centre, radius, density }, may_be_split })
     }
 
-    /// Share of the photons that the part takes, not normalized.
+    /// Number of photons aimed at the sphere, up to a factor that all spheres have in common.
     fn cost(&self) -> f32 {
         self.sphere.density * self.sphere.radius * self.sphere.radius
     }
 
-    /// Halves the part along its longest axis, if the halves together take fewer photons than it does.
+    /// Halves the triangles along their longest axis, if the two spheres together take fewer photons than
+    /// this one.
     fn split(&self) -> Option<[Self; 2]> {
         let middle = |([a, b, c], _): &Weighted| (*a + *b + *c) / 3.0;
         let lower = self.triangles.iter().map(middle).reduce(Vec3::min)?;
@@ -340,7 +342,7 @@ mod tests {
             }));
             sum += f64::from(measure);
         }
-        // Over the plane z = 1, whose solid angle falls off by the cube of the cosine.
+        // The integral is over the plane z = 1, where the solid angle per area is the cube of the cosine.
         let expected = covered(|u, v| {
             let direction = Vec3::new(2.0 * u - 1.0, 2.0 * v - 1.0, 1.0);
             let is_hit =

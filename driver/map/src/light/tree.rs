@@ -82,7 +82,7 @@ fn capacity(levels: usize) -> usize {
     LIGHT_CHILDREN.saturating_pow(levels as u32)
 }
 
-/// Splits emitters into up to four parts of at most `most` each.
+/// Splits emitters into up to four lists of at most `most` each.
 fn quarters<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mut [u32]; LIGHT_CHILDREN] {
     let [left, right] = halves(emitters, order, most.saturating_mul(2));
     let [a, b] = halves(emitters, left, most);
@@ -90,7 +90,7 @@ fn quarters<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o 
     [a, b, c, d]
 }
 
-/// Splits emitters into two parts of at most `most` each.
+/// Splits emitters into two lists of at most `most` each.
 fn halves<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mut [u32]; 2] {
     if order.len() < 2 {
         let middle = order.len();
@@ -99,7 +99,7 @@ fn halves<'o>(emitters: &[Bounds], order: &'o mut [u32], most: usize) -> [&'o mu
     let split = Split::best(emitters, order);
     let mut middle = 0;
     if let Some(split) = &split {
-        // Stable, so that the tree is the same on every machine.
+        // The sort is stable, so that the tree is the same on every machine.
         order.sort_by_cached_key(|&emitter| split.bin(emitters[emitter as usize].middle()) > split.last);
         middle =
             order.partition_point(|&emitter| split.bin(emitters[emitter as usize].middle()) <= split.last);
@@ -373,7 +373,8 @@ mod tests {
 
     #[test]
     fn trails_fit_where_splits_would_be_uneven() {
-        // Each at a tenth of the previous distance: the best split separates one at a time.
+        // Each point is at a tenth of the previous distance, so that the best split separates one point at a
+        // time.
         let point = |i: i32| Bounds {
             corners: vec![DVec3::X * 10.0_f64.powi(-i)],
             cone: Cone::ALL,

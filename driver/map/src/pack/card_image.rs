@@ -16,8 +16,9 @@ const LIGHT_SECTIONS: [SectionKind; 4] = [
     SectionKind::EnvironmentCells,
 ];
 
-/// Number of lines to allocate for a photon map, beyond the `lines` of an image. The allocator copies an
-/// image that grows, which takes seconds if it is large; room that is not written takes no memory.
+/// Number of lines to allocate for a photon map, beyond the `lines` of an image. Without them the allocator
+/// copies the image when it grows, which takes seconds for a large image. Allocated lines that are not
+/// written take no memory.
 pub(super) fn room_for_photons(lines: usize) -> usize {
     const PHOTON_LINES: usize = 1 << 20;
     (lines / 16).min(PHOTON_LINES)
@@ -31,7 +32,7 @@ pub struct CardImage {
 }
 
 impl Clone for CardImage {
-    /// Copy with room for a photon map.
+    /// Copies the card image, and allocates lines for a photon map.
     fn clone(&self) -> Self {
         let mut lines = Vec::with_capacity(self.lines.len() + room_for_photons(self.lines.len()));
         lines.extend_from_slice(&self.lines);

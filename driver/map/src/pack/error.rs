@@ -18,7 +18,7 @@ pub enum PackError {
     Memory {
         /// Number of triangles of the scene.
         triangles: usize,
-        /// Size of the memory, bytes.
+        /// Size of the refused memory, bytes.
         bytes: u64,
     },
     /// The card image has more lines than a line address can number.

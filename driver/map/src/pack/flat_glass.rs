@@ -21,7 +21,7 @@ const FACES: f32 = 0.9;
 const EQUAL: f32 = 0.99;
 /// Maximum distance of a corner from its face's plane, divided by the thickness.
 const EVEN: f32 = 0.02;
-/// Rounding error of a coordinate, relative to the greatest one.
+/// Rounding error of a coordinate, relative to the greatest coordinate.
 const ROUNDING: f32 = 1e-6;
 /// Number of steps per unit of the thickness's natural logarithm. Panes in one step share a record.
 const THICKNESS_STEPS: f32 = 100.0;
@@ -62,7 +62,8 @@ impl<'a> Glazing<'a> {
             let indices = || part.triangles.iter().map(|&part| glass[part as usize] as usize);
             let triangles: Vec<&Triangle> = indices().map(|index| &scene.triangles[index]).collect();
             let Some(thickness) = thickness_of_slab(&triangles) else { continue };
-            // A face that is also another solid's is an interface of another ratio of indices.
+            // A face that is also a face of another solid has another ratio of refractive indices than the
+            // rest.
             if !is_of_one_medium(scene, &triangles) {
                 continue;
             }
@@ -75,7 +76,7 @@ impl<'a> Glazing<'a> {
         glazing
     }
 
-    /// Index in the card image of a pane's material, which is added if it is new.
+    /// Returns the index in the card image of a pane's material. Adds the material if it is new.
     fn material(&mut self, scene: &Scene, pane: Pane) -> u32 {
         let absorbs = transmission_of(&scene.materials[pane.material as usize])
             .is_some_and(|transmission| transmission.absorption != Vec3::ZERO);
@@ -172,7 +173,7 @@ fn thickness_of_slab(triangles: &[&Triangle]) -> Option<f32> {
         triangles.iter().filter(is_on_face).map(|triangle| triangle.area()).sum()
     };
     let all: f32 = triangles.iter().map(|triangle| triangle.area()).sum();
-    // Of a cavity, and of a mesh turned inside out, the faces look at each other.
+    // The faces of a cavity, and those of a mesh turned inside out, face each other.
     let is_slab = [1.0, -1.0].into_iter().any(|side| {
         let (above, below) = (face(upper, side), face(lower, -side));
         above + below >= FACES * all && above.min(below) >= EQUAL * above.max(below)
@@ -219,7 +220,7 @@ mod tests {
         let mut inside_out = thin.clone();
         inside_out.iter_mut().for_each(|triangle| triangle.vertices.swap(1, 2));
         assert!(close(thickness(&inside_out)));
-        // Without its rim.
+        // The two faces are a slab even without its rim.
         assert!(close(thickness(&thin[4..8])));
     }
 

@@ -36,7 +36,7 @@ pub(super) fn records(scene: &Scene, lights: &Lights, uncovered: &[bool]) -> Vec
 
 /// Record of a material without the flags that depend on its scene.
 pub(super) fn bare_record(material: &Material) -> layout::Material {
-    // Decoded from its bytes, because the record rounds some values.
+    // The record is encoded and decoded again, because its encoding rounds some values.
     layout::Material::read(&record(material, 0, None).to_bytes())
 }
 

@@ -53,8 +53,8 @@ impl PackedScene {
     /// Packs geometry, materials, textures and lights.
     ///
     /// # Errors
-    /// If the geometry exceeds a chip or this process's memory, or there are more textures or lights than a
-    /// chip can index.
+    /// If the geometry exceeds a chip's limits or this process's memory, or there are more textures or lights
+    /// than a chip can index.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
         allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
             .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
@@ -130,14 +130,14 @@ impl PackedScene {
         self.keeps_photons
     }
 
-    /// Returns whether there are both narrow lobes and punctual lights, whose light the caustic map brings to
-    /// the lobes.
+    /// Returns whether there are both materials with narrow lobes and punctual lights. Only the caustic map
+    /// shows such lights in such lobes.
     pub(crate) fn has_lobes_under_punctual_lights(&self) -> bool {
         self.has_lobes_under_punctual_lights
     }
 }
 
-/// Writes the sections of a scene.
+/// Writes a card image with the sections of a scene.
 fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     let uncovered = scene.uncovered_materials();
     let glazing = Glazing::new(scene);
@@ -149,7 +149,7 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     let indices = indices_in_image(scene, &hierarchy.leaf_triangles);
     let texel_lines = textures::lines(scene, lights.environment());
     let attribute_lines = corners.records.len().div_ceil(layout::Attributes::PER_LINE);
-    // Other sections have place in the room for photons.
+    // The other sections fit in the lines that are allocated for photons.
     let large = [hierarchy.nodes.len(), hierarchy.leaves.len(), attribute_lines, texel_lines];
     let mut image = ImageWriter::new(header(scene, lights), large.into_iter().sum());
     image.append(SectionKind::Nodes, hierarchy.nodes.into_iter())?;
@@ -170,7 +170,8 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     Ok(image.finish())
 }
 
-/// Header of a scene without photons: units, reach and lights. [`ImageWriter`] sets lines and sections.
+/// Creates the header of a scene without photons, with the fields `radiance_unit`, `reach` (the maximum
+/// magnitude of a coordinate, metres) and `lights`. [`ImageWriter`] sets `lines` and `sections`.
 fn header(scene: &Scene, lights: &Lights) -> Header {
     let (lower, upper) = scene.bounds();
     Header {

@@ -30,8 +30,8 @@ pub(super) fn records(
         .iter()
         .map(|image| {
             let texture = layout::Texture { first_line, ..bare(image) };
-            // An overflow is impossible after `lines` are appended: lines are counted there, and an image has
-            // fewer lines than texels.
+            // If the sum overflows, the card image is rejected when its texel lines are appended, because
+            // there are more of them than 32 bits can count.
             first_line = first_line.wrapping_add(texture.lines());
             texture
         })
@@ -90,7 +90,7 @@ fn write_tiles(
 fn bare(image: &Image) -> layout::Texture {
     layout::Texture {
         first_line: 0,
-        // The loader rejects larger images.
+        // The sides fit `u16`, because the loader rejects larger images.
         size: [image.width, image.height].map(|side| side as u16),
         wrap: [layout::Wrap::Repeat; 2],
         nearest: false,

@@ -14,8 +14,8 @@ pub(crate) struct ImageWriter {
 }
 
 impl ImageWriter {
-    /// Creates a writer of a card image without sections, with room for `lines` lines and a photon map.
-    /// `header` has the units and lights; the writer sets the numbers of lines and the sections.
+    /// Creates a writer of a card image without sections, and allocates `lines` lines and the lines of a
+    /// photon map. `header` has the units and lights; the writer sets the numbers of lines and the sections.
     pub(super) fn new(header: Header, lines: usize) -> Self {
         let mut all = Vec::with_capacity(HEADER_LINES + lines + room_for_photons(lines));
         all.resize(HEADER_LINES, Line::ZERO);

@@ -82,7 +82,7 @@ impl Spacing {
 
 /// Area per photon, square grid cells, from the nearest neighbours of `photon`.
 fn area(paths: &[Traced], photon: StoredPhoton) -> f64 {
-    // The first is the photon itself.
+    // The nearest photon is `photon` itself.
     let mut nearest = [u64::MAX; NEIGHBOR + 1];
     let mut found = 0;
     for photons in paths.iter().map(|traced| &traced.photons) {
@@ -144,7 +144,7 @@ mod tests {
         assert_eq!((traced.photons, traced.ends), (photons, vec![3, 4, 5]));
     }
 
-    /// Photons on a floor, eight cells apart.
+    /// The photons are on a floor, eight grid cells apart.
     #[test]
     fn the_spacing_follows_from_the_number_of_photons_in_the_map() {
         let floor = |side: u32| -> Vec<StoredPhoton> {

@@ -150,7 +150,7 @@ pub(super) fn emit(
         ..emission
     });
     let emission = emission.filter(|emission| emission.power.max_element() > 0.0);
-    // Bounces are fewer than `u32::MAX`: this random number is used once.
+    // Bounces have smaller numbers than `u32::MAX`, so that none of them uses this random number too.
     let survival = random.bounce(u32::MAX).survival();
     // The roulette equalises the power of the sources, not that of guided photons.
     let emission = emission.and_then(|emission| roulette(emission, sources.power, survival));
@@ -161,7 +161,7 @@ pub(super) fn emit(
 /// texture, so that photons have equal power.
 fn roulette(emission: Emission, mean_power: f64, roulette: f32) -> Option<Emission> {
     let probability = (f64::from(emission.power.element_sum()) / (3.0 * mean_power)) as f32;
-    // Differences by rounding are ignored.
+    // A probability near 1 counts as 1, because rounding can lower it.
     if probability > 0.99 {
         return Some(emission);
     }
@@ -284,8 +284,9 @@ fn aimed(point: &EmitterPoint, double_sided: bool, targets: &Targets, square: [f
     })
 }
 
-/// Emission from infinitely far along `direction`. `irradiance` is that of a surface facing the light. Rays
-/// that miss a part of the scene in which photons are stored are dropped, aimed or not.
+/// Emission from infinitely far along `direction`. `irradiance` is that of a surface facing the light. If
+/// photons are stored in only a part of the scene, rays that miss this part are dropped, whether they are
+/// aimed or not.
 fn from_afar(
     (scene, memory): (&SceneImage, &mut impl MemoryPort),
     sources: &Sources,
@@ -314,8 +315,8 @@ fn from_afar(
     let Some(emission) = emission.filter(|emission| meets_box(bounds, &emission.ray)) else {
         return Ok(None);
     };
-    // A ray begins outside the scene only if something lies before the box, because its precision falls with
-    // the distance.
+    // A ray begins outside the scene only if something lies before the box, because the precision of a ray
+    // falls with its length.
     let origin = emission.ray.origin;
     let is_open = closest_hit(scene, memory, &Ray::new(origin, -direction))?.is_none();
     let origin = if is_open { origin } else { origin - direction * sources.beyond };
@@ -331,7 +332,7 @@ fn shown([lower, upper]: [Vec3; 2], direction: Vec3) -> Vec3 {
 /// Returns whether the line of a ray hits a box.
 fn meets_box(bounds: [Vec3; 2], ray: &Ray) -> bool {
     let [a, b] = bounds.map(|corner| (corner - ray.origin) / ray.direction);
-    // A component is NaN in the plane of a face.
+    // A component is NaN if the ray is parallel to a face and its origin lies in the plane of the face.
     let first = a.min(b).to_array().into_iter().fold(f32::NEG_INFINITY, f32::max);
     let last = a.max(b).to_array().into_iter().fold(f32::INFINITY, f32::min);
     first <= last

@@ -15,7 +15,8 @@ pub(super) type Point = [u64; DIMENSIONS];
 pub(super) const UNIFORM_SHARE: f64 = 0.25;
 /// Minimum number of useful samples per half, on average.
 const MIN_USEFUL: usize = 8;
-/// Number of samples with the mean square of the enclosing box that are added to a box's own.
+/// Number of hypothetical samples, with the mean square use of the enclosing box, that are added to a box's
+/// own samples.
 const PRIOR_SAMPLES: f64 = 4.0;
 /// Maximum number of halvings along a dimension.
 const MAX_HALVINGS: u32 = 20;
@@ -24,13 +25,15 @@ const ALL: f64 = 18_446_744_073_709_551_616.0;
 /// Largest `f64` below 1.
 const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// Point of the hypercube, and the uses of the path that it begins, as if the path were not guided.
+/// Point of the hypercube from which a path is emitted, and the uses of the path's photons for the picture,
+/// as if the path were not guided.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sample {
     pub(super) point: Point,
     /// Sum of the uses of the path's photons.
     pub(super) use_of_path: f64,
-    /// Sum of the squared uses of the path's photons: their variance, because they lie in different places.
+    /// Sum of the squared uses of the path's photons. It is the variance that they add, because they lie in
+    /// different places.
     pub(super) squares: f64,
     /// Weight of the point under the guide that sampled it ([`Warped::weight`]).
     pub(super) weight: f32,
@@ -71,13 +74,13 @@ struct Halves {
 /// Sums over the samples in a box.
 #[derive(Clone, Copy, Default)]
 struct Sums {
-    /// Number of samples with any use.
+    /// Number of samples whose paths store a photon that the picture uses.
     useful: usize,
-    /// Sum of the weights.
+    /// Sum of the samples' weights.
     weight: f64,
-    /// Weighted sum of the uses.
+    /// Sum of the uses of the samples' paths, each times the sample's weight.
     uses: f64,
-    /// Weighted sum of the squares.
+    /// Sum of the samples' squared uses, each times the sample's weight.
     squares: f64,
 }
 
@@ -161,7 +164,7 @@ impl Guide {
     }
 }
 
-/// Boxes during construction.
+/// Boxes of a [`Guide`] during its construction.
 struct Builder {
     /// Boxes. `share` is the root mean square of the use of the box's paths times its volume, which is the
     /// optimal density.
@@ -203,8 +206,8 @@ fn is_upper(sample: &Sample, dimension: usize, halvings: u32) -> bool {
     sample.point[dimension] >> (63 - halvings) & 1 == 1
 }
 
-/// Dimension along which the two halves differ most, such that the sum of their optimal shares is least;
-/// `None` if the box has too few useful samples to be split.
+/// Returns the dimension along which the two halves differ most, such that the sum of their optimal shares is
+/// least; `None` if the box has too few useful samples to be split, or was halved too often.
 fn best_dimension(samples: &[Sample], halvings: [u32; DIMENSIONS]) -> Option<usize> {
     if Sums::of(samples).useful < 2 * MIN_USEFUL {
         return None;

@@ -115,8 +115,8 @@ struct Walk<'a, M> {
 }
 
 impl<M: MemoryPort> Walk<'_, M> {
-    /// Adds the importons of an eye path and of its gather rays. `left` and `above` are the corner of its
-    /// cell, as fractions of the picture's sides.
+    /// Adds the importons of an eye path and of its gather rays. `[left, above]` is the upper left corner of
+    /// the eye path's cell of the picture, as fractions of the picture's sides.
     fn look(
         &mut self,
         camera: &Camera,

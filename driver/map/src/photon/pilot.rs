@@ -1,5 +1,5 @@
-//! Pilots: paths with other seeds than the map's, from which the sources and the guide of its paths are
-//! chosen.
+//! Pilots: paths with other seeds than those of the photon map. They determine the sources and the guide of
+//! the map's paths.
 
 use std::collections::BTreeMap;
 
@@ -28,9 +28,9 @@ pub struct Guiding {
     pub gain: f64,
 }
 
-/// Number of tasks of each pilot that compares aimed with unaimed paths.
+/// Number of tasks, of [`PATHS_PER_TASK`] paths each, of a pilot that compares aimed with unaimed paths.
 const AIM_TASKS: u64 = 4;
-/// Number of tasks of each pilot that measures the share of caustics.
+/// Number of tasks, of [`PATHS_PER_TASK`] paths each, of a pilot that measures the share of caustics.
 const SHARE_TASKS: u64 = 8;
 /// Number of lower bits of a grid coordinate that a cell of [`CellPowers`] spans, such that the longest side
 /// of the grid has 32 to 64 cells.
@@ -45,9 +45,9 @@ const GUIDE_SEED: u32 = 0x7feb_352d;
 const GUIDE_ROUNDS: u32 = 4;
 /// Number of photons of the map per path of a pilot round.
 const PHOTONS_PER_GUIDE_PATH: u64 = 8;
-/// Minimum number of tasks of a round, and number of tasks of each pilot of [`more_useful`].
+/// Minimum number of tasks of a pilot round, and number of tasks of each pilot of [`more_useful`].
 const MIN_GUIDE_TASKS: u64 = 32;
-/// Maximum number of tasks of a round.
+/// Maximum number of tasks of a pilot round.
 const MAX_GUIDE_TASKS: u64 = 128;
 
 /// Returns the tracer of the photon map with aimed paths if their effective number of photons is more than
@@ -56,7 +56,7 @@ pub(super) fn tracer_of_more_photons(packed: &PackedScene, seed: u32) -> Result<
     let unaimed = Tracer::new(packed, packed.sources(), seed, Purpose::Indirect);
     let Some(sources) = packed.aimed_sources() else { return Ok(unaimed) };
     let aimed = Tracer::new(packed, sources, seed, Purpose::Indirect);
-    // Paths of another seed, so that the choice does not depend on the photons of the map.
+    // The pilot's paths have another seed, so that the choice does not depend on the photons of the map.
     let pilot = |tracer: &Tracer| effective_photons(&tracer.with_seed(!seed), packed);
     let [of_unaimed, of_aimed] = [pilot(&unaimed)?, pilot(&aimed)?];
     Ok(if of_aimed > MIN_GAIN_BY_AIM * of_unaimed { aimed } else { unaimed })
@@ -76,11 +76,13 @@ fn first_photons(tracer: &Tracer, packed: &PackedScene, tasks: u64) -> Result<Ve
     Ok(tasks?.into_iter().flat_map(|traced| traced.photons).collect())
 }
 
-/// Fraction of the power arriving at surfaces, over all bounces, that caustics contribute where they occur,
-/// averaged over their light; 1 if no other light arrives.
+/// Estimates the fraction of the power arriving at surfaces, over all bounces, that caustics contribute in
+/// the cells of space where they occur. The mean over cells is weighted by the power of caustics; it is 1 if
+/// no other light arrives.
 pub(super) fn caustic_share(packed: &PackedScene, seed: u32) -> Result<f64, Fault> {
     let power_by = |sources: Option<&Sources>, purpose: Purpose| {
-        // Paths of another seed, so that the number of paths does not depend on the photons of the map.
+        // The pilot's paths have another seed, so that the number of paths does not depend on the photons of
+        // the map.
         let tracer = Tracer::new(packed, sources.unwrap_or(packed.sources()), !seed, purpose);
         Ok(CellPowers::new(&tracer, first_photons(&tracer, packed, SHARE_TASKS)?))
     };
@@ -114,11 +116,12 @@ impl CellPowers {
         self.0.values().map(|cell| cell.power).sum()
     }
 
-    /// Mean share that these powers have of all power in their cells, weighted by these powers; at least
-    /// their share of the total.
+    /// Mean fraction that these powers are of all power in their cells, weighted by these powers. It is at
+    /// least the ratio of the two total powers.
     fn share_of(&self, all: &Self) -> f64 {
         let (own, whole) = (self.power(), all.power());
-        // Pairs of photons alone: a photon with itself would make any light of few photons seem focused.
+        // Only pairs of different photons count: pairs of a photon with itself would make any light of few
+        // photons seem focused.
         let of_cell = |(cell, own): (&[u32; 3], &CellPower)| {
             let around = all.0.get(cell).map_or(0.0, |all| all.power);
             (own.power * own.power - own.squares) / around.max(own.power)
@@ -163,7 +166,8 @@ pub(super) fn guide(
         (photons as u64 / PHOTONS_PER_GUIDE_PATH / PATHS_PER_TASK).clamp(MIN_GUIDE_TASKS, MAX_GUIDE_TASKS);
     let (mut guide, mut all) = (None, Vec::new());
     for round in 0..GUIDE_ROUNDS {
-        // Paths of another seed: weights that depended on the photons of the map would bias it.
+        // The pilot's paths have another seed: a guide that depended on the photons of the map would bias the
+        // map.
         let seed = tracer.seed ^ hash(GUIDE_SEED + round);
         let pilot = tracer.with_seed(seed).guided(guide.as_ref());
         all.extend(samples(&pilot, packed, importons, tasks)?);
@@ -176,7 +180,7 @@ pub(super) fn guide(
     }))
 }
 
-/// Samples the uses of the paths of `tasks` tasks.
+/// Traces the paths of `tasks` tasks, and measures how the picture uses their photons.
 fn samples(
     pilot: &Tracer,
     packed: &PackedScene,
@@ -190,7 +194,7 @@ fn samples(
     Ok(samples?.concat())
 }
 
-/// Samples the uses of the paths of one task.
+/// Traces the paths of one task, and measures how the picture uses their photons.
 fn samples_of_task(
     pilot: &Tracer,
     packed: &PackedScene,

@@ -13,12 +13,13 @@ use photoncard_shared::layout::{
 pub(crate) struct StoredPhoton {
     /// Grid point: three coordinates of [`GRID_BITS`] bits each, x in the lowest bits.
     place: u64,
-    /// Bytes that follow the position in a [`Photon`]'s record.
+    /// Bytes that follow the position in a [`Photon`]'s record, in little-endian order.
     content: u64,
 }
 
 const COORDINATE_MASK: u64 = (1 << GRID_BITS) - 1;
-/// Position of the splitting axis in the content, bits. The axis is zero outside a kd-tree.
+/// Bit offset of the kd-tree's splitting axis in [`StoredPhoton::content`]. The axis is 0 unless the photons
+/// are in a kd-tree.
 const AXIS_SHIFT: u32 = 48;
 const AXIS_MASK: u64 = 3 << AXIS_SHIFT;
 
@@ -41,7 +42,7 @@ impl StoredPhoton {
         (self.place >> (GRID_BITS * axis as u32) & COORDINATE_MASK) as u32
     }
 
-    /// Grid point.
+    /// Coordinates of the photon's grid point.
     #[inline(always)]
     pub(crate) fn point(self) -> [u32; 3] {
         [0, 1, 2].map(|axis| self.coordinate(axis))
@@ -98,7 +99,7 @@ impl StoredPhoton {
     #[must_use]
     pub(crate) fn with_power_of(self, other: Self) -> Self {
         let sum = Vec3::from(self.colour()) + Vec3::from(other.colour());
-        // Random bits that do not depend on the powers.
+        // The random bits do not depend on the powers.
         self.with_colour(sum, hash(self.place as u32 ^ hash(other.place as u32)))
     }
 
@@ -139,7 +140,8 @@ pub struct Photons {
 }
 
 impl Photons {
-    /// Photons at the nearest points of a grid. `power_unit` is the power of a photon of value 1, watts.
+    /// Moves photons to the nearest points of a grid. `power_unit` is the power of a photon of value 1,
+    /// watts.
     pub fn new(grid: PhotonGrid, power_unit: f32, photons: impl IntoIterator<Item = Photon>) -> Self {
         let list = photons.into_iter().map(|photon| StoredPhoton::new(&grid, &photon)).collect();
         Self { list, grid, power_unit }

@@ -28,9 +28,9 @@ pub struct PhotonPass {
 const FRUITLESS_PATHS: u64 = 1_000_000;
 /// Number of paths per caustic photon that are traced in any case.
 const MAX_PATHS_TO_A_CAUSTIC_PHOTON: u64 = 20;
-/// Maximum number of additional paths for caustics.
+/// Maximum number of paths for caustics in addition to [`MAX_PATHS_TO_A_CAUSTIC_PHOTON`] per photon.
 const MAX_PATHS_TO_CAUSTICS: f64 = 1_000_000.0;
-/// Minimum number of additional paths for caustics.
+/// Minimum number of paths for caustics in addition to [`MAX_PATHS_TO_A_CAUSTIC_PHOTON`] per photon.
 const MIN_PATHS_TO_CAUSTICS: u64 = 125_000;
 /// Share of the arriving power, where caustics occur, at which they get all [`MAX_PATHS_TO_CAUSTICS`]
 /// additional paths. A smaller share gets proportionally fewer, but at least [`MIN_PATHS_TO_CAUSTICS`].
@@ -97,7 +97,7 @@ pub(crate) fn trace_caustics_for(
     count: usize,
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Result<Photons, PhotonError> {
-    // Most scenes with caustics need no pilot.
+    // The pilot runs only if its result is needed: most scenes with caustics do not need it.
     let worth = LazyCell::new(|| caustic_share(packed, seed).map(paths_worth));
     let traced = trace_while(packed, importons, (seed, Purpose::Caustics), count, &|stored, paths| {
         if !go_on() {

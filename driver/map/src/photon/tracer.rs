@@ -62,8 +62,8 @@ pub(super) struct Tracer<'s> {
 
 impl<'s> Tracer<'s> {
     pub(super) fn new(packed: &'s PackedScene, sources: &'s Sources, seed: u32, purpose: Purpose) -> Self {
-        // Photons rarely gain power after emission: factor 2 at a Phong lobe, 16 at glass whose reflection is
-        // almost the mirror's alone.
+        // Photons rarely gain power after emission: by a factor of 2 at a Phong lobe, and of 16 at glass
+        // whose reflection is almost only that of a mirror.
         let path_unit = power_of_two_above(sources.strongest.into());
         let (scene, grid) = (packed.view().0, packed.photon_grid());
         Self { packed, scene, sources, guide: None, grid, path_unit, seed, purpose }
@@ -90,7 +90,7 @@ impl<'s> Tracer<'s> {
         Ok(traced)
     }
 
-    /// Traces a path.
+    /// Traces the path with the number `path`, and appends the photons that it stores.
     fn follow(
         &self,
         memory: &mut impl MemoryPort,

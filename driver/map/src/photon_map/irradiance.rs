@@ -121,7 +121,8 @@ fn surface_points(image: &CardImage) -> Result<Vec<SurfacePoint>, Fault> {
         let leaf = PhotonLeaf::read(line);
         (0..leaf.photons()).for_each(|photon| add(leaf.point(photon), leaf.content(photon)));
     }
-    // Neighbours on the curve have most of their photons in common, and the memory of their searches.
+    // Points that are neighbours on the curve gather mostly the same photons, so that their searches read the
+    // same memory.
     points.par_sort_by_cached_key(|&(point, normal)| (normal, HilbertCode::new(&grid, grid.position(point))));
     points.dedup();
     Ok(points)

@@ -43,7 +43,8 @@ fn photons_of_leaves(image: &CardImage) -> Vec<StoredPhoton> {
     photons
 }
 
-/// Number of nodes in the left subtree of a left-balanced tree with `count` nodes, at least one.
+/// Number of nodes in the left subtree of a left-balanced tree with `count` nodes. `count` must be at least
+/// 1.
 fn left_nodes(count: usize) -> usize {
     let last_level = 1 << count.ilog2();
     let in_last_level = count - (last_level - 1);

@@ -22,10 +22,10 @@ const AREA: f32 = 4.0 / 3.0;
 const MAX_SHARE_OF_DIAGONAL: f32 = 0.1;
 /// Minimum radius, cells of the photon grid.
 const MIN_CELLS: f32 = 4.0;
-/// Factor of a disc's area before its code rounds it up to a power of two, so that the power nearest by ratio
-/// is taken.
+/// Factor by which a disc's area is multiplied before its code rounds it up to a power of two, so that the
+/// code is that of the nearest power by ratio.
 const ROUNDING: f32 = std::f32::consts::FRAC_1_SQRT_2;
-/// Number of cells added to a photon's reach, for rounding of positions.
+/// Number of cells added to the radius of a photon's disc, for rounding of positions.
 const MARGIN_CELLS: u32 = 2;
 
 /// Sets the radius code of each photon, such that about `neighbors` photons of its light lie within the

@@ -55,8 +55,9 @@ impl<'a> PhotonTree<'a> {
         Self::of(photons, &Searches { radius, reach: None })
     }
 
-    /// Builds the tree of a caustic map, which is searched at a point: boxes contain all points within the
-    /// reach of each photon, and nodes state the class of the normals below each child.
+    /// Builds the tree of a caustic map, which is searched for the photons whose discs contain a point. A box
+    /// contains all points within the distance `reach` of its photons, and a node states the classes of the
+    /// normals below each child.
     pub(super) fn of_discs(photons: &'a mut [StoredPhoton], reach: Reach) -> Option<Self> {
         Self::of(photons, &Searches { radius: 0.0, reach: Some(reach) })
     }
@@ -68,7 +69,7 @@ impl<'a> PhotonTree<'a> {
             folded = Folded::new(build_groups(photons, searches, MAX_SKEWED)?);
         }
         if folded.stack > PHOTON_STACK {
-            // The tree above the groups is too deep.
+            // The tree above the groups is too deep, so that a tree without groups is built.
             folded = Folded::new(build(photons, 0, searches, MAX_SKEWED)?);
         }
         Some(Self { photons, folded })
@@ -102,8 +103,8 @@ type Reach<'r> = &'r (dyn Fn(&StoredPhoton) -> u32 + Sync);
 struct Searches<'r> {
     /// Radius of a typical search, cells.
     radius: f64,
-    /// Enlargement of photons' boxes in a caustic map, whose groups have radii of their own; `None` in a
-    /// photon map.
+    /// In a caustic map, the distance by which the box of each photon is enlarged; each group of photons then
+    /// has a `radius` of its own. `None` in a photon map.
     reach: Option<Reach<'r>>,
 }
 
@@ -113,7 +114,7 @@ fn group(photon: &StoredPhoton) -> (u32, u8) {
     (photon.normal_class(), photon.disc() / 2)
 }
 
-/// Builds the tree of photons, with a part for each group of a caustic map. `None` without photons.
+/// Builds the tree of photons, with a subtree for each group of a caustic map. `None` without photons.
 fn build_groups(
     photons: &mut [StoredPhoton],
     searches: &Searches,
@@ -132,7 +133,7 @@ fn build_groups(
     join(parts)
 }
 
-/// Binary tree of adjacent parts, of minimum depth. `None` without parts.
+/// Joins trees of adjacent photons to a binary tree of minimum depth. `None` without trees.
 fn join(mut parts: Vec<Tree<Run, Extent>>) -> Option<Tree<Run, Extent>> {
     let above = parts.split_off(parts.len() / 2);
     if parts.is_empty() {
@@ -141,7 +142,7 @@ fn join(mut parts: Vec<Tree<Run, Extent>>) -> Option<Tree<Run, Extent>> {
     let parts = [join(parts)?, join(above)?];
     let [below, above] = parts.each_ref().map(Tree::bounds);
     let both = below.union(above);
-    // Boxes contain the reach of their photons, so that the search radius is 0.
+    // The boxes contain the photons' discs, so that the search radius is 0.
     Some(Tree::node(parts, both, both.chance(0.0) as f32, None))
 }
 
@@ -196,7 +197,8 @@ impl Extent {
         Self { room, normals: 0 }
     }
 
-    /// Box of all grid points within the reach of the photons, on each axis, with their classes.
+    /// Box of all grid points that are within the distance `reach` of a photon on each axis, and the classes
+    /// of the photons' normals.
     fn reached(photons: &[StoredPhoton], reach: Option<Reach>) -> Self {
         let mut extent = Self { room: GridBox { lower: [u32::MAX; 3], upper: [0; 3] }, normals: 0 };
         for photon in photons {
@@ -217,7 +219,7 @@ impl Extent {
     }
 
     fn longest(&self) -> usize {
-        // The first of several equal sides.
+        // Of several equal sides the first is chosen.
         (0..3).rev().max_by_key(|&axis| self.side(axis)).unwrap_or(0)
     }
 
@@ -234,8 +236,8 @@ impl Extent {
         leaf_capacity(if photons > MANY { axes.min(2) } else { axes })
     }
 
-    /// Axis of the split, and number of photons below the plane. These fill whole leaves if there is more
-    /// than one leaf.
+    /// Returns the axis of a split, and the number of photons below its plane. The photons below the plane
+    /// fill whole leaves if there is more than one leaf.
     fn split(&self, photons: &[StoredPhoton], radius: f64) -> (usize, usize) {
         let (axis, below) = self.cheapest(photons, radius);
         let count = photons.len();
@@ -255,7 +257,7 @@ impl Extent {
         let sampled = photons.len().div_ceil(step);
         for axis in (0..3).filter(|&axis| self.side(axis) > 0) {
             let side = f64::from(self.side(axis));
-            // Intervals per cell, times 2^32.
+            // Number of intervals per grid cell, times 2^32.
             let scale = ((intervals as u64) << 32) / (u64::from(self.side(axis)) + 1);
             let mut counts = [0_usize; INTERVALS];
             for photon in photons.iter().step_by(step) {

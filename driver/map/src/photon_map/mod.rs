@@ -43,7 +43,7 @@ const MIN_CELLS: f32 = 8.0;
 
 /// Card image with its photon map, ready for gathers.
 pub struct MappedImage {
-    /// Card image.
+    /// Card image with the photon map.
     pub image: CardImage,
     /// Maximum distance of a gather, metres.
     pub max_distance: f32,
@@ -51,22 +51,22 @@ pub struct MappedImage {
     pub caustics: Option<CausticGather>,
     /// Number of paths traced from the lights.
     pub paths: u64,
-    /// Guiding of the paths; `None` if photons are for any camera.
+    /// Statistics of the guiding of the paths; `None` if photons are for any camera.
     pub guiding: Option<Guiding>,
-    /// Time of each step.
+    /// Time of each step of the photon pass.
     pub times: PhotonTimes,
 }
 
 /// Time of each step of the photon pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PhotonTimes {
-    /// Tracing photons.
+    /// Time of tracing photons.
     pub tracing: Duration,
-    /// Building the tree and writing its lines.
+    /// Time of building the tree and writing its lines.
     pub building: Duration,
-    /// Measuring the maximum distance of gathers, and the disc fractions.
+    /// Time of measuring the maximum distance of gathers and the disc fractions.
     pub measuring: Duration,
-    /// Precomputing irradiance; zero without it.
+    /// Time of precomputing irradiance; zero if it is not precomputed.
     pub estimating: Duration,
 }
 
@@ -88,13 +88,13 @@ pub fn map_photons(
     Ok(mapped)
 }
 
-/// Photons of both maps of a scene.
+/// Photons of the photon map and of the caustic map of a scene.
 pub struct TracedPhotons {
     /// Photons of the photon map.
     pub photons: Photons,
     /// Number of paths traced from the lights.
     pub(crate) paths: u64,
-    /// Guiding of the paths; `None` if photons are for any camera.
+    /// Statistics of the guiding of the paths; `None` if photons are for any camera.
     pub(crate) guiding: Option<Guiding>,
     /// Caustic photons; `None` if none were requested or found.
     pub(crate) caustic: Option<Photons>,

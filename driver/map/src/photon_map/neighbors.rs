@@ -11,7 +11,7 @@ use crate::photon::StoredPhoton;
 const MIN_DIRECTION_COSINE: f32 = 0.8;
 /// Minimum cosine between the normals of photons of one surface.
 const MIN_NORMAL_COSINE: f32 = photoncard_firmware::photon::MIN_NORMAL_COSINE;
-/// Number of photons in a leaf.
+/// Number of photons in a leaf of [`Places`].
 pub(super) const LEAF: usize = 12;
 /// A photon reuses the distance `d` of a like photon in its leaf if they are at most this fraction of `d`
 /// apart.
@@ -140,9 +140,10 @@ impl Places {
     pub(super) fn nearest(&self, index: usize, number: usize, limit: f32) -> Vec<(f32, usize)> {
         let own = &self.places[index];
         let mut limit = limit * limit;
-        // Bits of the least squared distances, the greatest on top: they are ordered as the distances.
+        // The least squared distances found, with the photons' indices, and the greatest of them on top. The
+        // bits of positive floats are ordered as the floats.
         let mut nearest = BinaryHeap::with_capacity(number);
-        // Squared distances of boxes, with their levels and indices.
+        // Stack of boxes to visit: the squared distance, level and index of each.
         let mut waiting = vec![(0.0, self.levels.len() - 1, 0)];
         while let Some((distance, level, node)) = waiting.pop() {
             if distance >= limit {
@@ -154,7 +155,7 @@ impl Places {
                     below.map(|(part, bounds)| (bounds.distance_squared(own.position), level - 1, part));
                 let first = waiting.len();
                 waiting.extend(parts);
-                // The nearest on top.
+                // The nearer box is put on top of the stack.
                 waiting[first..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
                 continue;
             }

@@ -1,9 +1,9 @@
 //! Spreads the power of photons that are much stronger than their neighbours.
 //!
-//! The paths of a map for a camera differ in power. A path that the guide takes for useless may bring
-//! hundreds of times the power of the photons around it: a bright spot of the size of a gather. The excess
-//! is distributed over so many neighbours that none of them becomes much brighter. The sum of all powers does
-//! not change.
+//! The paths of a map for a camera differ in power. A path that the guide takes for useless is rare, and its
+//! photons can have hundreds of times the power of the photons around them, which causes a bright spot of the
+//! size of a gather. The excess is distributed over so many neighbours that none of them becomes much
+//! brighter. The sum of all powers does not change.
 
 use glam::{DVec3, Vec3};
 use photoncard_firmware::memory::Lines;
@@ -17,9 +17,9 @@ use super::neighbors::{LEAF, Place, Places, arrange};
 use crate::pack::PackedScene;
 use crate::photon::{Photons, StoredPhoton};
 
-/// Maximum relative gain in power of a neighbour by one photon.
+/// Maximum power that a photon gives to a neighbour, relative to the neighbour's own power.
 const MAX_GAIN: f64 = 0.25;
-/// Numbers of neighbours that are tried in turn, until the excess fits.
+/// Numbers of neighbours that are tried in turn, until a photon can give its whole excess of power to them.
 const NUMBERS: [usize; 5] = [32, 128, 512, 2048, 8192];
 /// Distance of a line of sight from the surfaces at its ends, relative to its length.
 const LIFT: f32 = 0.02;
@@ -78,7 +78,7 @@ impl<'a> Map<'a> {
         let place = |photon: &StoredPhoton| Place {
             position: Vec3::from_array(photon.point().map(|coordinate| coordinate as f32)),
             normal: photon.normal(),
-            // Equal for all photons: neighbours are compared by normal alone.
+            // The direction is equal for all photons, so that neighbours are compared by normal alone.
             direction: Vec3::Y,
         };
         let stored = photons.stored();
@@ -115,7 +115,7 @@ impl<'a> Map<'a> {
             let sum: f64 = to.iter().map(|(_, weight)| weight).sum();
             let mean = to.iter().map(|(other, _)| self.power(*other)).sum::<f64>() / to.len() as f64;
             let given = (own - mean).min(MAX_GAIN * sum);
-            // `given` is 0 if the photon sees none of them.
+            // `given` is 0 if the photon sees none of its neighbours.
             if given > 0.0 {
                 to.iter_mut().for_each(|(_, weight)| *weight /= sum);
                 gift = Some(Gift { from: photon, power: self.colours[photon] * (given / own), to });
@@ -127,7 +127,7 @@ impl<'a> Map<'a> {
         Ok(gift)
     }
 
-    /// Photons of a photon's leaf with about its normal.
+    /// Returns the other photons of a photon's leaf of [`Places`] that have a similar normal.
     fn others_of_leaf(&self, photon: usize) -> Vec<usize> {
         let leaf = photon / LEAF * LEAF;
         let is_other = |&other: &usize| other != photon && self.places.are_alike(photon, other);

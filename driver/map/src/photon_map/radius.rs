@@ -6,7 +6,7 @@ use crate::photon::{Photons, StoredPhoton};
 
 /// Number of photons around which [`typical_radius`] searches.
 const SAMPLED_PHOTONS: usize = 64;
-/// Number of photons that [`typical_radius`] searches, if there are enough.
+/// Minimum number of photons in the subset that [`typical_radius`] searches, unless there are fewer photons.
 const SAMPLED_NEIGHBORS: usize = 1 << 16;
 /// Minimum number of neighbours within the subset, unless the subset has at least `1 / MIN_STEP` of the
 /// photons.
@@ -24,7 +24,7 @@ pub(super) fn typical_radius(photons: &Photons, neighbors: u32) -> f64 {
     let rank = (neighbors / step).max(1);
     let squared_distance = |point: [u32; 3], other: StoredPhoton| {
         let mut sum = 0;
-        // A loop: compilers may leave `map` as a call.
+        // This is a loop, because compilers may leave `map` as a call.
         for (axis, coordinate) in point.into_iter().enumerate() {
             let side = u64::from(coordinate.abs_diff(other.coordinate(axis)));
             sum += side * side;

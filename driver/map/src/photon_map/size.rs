@@ -10,7 +10,7 @@ use crate::pack::CardImage;
 /// Size of a photon map in card memory, without caustics and irradiance points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhotonMapSize {
-    /// Number of photons in the map: `N_PM` of Table 7.1.
+    /// Number of photons in the map: `N_PM` of Table 7.1 of the dissertation.
     pub photons: u64,
     /// Size of the photons and their tree, whole lines, bytes.
     pub bytes: u64,

@@ -40,7 +40,7 @@ pub fn store_photons(
 }
 
 /// Adds a caustic map to a card image. The radius codes of `photons` must be set already; the greatest
-/// possible code stands for the radius `greatest`, metres.
+/// possible code is that of the radius `greatest`, metres.
 ///
 /// # Errors
 /// As [`store_photons`].

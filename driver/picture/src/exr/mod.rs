@@ -278,12 +278,12 @@ pub(crate) fn ascii(json: &str) -> String {
 pub enum Shown {
     /// The channels `R G B` of the unnamed layer.
     Rendered,
-    /// The layer [`Content::denoised`], or [`Self::Rendered`] in a file without it: what a tone-mapped
-    /// picture shows.
+    /// The layer [`Content::denoised`], which tone-mapped pictures show; in a file without that layer the
+    /// same as [`Self::Rendered`].
     Denoised,
 }
 
-/// Reads three channels (half, float or unsigned) from the first part that has them.
+/// Reads the three channels that `shown` selects (half, float or unsigned) from the first part that has them.
 ///
 /// # Errors
 /// If the file cannot be read, is malformed, lacks the channels, or has more than [`MAX_READ_PIXELS`]. A file
@@ -315,7 +315,7 @@ pub fn read_form(path: &Path) -> Option<(String, SampleFormat)> {
     Some((provenance(&header.own_attributes)?, format))
 }
 
-/// Returns whether a file has exactly the bytes that [`write()`] wrote. An unreadable file has not.
+/// Returns whether a file has exactly the bytes that [`write()`] wrote; false if it cannot be read.
 pub fn is_intact(path: &Path) -> bool {
     std::fs::read(path).is_ok_and(|bytes| intact::is_intact_exr(&bytes))
 }
@@ -412,7 +412,7 @@ fn check_size(path: &Path, header: &Header, length: u64, most_pixels: u64) -> Re
         });
     };
     let held = length.saturating_mul(most);
-    // A picture of one colour exceeds the ratio, so that small pictures with DWA are read at any ratio.
+    // A picture of one colour may exceed the ratio, so small pictures with DWA are read at any ratio.
     let held = if dwa::is_dwa(header.compression) { held.max(dwa::PLAIN_BYTES) } else { held };
     let stated = pixels.saturating_mul(header.channels.bytes_per_pixel as u64);
     if stated > held {

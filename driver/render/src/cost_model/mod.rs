@@ -74,9 +74,9 @@ impl Cost {
         Self::of_units(workload, symbols, reflection)
     }
 
-    /// Cost by counted arithmetic. The ray caster has rays against boxes and triangles, and surfaces; the
-    /// gather unit has searches and all reflection; the controller has directions, irradiance cache and
-    /// pixels.
+    /// Cost by counted arithmetic. The ray caster intersects boxes and triangles and evaluates surfaces, the
+    /// gather unit searches for photons and computes all reflection, and the controller computes directions,
+    /// irradiance cache and pixels.
     pub fn counted(workload: &Workload, arithmetic: &Arithmetic) -> Self {
         let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();
         Self {

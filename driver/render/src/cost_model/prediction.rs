@@ -108,8 +108,8 @@ impl Prediction {
         self.chips_frames_per_second(chips).min(self.link_frames_per_second)
     }
 
-    /// Resource that limits `chips` chips. Of equal limits, those of the chips precede that of the link,
-    /// because more chips would help, and bandwidth precedes arithmetic.
+    /// Resource that limits the frame rate of `chips` chips. If limits are equal, those of the chips take
+    /// precedence over that of the link, because more chips would help, and bandwidth over arithmetic.
     pub fn binding(&self, chips: u64) -> Resource {
         if self.link_frames_per_second < self.chips_frames_per_second(chips) {
             Resource::HostLink

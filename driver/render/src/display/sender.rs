@@ -53,7 +53,7 @@ impl Display {
         Self::with_room_for(MAX_WAITING, settings, window, channels)
     }
 
-    /// Does [`Self::open`] with a queue of at most `most_waiting` bytes.
+    /// Opens a display as [`Self::open`] does, with a queue of at most `most_waiting` bytes.
     pub(super) fn with_room_for(
         most_waiting: usize,
         settings: &DisplaySettings,

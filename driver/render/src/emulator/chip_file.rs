@@ -171,9 +171,9 @@ impl Emulated {
         TechniqueMemory { reordering, irradiance_cache, importance_sampling }
     }
 
-    /// Sizes, bytes, of a board's card with these capacities, and of its reordering, irradiance cache and
-    /// importance sampling. They are extrapolated: buffers are linear in their entries, and the chip in its
-    /// tiles in flight.
+    /// Sizes, bytes, of the firmware's memory on a card with these capacities, and of its parts for
+    /// reordering, irradiance cache and importance sampling. They are extrapolated: the size of a buffer is
+    /// linear in its number of entries, and that of the chip in its number of tiles in flight.
     fn sizes(&self) -> [usize; 4] {
         let Budget { tile_pixels, neighbors, gather_queue, irradiance_records, in_flight, .. } = self.budget;
         let [pixels, queue, records, flights] =
@@ -192,8 +192,8 @@ const ALIGNMENT: usize = 8;
 /// Number of entries of each buffer of the smallest probe. Each other probe has twice as many in one buffer.
 const PROBED: usize = 64;
 
-/// Extrapolates sizes to other numbers of entries, from those of the smallest probe and of one probe for each
-/// buffer.
+/// Extrapolates sizes to the numbers of entries `entries`, from the sizes of the smallest probe and of probes
+/// that have twice as many entries in one buffer.
 fn extrapolated(entries: &[usize; 5], [base, doubled @ ..]: &[[usize; 4]; 6]) -> [i64; 4] {
     std::array::from_fn(|i| {
         let size = |sizes: &[usize; 4]| sizes[i] as i64;

@@ -21,8 +21,8 @@ use super::{EmulatedChip, EmulatedKind};
 
 /// A rendered tile, with the work and memory traffic of rendering it.
 pub struct RenderedTile {
-    /// Sums of the light of the pixels, row by row, in the card image's radiance units: one per pixel, or
-    /// with layers [`photoncard_shared::budget::SUMS_WITH_LAYERS`].
+    /// Sums of the light of the pixels, row by row, in the card image's radiance units: one sum per pixel, or
+    /// with layers [`photoncard_shared::budget::SUMS_WITH_LAYERS`] sums.
     pub sums: Vec<ColourSum>,
     /// Albedo, normal and depth of the pixels, row by row.
     pub views: Vec<PixelView>,

@@ -24,7 +24,7 @@ impl Emulated {
     }
 
     /// Replaces the budget, which must be within the ranges of a chip's indices. The number of gather points
-    /// stays.
+    /// does not change.
     #[must_use]
     pub fn with_budget(self, budget: Budget) -> Self {
         Self { budget, ..self }

@@ -50,7 +50,7 @@ impl CacheSpec {
         CacheShape::new(self.bytes, self.line_bytes, self.ways, self.index)
     }
 
-    /// Returns whether the size is that of whole sets.
+    /// Returns whether the shape is valid; in particular, the size must be a whole number of sets.
     pub(super) fn is_possible(&self) -> bool {
         self.shape().is_ok()
     }

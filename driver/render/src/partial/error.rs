@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-/// Version of the file's format. The first line states it.
+/// Version of the format of a partial render's file, which the file's first line states.
 pub(super) const VERSION: u32 = 4;
 
 /// Error of a partial render that cannot be resumed or written.

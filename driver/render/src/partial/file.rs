@@ -9,9 +9,10 @@ use photoncard_picture::output::kind_of;
 
 use super::error::PartialError;
 
-/// Beginning of the first line in all versions. The version's number follows it.
+/// Beginning of the first line of a partial render in all versions of its format. The version's number
+/// follows.
 pub(super) const FAMILY: &str = "photoncard partial render ";
-/// Maximum length of the first line, bytes: a number of 10 digits and the line feed.
+/// Maximum length of the first line, bytes: [`FAMILY`], a version of up to 10 digits, and the line feed.
 const MAX_TITLE: u64 = FAMILY.len() as u64 + 11;
 /// Maximum number of attempts to open a file that other processes create or remove at the same time.
 const MAX_TRIES: usize = 16;
@@ -109,8 +110,8 @@ fn has_other_names(_: &Metadata) -> bool {
     false
 }
 
-/// Checks that no other render has locked the file. The check passes on a system without locks, or that
-/// refuses them.
+/// Checks that no other render has locked the file. The check passes on a system that has no locks or refuses
+/// them.
 pub(super) fn check_lock(path: &Path, locked: &Result<(), TryLockError>) -> Result<(), PartialError> {
     match locked {
         Err(TryLockError::WouldBlock) => Err(PartialError::Busy { path: path.to_owned() }),

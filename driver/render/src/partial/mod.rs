@@ -73,8 +73,8 @@ struct KeptTiles {
 impl PartialRender {
     /// Opens the file if it exists. `settings` identify the picture: all settings that its pixels depend on,
     /// except the number of samples, which `film` states. With [`PartialSettings::resume`], tiles of the file
-    /// are written into the film. If the file has all tiles of fewer samples, these are the second result,
-    /// and the film has the remaining samples.
+    /// are written into the film. If the file has all tiles of the picture's first samples, their film is the
+    /// second result, and `film` is left with the remaining samples.
     ///
     /// # Errors
     /// If the file is not a partial render, in use by another render, or unreadable, or its settings are
@@ -220,7 +220,7 @@ impl PartialRender {
         self.lock().holds_tiles
     }
 
-    /// Reports the first failure of writing a tile, once.
+    /// Returns the first failure of writing a tile, once.
     ///
     /// # Errors
     /// If a write failed.

@@ -106,7 +106,7 @@ pub(super) fn has_record(reader: &mut impl BufRead) -> io::Result<bool> {
 }
 
 /// Skips to the end of the next magic number. Returns the number of bytes skipped; `None` if the file ends
-/// before.
+/// first.
 fn skip_magic(reader: &mut impl BufRead) -> io::Result<Option<u64>> {
     let (mut skipped, mut matched) = (0, 0);
     loop {
@@ -159,7 +159,7 @@ fn read_tile(
     }
     if let Some(film) = kept.film_of(samples) {
         for ((x, y), record) in pixel_positions(&tile).zip(bytes[HEAD_BYTES..].chunks_exact(pixel_bytes)) {
-            // Cannot fail: the tile lies inside the window, and records have their full length.
+            // Writing cannot fail: the tile lies inside the window, and records have their full length.
             let _ = PixelSums::read(record).map(|sums| film.write(x, y, &sums));
         }
     }

@@ -13,7 +13,7 @@ pub(super) struct SampleRange {
     pub(super) count: u32,
 }
 
-/// Films of ranges of samples, for a picture that may have more samples.
+/// Films of the ranges of samples in a partial render's file, for a picture that may have more samples.
 pub(super) struct KeptSamples<'a> {
     /// Empty film of the picture.
     empty: &'a Film,
@@ -85,7 +85,7 @@ impl<'a> KeptSamples<'a> {
             let (_, film) = self.ranges.swap_remove(index);
             match &mut base {
                 None => base = Some(film),
-                // Cannot fail: all are films of one picture.
+                // Adding cannot fail: all are films of one picture.
                 Some(base) => drop(base.add(&film)),
             }
         }

@@ -108,8 +108,8 @@ fn damage_loses_only_the_tile_that_it_hits() {
     assert_eq!(taken_over(&folder, &bytes[..bytes.len() - 1]), [0, 1, 2, 3, 4]);
 }
 
-/// Tiles of an outvoted card must not be taken over before another card has rendered them, and then with that
-/// card's pixels.
+/// A tile of an outvoted card must not be taken over. Once another card has rendered the tile, it must be
+/// taken over with that card's pixels.
 #[test]
 fn revoked_tiles_are_struck_out_and_replaced() {
     let folder = tempfile::tempdir().unwrap();
@@ -215,7 +215,8 @@ fn a_partial_file_is_locked_by_one_render() {
     begin(false, &mut three).unwrap();
 }
 
-/// The appended records are heads of the largest tiles without pixels. Reading and summing each is in vain.
+/// The appended records are heads of the largest tiles, without pixels. The reader reads and sums each in
+/// vain.
 #[test]
 fn a_hostile_file_is_read_quickly() {
     let folder = tempfile::tempdir().unwrap();
@@ -318,7 +319,7 @@ fn a_foreign_file_is_refused_and_unchanged() {
     assert!(matches!(begun.check(), Err(PartialError::Foreign { .. })));
     begun.remove().unwrap();
     assert_eq!(fs::read(&path).unwrap(), b"notes");
-    // Nor is one that replaces a file that was begun.
+    // A foreign file that replaces a file that was begun is neither written nor removed.
     fs::remove_file(&path).unwrap();
     let begun = begin_render(&partial(&folder, false), json!({}), film).unwrap();
     begun.put(&blank(&tile(0)));
@@ -359,7 +360,7 @@ fn finished_tiles_are_not_lost_without_resume() {
     }
 }
 
-/// A file that replaces one being read is another picture's, and must be refused.
+/// A file that replaces the one being read belongs to another picture, and must be refused.
 #[test]
 fn a_file_that_changes_while_it_is_read_is_refused() {
     let folder = tempfile::tempdir().unwrap();

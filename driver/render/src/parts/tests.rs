@@ -158,7 +158,7 @@ fn a_damaged_part_is_refused_and_named() {
     refuses(b"photoncard partial render 4\n{}\n", "a partial render");
     fs::write(&path, b"photoncard part 1\n{}\n").unwrap();
     assert!(matches!(refused(std::slice::from_ref(&path)), PartError::Version { found: 1, .. }));
-    // A copy of another picture's part over this one that was interrupted behind the head.
+    // Copying another picture's part over this file was interrupted after the head.
     let mut other = head(part(1, 1), 4);
     other.settings.insert("seed".into(), json!(4));
     write(&path, &other, &film(9)).unwrap();
@@ -192,7 +192,7 @@ fn a_hostile_head_is_refused() {
         write(&path, &hostile, &film(0)).unwrap();
         assert!(matches!(refused(std::slice::from_ref(&path)), PartError::Damaged { .. }), "{number}");
     }
-    // A picture as large as any, of which the file has no pixel.
+    // The head states the largest possible picture, of which the file has no pixel.
     let mut large = head(part(1, 65_536), 4);
     large.settings.insert("size".into(), json!([1 << 14, 1 << 14]));
     large.settings.insert("crop".into(), json!([0, 1 << 14, 0, 1 << 14]));

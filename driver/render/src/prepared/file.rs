@@ -19,7 +19,7 @@ use crate::PROGRAM;
 pub(super) const KIND: Kind = Kind { name: "photoncard prepared scene", version: VERSION };
 /// Alignment of the lines in the file, bytes: a page of memory, which is a multiple of a line.
 const PAGE: u64 = 4096;
-/// Maximum number of lines, because no card has more than 4 GB of memory.
+/// Maximum number of lines of a card image, because no card has more than 4 GiB of memory.
 const MAX_LINES: u32 = u32::MAX / LINE_BYTES as u32;
 /// Number of bytes that are read at once.
 const BUFFER: usize = 1 << 18;

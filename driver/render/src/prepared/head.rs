@@ -18,7 +18,7 @@ use crate::renderer::Kept;
 use crate::work::Prepared;
 use crate::{Integrator, PROGRAM, PhotonMaps, RenderSettings};
 
-/// Head of the file.
+/// Head of a prepared scene's file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Head {

@@ -32,7 +32,8 @@ pub struct Fit {
     /// Maximum error of interpolated irradiance; infinite if the quality's own error bound is small enough.
     pub max_irradiance_error: f32,
     /// Adaptive threshold of the cost model for one sample of unit cost: `sqrt(M) / w`, W^(1/2)/(sr^(1/2) m),
-    /// with the median radiance `M` and the worth of accuracy `w`.
+    /// with the median radiance `M` and the worth of accuracy `w`: a relative variance of 1 in a pixel is
+    /// worth the time of `w^2` samples.
     pub unit_threshold: f64,
     /// Adaptive threshold at which the pilot's pixels have 1.1 paths per sample after the probes,
     /// W^(1/2)/(sr^(1/2) m); `None` if these paths do not at least halve the variance of direct light.
@@ -72,8 +73,8 @@ impl TimeOfPicture {
         if self.finish == Finish::Denoised { seconds } else { 0.0 }
     }
 
-    /// Cost, in the unit of [`COST_OF_SHADOW_RAY`], that a pixel may have in the part of the time for
-    /// [`SAMPLES_IN_TIME`] samples.
+    /// Maximum cost of the first [`SAMPLES_IN_TIME`] samples of a pixel, in the unit of
+    /// [`COST_OF_SHADOW_RAY`].
     fn cost_of_pixel(&self) -> f64 {
         let of_render = SHARE_OF_SAMPLES * self.cpu_seconds - self.cpu_seconds_of_denoiser();
         of_render / (SECONDS_OF_COST * self.pixels.max(1.0))
@@ -114,9 +115,9 @@ impl Stated {
         adaptive: true,
     };
 
-    /// Returns whether any setting is left to a pilot. Adaptive sampling does not count: it is off without a
-    /// pilot. Neither do caustic photons, which only a short time changes, and photons of a gather, which no
-    /// pilot does.
+    /// Returns whether any setting is left to a pilot. Three settings do not count: adaptive sampling, which
+    /// is off without a pilot; caustic photons, which only a short time limit changes; and photons of a
+    /// gather, which no pilot changes.
     pub fn needs_fit(self) -> bool {
         Self { adaptive: true, caustic_photons: true, neighbors: true, ..self } != Self::ALL
     }
@@ -179,7 +180,8 @@ const WEIGHT_OF_MAP: f64 = 6.0;
 /// few photons, which is guided less, shows a third of their squared error.
 const WEIGHT_OF_GUIDED_MAP: f64 = 8.0 * WEIGHT_OF_MAP;
 /// Minimum number of photons per triangle, up to [`MOST_FOR_TRIANGLES`] in all. A map whose photons are
-/// farther apart than furniture is large makes a room too dark, a bias that the pilot does not measure.
+/// farther apart than the size of the furniture makes a room too dark, a bias that the pilot does not
+/// measure.
 const PHOTONS_OF_TRIANGLE: usize = 8;
 const MOST_FOR_TRIANGLES: usize = 1_000_000;
 /// Allowed error of 4x4 pixels by the photon map, relative to the aimed noise of the picture. The error of
@@ -199,15 +201,15 @@ const MAX_RAYS_OF_RECORD: u32 = 8_000;
 const PHOTONS_IN_A_SECOND: f64 = 80_000.0;
 /// CPU seconds of a sample of cost 1, the unit of [`COST_OF_SHADOW_RAY`], as measured in furnished rooms.
 const SECONDS_OF_COST: f64 = 6e-6;
-/// CPU seconds of a denoiser that follows the render, and of each pixel in it.
+/// CPU seconds of a denoiser that follows the render, and of each denoised pixel.
 const SECONDS_OF_DENOISER: f64 = 0.25;
 const SECONDS_OF_DENOISED_PIXEL: f64 = 18e-6;
 /// Maximum fraction of a picture's time that its photons take.
 const SHARE_OF_PHOTONS: f64 = 0.25;
 /// Fraction of a picture's time for its first [`SAMPLES_IN_TIME`] samples and a denoiser.
 const SHARE_OF_SAMPLES: f64 = 0.5;
-/// Number of samples of a pixel that any time should allow: with fewer, the time that a whole pass leaves
-/// would be a large part of it.
+/// Number of samples per pixel that every time limit should allow. With fewer samples, the time that is left
+/// when no further whole pass fits would be a large part of the limit.
 const SAMPLES_IN_TIME: f64 = 4.0;
 /// Minimum ratio of the number of photons that a time allows to that of caustic photons.
 const PHOTONS_OF_CAUSTIC_PHOTON: usize = 8;
@@ -246,9 +248,10 @@ impl Fit {
 
     /// Adjusts the settings for a picture that gets samples until a time is over, with the stated settings of
     /// `integrator`. The photon map takes about a quarter of the time at most, or has 50,000 photons; the
-    /// caustic map has an eighth of these at most. Four samples of each pixel and the denoiser take about
-    /// half of the time at most: records have as many rays as fit in, or else nothing is interpolated, and
-    /// each sample has the gather rays that fit in, at least one. Stated gather rays keep the records.
+    /// caustic map has at most an eighth of the number of photons that the time allows. Four samples of each
+    /// pixel and the denoiser take about half of the time at most. Irradiance records have as many rays as
+    /// fit in. If these are too few, nothing is interpolated unless the number of gather rays is stated, and
+    /// each sample has the gather rays that fit in, at least one.
     pub fn for_time(self, time: TimeOfPicture, integrator: &Integrator, stated: Stated) -> Self {
         let most = SHARE_OF_PHOTONS * PHOTONS_IN_A_SECOND * time.cpu_seconds;
         let most = rounded(most, &(MIN_PHOTONS_IN_TIME..=MAX_PHOTONS));
@@ -498,7 +501,7 @@ mod tests {
             let mut other = chosen;
             other[index] *= factor;
             if index == 0 {
-                // The shadow rays of a pixel stay, not those of a sample.
+                // The number of shadow rays of a pixel is kept, not that of a sample.
                 other[1] /= factor;
             }
             assert!(loss(&VARIANCES, other) > loss(&VARIANCES, chosen), "{index} {factor}");
@@ -593,8 +596,8 @@ mod tests {
         assert_eq!(caustics(&short, false), Some(short.photons / 8));
     }
 
-    /// Fit of [`PICTURED`] for a time of which the samples may take half: `costs` of each pixel, in units of
-    /// 6 microseconds, and the denoiser.
+    /// Fit of [`PICTURED`] for a time limit of which half suffices for the cost `costs` of each pixel, in
+    /// units of 6 microseconds, and for the denoiser.
     fn in_time(fit: Fit, costs: f64, finish: Finish, stated: Stated) -> Fit {
         let pixels = PICTURED.pixels;
         let of_denoiser = TimeOfPicture { cpu_seconds: 0.0, pixels, finish }.cpu_seconds_of_denoiser();

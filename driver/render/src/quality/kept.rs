@@ -38,8 +38,8 @@ impl Stated {
         if !self.shadow_rays {
             integrator.shadow_rays = count("shadow-rays").unwrap_or(integrator.shadow_rays);
         }
-        // The error is the quality's own, or less for little noise; the scene decides only if irradiance is
-        // interpolated.
+        // The error bound is the quality's own, or smaller if little noise was aimed at. The scene determines
+        // only whether irradiance is interpolated.
         if !self.cache
             && let Some(kept) = kept.get("ic-error")
         {

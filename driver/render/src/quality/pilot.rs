@@ -23,9 +23,8 @@ const SPREAD: Grid = Grid { cells: 8, side: 4 };
 /// Grid of tiles in which irradiance records are placed. The tiles are large, because tiles do not share the
 /// records at their borders.
 const SURVEYED: Grid = Grid { cells: 4, side: 32 };
-/// Photon maps guided towards the camera are taken only if the picture can use less than this fraction of
-/// the photons of an unguided map. In rooms, halls and Cornell boxes, where guiding gains nothing, the
-/// fraction is greater.
+/// Fraction of an unguided map's photons that the picture can use, below which maps guided towards the camera
+/// are tried. In rooms, halls and Cornell boxes, where guiding gains nothing, the fraction is greater.
 const MAX_USED_SHARE: f64 = 0.3;
 /// Range of the used fraction of an unguided map's photons in which the short pilot estimates the error of a
 /// guided map. Below it the picture uses less than a hundred of the pilot's photons; above it guiding may
@@ -52,7 +51,7 @@ pub(super) struct Effort {
     few_photons: usize,
     /// Numbers of gather rays that are compared.
     gather_rays: [u32; 2],
-    /// True if guided maps are rendered even where their errors can be estimated. Guides take most of a
+    /// True if guided maps are rendered even where their errors can be estimated. Guiding takes most of a
     /// pilot's time.
     measures_guided: bool,
 }
@@ -60,8 +59,8 @@ pub(super) struct Effort {
 impl Effort {
     pub(super) const FULL: Self = Self { few_photons: 16_384, gather_rays: [8, 32], measures_guided: true };
     /// Half of the photons, three quarters of the gather rays and few guided maps, for pictures of which the
-    /// full pilot would take too large a part. Settings are less certain. Points of fewer than eight rays
-    /// would be sampled in another way.
+    /// full pilot would take too large a part. Settings are less certain. Gather points with fewer than eight
+    /// rays would be sampled in another way.
     pub(super) const LESS: Self = Self { few_photons: 8_192, gather_rays: [8, 24], measures_guided: false };
 }
 
@@ -69,7 +68,7 @@ impl Effort {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Variances {
     /// Variance of a sample caused by its position, at edges and textures in a pixel. It is a lower bound,
-    /// because strata make the variance by several rays less than `v / n`.
+    /// because stratification makes the variance with `n` rays less than `v / n`.
     pub(super) place: f64,
     /// Variance of a sample caused by one shadow ray.
     pub(super) shadow_ray: f64,
@@ -149,7 +148,7 @@ pub(super) fn measure(
     });
     let render_map = |pilot: &Pilot| pilot.render_pixels(&by_map, &tiles);
     let pilot = |settings, photons| Pilot::new(scene, packed, settings, photons, &pool, observer);
-    // A pilot has a card image of its own: there is one at a time.
+    // Each pilot has its own card image, so only one pilot exists at a time.
     let few = pilot(settings, few_photons)?;
     let by_few_photons = render_map(&few)?;
     let gather_rays_per_ray = few.gather_rays_per_ray(settings, &SURVEYED.tiles(window))?;
@@ -294,7 +293,7 @@ impl<'a> Pilot<'a> {
     ) -> Result<Self, RenderError> {
         observer.progress(Phase::Pilot, 0, 1);
         let of_picture = settings.photon_settings(scene);
-        // Caustics add no noise: their gathers find no map.
+        // Gathers in the caustic map find no photons, so that caustics add no noise.
         let photons = PhotonSettings { photons, seed: PHOTON_SEED, caustic_photons: 0, ..of_picture };
         let go_on = |_| !observer.is_stopped();
         let traced = TracedPhotons::new(packed, &photons, &go_on)?;

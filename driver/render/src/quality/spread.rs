@@ -1,6 +1,7 @@
 //! Relative mean squared differences between renders, over most pixels.
 
-/// Fraction of the greatest squares that is omitted, because a few bright pixels would outweigh all others.
+/// Fraction of the squared differences, the greatest ones, that is omitted, because a few bright pixels would
+/// outweigh all others.
 const LEFT_OUT: f64 = 0.02;
 /// Levels to which differences are relative: the radiance of each pixel, or the median of the lit pixels if
 /// that is greater, because noise in the dark is less visible.

@@ -18,8 +18,8 @@ impl RenderSettings {
     /// If the scene has no camera with this name, or the values are not valid for a camera.
     pub fn camera(&self, scene: &Scene) -> Result<Camera, RenderError> {
         let Picture { camera, camera_at, look_at, fov, .. } = &self.picture;
-        // With position and direction stated, nothing of an orthographic camera is used: the first camera
-        // stands in.
+        // If position and direction are stated, no property of an orthographic camera is used, and the first
+        // camera can replace it.
         let is_placed = self.picture.states_view();
         let found = match (scene.camera(camera.as_deref()), scene.cameras.first()) {
             (Err(SceneError::OrthographicCamera { .. }), Some(other)) if is_placed => other,

@@ -30,7 +30,7 @@ pub struct Picture {
     pub height: u32,
     /// Window to render; `None` for the whole picture.
     pub crop: Option<Window>,
-    /// Name of the camera; `None` for the scene's first.
+    /// Name of the camera; `None` for the first camera of the scene.
     pub camera: Option<String>,
     /// Position of the camera in the coordinates of the scene's file, metres; `None` for the camera's own.
     pub camera_at: Option<[f64; 3]>,
@@ -176,7 +176,7 @@ pub struct Integrator {
     pub shadow_rays: u32,
     /// Importance sampling of final gather rays.
     pub sampling: Sampling,
-    /// Error bound of interpolated irradiance, relative; `None` to interpolate none.
+    /// Relative error bound of interpolated irradiance, at most 1; `None` for no interpolation.
     pub irradiance_error: Option<f32>,
     /// Threshold of adaptive sampling, W^(1/2)/(sr^(1/2) m); `None` for one path per sample. Samples after a
     /// pixel's probes are means of several paths if the standard deviation of the probes, divided by the
@@ -286,7 +286,8 @@ pub struct CardSet {
     pub faults: Option<LineFaults>,
     /// Fraction of the tiles that two cards render for comparison; `None` for no tiles.
     pub verify: Option<f64>,
-    /// Caches of the memory model; `None` for no model, which has no cost.
+    /// Caches of the memory model; `None` for no model, unless `trace` is stated. Without a model, memory is
+    /// read at no extra cost.
     pub caches: Option<CacheSettings>,
     /// Trace of every read of the chip, which must be the only one. Without `caches`, the caches of the kind
     /// of chip are modelled.

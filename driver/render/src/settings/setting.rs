@@ -14,7 +14,7 @@ pub enum Changes {
     Work,
     /// Cards, their links, and the model of their memory.
     Cards,
-    /// None of these.
+    /// No results.
     Nothing,
 }
 

@@ -45,11 +45,11 @@ pub(super) struct Format {
 /// Interpretation of integer components (glTF 2.0, 3.11 "Accessors").
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Integers {
-    /// Integers as they are.
+    /// Integers that are converted to floating-point numbers without scaling.
     Whole,
     /// Integers mapped to 0 to 1, or to -1 to 1 if signed.
     Normalized,
-    /// Normalised or not, according to the accessor's `normalized`.
+    /// Integers that are normalised if the accessor's `normalized` is true.
     AsStated,
 }
 
@@ -181,7 +181,8 @@ impl<'a> Elements<'a> {
         Self::decompressed(source, index, item, format, |_| Ok(None))
     }
 
-    /// [`new`](Self::new) for an accessor whose bytes `decompress` may supply in place of its buffer view.
+    /// Does what [`new`](Self::new) does, with bytes that `decompress` may supply in place of the accessor's
+    /// buffer view.
     pub(super) fn decompressed(
         source: &Source<'a>,
         index: usize,

@@ -106,7 +106,7 @@ pub(super) fn targets(animation: &json::Animation) -> impl Iterator<Item = usize
     animation.channels.iter().map(|channel| channel.target.node.value())
 }
 
-/// Channel of an animation, with its sampler, which was checked.
+/// Channel of an animation, with the contents of its sampler. Channel and sampler were checked.
 struct Channel<'a> {
     source: &'a Source<'a>,
     /// JSON path of the channel.
@@ -200,7 +200,7 @@ impl<'a> Channel<'a> {
         DVec4::from_array(self.values.floats(index, [0.0; 4]).map(f64::from))
     }
 
-    /// Value of an element at `place`, interpolated component by component.
+    /// Value of an element at `place`, a position among the keyframes, interpolated component by component.
     fn value(&self, place: Place, element: u64) -> DVec4 {
         let Place { keyframe, share, interval } = place;
         match self.keyframes.interpolation {

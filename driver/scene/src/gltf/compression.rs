@@ -53,12 +53,12 @@ impl Compressed {
         Ok(Some(Self { index, item, stated_bytes: view.byte_length.0, extension }))
     }
 
-    /// Index of the buffer with the stream.
+    /// Index of the buffer with the compressed stream.
     pub(super) fn buffer(&self) -> usize {
         self.extension.buffer
     }
 
-    /// Offset and length of the stream, bytes.
+    /// Offset and length of the compressed stream in its buffer, bytes.
     pub(super) fn place(&self) -> (u64, u64) {
         (self.extension.byte_offset, self.extension.byte_length)
     }

@@ -328,7 +328,8 @@ fn parse(path: &Path, bytes: &[u8]) -> Result<(json::Root, Shortened), SceneErro
     }
 }
 
-/// [`parse`] of a text that is valid JSON but that the types of the `gltf` crate reject.
+/// Parses a text that is valid JSON but that the types of the `gltf` crate reject, after [`schema::amend`]
+/// has changed it.
 fn parse_amended(
     path: &Path,
     text: &str,

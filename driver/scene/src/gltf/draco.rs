@@ -166,7 +166,7 @@ impl Counts {
     }
 
     /// Checks that the sums over all decompressed primitives stay within bounds, and that the process can
-    /// have the memory for the present one.
+    /// have the memory to decompress this one.
     fn check_memory(&self, source: &Source<'_>, item: &str) -> Result<(), SceneError> {
         let (document, sums) = (source.document, &source.decompressed);
         let triangles = sums.triangles.get().saturating_add(self.triangles);

@@ -12,7 +12,7 @@ use std::sync::Arc;
 pub(super) enum Bytes<'a> {
     /// A range of the scene file or of a buffer.
     Part(&'a [u8]),
-    /// A file, or the contents of a data URI.
+    /// The contents of a file or of a data URI.
     Shared(Arc<Vec<u8>>),
 }
 

@@ -19,7 +19,8 @@ use crate::{Encoding, Image};
 const EXPORT_AGAIN: &str = "export the scene again, with its images";
 const CONVERT: &str = "convert the image to PNG, JPEG or WebP";
 
-/// Maximum number of texels of all images, in the sizes of their files: what decoding them may take of time.
+/// Maximum number of texels of all images, in the sizes of their files. It bounds the time that decoding
+/// takes.
 const MAX_TEXELS: u64 = 1 << 31;
 /// Maximum number of texels of several images that are decoded at once, before they are scaled down.
 const TEXELS_AT_ONCE: u64 = 1 << 28;
@@ -60,7 +61,7 @@ struct Decoded {
 
 /// Failure to read an image.
 enum Failure {
-    /// Fault of the image alone.
+    /// Fault of the image alone, without which the scene can be loaded.
     Image(Fault),
     /// Fault of a buffer, which other parts of the scene need as well.
     Scene(SceneError),
@@ -72,7 +73,8 @@ impl From<Fault> for Failure {
     }
 }
 
-/// Takes the next images, as many as may be decoded at once.
+/// Takes the next images that may be decoded at once: one of any size, or several of up to [`TEXELS_AT_ONCE`]
+/// texels in all.
 fn take_together<'a, 'w>(
     found: &mut Peekable<impl Iterator<Item = (Option<Found<'a>>, &'w Wanted)>>,
 ) -> Vec<(Option<Found<'a>>, &'w Wanted)> {

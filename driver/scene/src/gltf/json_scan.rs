@@ -6,8 +6,8 @@
 //! forbids them, and parsers differ in which value they take.
 //!
 //! A parser skips values that it does not need, whatever they are: numbers beyond the range of floats, lone
-//! surrogates, any depth. So does the scan, which knows tokens alone and never fails. Its result is right for
-//! valid JSON; parsing finds whether the text is valid.
+//! surrogates, any depth. The scan skips them too: it only splits the text into tokens, and never fails. Its
+//! result is right for valid JSON; parsing finds whether the text is valid.
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
@@ -20,14 +20,14 @@ use gltf::json;
 use super::specular_glossiness::Conversion;
 use crate::{Camera, Material};
 
-/// Maximum number of bytes of memory per byte of JSON, beyond [`BYTES_OF_ANY`].
+/// Maximum number of bytes of memory per byte of JSON, in addition to [`BYTES_OF_ANY`].
 pub(super) const BYTES_OF_A_BYTE: u64 = 32;
 
 /// Memory that the parsed form of any JSON may take, however short, bytes.
 pub(super) const BYTES_OF_ANY: u64 = 256 << 20;
 
-/// Estimated memory of a value outside the root's lists, bytes: twice the size of the largest,
-/// `serde_json::Value`.
+/// Estimated memory of a value outside the root's lists, bytes: twice the size of the largest type of a
+/// value, `serde_json::Value`.
 const VALUE: u64 = 64;
 
 /// Estimated memory of an object outside the root's lists, bytes: a node of a `BTreeMap` with one key, or a
@@ -128,13 +128,15 @@ fn element(list: &str) -> u64 {
     2 * bytes as u64
 }
 
-/// Position of a value in the document.
+/// Position of a value in the JSON document, by which its memory is estimated.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Root,
-    /// Member of the root. If it is a list, each element counts this number of bytes.
+    /// Member of the root object. If the member is a list, the number is the estimated memory of each of its
+    /// elements, bytes.
     List(u64),
-    /// Element of a top-level list. Its size was added when it began, as [`Self::List`] states.
+    /// Element of a list that is a member of the root object. Its memory is counted when it begins, so that
+    /// its first key does not add [`OBJECT`].
     Element,
     Other,
 }

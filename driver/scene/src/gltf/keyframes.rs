@@ -17,7 +17,7 @@ pub(super) struct Keyframes<'a> {
     pub(super) interpolation: Interpolation,
 }
 
-/// Position of a time between two keyframes.
+/// Position of a time among the keyframes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
     /// Index of the last keyframe at or before the time; 0 if the time precedes all keyframes.

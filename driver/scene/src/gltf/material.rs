@@ -74,7 +74,7 @@ fn load_one(
     let is_gltf = matches!(material.reflection, Reflection::MetallicRoughness { .. });
     let base = (unlimited_f0(source), is_gltf);
     material.layers = layers::load(document, index, source, textures, base)?;
-    // Diffuse transmission makes a surface double-sided: the transmitted light has arrived at the back.
+    // Diffuse transmission makes a surface double-sided, because transmitted light arrives at the back.
     let transmits_diffusely =
         material.layers.as_ref().is_some_and(|layers| layers.diffuse_transmission.is_some());
     material.double_sided |= transmits_diffusely;
@@ -180,7 +180,7 @@ fn metallic_roughness(source: &json::Material, base_colour: Vec3) -> Reflection 
 fn unlimited_f0(source: &json::Material) -> Vec3 {
     let extensions = source.extensions.as_ref();
     let ior = extensions.and_then(|extensions| extensions.ior.as_ref()).map_or(IOR, |ior| ior.ior.0);
-    // An index of 0 stands for infinity; its reflectance is then 1 (`KHR_materials_ior`).
+    // An index of 0 means infinity; the reflectance is then 1 (`KHR_materials_ior`).
     let amplitude = (f64::from(ior) - 1.0) / (f64::from(ior) + 1.0);
     let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
     let colour = specular.map_or(Vec3::ONE, |specular| specular.specular_color_factor.0.into());
@@ -219,7 +219,7 @@ fn transmission(extensions: Option<&json::extensions::material::Material>, ior: 
     let absorption = volume.map_or(Vec3::ZERO, |volume| {
         let distance = volume.attenuation_distance.0;
         let coefficient = |colour: f32| match -libm::logf(colour) / distance {
-            // A black attenuation colour, or a distance of 0.
+            // The coefficient of a black attenuation colour or of a distance of 0 is infinite.
             infinite if infinite == f32::INFINITY => MAX_ABSORPTION,
             coefficient => coefficient.min(MAX_ABSORPTION),
         };

@@ -23,7 +23,7 @@ pub(super) struct MeshPlacer<'a> {
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,
     /// Number of counted instances of each mesh.
     placed: BTreeMap<usize, u64>,
-    /// Number of triangles and primitives to convert, including triangles of zero area.
+    /// Number of triangles and primitives of all counted instances, including triangles of zero area.
     work: u64,
     /// Indices of meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
@@ -43,7 +43,8 @@ impl<'a> MeshPlacer<'a> {
         }
     }
 
-    /// Counts the triangles of `instances` instances of mesh `index`, at most [`MAX_TRIANGLES`] in all.
+    /// Counts the triangles and primitives of `instances` instances of mesh `index`. Returns an error if
+    /// there are more than [`MAX_TRIANGLES`] in all.
     pub(super) fn count(
         &mut self,
         index: usize,
@@ -63,10 +64,10 @@ impl<'a> MeshPlacer<'a> {
         Ok(())
     }
 
-    /// Checks that a card has room for all counted triangles.
+    /// Checks that a card's memory can hold all counted triangles.
     pub(super) fn check_room(&self, room: &mut Room) -> Result<(), SceneError> {
         let triangles = self.placed().map(|(primitive, times)| primitive.triangles * times).sum();
-        // Shared vertices are counted only if the upper bound exceeds the room.
+        // Shared vertices are counted only if an upper bound of the triangles' size exceeds the memory.
         if room.fits_any(triangles) {
             return Ok(());
         }

@@ -24,8 +24,9 @@ use crate::{Camera, LightUnits, Scene};
 /// Maximum depth of the node hierarchy.
 const MAX_DEPTH: usize = 1024;
 
-/// Adds the meshes, lights and cameras of the scene's nodes: animated nodes in `poses`, lights in `units`.
-/// `anchor` caches the offset of the scene's origin, which follows from the scene at rest.
+/// Adds the meshes, lights and cameras of the scene's nodes. Animated nodes are in `poses`; the intensities
+/// of lights are read in `units`. `anchor` caches the offset of the scene's origin, which follows from the
+/// scene at rest.
 ///
 /// All triangles are counted before the first is added.
 pub(super) fn place(

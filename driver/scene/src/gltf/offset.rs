@@ -12,8 +12,8 @@ use super::vertex::MAX_COORDINATE;
 /// Distance of a scene's centre from the origin beyond which the scene is moved, in sizes of the scene.
 const NEAR: f64 = 16.0;
 
-/// Distance of a scene's centre from the origin beyond which the scene is moved unless it is larger than
-/// that, metres. Single precision is coarser than 60 um there.
+/// Distance of a scene's centre from the origin beyond which the scene is moved, unless the scene is larger
+/// than this distance, metres. Beyond it single precision is coarser than 60 um.
 const FAR: f64 = 1000.0;
 
 /// Least exponent of a power of two to which the offset is rounded: 2^-10 m.
@@ -49,8 +49,8 @@ impl Bounds {
     }
 
     /// Offset of a scene with these bounds, metres. It is 0 along axes on which the scene is near the origin.
-    /// `stated` are translations of nodes that contain the whole scene; one that is integral, and at most the
-    /// scene's size from its centre, is preferred.
+    /// `stated` are translations of nodes that contain the whole scene. Along each axis, a translation that
+    /// is integral and at most the scene's size from the scene's centre is preferred.
     pub(super) fn offset(&self, stated: &[DVec3]) -> DVec3 {
         let size = (self.high - self.low).max_element();
         let furthest = self.low.abs().max(self.high.abs()).max_element();

@@ -51,9 +51,9 @@ enum Kind {
     Imported(&'static str, &'static str),
     Zip,
     ByHand(&'static str),
-    /// Partial file of a render.
+    /// File of the finished tiles of an interrupted render.
     Partial,
-    /// Part file of a picture.
+    /// File of a part of a picture, which `photoncard merge` joins with the others.
     Part,
     Prepared,
     Picture,

@@ -224,7 +224,7 @@ impl<'a> Primitive<'a> {
     /// Lower bound of the card memory that each instance takes, bytes.
     ///
     /// # Errors
-    /// If the process cannot have the memory for a set of its vertices.
+    /// If the process cannot have the memory for the set of the primitive's vertex positions.
     pub(super) fn bytes_of_a_card(&self) -> Result<u64, OutOfMemory> {
         let sets = 1 + u64::from(self.coordinates[1].is_some());
         // Normals may equal the triangles' own, and colours may be white: these need no records.
@@ -234,8 +234,8 @@ impl<'a> Primitive<'a> {
         Ok(Room::geometry(self.triangles, self.corners_in_different_places()?) + attributes)
     }
 
-    /// Number of distinct vertex positions. The memory of the set is bounded by the size of the file, not by
-    /// a count in it.
+    /// Counts distinct vertex positions. The set grows with the positions that the file contains, not with a
+    /// count that it states, so a small hostile file cannot take much memory.
     fn corners_in_different_places(&self) -> Result<u64, OutOfMemory> {
         let mut places = HashSet::new();
         for corner in (0..self.triangles).flat_map(|triangle| self.corners(triangle)) {

@@ -15,7 +15,7 @@ use photoncard_shared::layout::{
 use crate::error::SceneError;
 use crate::reduction::reduced_size;
 
-/// Memory of a card and the part that is in use, bytes.
+/// Memory of a card, and how much of it the contents counted so far take, bytes.
 #[derive(Clone)]
 pub(super) struct Room {
     file: PathBuf,
@@ -39,8 +39,8 @@ impl Room {
         self.take((count * Material::BYTES) as u64, || format!("{count} materials"))
     }
 
-    /// Maximum total size of all image files, bytes: 2 GB, or eight for each texel that fits. No format takes
-    /// more.
+    /// Maximum total size of all image files, bytes: 2 GB or, if it is more, 8 bytes for each texel of 4
+    /// bytes that fits the card's memory. No format takes more bytes per texel.
     pub(super) fn image_file_bytes(&self) -> u64 {
         self.available.saturating_mul(2).max(2 << 30)
     }

@@ -81,7 +81,8 @@ impl SceneFile {
         self.placed(self.bare.clone(), None)
     }
 
-    /// [`Self::at_rest`] that consumes the file. A remark names the animations, which do not play.
+    /// Does what [`Self::at_rest`] does, and consumes the file. A remark names the animations, which do not
+    /// play.
     ///
     /// # Errors
     /// As [`Self::at_rest`].
@@ -141,7 +142,7 @@ impl SceneFile {
     }
 
     /// Returns whether the animations of these names move cameras alone, and neither meshes nor lights. An
-    /// empty list stands for all animations.
+    /// empty list means all animations.
     ///
     /// # Errors
     /// If `names` has a name that no animation has.
@@ -201,7 +202,7 @@ impl SceneFile {
         Ok(scene)
     }
 
-    /// Default camera of a file without cameras. It is placed by the scene at rest.
+    /// Default camera of a file without cameras. Its position follows from the scene at rest.
     fn framed(&self, scene: &Scene, moment: Option<&Moment>) -> Result<(Camera, Framed), SceneError> {
         if moment.is_some() && self.framed.get().is_none() {
             self.at_rest()?;

@@ -17,7 +17,7 @@ const MAX_INTEGER: f64 = 9_007_199_254_740_992.0;
 /// Values of `path` of an animation target.
 const PATHS: [&str; 4] = ["translation", "rotation", "scale", "weights"];
 
-/// Names of the root's lists.
+/// Names of the lists in the root object of glTF.
 const LISTS: [&str; 15] = [
     "accessors",
     "animations",

@@ -11,7 +11,7 @@ pub struct LoadSettings {
     /// Memory of the cards into which the scene must fit, bytes.
     pub dram_bytes: u64,
     /// Maximum width and height of an image, texels, at least 1. Larger images are scaled down by a whole
-    /// number, to means in linear light. `None` keeps the sizes of the files.
+    /// number, each texel to the mean in linear light. `None` keeps the sizes of the files.
     pub texture_limit: Option<u32>,
     /// Variant of the materials (`KHR_materials_variants`); `None` for the materials that the meshes state.
     pub variant: Option<String>,

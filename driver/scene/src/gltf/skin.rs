@@ -19,8 +19,8 @@ pub(super) struct Skin {
 }
 
 impl Skin {
-    /// Computes the joint matrices of skin `index`, which exists, from the world transforms of all nodes;
-    /// `None` stands for a node outside the scene.
+    /// Computes the joint matrices of skin `index`, which exists, from the world transforms of all nodes. The
+    /// transforms of nodes outside the scene are `None`.
     pub(super) fn new(
         source: &Source<'_>,
         index: usize,

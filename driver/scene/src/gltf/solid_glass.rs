@@ -43,7 +43,7 @@ enum Form {
     AsStated,
     Solid,
     Wall,
-    /// Stated as a volume although it is open, and left unchanged.
+    /// Open surface for which the file states a volume. It is left unchanged.
     Open,
 }
 

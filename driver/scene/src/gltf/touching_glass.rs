@@ -130,7 +130,7 @@ mod tests {
         Material::new(name, reflection)
     }
 
-    /// Two tetrahedra of different media that share the place of a face.
+    /// Two tetrahedra of different media with one pair of coinciding faces.
     fn tetrahedra(media: [Material; 2]) -> Scene {
         let corners = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z, Vec3::ONE];
         let faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3], [3, 2, 1], [4, 1, 2], [4, 2, 3], [4, 3, 1]];

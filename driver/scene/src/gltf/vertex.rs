@@ -128,7 +128,8 @@ impl VertexReader<'_, '_> {
         displaced(base, &self.primitive.targets, weights, attribute, vertex)
     }
 
-    /// Attributes of a triangle's corners beyond positions; `None` if all have their default value.
+    /// Attributes of a triangle's corners beyond positions; `None` if all have their default value and the
+    /// primitive has no texture coordinates.
     pub(super) fn attributes(
         &self,
         corners: &Corners<'_>,

@@ -82,8 +82,8 @@ fn read_groups(stream: &mut &[u8], widths: [u32; 4], lane: &mut [u8]) -> Option<
     Some(())
 }
 
-/// Reads a group of differences of 1, 2 or 4 bits. A difference with all bits set stands for a byte that
-/// follows the group.
+/// Reads a group of differences of 1, 2 or 4 bits. If all bits of a difference are set, its value is instead
+/// a byte that follows the group.
 fn read_narrow(stream: &mut &[u8], width: u32, group: &mut [u8]) -> Option<()> {
     let each = 8 / width;
     let packed = stream.split_off(..GROUP / each as usize)?;

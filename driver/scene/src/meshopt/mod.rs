@@ -27,7 +27,7 @@ pub(super) enum Mode {
     Attributes,
     /// Indices of a list of triangles, relative to recent edges and vertices.
     Triangles,
-    /// Other lists of indices, as differences.
+    /// Lists of indices other than triangles, as differences.
     Indices,
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Layout {
     pub(super) filter: Filter,
 }
 
-/// Error of a stream.
+/// Error of a stream or its layout, or of the memory for the result.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum Fault {
     /// Damage of the stream, or a combination of sizes, mode and filter that the extension does not allow,

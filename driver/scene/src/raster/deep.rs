@@ -52,7 +52,7 @@ fn normal(codes: [u16; 3]) -> [u8; 4] {
     const HALF: f64 = u16::MAX as f64 / 2.0;
     let [x, y, z] = codes.map(|code| f64::from(code) - HALF);
     let length = libm::sqrt(x * x + y * y + z.max(0.0) * z.max(0.0));
-    // Every code is half a step from 0 at least: the length is not 0.
+    // Every channel is at least half a step from 0, so that the length is not 0.
     pair([x, y].map(|channel| ((channel / length + 1.0) * HALF).round() as u16))
 }
 

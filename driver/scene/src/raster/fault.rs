@@ -7,7 +7,7 @@ use photoncard_picture::allocation::{self, OutOfMemory};
 pub(crate) struct Fault {
     /// Description of the fault.
     pub(crate) reason: String,
-    /// Remedy.
+    /// Advice on how to mend or replace the image.
     pub(crate) remedy: &'static str,
     /// True if the image exceeds a limit or the memory of the process; false if it cannot be read.
     pub(crate) is_limit: bool,

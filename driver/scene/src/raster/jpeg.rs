@@ -18,7 +18,7 @@ type Decoder<'a> = JpegDecoder<ZCursor<&'a [u8]>>;
 
 fn decoder(bytes: &[u8]) -> Decoder<'_> {
     let side = MAX_SIDE as usize;
-    // Strict mode: otherwise truncated parts would be grey.
+    // Strict mode reports a truncated file. Without it, the missing part would be grey.
     let options = DecoderOptions::new_safe().set_strict_mode(true).set_max_width(side).set_max_height(side);
     JpegDecoder::new_with_options(ZCursor::new(bytes), options)
 }

@@ -37,7 +37,7 @@ const UASTC_BLOCK: u64 = 16;
 const ZSTANDARD_TEXELS_OF_A_BYTE: u64 = 1 << 15;
 
 /// Window size that decoders of Zstandard should support (RFC 8878, 3.1.1.1.2), bytes. An encoder that knows
-/// the length of its data takes no larger window than that.
+/// the length of its data takes no window larger than this length.
 const ZSTANDARD_WINDOW: u64 = 8 << 20;
 
 const ENCODE_AGAIN: &str = "encode the image again for glTF, or convert it to PNG, JPEG or WebP";

@@ -74,7 +74,7 @@ fn vertices_are_those_of_the_wave_within_the_quantisation() {
         let (mut json, bytes) = parts(file);
         json["nodes"][0].as_object_mut().unwrap().remove("skin");
         let scene = load_parts(&(json, bytes)).unwrap();
-        // 14 bits for 4 m; the colours are not quantised.
+        // Positions have 14 bits for 4 m; the colours are not quantised.
         let tolerance = 4.0 / 16_384.0;
         let mut squares = BTreeSet::new();
         for triangle in &scene.triangles {
@@ -202,7 +202,7 @@ fn the_memory_of_all_primitives_is_bounded_together() {
     let mut one = primitive(&mut json).clone();
     json["meshes"][0]["primitives"] = json!(vec![one.clone(); 3]);
     assert_eq!(load_parts(&(json.clone(), bytes.clone())).unwrap().triangles.len(), 3 * TRIANGLES);
-    // Each takes 0.9 GB, with an attribute that no material uses.
+    // Each primitive takes 0.9 GB, with an attribute that no material uses.
     let count = 12_000_000;
     let accessor = json!({"componentType": 5121, "type": "VEC4", "count": count});
     one["attributes"]["_UNUSED"] = json!(crate::support::push(&mut json, "accessors", accessor));

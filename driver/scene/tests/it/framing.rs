@@ -20,7 +20,7 @@ fn room(open: &[usize], faces_inwards: bool, double_sided: bool, lamps: &[[f32; 
                 (Vec3::from(place) * size).to_array()
             };
             let [a, b, c, d] = [corner(0.0, 0.0), corner(1.0, 0.0), corner(1.0, 1.0), corner(0.0, 1.0)];
-            // Counter-clockwise seen from the greater coordinates.
+            // The corners are counter-clockwise seen from greater coordinates.
             let faces_up = (side == 0.0) == faces_inwards;
             let quadrilateral = if faces_up { [a, b, c, a, c, d] } else { [c, b, a, d, c, a] };
             corners.extend(quadrilateral.into_iter().filter(|_| !open.contains(&number)));

@@ -187,7 +187,7 @@ fn metadata_that_change_the_picture_are_refused() {
     let with = |entry: &[u8]| {
         let mut file = UASTC.to_vec();
         let offset = file.len() as u32;
-        // After an entry whose length is not a multiple of four.
+        // The entry follows one whose length is not a multiple of four.
         for entry in [b"KTXwriter\0tests", entry] {
             file.extend((entry.len() as u32).to_le_bytes());
             file.extend(entry);

@@ -134,7 +134,7 @@ fn json_that_violates_the_schema_is_named_by_its_place() {
             other => panic!("{place}: {:?}", other.err()),
         }
     }
-    // With and without a number that the crate does not take.
+    // Each key is repeated with and without a number that the `gltf` crate does not take.
     for (text, place) in [
         (r#"{"asset": {"version": "2.0"}, "nodes": [], "nodes": []}"#, "nodes"),
         (
@@ -267,7 +267,7 @@ fn contents_of_extras_are_free() {
     }
 }
 
-/// A buffer that nothing uses may be absent, or be an extension's.
+/// A buffer that nothing uses may be absent, or belong to an extension.
 #[test]
 fn buffers_without_use_are_not_read() {
     for buffer in [json!({"byteLength": 10}), json!({"byteLength": 10, "uri": "absent.bin"})] {

@@ -342,14 +342,14 @@ fn images_above_a_limit_are_scaled_down_and_count_so_in_the_memory_of_cards() {
     assert_eq!((whole.width, whole.height), (24, 16));
     assert_eq!((&whole, &checksum), (&same, &of_same));
     assert_ne!(checksum, of_small);
-    // A third of each side: means of nine texels, whose columns are about 10 apart.
+    // Each side is reduced to a third. Texels are means of nine, and columns differ by about 10.
     assert_eq!((small.width, small.height, small.texels.len()), (8, 6, 48));
     let red = |image: &photoncard_scene::Image, x: usize| i32::from(image.texels[x][0]);
     for x in 0..8 {
         let (mean, middle) = (red(&small, x), red(&whole, 3 * x + 1));
         assert!((mean - middle).abs() < 6, "{mean}, {middle}");
     }
-    // Twelve lines of texels, or two.
+    // The texels take twelve lines, or two with a limit of 8 texels.
     let load = |texture_limit| {
         let settings =
             gltf::LoadSettings { dram_bytes: 1000, texture_limit, ..gltf::LoadSettings::default() };

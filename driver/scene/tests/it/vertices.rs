@@ -250,7 +250,7 @@ fn quantised_vertices_are_read_where_the_extension_allows_them() {
 /// that it extends.
 #[test]
 fn quantised_attributes_mean_what_their_type_says() {
-    // The greatest value of each type, as bytes, and what it stands for once normalised.
+    // The greatest value of each type, as bytes, and its meaning once normalised.
     let types: [(u32, &[u8], f32); 4] = [
         (5120, &[127], 127.0),
         (5121, &[255], 255.0),

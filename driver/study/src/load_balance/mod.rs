@@ -93,7 +93,8 @@ impl Balance {
         self.speedup() / self.chip_seconds.len() as f64
     }
 
-    /// Idle fraction, `1 - efficiency`: chips wait for tiles, or for the last chip.
+    /// Idle fraction, `1 - efficiency`: fraction of the chips' time until the makespan in which they wait for
+    /// tiles, or for the last chip to finish.
     pub(crate) fn idle_share(&self) -> f64 {
         1.0 - self.efficiency()
     }
@@ -164,8 +165,8 @@ impl Simulation {
         for chip in 0..self.chips.len() {
             self.deal(chip);
         }
-        // A result of a tile dealt later arrives later than the result that frees its credit: the first in
-        // the heap is the next.
+        // The result of a tile arrives later than the result that freed the tile's credit. The first result
+        // in the heap is therefore always the next one.
         while let Some(Reverse((arrival, chip, id))) = self.results.pop() {
             self.now = self.now.max(arrival) + self.result;
             self.busy += self.result;
@@ -239,7 +240,7 @@ pub(crate) enum TileOrder {
 }
 
 impl TileOrder {
-    /// Tiles with these costs, in this order. A tile's number is its index in `costs`.
+    /// Returns one tile for each of `costs`, in the order `self`. A tile's number is its index in `costs`.
     fn tiles(self, costs: &[u128]) -> Vec<Tile> {
         let mut tiles: Vec<Tile> = (0_u32..).zip(costs).map(|(id, _)| tile(id)).collect();
         match self {

@@ -47,10 +47,11 @@ const ROUNDING: f64 = 1e-10;
 fn a_chip_waits_for_its_command_and_the_host_for_its_result() {
     let link = LinkModel { command_seconds: 0.01, result_seconds: 0.02, latency_seconds: 0.1 };
     let one = balance(&[1.0, 1.0], TileOrder::Picture, 1, 1, link);
-    // Twice: command, way, tile, way, result.
+    // Each of two tiles takes the time of the command, the latency, the render, the latency, and the result.
     assert!((one.makespan_seconds - 2.0 * (0.01 + 0.1 + 1.0 + 0.1 + 0.02)).abs() < ROUNDING);
     let two = balance(&[1.0, 1.0], TileOrder::Picture, 2, 1, link);
-    // The second chip's command waits for the first's 0.01, and its result then for 0.01 of the first's.
+    // The command to the second chip is sent after 0.01 s for the first. The second result arrives 0.01 s
+    // after the first, and waits for the rest of the 0.02 s that the host takes for the first.
     assert!((two.makespan_seconds - (0.02 + 0.1 + 1.0 + 0.1 + 0.01 + 0.02)).abs() < ROUNDING, "{two:?}");
     assert!((two.host_seconds - 0.06).abs() < ROUNDING);
     assert_eq!([one.most_in_flight, two.most_in_flight], [1, 2]);
@@ -61,7 +62,8 @@ fn a_second_credit_hides_the_latency_of_the_link() {
     let costs = [0.01; 400];
     let link = LinkModel { latency_seconds: 0.005, ..NO_LINK };
     let [one, two, four] = [1, 2, 4].map(|credits| balance(&costs, TileOrder::Picture, 4, credits, link));
-    // A tile is as long as the way to the host and back: with one credit half of the time is waiting.
+    // A tile takes as long as the latencies to the host and back, so that a chip with one credit waits for
+    // half of the time.
     assert!((one.idle_share() - 0.5).abs() < 0.01, "{}", one.idle_share());
     // A second credit hides the latency but for each chip's last tile.
     assert!(two.idle_share() < 0.05, "{}", two.idle_share());

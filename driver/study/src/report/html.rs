@@ -79,8 +79,8 @@ pub struct Provenance {
 }
 
 impl Report {
-    /// Adds a banner to the report. Titles of plots then say that they are of a trial, because the plots'
-    /// files can be used separately.
+    /// Adds `banner` to the report, and `Trial: ` to the title of each plot, because the files of plots can
+    /// be used without the page.
     #[must_use]
     pub(crate) fn marked(mut self, banner: String) -> Self {
         self.banner = Some(banner);

@@ -4,7 +4,7 @@
 const RAISED: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
 
 /// Formats `value` with at most `digits` significant digits, thousands separators and a true minus sign.
-/// Values that would need many zeros are written with a power of ten.
+/// Magnitudes other than 0 that are below 10^-4 or of at least 10^15 are written with a power of ten.
 pub fn human(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "n/a".to_owned();
@@ -31,7 +31,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
 /// Adds thousands separators and a true minus sign to a decimal number in plain digits.
 pub(super) fn grouped(decimal: &str) -> String {
     let (sign, digits) = match decimal.strip_prefix('-') {
-        // A zero has no sign once it is rounded.
+        // A number that is rounded to zero has no sign.
         Some(digits) if digits.bytes().any(|digit| (b'1'..=b'9').contains(&digit)) => ("−", digits),
         Some(digits) => ("", digits),
         None => ("", decimal),

@@ -49,7 +49,7 @@ pub enum Cell {
 }
 
 impl Column {
-    /// A column of a name and a unit.
+    /// Creates the head of a column with a name and a unit.
     pub(crate) fn new(name: impl Into<String>, unit: impl Into<String>) -> Self {
         Self { name: name.into(), unit: unit.into() }
     }
@@ -223,8 +223,8 @@ impl Table {
     }
 }
 
-/// Encodes records as CSV. Writing to memory does not fail, and the records have one length: the result is
-/// never `None`.
+/// Encodes records as CSV. Writing to memory does not fail, and all records have equal lengths, so that the
+/// result is never `None`.
 fn csv_of(records: &[Vec<String>]) -> Option<String> {
     let mut csv = csv::WriterBuilder::new().terminator(csv::Terminator::CRLF).from_writer(Vec::new());
     records.iter().try_for_each(|record| csv.write_record(record)).ok()?;

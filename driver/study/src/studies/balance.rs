@@ -25,13 +25,14 @@ pub(super) fn chip_counts(most: usize) -> Vec<usize> {
     std::iter::successors(Some(1), |chips| Some(2 * chips)).take_while(|&chips| chips <= most).collect()
 }
 
-/// Simulates the assignment of tiles that take `seconds` each, with links that take no time; `None` if there
-/// are no tiles.
+/// Simulates the assignment of tiles, which take the times `seconds`, to `chips` chips. Links take no time.
+/// Returns `None` if there are no tiles.
 pub(super) fn deal(seconds: &[f64], chips: usize, (_, order, credits): Dealing) -> Option<Balance> {
     simulate(seconds, order, &Setup { chips, credits, link: LinkModel::default() }).ok()
 }
 
-/// Panel over the number of chips, with one line per policy.
+/// Panel of a plot over the number of chips, with one line per policy. Its vertical axis has the given label
+/// and scale, and the function computes the plotted value.
 pub(super) fn curves(
     title: &str,
     seconds: &[f64],

@@ -1,4 +1,4 @@
-//! Tiles in flight: traffic of whole frames whose gathers wait across tiles.
+//! Tiles in flight: traffic of whole frames in which gathers of several tiles wait in a chip's queue at once.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::{LARGE, REFERENCE};

@@ -47,7 +47,7 @@ fn photons(scale: &Scale) -> Vec<usize> {
     scale.pick(&[1, 4, 12], &[1, 4]).iter().map(|times| times * scale.photons).collect()
 }
 
-/// A line's point at a number of photons, with its names.
+/// A line at one scene and one number of photons. It determines a point.
 struct Headline {
     scene: &'static str,
     scene_name: &'static str,
@@ -81,7 +81,8 @@ impl Headline {
         measured.photon_map_bytes().value / measured.gathers().value
     }
 
-    /// Ratio of the bytes of the naive order to this line's, with the same number of photons.
+    /// Ratio of the bytes of the naive order to those of this line, with the same scene and number of
+    /// photons.
     fn factor(&self, scale: &Scale, results: &Results) -> Ratio {
         let naive = Self { line: NAIVE, ..*self };
         if self.line.0 == NAIVE.0 {

@@ -215,8 +215,8 @@ fn host_work(measured: &[(&Frame, &HostFrame)]) -> Table {
     table
 }
 
-/// Number of threads of this host needed for [`RATE`] frames per second, if its work is distributed over them
-/// without loss.
+/// Number of threads of this host needed for [`RATE`] frames per second, if the host's work is distributed
+/// over them without loss.
 fn threads_needed(host: &HostFrame) -> u64 {
     (RATE * host.threads as f64 * host.seconds()).ceil() as u64
 }

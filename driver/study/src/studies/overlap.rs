@@ -1,5 +1,5 @@
-//! Compares the times of a frame on a chip that casts rays while its queue is drained with those of the chip
-//! as it is built.
+//! Compares the times of a frame on two chips: one that casts rays while its queue is drained, and the chip
+//! as it is built, which does not.
 
 use photoncard_cards::scheduler::GatherOrder;
 use photoncard_firmware::kind::REFERENCE;
@@ -24,7 +24,8 @@ type Line = (GatherOrder, PhotonLayout);
 /// The line whose queue is varied.
 const SORT_LINES: Line = (GatherOrder::Sort, PhotonLayout::Lines);
 
-/// Sizes of the queue for which times are compared; half of each is measured, too.
+/// Sizes of the queue, in gathers, for which times are compared. Points are measured with each size and with
+/// half of it.
 fn queues(scale: &Scale) -> Vec<u32> {
     scale.pick(&[512, 1024, 2048, 4096, 8192, 16_384], &[2048, 8192])
 }

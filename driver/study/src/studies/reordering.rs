@@ -322,7 +322,8 @@ fn by_caches(title: &str, scale: &Scale, results: &Results, caches: &[(String, C
     table
 }
 
-/// Series for each order over caches at positions `x`.
+/// One series per order: bytes of the photon map fetched from DRAM, over `caches`. Each of `caches` has a
+/// horizontal position.
 fn lines_by_caches(scale: &Scale, results: &Results, caches: &[(f64, CacheSettings)]) -> Vec<Series> {
     let line = |order: GatherOrder| {
         let points = caches.iter().map(|&(x, caches)| {

@@ -18,16 +18,16 @@ const FEWER_TASKS: [u32; 2] = [1, 16];
 pub(super) struct TimedFrame {
     load: FrameLoad,
     machine: Machine,
-    /// Mean number of gathers at the beginning of a drain: the counted number or, if the order has no queue,
-    /// the number of places in the chip's queue. Gathers of such an order also wait for the gather unit, and
+    /// Mean number of gathers that wait when a drain begins: the counted number or, if the order has no
+    /// queue, the capacity of the chip's queue. Gathers of such an order also wait for the gather unit, and
     /// are done in the order of arrival.
     drained: u64,
     has_queue: bool,
 }
 
 impl TimedFrame {
-    /// Sums up the rays with their reads of the scene, and the gathers with their reads of the photon map, in
-    /// a point's frame.
+    /// Sums up the work of the frame that was measured at `point`: its rays with the reads of the scene, and
+    /// its gathers with the reads of the photon map.
     pub(super) fn new(point: &Point, measured: &Measurement, machine: &Machine) -> Self {
         let arithmetic = arithmetic::of_frame(measured, &workload::symbols(&point.settings));
         let flops = |part: ChipPart| arithmetic.sum(|unit| unit.part() == part).flops();

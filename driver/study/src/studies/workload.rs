@@ -9,11 +9,12 @@ use super::super::measure::{Measurement, TileMeasurement};
 
 type Count<'a> = &'a dyn Fn(&TileMeasurement) -> f64;
 
-/// Workload of one frame, estimated from its sample of tiles. Bytes on the host's link are the table's,
-/// because they do not depend on the scene.
+/// Workload of one frame, estimated from its sample of tiles. Bytes on the host's link are those of Table
+/// 7.1, because they do not depend on the scene.
 pub(super) fn of_frame(measured: &Measurement, pixels: f64, symbols: &Symbols) -> Workload {
     let total = |count: Count| measured.total(count).value;
-    // Tiles of the table's size, so that tile rates of frames in tiles of any size can be compared.
+    // Tiles have the size of those in Table 7.1, so that tile rates of frames in tiles of any size can be
+    // compared.
     of(&total, pixels / symbols.tile_pixels, pixels, symbols)
 }
 

@@ -145,8 +145,8 @@ fn verified_lies_are_outvoted_or_named() {
     });
 }
 
-/// Light that a chip's sums can hold, and that is next to impossible: without verification, the card without
-/// such light is believed.
+/// Light that a chip's sums can hold, but that no scene is likely to have. Without verification, the answer
+/// of the card without such light is accepted.
 #[test]
 fn dazzling_lies_never_reach_the_picture() {
     with_room_for_a_card(|| {

@@ -17,7 +17,8 @@ use super::world::{Fixture, IN_FLIGHT, Memory};
 
 /// Virtual time of a step.
 const STEP: Duration = Duration::from_micros(100);
-/// Number of turns of a chip per step of its work: bytes move over the line in the meantime.
+/// Mean number of times that a chip is selected per step of its work. Bytes move over the line in the
+/// meantime.
 const TURNS_OF_CHIP: usize = 8;
 
 /// Condition of a card.

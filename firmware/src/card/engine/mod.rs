@@ -29,7 +29,7 @@ pub const MAX_TILES: usize = 8;
 pub(super) struct Engine<K: ChipKind> {
     chip: Chip<K>,
     image: ImageState,
-    /// Function that measures on-chip memory; `None` on a board without one.
+    /// Function that measures on-chip memory; `None` on a board without such a function.
     pub(super) measure: Option<fn() -> MemoryUse>,
     /// Number of lines, from the first line, written since the card was switched on.
     written: u32,
@@ -45,7 +45,7 @@ pub(super) struct Engine<K: ChipKind> {
     is_flushed: bool,
     /// True if tiles are in flight, but the chip can do nothing for them before the next command.
     waits: bool,
-    /// Tile of the pixels in `data`, and the row-major index in this tile of the first of them.
+    /// Tile of the pixels in `data`, and the row-major index in this tile of the first of these pixels.
     first: (u32, u32),
     /// Data of the next reply: consecutive pixels of a tile, checksums, or results of a computation.
     data: heapless::Vec<u8, DATA_BYTES>,
@@ -319,8 +319,8 @@ impl<K: ChipKind> Engine<K> {
     }
 
     /// Adds the sums of a pixel, given by tile and index, to the buffer of pixels to be sent. The buffer is
-    /// sent first if the pixel does not directly follow the buffered ones, and sent afterwards if it has no
-    /// room for another pixel.
+    /// sent first if the pixel does not directly follow the buffered ones, and sent afterwards if the buffer
+    /// has no room for another pixel.
     fn add_pixel(
         &mut self,
         (tile, index): (u32, u32),

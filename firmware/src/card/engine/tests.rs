@@ -1,5 +1,4 @@
-//! Reply buffers that tests fill beforehand: the engine reports a fault instead of losing pixels or
-//! checksums.
+//! Tests with full reply buffers: the engine must report a fault instead of losing pixels or checksums.
 
 use std::boxed::Box;
 use std::vec;

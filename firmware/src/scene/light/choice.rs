@@ -50,7 +50,7 @@ pub(super) struct Chosen {
     pub(super) rest: Fraction,
 }
 
-/// Number of units in 1 of the thresholds of a cumulative distribution function: 2^32.
+/// Number of units of a cumulative distribution function's thresholds in a probability of 1: 2^32.
 const ALL: f32 = 4_294_967_296.0;
 
 /// Chooses one of `count` items by a cumulative distribution function. `threshold` returns the function's

@@ -12,8 +12,8 @@ use crate::scene::SceneImage;
 
 const LIGHTS_PER_LINE: u32 = DistantLight::PER_LINE as u32;
 
-/// Samples a distant light by the fraction `across`. `share` is the probability with which the light sample
-/// is one of the distant lights.
+/// Samples a distant light by the fraction `across`. `share` is the probability with which a light sample
+/// chooses a distant light.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

@@ -114,8 +114,8 @@ pub fn emitter_density(
     Ok(probability * (distance * distance / (cosine * area(vertices))))
 }
 
-/// Samples the emitters by the fractions `across` and `down`. `share` is the probability with which the light
-/// sample is one of the emitters.
+/// Samples the emitters by the fractions `across` and `down`. `share` is the probability with which a light
+/// sample chooses an emitter.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,

@@ -73,8 +73,8 @@ pub fn environment_density(
     Ok(density * parts.density(scene, memory, place)?)
 }
 
-/// Samples a direction of the environment. `share` is the probability with which the light sample is one of
-/// the environment.
+/// Samples a direction of the environment. `share` is the probability with which a light sample chooses the
+/// environment.
 pub(super) fn sample(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
@@ -144,7 +144,8 @@ impl Cells {
     /// Density, 1/sr, of a direction in a cell of row `row`, if the environment is chosen with the
     /// probability `share` and the cell then with the probability `probability`.
     fn density(&self, share: f32, row: u32, probability: f32) -> f32 {
-        // cos(upper border) - cos(lower border), as a product: no cancellation.
+        // The difference cos(upper border) - cos(lower border) is computed as a product, to avoid
+        // cancellation.
         let half = 0.5 * PI / self.rows as f32;
         let height = 2.0 * libm::sinf((2 * row + 1) as f32 * half) * libm::sinf(half);
         let solid_angle = 2.0 * PI / self.columns as f32 * height;
@@ -160,8 +161,9 @@ struct Parts {
 }
 
 impl Parts {
-    /// Reads the parts of a cell; `None` if it is not subdivided. After the thresholds of all cells come the
-    /// number of subdivided cells, the number of rows of each, and the cells' numbers in increasing order.
+    /// Reads the parts of a cell; `None` if the cell is not subdivided. After the thresholds of all cells
+    /// come the number of subdivided cells, the number of rows of each, and the cells' numbers in increasing
+    /// order.
     fn of(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,

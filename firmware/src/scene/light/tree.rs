@@ -98,7 +98,7 @@ pub fn selection_probability(
         trail >>= TRAIL_BITS;
         let link = children.get(next).and_then(|child| child.map(|child| child.link));
         let Some(child) = Choice::new(&children, receiver).option(next) else {
-            // The child is excluded, or does not exist: an unsound trail.
+            // The child is excluded, or does not exist, because the trail is unsound.
             return link.map(|_| 0.0).ok_or(Fault { code: FaultCode::Record, detail: emitter });
         };
         probability *= child.probability;
@@ -127,8 +127,8 @@ const KEPT_CHOICES: usize = 4;
 /// nodes.
 pub struct LightChoices {
     pub(super) receiver: Receiver,
-    /// Cached choices, each with the number of its node. A node's place is its number modulo the length of
-    /// the array.
+    /// Cached choices, each with the number of its node. The index of a node's choice in the array is the
+    /// node's number modulo the array's length.
     kept: [(u32, Choice); KEPT_CHOICES],
 }
 

@@ -54,8 +54,8 @@ pub(super) enum Estimate {
     /// A ray follows the lobe. Caustic photons of lights without an area are stored and gathered for the
     /// lobe.
     Ray,
-    /// As [`Self::Ray`], but no photons are stored for the lobe: the gathered ones are those of the
-    /// Lambertian part beside the lobe.
+    /// As [`Self::Ray`], but no photons are stored for the lobe: the gathered photons are those stored for
+    /// the Lambertian part beside the lobe.
     RayBesideBase,
     /// A ray follows the lobe, which takes no light from photons: the lobe of a coat or of rough
     /// transmission.
@@ -132,8 +132,8 @@ impl GgxLobe {
     }
 
     /// Returns true if the lobe takes light from the caustic map: from photons of lights without an area. The
-    /// lobe must be wider than the rounding of photon directions, and than a photon's disc appears from the
-    /// object that the lobe reflects.
+    /// lobe must be wider than the rounding error of photon directions, and wider than a photon's disc
+    /// appears when it is seen from the object that the lobe reflects.
     pub(super) fn gathers_caustics(&self) -> bool {
         self.alpha >= MIN_CAUSTIC_ALPHA && self.estimate != Estimate::RayAlone
     }

@@ -10,7 +10,8 @@ use super::sheen::SheenLobe;
 /// Phong, GGX or sheen lobe of a surface's reflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Lobe {
-    /// Phong lobe of the dissertation and of `extras.photoncard.phong`.
+    /// Phong lobe, as in Steinhurst's dissertation (2007) and in `extras.photoncard.phong` of a glTF
+    /// material.
     Phong(PhongLobe),
     /// GGX lobe of glTF's metallic-roughness model.
     Ggx(GgxLobe),

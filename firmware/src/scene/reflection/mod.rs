@@ -97,7 +97,8 @@ impl Reflection {
         }
     }
 
-    /// Fraction of the albedo that a sharp GGX lobe has, in which objects are recognised; 0 without one.
+    /// Fraction of the albedo that a sharp GGX lobe has; 0 without such a lobe. Objects can be recognised in
+    /// the reflection of a sharp lobe.
     pub fn sharp_share(&self) -> f32 {
         let is_sharp = matches!(&self.lobe, Lobe::Ggx(lobe) if lobe.alpha() <= MAX_SHARP_ALPHA);
         if is_sharp { self.glossy_share() } else { 0.0 }

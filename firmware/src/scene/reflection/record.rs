@@ -11,8 +11,8 @@ use super::phong::{self, PhongLobe};
 use crate::fixed_point::ColourSum;
 use crate::vector::{from_upper_half, max, mirror, unit, upper_half};
 
-/// A reflection function, evaluated as far as it does not depend on a photon: 13 bytes, the dissertation's
-/// `S_B` (section 7.4).
+/// A reflection function, evaluated as far as it does not depend on a photon, in 13 bytes: `S_B` of
+/// Steinhurst's dissertation (2007, section 7.4).
 ///
 /// Stage one, [`Self::encode`], is done once per gather: albedos, weight, units and the lobe's constant
 /// factor become two colours. Stage two, [`Self::lobe_factor`], is done once per photon. Colours are rounded
@@ -171,8 +171,8 @@ impl Shape {
     fn ggx(reflector: &Reflector, lobe: &GgxLobe) -> Self {
         let [a, b] = encode_direction(reflector.outgoing.to_array()).map(coarse);
         let [c, d] = encode_direction(reflector.normal.to_array()).map(coarse);
-        // The third byte holds bit and roughness. Each other byte holds a coordinate of six bits and two bits
-        // of the fourth coordinate.
+        // The third byte holds the bit [`GGX`] and the roughness. Each other byte holds a coordinate of six
+        // bits and two bits of the fourth coordinate.
         let roughness = (lobe.roughness() * ROUGHNESS_STEPS + 0.5) as u8;
         Self([a | d >> 4 << 6, b | (d >> 2 & 3) << 6, GGX | roughness, c | (d & 3) << 6])
     }

@@ -9,9 +9,9 @@
 //! That part is mirrored in the triangle, so that no light is lost: with `i' = i - 2 (g.i) g`, the lobe has
 //! `f(i) + f(i') max(0, n.i') / n.i` for `i` above the triangle, and the density `p(i) + p(i')`.
 //!
-//! Of the light from `i`, the eye thus receives `f(i) n.i + f(i') max(0, n.i')`. A photon from `i` is
-//! therefore two, one from `i` and one from `i'`, which the lobe about the shading normal alone reflects. One
-//! of them is followed, with twice the weight.
+//! The eye thus receives `f(i) n.i + f(i') max(0, n.i')` of the light from `i`. A photon from `i` therefore
+//! counts as two photons, one from `i` and one from `i'`, each of which is reflected by the lobe about the
+//! shading normal. One of the two, chosen at random, is followed with twice the weight.
 
 use core::f32::consts::{FRAC_1_PI, PI};
 
@@ -157,8 +157,8 @@ impl Reflector {
     }
 
     /// Samples the lobe alone for a photon that arrives from `outgoing`, by a point of the unit square: the
-    /// adjoint of [`Self::sample_lobe_alone`]. Returns the direction, too, that the photon is taken to come
-    /// from: `outgoing`, or its mirror direction below the triangle.
+    /// adjoint of [`Self::sample_lobe_alone`]. Also returns the direction from which the photon is taken to
+    /// come: `outgoing`, or the mirror image of `outgoing` below the triangle.
     pub fn sample_photon(&self, [u, v]: [f32; 2]) -> (Vec3, ReflectedDirection) {
         let below = -mirror(self.outgoing, self.geometric_normal);
         let is_of_two = self.normal != self.geometric_normal && self.normal.dot(below) > 0.0;

@@ -88,8 +88,8 @@ fn hostile_messages_are_answered_or_end_their_connection_alone() {
     assert_eq!(std::fs::read_dir(room.path("out")).unwrap().count(), 0);
 }
 
-/// A view has 16 places for pages. A page that closes its connection gives up its place at once, without any
-/// message to it.
+/// A view accepts 16 connections. A page that closes its connection is subtracted at once, before the view
+/// sends any message to the page.
 #[test]
 fn pages_that_have_gone_free_their_places() {
     let room = Room::new();
@@ -102,8 +102,7 @@ fn pages_that_have_gone_free_their_places() {
     }
 }
 
-/// More silent connections than there are places neither close a page's connection nor keep the next page
-/// out.
+/// More silent connections than a view accepts neither close a page's connection nor keep the next page out.
 #[test]
 fn silent_connections_do_not_exclude_pages() {
     let room = Room::new();

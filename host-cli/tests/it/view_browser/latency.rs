@@ -11,7 +11,7 @@ use crate::support::{Room, shipped};
 
 /// Time limit for any picture.
 const LIMIT: Duration = Duration::from_secs(120);
-/// Number of camera moves that a median is of.
+/// Number of camera moves of which the median is taken.
 const MOVES: usize = 7;
 
 /// Prints a table row: scene, what is measured, value, goal.

@@ -1,4 +1,4 @@
-//! Random actions on the page, with a random order of what people, networks and cards may do.
+//! Random actions on the page: what people, networks and cards may do, in random order.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Functions of libm that count their calls. Their other half is `counters.rs` of the program.
+//! Functions of libm whose calls are counted. They call symbols that `counters.rs` of the program defines.
 #![no_std]
 
 pub use real;

@@ -3,7 +3,8 @@
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
-/// For each file, the files that it imports, each with a path in its source that names an item there.
+/// For each file, the files that it imports. Each imported file has a path that occurs in the importing file
+/// and names an item of the imported file.
 pub(crate) type Imports = BTreeMap<PathBuf, BTreeMap<PathBuf, String>>;
 
 /// Circles of imports without common files, each as text with a line for each import.

@@ -11,8 +11,8 @@ use super::paths::{Names, PathText, Paths, names_and_paths};
 /// Index in [`Crate::modules`].
 type ModuleIndex = usize;
 
-/// Modules and names that were looked up for a path. None is looked up twice: modules may re-export each
-/// other's names.
+/// Modules and names that were looked up for a path. None is looked up twice, because the search would not
+/// end if modules re-export each other's names.
 type Asked = BTreeSet<(ModuleIndex, String)>;
 
 /// Module, inline or in a file of its own.

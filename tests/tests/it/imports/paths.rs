@@ -63,8 +63,7 @@ fn defined_name(item: &Item) -> Option<String> {
     Some(name.to_string())
 }
 
-/// Adds the names that a `use` imports below the path `before`; `self` stands for the last segment of
-/// `before`.
+/// Adds the names that a `use` imports below the path `before`; the name `self` imports `before` itself.
 fn add_imported(tree: &UseTree, before: &[String], names: &mut Names) {
     match tree {
         UseTree::Path(path) => add_imported(&path.tree, &with(before, &path.ident), names),
@@ -116,8 +115,8 @@ impl<'ast> Visit<'ast> for Paths {
     fn visit_macro(&mut self, called: &'ast Macro) {
         self.visit_path(&called.path);
         let arguments = Punctuated::<Expr, Token![,]>::parse_terminated.parse2(called.tokens.clone());
-        // Another visitor reads the arguments: this one borrows from the file's syntax tree, which they do
-        // not outlive.
+        // Another visitor reads the arguments, because `self` borrows from the file's syntax tree, which
+        // lives longer than they do.
         let mut paths = Paths::default();
         arguments.iter().flatten().for_each(|argument| paths.visit_expr(argument));
         self.imports.append(&mut paths.imports);

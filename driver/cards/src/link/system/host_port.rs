@@ -25,7 +25,7 @@ pub struct HostPort {
     next: Option<Box<dyn Port + Send>>,
     /// Time of the last poll of the host and of the listener.
     looked: Instant,
-    /// True if the last byte of the card was not the end of a frame.
+    /// True if the last byte that the card sent was not the end of a frame.
     in_frame: bool,
     /// Receives messages about hosts.
     say: fn(fmt::Arguments),
@@ -44,7 +44,7 @@ struct Host {
 /// Minimum time between two polls. A busy card reads its port after every short step, and a system call at
 /// each would slow it down.
 const LOOK_INTERVAL: Duration = Duration::from_micros(200);
-/// Time limit of a host's first whole frame.
+/// Time within which a host must send its first whole frame.
 const FIRST_FRAME: Duration = Duration::from_secs(10);
 /// Byte that ends a frame.
 const FRAME_END: u8 = 0;
@@ -67,8 +67,8 @@ impl HostPort {
         }
     }
 
-    /// Accepts a second host. If the present host `is_silent` but connected, one accepted earlier is refused
-    /// first.
+    /// Accepts a second host. If the present host `is_silent` but still connected, first refuses a second
+    /// host that was accepted earlier.
     fn look_for_others(&mut self, is_silent: bool) {
         // A host that was accepted earlier did not wait for the end of the present host's connection.
         if is_silent {

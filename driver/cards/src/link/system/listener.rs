@@ -28,7 +28,7 @@ pub enum ListenAddress {
     Tcp {
         /// Name or IP address to bind to.
         host: String,
-        /// Port; 0 for any free one.
+        /// Port number; 0 lets the system choose a free port.
         port: u16,
     },
     /// A Unix socket.

@@ -41,7 +41,7 @@ impl Pty {
         Ok((Self { controller: File::from(controller) }, path))
     }
 
-    /// Port to the host that has the terminal open; `None` if there is none.
+    /// Returns a port to the host that has the terminal open; `None` if no host has it open.
     pub(super) fn accept(&mut self) -> io::Result<Option<StreamPort<File>>> {
         if !wait_for(&self.controller, PollFlags::IN, Duration::ZERO).contains(PollFlags::HUP) {
             return Ok(Some(StreamPort::new(self.controller.try_clone()?)));

@@ -17,7 +17,7 @@ pub enum RemoteAddress {
     },
     /// TCP port on which the card listens.
     Tcp {
-        /// Name or IP address of the host.
+        /// Name or IP address of the machine on which the card listens.
         host: String,
         /// Port number.
         port: u16,

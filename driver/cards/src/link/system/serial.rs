@@ -19,7 +19,8 @@ use serialport::TTYPort as SystemPort;
 
 /// Duration of silence after which a line holds no stale bytes.
 const QUIET: Duration = Duration::from_millis(50);
-/// Time after which the bytes of a busy card are dropped only up to the next end of a frame.
+/// Maximum time for which all bytes of a card that does not fall silent are dropped. After that time, only
+/// the bytes up to the next end of a frame are dropped.
 const STALE: Duration = Duration::from_secs(1);
 /// Inverse of the maximum relative error of the bit rate, 2 %. A UART character of ten bits tolerates more.
 const SPEED_TOLERANCE: u32 = 50;
@@ -89,7 +90,7 @@ fn open_alone(settings: SerialPortBuilder) -> io::Result<SystemPort> {
 }
 
 /// Returns whether a path names a pseudo terminal of macOS, which rejects any speed. `serialport` sets no
-/// speed if the stated one is 0.
+/// speed if it is given a speed of 0.
 fn is_without_speed(path: &Path) -> bool {
     let is_terminal = |path: &Path| path.to_str().is_some_and(|name| name.starts_with("/dev/ttys"));
     cfg!(target_os = "macos") && path.canonicalize().is_ok_and(|path| is_terminal(&path))
@@ -157,7 +158,7 @@ impl Port for SerialLink {
     }
 }
 
-/// Number of bytes moved; 0 after a timeout.
+/// Converts the result of a read or write to the number of bytes moved; 0 after a timeout.
 fn moved_in_time(result: io::Result<usize>) -> Result<usize, PortError> {
     match result {
         Err(error) if error.kind() == ErrorKind::TimedOut => Ok(0),

@@ -64,7 +64,7 @@ pub(super) fn wait_for(stream: &impl AsFd, events: PollFlags, wait: Duration) ->
     streams[0].revents()
 }
 
-/// Number of bytes moved; 0 if the stream would block.
+/// Converts the result of a read or write to the number of bytes moved; 0 if the stream would block.
 pub(super) fn moved(result: io::Result<usize>) -> Result<usize, PortError> {
     result.or_else(|error| match error.kind() {
         ErrorKind::WouldBlock | ErrorKind::Interrupted => Ok(0),

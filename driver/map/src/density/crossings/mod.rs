@@ -22,7 +22,7 @@ const MAX_LAYERS: usize = 64;
 pub(super) struct Layer {
     /// Sort keys of the crossings ([`key`]); 0 for a chord that does not hit the triangle.
     keys: [u32; LANES],
-    /// Surface area per area of the disc, `1 / cos`.
+    /// Ratio of the surface area to its projection on the disc, `1 / cos`.
     slope: f32,
     face: u32,
     /// Index of the triangle in the card image.
@@ -42,7 +42,7 @@ fn key(height: f32, is_front: bool) -> u32 {
 /// Least value of `ascending` in [`key`] for heights above -2. Its subtraction leaves a bit for the face.
 const LOWEST: u32 = 1 << 30;
 
-/// Height of the crossing with this key.
+/// Height of a crossing, decoded from its sort key.
 #[inline(always)]
 fn height(key: u32) -> f32 {
     let ascending = (key >> 1).wrapping_add(LOWEST);
@@ -50,7 +50,8 @@ fn height(key: u32) -> f32 {
 }
 
 /// Encodes the side of a triangle that a downward chord hits. Bits 0 to 7 are the code of the side's normal;
-/// bit 8 is set if no photons are stored there; bits 9 and 10 are the change of depth plus 1.
+/// bit 8 is set if no photons are stored there; bits 9 and 10 are 1 plus the change of the number of solids
+/// that contain the chord's point.
 #[inline(always)]
 fn face(sides: Sides, is_front: bool) -> u32 {
     let normal = sides.normal(is_front).map_or(1 << 8, u32::from);
@@ -102,11 +103,12 @@ impl Layer {
 pub(super) struct Crossings {
     /// Layers of crossings, by batch of chords.
     pub(super) layers: [Vec<Layer>; BATCHES],
-    /// Depth of each chord at [`Self::height`], relative to the depth of the reference point.
+    /// For each chord, the number of solids that contain its point at [`Self::height`], minus the number that
+    /// contain the reference point.
     pub(super) depths: [[i32; LANES]; BATCHES],
-    /// Height of the reference point.
+    /// Height of the reference point, in radii of the ball.
     height: f32,
-    /// Buffer of [`OpenAll`].
+    /// Working memory of [`OpenAll`].
     levels: Vec<Level>,
 }
 
@@ -122,13 +124,14 @@ impl Crossings {
         self.height = height;
     }
 
-    /// Sets the depth of a chord at the height of the reference point, relative to that point.
+    /// Sets the depth of a chord: the number of solids that contain its point at the height of the reference
+    /// point, minus the number that contain the reference point.
     pub(super) fn set_depth(&mut self, chord: usize, depth: i32) {
         self.depths[chord / LANES][chord % LANES] = depth;
     }
 
-    /// Collects the crossings outside all solids, chord by chord. Crossings below another one of their chord
-    /// are collected in `covered`.
+    /// Collects the crossings outside all solids: in `surfaces`, those with no other crossing of their chord
+    /// above them, and in `covered`, all others.
     pub(super) fn open_surfaces(
         &mut self,
         chords: &Chords,
@@ -141,7 +144,7 @@ impl Crossings {
     }
 }
 
-/// Crossings of sixteen chords, one each: the n-th from above of every chord.
+/// The n-th crossing from above of each of sixteen chords.
 #[derive(Clone, Copy)]
 struct Level {
     /// Sort keys; 0 for a chord with fewer crossings.
@@ -163,13 +166,13 @@ impl Level {
     }
 
     /// For each chord, moves the upper of the crossings of `self` and `other` to `self`, and the lower to
-    /// `other`. Equal crossings are exchanged.
+    /// `other`. Crossings with equal keys are exchanged.
     #[inline(always)]
     fn sort(&mut self, other: &mut Self) {
         for lane in 0..LANES {
             let [a, b] = [self.keys[lane], other.keys[lane]];
-            // Exchanged by a mask of their XOR: lanes that are chosen in memory would be written one by one,
-            // and read back slowly.
+            // The values are exchanged by a masked XOR. A choice between two addresses would write the lanes
+            // one by one, and they would be read back slowly.
             let exchange = if b >= a { u32::MAX } else { 0 };
             let slopes = (self.slopes[lane] ^ other.slopes[lane]) & exchange;
             let faces = (self.faces[lane] ^ other.faces[lane]) & exchange;
@@ -189,7 +192,7 @@ fn sort(isa: impl Isa, layers: &[Layer], levels: &mut Vec<Level>) {
     if layers.len() > MAX_LAYERS {
         return sort_each(layers, levels);
     }
-    // From the last layer on, because an inserted crossing comes before its equals.
+    // Insertion starts with the last layer, because an inserted crossing goes before those with equal keys.
     for layer in layers.iter().rev() {
         let mut inserted = Level::of(layer);
         for level in levels.iter_mut() {
@@ -257,7 +260,7 @@ fn open(isa: impl Isa, levels: &mut [Level], depths: &mut [i32; LANES], referenc
         let mut closed = [0; LANES];
         for (lane, depth) in depths.iter_mut().enumerate() {
             let face = level.faces[lane];
-            // Negative depth: the chord crossed the back of an open (non-manifold) surface.
+            // The depth is negative if the chord crossed the back of an open (non-manifold) surface.
             let is_open = (level.keys[lane] != 0) & stores_photons(face) & (*depth <= 0);
             closed[lane] = if is_open { 0 } else { 1 };
             *depth += change_of_depth(face);
@@ -272,7 +275,7 @@ pub(super) struct Covered {
     pub(super) slope: f32,
     /// Code of the surface normal.
     pub(super) normal: u8,
-    /// Distance to the crossing above.
+    /// Distance to the crossing above, in radii of the ball.
     pub(super) gap: f32,
     /// Interval of heights that are nearer to this crossing than to those above and below it.
     pub(super) heights: [f32; 2],

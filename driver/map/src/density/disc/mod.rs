@@ -1,11 +1,12 @@
 //! Disc fractions: the boundary correction of the density estimate.
 //!
 //! A gather divides by the area of a flat disc. Its search covers a sphere, however, and finds the photons of
-//! all surfaces in it; photons with a similar normal count. Near an edge or in a corner these surfaces have
-//! less area than the disc, and the estimate would be too dark: on a Cornell box by some 2 % of all indirect
-//! light. On steps or between balusters they can have more area, and the estimate would be too bright. This
-//! module measures the area once per photon, with the radius of a gather at the photon, along chords of the
-//! sphere ([`super::chords`]). A gather then divides by this area ([`photoncard_firmware::photon`]).
+//! all surfaces in the sphere, of which it counts those with a similar normal. Near an edge or in a corner
+//! these surfaces have less area than the disc, and the estimate would be too dark: on a Cornell box by some
+//! 2 % of all indirect light. On steps or between balusters they can have more area, and the estimate would
+//! be too bright. This module measures the area once per photon, with the radius of a gather at the photon,
+//! along chords of the sphere ([`super::chords`]). A gather then divides by this area
+//! ([`photoncard_firmware::photon`]).
 //!
 //! Most photons lie inside a large flat surface and have the fraction 1. Leaves with only such photons are
 //! recognized by the triangles around them. The photons of any other leaf share the search for the radius,
@@ -42,14 +43,15 @@ const OPEN_HEIGHT: f32 = 0.1;
 /// Radius of the sphere in which a gather looks for hidden surfaces, divided by the radius of a gather at the
 /// photon. It exceeds 1 because the point of a gather lies beside the photon.
 const MARGIN: f32 = 1.15;
-/// Maximum difference between the hidden fractions of area and of light, within [`MARGIN`] radii of a gather,
-/// at which the gather uses all photons instead of those in its visible region.
+/// Maximum difference between the hidden fraction of the surface area and that of the photons' power, within
+/// [`MARGIN`] radii of a gather, at which the gather uses all photons instead of those in its visible region.
 const MAX_DIFFERENCE: f32 = 0.06;
-/// Maximum difference of the hidden fractions of area and of light around a group of photons, times the ratio
-/// of the group's disc area to a photon's, at which its photons have the fractions of their whole discs.
+/// Maximum difference between the hidden fraction of the surface area and that of the photons' power around a
+/// group of photons, times the ratio of the group's disc area to a photon's. If the product is not greater,
+/// the photons of the group have the fractions of their whole discs.
 const NEAR_DIFFERENCE: f32 = 0.03;
-/// Ratio of the estimated radius of a leaf's gathers to `d sqrt(k / n)`, for n photons within the distance d
-/// of the middle one.
+/// Ratio of the estimated radius of a leaf's gathers of k photons to `d sqrt(k / n)`, for n photons of the
+/// leaf within the distance d of the middle one.
 const BY_SPREAD: f32 = 1.2;
 /// Maximum distance at which a photon shows that a surface is lit, divided by the radius of a gather.
 const EVIDENT: f32 = 0.7;
@@ -150,7 +152,7 @@ impl DiscPhoton {
 struct Cluster {
     ball: Ball,
     radius: f32,
-    /// Radius of a disc that contains the discs of all these photons.
+    /// Radius of a disc that contains the discs of all photons of the cluster, metres.
     outer: f32,
 }
 
@@ -256,8 +258,8 @@ impl<'a> Meter<'a> {
     ) -> Result<(), Fault> {
         let spread = spread(&photons, middle);
         let outer = MARGIN * radius + spread;
-        // The paths from the reference point lie in the ball as well. In `f64`, because squares of `f32`
-        // lengths can overflow.
+        // The ball also contains the paths from the reference point to the chords. Its radius is computed in
+        // `f64`, because squares of `f32` lengths can overflow.
         let [across, along] = [outer, spread + OPEN_HEIGHT * radius].map(f64::from);
         let reach = (across * across + along * along).sqrt() as f32;
         let ball = Ball { centre: middle.position, radius: 1.001 * reach + 2.0 * self.lift(radius) };
@@ -321,8 +323,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Measures around a photon, within two radii, the surfaces that its gathers count and the part of them
-    /// that it sees.
+    /// Measures the areas of the surfaces around a photon that its gathers count, and of the part of them
+    /// that the photon sees, within two radii (metres).
     fn seen(
         &self,
         surfaces: &OpenSurfaces,
@@ -339,8 +341,8 @@ impl<'a> Meter<'a> {
         run(AreasWithin { chords, surfaces, region, centre, radius, outer_radius, lift })
     }
 
-    /// Adds the covered crossings that photons show to be lit ([`super::evidence`]), unless the gap to the
-    /// crossing above is within the error of the photon grid.
+    /// Adds to [`Self::surfaces`] the covered crossings that photons show to be lit ([`super::evidence`]),
+    /// unless the gap to the crossing above is within the error of the photon grid.
     fn add_covered(&mut self, photon: Vec3, frame: &ChordFrame, cluster: &Cluster) -> Result<(), Fault> {
         if self.covered.is_empty() {
             return Ok(());
@@ -359,7 +361,7 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Finds the photons in the ball of a cluster, unless they are known.
+    /// Finds the photons in the ball of a cluster, unless [`Self::evidence`] holds them already.
     fn find_evidence(&mut self, ball: Ball) -> Result<(), Fault> {
         let Searcher { scene, memory, .. } = &self.searcher;
         if !std::mem::replace(&mut self.has_evidence, true) {
@@ -368,8 +370,8 @@ impl<'a> Meter<'a> {
         Ok(())
     }
 
-    /// Returns whether the hidden fractions of area and of light may differ for the photons of a group,
-    /// judged at the first one.
+    /// Returns whether the hidden fractions of the surface area and of the photons' power may differ for the
+    /// photons of a group. Only the first photon of the group is examined.
     fn may_differ(
         &mut self,
         group: &[DiscPhoton],
@@ -483,8 +485,8 @@ impl<'a> Meter<'a> {
         }))
     }
 
-    /// Collects the crossings by rays through the scene, as [`Surroundings::cross`] does from a list, where
-    /// the list is incomplete.
+    /// Collects the crossings by rays through the scene. [`Surroundings::cross`] does the same from a list of
+    /// triangles, which must be complete.
     fn cross_by_rays(&mut self, frame: &ChordFrame, chords: &Chords, ball: Ball) -> Result<(), Fault> {
         self.crossings.clear(frame.open.z);
         let Searcher { scene, memory, .. } = &self.searcher;
@@ -518,8 +520,9 @@ impl<'a> Meter<'a> {
 }
 
 impl Fraction {
-    /// Chooses the fraction of a photon's disc or, if the hidden fractions of area and of light differ by
-    /// more than [`MAX_DIFFERENCE`] plus 1.5 standard deviations, that of its visible region.
+    /// Chooses the disc fraction of a photon: that of its whole disc or, if the hidden fractions of the
+    /// surface area and of the photons' power differ by more than [`MAX_DIFFERENCE`] plus 1.5 standard
+    /// deviations, that of its visible region.
     fn new(areas: &Areas, powers: &Areas) -> Self {
         let chance = areas.hidden * (1.0 - areas.hidden) / powers.points.max(1.0);
         let differs = (areas.hidden - powers.hidden).abs() > MAX_DIFFERENCE + 1.5 * chance.sqrt();

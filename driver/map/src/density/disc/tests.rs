@@ -7,7 +7,6 @@ use crate::pack::PackedScene;
 use crate::photon::trace;
 use crate::photon_map::store_photons;
 
-/// Compared in rooms and on curved columns.
 #[test]
 fn rays_hit_the_triangles_listed_around_a_photon() {
     for (name, photons) in [("cornell.gltf", 3000), ("atrium.glb", 10_000)] {

@@ -230,7 +230,8 @@ impl Step {
     }
 }
 
-/// Estimates the photons found by searches for direction tables: per search, the mean of all searches.
+/// Estimates the number of photons found by searches for direction tables. Each is assumed to find as many as
+/// the mean search of all kinds.
 fn photons_of_tables(counters: &Counters) -> f64 {
     counters.photons_found as f64 * counters.tables as f64 / counters.gathers.max(1) as f64
 }

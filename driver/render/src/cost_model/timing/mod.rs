@@ -31,16 +31,16 @@ pub enum Policy {
 /// Fractions of the chip's arithmetic that its units have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shares {
-    /// Fraction of the ray caster.
+    /// Fraction of the chip's arithmetic that the ray caster has, 0 to 1.
     pub ray_caster: f64,
-    /// Fraction of the controller.
+    /// Fraction of the chip's arithmetic that the controller has, 0 to 1.
     pub controller: f64,
-    /// Fraction of the gather unit.
+    /// Fraction of the chip's arithmetic that the gather unit has, 0 to 1.
     pub gather_unit: f64,
 }
 
 impl Shares {
-    /// Shares in proportion to a cost's arithmetic; equal shares if it has none.
+    /// Shares in proportion to a cost's arithmetic; equal shares if the cost has no arithmetic.
     pub fn of(cost: &Cost) -> Self {
         let total = cost.total().flops;
         let share = |flops: f64| if total > 0.0 { flops / total } else { 1.0 / 3.0 };
@@ -74,14 +74,14 @@ pub struct FrameLoad {
     pub gathers: Load,
 }
 
-/// Minimum number of drains that are simulated. From the first on, a frame's time is linear in its number of
-/// drains.
+/// Minimum number of drains that are simulated. A frame's time is linear in its number of drains from the
+/// first drain on.
 const MIN_DRAINS: f64 = 4.0;
-/// Number of steps that are simulated: as many drains as have about this many together, at least
-/// [`MIN_DRAINS`].
+/// Approximate number of steps that are simulated. The number of simulated drains follows from it, but is at
+/// least [`MIN_DRAINS`].
 const STEPS: f64 = 65_536.0;
 /// Maximum number of entries of a simulated queue. The fraction of time that a longer queue would save is
-/// below the number of tasks in flight over that of entries.
+/// below the number of tasks in flight divided by the number of entries.
 const MAX_QUEUE: u64 = 32_768;
 
 impl FrameLoad {

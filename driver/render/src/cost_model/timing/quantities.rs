@@ -5,7 +5,7 @@
 pub struct Load {
     /// Number of tasks (rays or gathers).
     pub tasks: f64,
-    /// Number of reads of lines, hits and misses.
+    /// Number of reads of lines, both cache hits and misses.
     pub requests: f64,
     /// Bytes fetched from DRAM.
     pub dram_bytes: f64,

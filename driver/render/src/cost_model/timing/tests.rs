@@ -50,8 +50,8 @@ fn one_task_waits_for_everything_in_turn() {
 
 #[test]
 fn tasks_hide_latency_until_a_resource_is_busy() {
-    // Where every step misses the queues are deterministic: max(arithmetic, bus, (arithmetic + bus + latency)
-    // / tasks).
+    // If every step misses, the queues are deterministic. A step then takes max(arithmetic, bus, (arithmetic
+    // + bus + latency) / tasks).
     for (tasks, flops, nanoseconds) in
         [(4, 500.0, 26.75), (16, 500.0, 6.6875), (64, 500.0, 5.0), (500, 100.0, 2.0)]
     {
@@ -76,7 +76,8 @@ fn alternating_units_take_the_sum_of_both_times() {
 
 #[test]
 fn overlapped_units_take_the_longer_time_and_one_fill_or_drain_of_a_half() {
-    // Without reads: 100 halves of 50 gathers, each of a ray of 4 or 8 ns and a gather of 6 ns.
+    // No task reads. Half a queue has 50 gathers, and is filled 100 times. A ray takes 4 or 8 ns, a gather 6
+    // ns.
     for (ray, longer, rest) in [(400.0, 6.0, 4.0), (800.0, 8.0, 6.0)] {
         let both = frame(load(5000.0, 1.0, 0.0, ray), load(5000.0, 1.0, 0.0, 600.0));
         let found = seconds(&both, &chip(16, 100, Policy::Overlapped(WHOLE)));
@@ -169,7 +170,7 @@ fn a_sample_of_drains_extrapolates_to_all() {
 
 #[test]
 fn twice_the_tasks_take_half_the_time_while_no_resource_is_busy() {
-    // 104 ns a step that misses: 2 on the bus, 100 of latency, 2 of arithmetic.
+    // A step that misses takes 104 ns: 2 on the bus, 100 of latency, 2 of arithmetic.
     let missing = frame(load(1e5, 8.0, 1.0, 200.0), load(1e5, 8.0, 1.0, 200.0));
     for policy in [Policy::Alternate, Policy::Overlapped(WHOLE)] {
         let [few, more] = [4, 8].map(|tasks| seconds(&missing, &chip(tasks, 10_000, policy)));

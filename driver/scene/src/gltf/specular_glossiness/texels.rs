@@ -39,7 +39,7 @@ impl Conversion {
         sources.into_iter().flatten().fold([1, 1], |[width, height], [w, h]| [width.max(w), height.max(h)])
     }
 
-    /// Computes the texels of the converted image. The factors alone stand for a source that cannot be read.
+    /// Computes the texels of the converted image. For a source that cannot be read, only the factors count.
     pub(in crate::gltf) fn texels(&self, size: [u32; 2], sources: [Option<Grid<'_>>; 2]) -> Vec<[u8; 4]> {
         let srgb = Srgb::new();
         let places = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| [x, y]));

@@ -87,7 +87,7 @@ pub(super) fn decode(
         None => &|texel| texel.map(to_8_bits),
     };
     let mut decoder = decoder(bytes);
-    // A row before and after filtering, each of up to eight bytes per texel.
+    // The limit contains a row before and a row after filtering, each of up to eight bytes per texel.
     decoder.set_limits(png::Limits { bytes: ANCILLARY_BYTES + 64 * width as usize });
     let mut reader = decoder.read_info().map_err(Fault::damaged)?;
     let mut texels = Vec::new();

@@ -18,8 +18,8 @@ const WHOLE: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub(super) struct Axis {
     kind: Kind,
-    /// Lower end of the axis, in its own measure: a value, a logarithm, or the index of a category. `high` is
-    /// the upper end.
+    /// Lower end of the axis: a value, its logarithm to base 2 or 10, or the index of a category, depending
+    /// on `kind`. `high` is the upper end.
     low: f64,
     high: f64,
 }

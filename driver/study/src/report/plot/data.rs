@@ -7,7 +7,7 @@ use super::content::{Panel, Point, XScale, YScale};
 const LARGEST: f64 = 1e300;
 /// Minimum value that is drawn on a logarithmic axis.
 const SMALLEST: f64 = 1e-300;
-/// An error bar extends a logarithmic axis downwards to no less than this fraction of its value.
+/// Fraction of a value below which the value's error bar does not extend a logarithmic axis.
 const BAR_SHARE: f64 = 0.1;
 
 /// Points of one series that can be drawn, in runs that are joined by a line.
@@ -38,8 +38,8 @@ pub(super) struct LeftOut<'a> {
     pub(super) count: usize,
 }
 
-/// Separates the points of a panel that can be drawn from those that cannot. The latter interrupt their
-/// lines.
+/// Separates the points of a panel that can be drawn from those that cannot. A point that cannot be drawn
+/// interrupts the line of its series.
 pub(super) fn clean(panel: &Panel) -> (Vec<Drawable<'_>>, Vec<LeftOut<'_>>) {
     let mut left_out: Vec<LeftOut> = Vec::new();
     let mut drawable = Vec::new();

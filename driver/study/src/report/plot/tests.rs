@@ -283,7 +283,8 @@ fn omitted_points_are_reported_and_interrupt_the_line() {
             "Left out: 2 points of a (zero or less, on a logarithmic axis)."
         ]
     );
-    // Four points and the legend's; one stretch of more than a point and the legend's.
+    // There are five markers: of four points, and in the legend. There are two lines: through the only run of
+    // several points, and in the legend.
     assert_eq!((of_class(&svg, "marker").len(), of_class(&svg, "line").len()), (5, 2));
     let names =
         plot(vec![panel(names(&ORDERS), YScale::Linear, vec![series("a", &[(0.5, 1.0), (6.0, 1.0)])])]);
@@ -313,6 +314,6 @@ fn an_error_bar_beyond_a_logarithmic_axis_ends_at_its_border() {
     let points = vec![Point::with_half_width(1.0, 10.0, 20.0), Point::with_half_width(2.0, 10.0, 5.0)];
     let series = Series { name: "a".to_owned(), points };
     let svg = elements(&plot(vec![panel(XScale::Linear, YScale::Log10, vec![series])]).to_svg());
-    // A bar with its upper cap, and a bar with both.
+    // The first bar has only its upper cap, the second has both: five segments.
     assert_eq!(of_class(&svg, "bar").len(), 5);
 }

@@ -94,7 +94,7 @@ mod tests {
         assert!(lines.iter().all(|line| width(line, LABEL) <= 150.0), "{lines:?}");
         assert_eq!(lines.concat().replace(' ', ""), text.replace(' ', ""));
         assert!(wrap(" \n ", LABEL, 150.0).is_empty());
-        // Even where not a single character fits, each gets its line.
+        // If not even one character fits, each character has a line of its own.
         assert_eq!(wrap("ab", LABEL, 1.0), ["a", "b"]);
     }
 

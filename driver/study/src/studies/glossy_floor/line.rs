@@ -1,4 +1,4 @@
-//! Lines of figure 6.17: the renders of each, and a measure of the flatness of a curve.
+//! Lines of figure 6.17: the renders of each line, and measures of the flatness of a curve.
 
 use photoncard_cards::scheduler::GatherOrder::{self, DirectionBins, Hash, Naive, Sort, Tiled};
 use photoncard_picture::choice::Choice;

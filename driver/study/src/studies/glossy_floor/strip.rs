@@ -1,6 +1,7 @@
 //! Strip of the picture that shows only the floor.
 //!
-//! The remaining picture hardly changes with the floor's exponent, and thus flattens every line.
+//! The rest of the picture hardly depends on the floor's exponent, so that lines for the whole picture are
+//! flatter.
 
 use photoncard_picture::film::Window;
 

@@ -22,8 +22,8 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// Creates the sweep over `axes`. `point` creates the point for names and values, one per axis; its task
-    /// must be [`Task::Traffic`].
+    /// Creates the sweep over `axes`. `point` creates the point of a combination from the name and the value
+    /// of each axis. The point's task must be [`Task::Traffic`].
     ///
     /// # Errors
     /// If the axes cannot form a sweep, or `point` fails.

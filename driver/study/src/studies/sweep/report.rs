@@ -147,8 +147,8 @@ impl Swept<'_> {
     }
 
     /// Plot of the bytes of photon map and scene over an axis. There is a line for each combination of the
-    /// other axes, as many of them as give at most [`MAX_LINES`] lines; the remaining axes keep their first
-    /// value.
+    /// values of other axes. An axis that would make more than [`MAX_LINES`] lines keeps its first value
+    /// instead.
     fn plot(&self, axis: usize) -> Block {
         let (varied, kept) = self.other_axes(axis);
         let lines: Vec<Vec<usize>> = (self.axes.combinations())
@@ -187,7 +187,7 @@ impl Swept<'_> {
         plot(&format!("structures-by-{name}"), &title, &self.caption(&others), vec![axes])
     }
 
-    /// Line over an axis. The other axes have their values of the combination `indices`.
+    /// Line over an axis. The other axes have the values of the combination `indices`.
     fn line(
         &self,
         name: String,
@@ -244,8 +244,8 @@ fn scale(axis: &Axis) -> XScale {
     }
 }
 
-/// Converts the values to positive numbers; `None` if any is not one. K and M stand for 2^10 and 2^20, as in
-/// sizes of caches.
+/// Converts the values to positive numbers; `None` if any is not one. The suffixes K and M multiply a number
+/// by 2^10 and 2^20, as in sizes of caches.
 fn numbers(axis: &Axis) -> Option<Vec<f64>> {
     let number = |text: &String| {
         let (digits, unit) = match text.strip_suffix('K') {

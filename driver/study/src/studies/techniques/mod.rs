@@ -181,8 +181,8 @@ fn curves(file: &str, measured: &Measured, name: &str) -> Block {
     plot(file, &format!("{name}: error of indirect light by traffic"), caption, vec![axes])
 }
 
-/// Table of exact reordering and of all techniques together, on the reference chip, and on the large chip
-/// with tiles in flight, in all scenes.
+/// Table of three combinations in all scenes: exact reordering, all techniques on the reference chip, and all
+/// techniques on the large chip with several tiles in flight.
 fn together(scenes: &[(Measured, &str)]) -> Table {
     let heads = [
         ("scene", ""),

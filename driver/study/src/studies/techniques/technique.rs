@@ -64,8 +64,8 @@ pub(super) const ALL_ON_LARGE: Technique = Technique {
     in_flight: Some(LARGE_IN_FLIGHT),
     ..ALL_IN_LINES
 };
-/// Combinations that are measured. Those with the irradiance cache have square tiles, because rows of pixels
-/// share few records.
+/// Combinations that are measured. Those with the irradiance cache have square tiles, because the pixels of a
+/// row share few irradiance records.
 pub(super) const TECHNIQUES: [Technique; 13] = [
     NAIVE,
     Technique { name: "sort", order: GatherOrder::Sort, ..NAIVE },
@@ -128,8 +128,9 @@ impl Technique {
         self.irradiance_error.is_some() || self.sampling != NAIVE.sampling || self.radiance != NAIVE.radiance
     }
 
-    /// Numbers of gather rays at which the technique's error is measured, ascending. Combined sampling by
-    /// itself takes about as many rays as the naive render; interpolated light may take fewer or more.
+    /// Numbers of gather rays at which the technique's error is measured, ascending. To reach an error,
+    /// combined sampling by itself needs about as many rays as the naive render; interpolated light may need
+    /// fewer or more.
     pub(super) fn sweep(&self, scale: &Scale) -> Vec<u32> {
         if !self.changes_pixels() {
             return vec![scale.gather_rays];
@@ -153,7 +154,7 @@ impl Technique {
     }
 }
 
-/// Adds the scale's own number of rays to the numbers, ascending.
+/// Returns `rays` and the scale's own number of gather rays, ascending and without duplicates.
 fn with_equal_rays(scale: &Scale, mut rays: Vec<u32>) -> Vec<u32> {
     rays.push(scale.gather_rays);
     rays.sort_unstable();

@@ -27,8 +27,9 @@ impl AtQuality {
     }
 }
 
-/// First crossing of an error by a curve of rays and errors in ascending order of rays, interpolated linearly
-/// in logarithms; `None` for an empty curve.
+/// Returns the number of gather rays at which the error first falls to `rmse`. Each element of `curve` is a
+/// number of rays and the error with it, in ascending order of rays. Between two elements, the logarithm of
+/// the error is linear in the logarithm of the rays. Returns `None` if `curve` is empty.
 fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
     let &[rays, first] = curve.first()?;
     if first <= rmse {
@@ -44,7 +45,9 @@ fn at_quality(curve: &[[f64; 2]], rmse: f64) -> Option<AtQuality> {
     curve.last().map(|&[rays, _]| AtQuality::Missed(rays))
 }
 
-/// Bytes at a number of rays, interpolated and extrapolated linearly in logarithms.
+/// Returns the bytes at `rays` gather rays. Each element of `curve` is a number of rays and the bytes with
+/// it, in ascending order of rays. Between elements and beyond them, the logarithm of the bytes is linear in
+/// the logarithm of the rays.
 fn bytes_at(curve: &[(f64, Estimate)], rays: f64) -> Estimate {
     let after = curve.iter().position(|(more, _)| *more >= rays).unwrap_or(curve.len());
     let after = after.clamp(1, curve.len().saturating_sub(1).max(1));
@@ -94,8 +97,8 @@ impl Measured<'_> {
         Ratio::new(bytes(&NAIVE), bytes(technique), 0.0)
     }
 
-    /// Number of rays at which a technique reaches the naive render's error, from all tiles or without tile
-    /// `omitted`.
+    /// Number of rays at which a technique reaches the naive render's error, with errors over all tiles, or
+    /// over all tiles but `omitted`.
     fn at_quality(&self, technique: &Technique, omitted: Option<usize>) -> AtQuality {
         let rmse = |technique, rays| {
             let quality = self.quality(technique, rays);
@@ -137,7 +140,7 @@ impl Measured<'_> {
         is_reached.then(|| self.factor(&NAIVE, technique))
     }
 
-    /// Part of a sentence that states whether a technique reads less than another at the naive render's
+    /// Part of a sentence that states whether `technique` reads fewer bytes than `base` at the naive render's
     /// error.
     pub(super) fn verdict(&self, base: &Technique, technique: &Technique) -> String {
         let at = self.worth(technique).at;
@@ -179,8 +182,9 @@ enum Verdict {
 }
 
 impl Verdict {
-    /// Verdict on a technique that reaches the error with `at` rays and reads `factor` times less there. With
-    /// [`AtQuality::AtMost`] the factor is a lower bound, with [`AtQuality::Missed`] an upper bound.
+    /// Creates the verdict on a technique that reaches the error with `at` rays and then reads `factor` times
+    /// fewer bytes than the other. With [`AtQuality::AtMost`] the factor is a lower bound, with
+    /// [`AtQuality::Missed`] an upper bound.
     fn new(at: AtQuality, factor: Ratio) -> Self {
         match at {
             AtQuality::Met(_) | AtQuality::AtMost(_) if factor.lower > 1.0 => Self::Pays,
