@@ -88,8 +88,9 @@ pub struct FrameHeader {
     pub kind: FrameKind,
     /// Number of the frame's session.
     pub session: u32,
-    /// Number of the frame's message among the messages in this direction, modulo 2^16. In probes and answers
-    /// it is the number of another message ([`FrameKind`]); in other frames without a message it is 0.
+    /// Number of this frame's message among those of its direction, modulo 2^16. In an answer it is the
+    /// number of the sender's next message, in a probe the bound described at [`FrameKind::Probe`], and in
+    /// other frames without a message 0.
     pub sequence: u16,
     /// Number of the message of the other direction that the frame's sender takes next. The sender has taken
     /// all messages before it.

@@ -19,7 +19,7 @@ pub(super) struct GreetedCard {
     pub(super) budget: Budget,
     /// Bytes of the link that statistics of earlier renders include.
     pub(super) counted: LinkBytes,
-    /// Tiles of the last picture that only this card rendered.
+    /// Those tiles of the last picture that this card rendered and no other card did.
     pub(super) tiles: Vec<Tile>,
 }
 

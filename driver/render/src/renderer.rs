@@ -236,7 +236,7 @@ impl Kept {
 pub(super) enum Source {
     /// The card image of an earlier picture, or of a prepared scene.
     Kept(Kept),
-    /// A packed scene whose photons must be traced.
+    /// A packed scene whose photons are still to be traced.
     Packed(Box<PackedScene>),
 }
 

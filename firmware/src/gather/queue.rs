@@ -64,7 +64,7 @@ impl<C: Capacity> GatherQueue<C> {
         self.waiting.push(request)
     }
 
-    /// Begins a drain by sorting the requests in the order of `drain`.
+    /// Begins a drain by sorting the requests in the order that `drain` names.
     pub fn begin_drain(&mut self, drain: Drain) {
         // In descending order, as requests are popped from the end.
         self.waiting.values_mut().sort_unstable_by_key(|request| u64::MAX - request.position.key(drain));

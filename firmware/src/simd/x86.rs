@@ -170,7 +170,8 @@ const LANES_OF: [[u8; 8]; 256] = {
     lanes_of
 };
 
-/// Table [`LANES_OF`] for four 64-bit lanes, each given as two 32-bit halves.
+/// For each mask of four 64-bit lanes, the indices of the set lanes, ascending. Each lane is given as its two
+/// 32-bit halves, `2 * lane` and `2 * lane + 1`.
 const LONG_LANES_OF: [[u8; 8]; 16] = {
     let mut lanes_of = [[0; 8]; 16];
     let mut mask = 0;

@@ -175,7 +175,8 @@ impl RenderOptions {
         }
     }
 
-    /// Returns whether a pilot decides if photons are guided to the camera.
+    /// Returns whether a pilot decides if photons are guided to surfaces that matter to the camera's
+    /// picture.
     pub(crate) fn leaves_cameras_open(&self) -> bool {
         self.photons_for() == PhotonsFor::Auto
     }

@@ -127,7 +127,7 @@ fn reason(error: &clap::Error) -> String {
     text.split("\n\n").next().unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Failure of values that an option refuses.
+/// The error that `--vary` cannot take these values together, for `reason`.
 fn refused(values: &[Value], reason: &str) -> Failure {
     let values: Vec<_> = values.iter().map(|(name, value)| format!("{name}={value}")).collect();
     let text = format!("--vary {} is not possible: {reason}", values.join(" with "));

@@ -229,7 +229,8 @@ impl<T: Copy + PartialEq, const MOST: usize> Distinct<T, MOST> {
         Self { items: [None; MOST], count: 0 }
     }
 
-    /// Returns the index of an item, after adding a new one; `None` if the item is new and the set is full.
+    /// Returns the index of `item`, which is added if the set lacks it. `None` if it would have to be added
+    /// and the set is full.
     fn index(&mut self, item: T) -> Option<usize> {
         let index = self.items().position(|other| other == item).unwrap_or(self.count);
         *self.items.get_mut(index)? = Some(item);

@@ -120,7 +120,8 @@ impl<'a> PhotonLeaf<'a> {
         [x.coordinate(index), y.coordinate(index), z.coordinate(index)]
     }
 
-    /// Contents of the photons in reverse order: the first photon's is the last element.
+    /// Power, direction and flags ("content") of each photon, in reverse order: the first photon's is the
+    /// last element. Elements before the last photon's hold other bytes of the line.
     #[inline(always)]
     pub fn contents(&self) -> &'a [[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] {
         const NONE: &[[u8; PHOTON_CONTENT_BYTES]; LEAF_LANES] = &[[0; PHOTON_CONTENT_BYTES]; LEAF_LANES];

@@ -95,7 +95,8 @@ pub struct PixelSums {
     pub depth: i64,
     /// Number of samples that see a surface.
     pub surfaces: u32,
-    /// Components of the light; `None` in a frame without layers.
+    /// Sums of direct, indirect and caustic light apart; `None` if the rendered frame does not ask for such
+    /// layers.
     pub layers: Option<LayerSums>,
 }
 

@@ -17,7 +17,8 @@ pub enum MemoryPattern {
     /// One bit is clear, at a different position in each word of a line. Finds data lines that are stuck at 1
     /// or connected.
     WalkingZero,
-    /// The word's own index. Finds address lines that are stuck, connected or missing, and mirrored memory.
+    /// The word's own index. Finds address lines that are stuck, shorted together or missing, and memory that
+    /// repeats at other addresses.
     Address,
     /// The complement of the word's index: the pattern [`Self::Address`] with every bit inverted.
     Complement,

@@ -96,7 +96,8 @@ pub(super) struct FractionWithin<'a> {
     pub(super) surfaces: &'a OpenSurfaces,
     pub(super) centre: Vec3,
     pub(super) radius: f32,
-    /// Maximum error of heights, in radii of the ball.
+    /// Points at most this far above or below the photon's plane count as in the plane, because the photon
+    /// grid can move a photon off its surface. In radii of the ball around the photon's cluster.
     pub(super) lift: f32,
 }
 
@@ -156,7 +157,8 @@ pub(super) struct AreasWithin<'a> {
     pub(super) radius: f32,
     /// Radius of the larger sphere, in radii of the ball.
     pub(super) outer_radius: f32,
-    /// Maximum error of heights, in radii of the ball.
+    /// Points at most this far above or below the photon's plane count as in the plane, because the photon
+    /// grid can move a photon off its surface. In radii of the ball around the photon's cluster.
     pub(super) lift: f32,
 }
 
@@ -206,8 +208,9 @@ impl Kernel for AreasWithin<'_> {
 }
 
 impl SurfaceLanes {
-    /// Vectors from a position to the points. Heights up to `lift` count as 0: the photon grid can move a
-    /// photon off its plane, which must keep the fraction 1.
+    /// Vectors from a photon's position to the points. Points at most `lift` above or below the photon's
+    /// plane count as in the plane: the photon grid can move a photon off its surface, and the disc fraction
+    /// of a plane must still be 1.
     #[inline(always)]
     fn ways(&self, from: Vec3, lift: f32) -> [Lane; 3] {
         let [p, q, r] = from.to_array();

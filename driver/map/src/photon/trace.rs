@@ -74,9 +74,10 @@ pub(crate) fn trace_for(
     Ok(traced)
 }
 
-/// Traces paths until `count` caustic photons are stored or enough paths are traced. If fewer than one path
-/// in twenty stores a photon, the number of paths follows from the fraction of light that caustics
-/// contribute. `go_on` returns whether to continue.
+/// Traces paths until `count` caustic photons are stored or a limit on paths is reached. The limit is 125,000
+/// paths, and twenty more for each stored photon. Once it is reached, a pilot measures the share of light
+/// that caustics contribute, and 125,000 is replaced by a number in proportion to it, from 125,000 to a
+/// million. `go_on` returns whether to continue.
 ///
 /// # Errors
 /// If `go_on` returns false.

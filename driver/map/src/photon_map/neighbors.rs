@@ -61,7 +61,9 @@ impl Bounds {
     }
 }
 
-/// Sorts photons into the order of a kd-tree of [`Places`]: each box is halved along its longest side.
+/// Sorts photons into the order of the kd-tree [`Places`]: photons are split across the longest side of their
+/// box into two runs of whole leaves, and so on down to single leaves. Only the last leaf may have fewer than
+/// [`LEAF`] photons.
 pub(super) fn arrange(photons: &mut [StoredPhoton]) {
     let leaves = photons.len().div_ceil(LEAF);
     if leaves < 2 {

@@ -305,8 +305,8 @@ impl<'a> Pilot<'a> {
         Ok(Self { scene, mapped, pool, observer, has_caustics, used_share })
     }
 
-    /// Number of gather rays per pixel of the tiles, with the irradiance cache and the setting `gather_rays`
-    /// 1.
+    /// Number of gather rays that are cast per pixel of the tiles if the setting `gather_rays` is 1 and there
+    /// is one sample a pixel: rays of irradiance records, and of samples that are not interpolated.
     fn gather_rays_per_ray(&self, settings: &RenderSettings, tiles: &[Tile]) -> Result<f64, RenderError> {
         let mut frame = self.frame(settings)?;
         (frame.samples, frame.planned_samples, frame.shadow_rays, frame.gather_rays, frame.seed) =

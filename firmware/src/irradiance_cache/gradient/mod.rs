@@ -52,7 +52,8 @@ fn decode(code: u8) -> f32 {
 /// of the scene.
 pub(super) type Coefficients = [[f32; 2]; CELLS];
 
-/// Coefficients of the cells for a gather point's rays on a white Lambertian surface.
+/// Weight of each hemisphere cell's rays in the translational gradient at a gather point, as if its surface
+/// were white and Lambertian. Cells without rays have weight 0.
 pub(super) fn coefficients(point: &GatherPoint, distances: &Distances) -> Coefficients {
     let rays = point.directions.rays_in_cells(point.pattern, point.rays);
     let mut coefficients = [[0.0; 2]; CELLS];

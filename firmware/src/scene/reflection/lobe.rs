@@ -32,8 +32,8 @@ impl Lobe {
         }
     }
 
-    /// Albedo of a Phong lobe at normal incidence, or of another lobe for the outgoing direction that the
-    /// lobe is made for.
+    /// Albedo of the lobe: for Phong at normal incidence; for GGX and sheen for the outgoing direction given
+    /// when the lobe was built.
     #[inline(always)]
     pub(super) fn albedo(&self) -> Vec3 {
         match self {
