@@ -41,7 +41,7 @@ out=${out:-$PWD/dist}
 cargo=${CARGO:-cargo}
 target=$(rustc -vV | sed -n 's/^host: //p')
 
-tar --version 2>/dev/null | grep -q GNU || fail "GNU tar is missing; it sorts the names in an archive"
+[[ $(tar --version 2>/dev/null) == *GNU* ]] || fail "GNU tar is missing; it sorts the names in an archive"
 command -v strip >/dev/null || fail "strip is missing; on Debian: sudo apt-get install binutils"
 [ -z "$deb" ] || "$cargo" deb --version >/dev/null 2>&1 || fail "cargo-deb is missing; run: cargo install cargo-deb --locked"
 if [ -z "$binary" ]; then
