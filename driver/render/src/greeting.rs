@@ -19,7 +19,7 @@ pub(super) struct GreetedCard {
     pub(super) budget: Budget,
     /// Bytes of the link that statistics of earlier renders include.
     pub(super) counted: LinkBytes,
-    /// Those tiles of the last picture that this card rendered and no other card did.
+    /// Tiles of the last picture that this card alone rendered.
     pub(super) tiles: Vec<Tile>,
 }
 

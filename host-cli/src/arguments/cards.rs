@@ -52,7 +52,7 @@ pub(crate) struct CardOptions {
     /// by gzip; a large picture has billions of reads: use --crop
     #[arg(long, value_name = "OUT.gz", value_parser = file(), hide_short_help = true)]
     pub(crate) trace: Option<PathBuf>,
-    /// Which reads are in the trace, and its format
+    /// Reads that the trace contains, and the trace's format
     #[arg(
         long,
         default_value = TraceFormat::default().name(),

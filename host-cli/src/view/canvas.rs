@@ -1,5 +1,5 @@
-//! Tiles that pages are sent: those of the newest wish that has a tile, numbered in the order of completion.
-//! A wish is the picture that pages request: settings, camera and changes of the scene.
+//! Tiles that pages are sent: those of the newest [wish](super::wish) that has a tile, numbered in the order
+//! of completion.
 //!
 //! A page remembers only the number of its next tile; outdated tiles are dropped before the page is sent
 //! them. A slow page therefore receives fewer and newer tiles, and needs no buffer.

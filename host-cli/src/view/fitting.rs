@@ -1,6 +1,5 @@
 //! Pilot renders (small test renders by which a quality chooses settings). They run on a thread of their own,
-//! so that the painter can meanwhile render a newer wish: the picture that pages request by settings, camera
-//! and changes of the scene.
+//! so that the painter can meanwhile render a newer [wish](super::wish).
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,5 +1,4 @@
-//! Messages to pages: selection of the next message to each page, in bounded memory. Tiles belong to a wish:
-//! the picture that pages request by settings, camera and changes of the scene.
+//! Messages to pages: selection of the next message to each page, in bounded memory.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

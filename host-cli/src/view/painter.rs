@@ -1,5 +1,4 @@
-//! Thread that renders a view's pictures, one after another, on the same cards. Each picture is that of a
-//! wish: settings, camera and changes of the scene that pages request.
+//! Thread that renders one [wish](super::wish) of a view after another, on the same cards.
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,5 +1,5 @@
 //! Interface between a view's state and the painter: the next pass with its settings, finished tiles, and
-//! ends of passes. A pass renders a wish: settings, camera and changes of the scene that pages request.
+//! ends of passes. A pass renders a [wish](super::wish).
 
 use std::time::Duration;
 

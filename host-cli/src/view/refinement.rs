@@ -1,11 +1,9 @@
 //! Order of a view's passes, from the coarsest picture to the settled one, which is that of
 //! `photoncard render`: a state machine without threads, clock or pixels.
 //!
-//! A wish is the picture that pages request: settings, camera and changes of the scene.
-//!
-//! A newer wish stops the running pass of an older one, with two exceptions. If the first pass of a wish was
-//! stopped, the next first pass runs to its end: pages are shown pictures however fast wishes follow each
-//! other. Photons that the newest wish can use are traced to their end.
+//! A newer [wish](super::wish) stops the running pass of an older one, with two exceptions. If the first pass
+//! of a wish was stopped, the next first pass runs to its end: pages are shown pictures however fast wishes
+//! follow each other. Photons that the newest wish can use are traced to their end.
 
 use std::time::Duration;
 

@@ -1,5 +1,5 @@
-//! State of a view: wishes (the pictures that pages request: settings, camera and changes of the scene),
-//! their tiles, and the connected pages. Threads, clock, input and output are in [`super::hub`].
+//! State of a view: [wishes](super::wish), their tiles, and the connected pages. Threads, clock, input and
+//! output are in [`super::hub`].
 
 use std::collections::BTreeMap;
 use std::time::Duration;
