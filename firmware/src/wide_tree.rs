@@ -27,6 +27,10 @@ struct Deferred(u64);
 /// Flag in the lower half of a [`Deferred`] that marks a leaf.
 const LEAF: u32 = 1 << 31;
 
+/// Index of a leaf that no card image has. On the stack it lies below the parts of a group
+/// ([`Descent::begin_group`]).
+pub(crate) const END_OF_GROUP: u32 = !LEAF;
+
 impl Deferred {
     #[inline(always)]
     fn distance(self) -> u32 {
@@ -89,6 +93,28 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         // A tree visits each record once: more visits mean a cycle in an unsound card image.
         let parts = [nodes, leaves].map(|kind| u64::from(scene.header.section(kind).records));
         Self { scene, nodes, leaves, stack, visits_left: parts.into_iter().sum() }
+    }
+
+    /// Begins the traversal of a group's tree with this root, whose distance bits are `bits`. After the
+    /// group's last node or leaf, the traversal returns the leaf [`END_OF_GROUP`]. Returns the argument of
+    /// [`Self::end_group`].
+    ///
+    /// # Errors
+    /// [`FaultCode::Depth`] if the stack overflows.
+    #[inline(always)]
+    pub(crate) fn begin_group(&mut self, root: u32, bits: u32) -> Result<u64, Fault> {
+        let depth = Fault { code: FaultCode::Depth, detail: root };
+        // A root with the bit LEAF occurs in unsound card images only.
+        let parts = [u64::from(LEAF | END_OF_GROUP), u64::from(bits) << 32 | u64::from(root & !LEAF)];
+        self.stack.extend_from_slice(&parts).map_err(|_| depth)?;
+        let parts = [self.nodes, self.leaves].map(|kind| u64::from(self.scene.header.section(kind).records));
+        Ok(core::mem::replace(&mut self.visits_left, parts.into_iter().sum()))
+    }
+
+    /// Returns to the tree around a group.
+    #[inline(always)]
+    pub(crate) fn end_group(&mut self, visits_left: u64) {
+        self.visits_left = visits_left;
     }
 
     /// Returns the next leaf or node whose distance is at most `limit`, given as `f32` bits; `None` at the

@@ -19,7 +19,7 @@ use crate::message::SumScale;
 /// The first eight bytes of a card image.
 pub const MAGIC: [u8; 8] = *b"PHOTCARD";
 /// Version of the formats in this module and in [`crate::layout`].
-pub const LAYOUT_VERSION: u16 = 15;
+pub const LAYOUT_VERSION: u16 = 16;
 /// Lines of the header.
 pub const HEADER_LINES: usize = 2;
 /// Number of entries of [`SectionKind::LeafAttributes`] per line.

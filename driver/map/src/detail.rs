@@ -38,7 +38,12 @@ pub(crate) fn detailed_part(scene: &Scene) -> Option<[Vec3; 2]> {
         let [low, high] = ends(&triangle.vertices);
         (high - low).max_element() < SHARE_OF_DETAIL * size
     };
+    let instances: Vec<_> = scene.instance_bounds().collect();
+    if instances.iter().any(|[low, high]| (high - low).max_element() >= SHARE_OF_DETAIL * size) {
+        return None;
+    }
     let detail = scene.triangles.iter().filter(is_detail).map(|triangle| ends(&triangle.vertices));
+    let detail = detail.chain(instances);
     let [low, high] = detail.reduce(|[a, b], [c, d]| [a.min(c), b.max(d)])?;
     let around = (SIZES_AROUND * (high - low).max_element()).max(MIN_SHARE * size);
     let margin = MARGIN * around;

@@ -7,13 +7,14 @@ use photoncard_shared::checksum::Checksum;
 
 use crate::camera::Camera;
 use crate::environment::Environment;
+use crate::instance::Instance;
 use crate::light::PunctualLight;
 use crate::material::Material;
 use crate::texture::{Image, Texture};
 use crate::triangle::{CornerTangents, Triangle, VertexAttributes};
 
-/// Contents of a [`Scene`](crate::Scene): triangles, materials, textures, lights and cameras in world space,
-/// with all instances expanded.
+/// Contents of a [`Scene`](crate::Scene): triangles, instances, materials, textures, lights and cameras in
+/// world space.
 #[derive(Clone, Debug, Default)]
 pub struct SceneContents {
     /// Position of the scene's origin in the coordinates of its file, metres. It is 0 unless the scene lies
@@ -21,6 +22,10 @@ pub struct SceneContents {
     pub offset: DVec3,
     /// Triangles of non-zero area, in file order, counter-clockwise seen from the front.
     pub triangles: Vec<Triangle>,
+    /// Groups of triangles, each in a space of its own, that [`Self::instances`] place in the scene.
+    pub groups: Vec<Vec<Triangle>>,
+    /// Instances of the groups, in file order.
+    pub instances: Vec<Instance>,
     /// Attributes of the triangles that have any: normals, texture coordinates and colours of the corners.
     pub attributes: Vec<VertexAttributes>,
     /// Tangents of the triangles whose material has a normal map.
@@ -69,13 +74,23 @@ pub enum Concern {
 }
 
 impl SceneContents {
-    /// Checksum of the triangles with their attributes and tangents, and of all texels.
+    /// Triangles of the scene as they are stored: those in world space, then those of the groups.
+    pub fn stored_triangles(&self) -> impl Iterator<Item = &Triangle> {
+        self.triangles.iter().chain(self.groups.iter().flatten())
+    }
+
+    /// Checksum of the triangles and instances with their attributes and tangents, and of all texels.
     pub(crate) fn bulk_checksum(&self) -> Checksum {
         let mut sum = Checksum::default();
-        for triangle in &self.triangles {
+        for triangle in self.stored_triangles() {
             triangle.vertices.iter().for_each(|vertex| add(&mut sum, &vertex.to_array()));
             sum.update(&triangle.material.to_le_bytes());
             sum.update(&triangle.attributes.to_le_bytes());
+        }
+        self.groups.iter().for_each(|group| sum.update(&group.len().to_le_bytes()));
+        for instance in &self.instances {
+            sum.update(&instance.group.to_le_bytes());
+            add(&mut sum, instance.to_world.as_flattened());
         }
         for attributes in &self.attributes {
             sum.update(&[u8::from(attributes.normals.is_some())]);

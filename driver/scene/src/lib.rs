@@ -1,4 +1,4 @@
-//! Loaded scenes: triangles, materials, textures, lights and cameras in world space.
+//! Loaded scenes: triangles, instances, materials, textures, lights and cameras in world space.
 //!
 //! Coordinates are right-handed, y up, in metres; radiance is in W/(sr m^2) per linear RGB channel.
 //! Coordinates are relative to the scene's own origin, which lies at [`SceneContents::offset`] in the file,
@@ -12,6 +12,7 @@ mod coplanar;
 mod environment;
 pub mod error;
 pub mod gltf;
+mod instance;
 mod layers;
 mod light;
 mod light_units;
@@ -21,6 +22,7 @@ mod material;
 mod meshopt;
 mod out_of_range;
 mod parts;
+mod placed;
 mod radiance;
 mod raster;
 mod reduction;
@@ -38,6 +40,7 @@ use photoncard_shared::checksum::Checksum;
 pub use self::camera::Camera;
 pub use self::contents::{Concern, SceneContents};
 pub use self::environment::Environment;
+pub use self::instance::Instance;
 pub use self::layers::{Coat, DiffuseTransmission, Layers, NormalMap, Sheen};
 pub use self::light::{PunctualKind, PunctualLight};
 pub use self::light_units::LightUnits;
@@ -58,7 +61,7 @@ const NO_LIGHT: &str = "give a material of at least one triangle an emissiveFact
                         for its radiance), place a light of KHR_lights_punctual, or add an environment: --environment 1,1,1 \
                         is a white sky";
 
-/// Scene in world space, with all instances expanded. [`gltf::load`] reads one from a file.
+/// Scene in world space. [`gltf::load`] reads one from a file.
 ///
 /// It dereferences to its [contents](SceneContents). Checksums are computed once; mutable access to the
 /// contents discards them.
@@ -164,11 +167,12 @@ impl Scene {
         (place - self.offset).as_vec3()
     }
 
-    /// Lower and upper corner of the scene's bounding box, metres; both zero for a scene without triangles.
+    /// Lower and upper corner of a box around the scene, metres; both zero for a scene without triangles. It
+    /// is the smallest one without instances, of which it contains the boxes around their groups' boxes.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let mut vertices = self.triangles.iter().flat_map(|triangle| triangle.vertices);
-        let first = vertices.next().unwrap_or(Vec3::ZERO);
-        vertices.fold((first, first), |(low, high), vertex| (low.min(vertex), high.max(vertex)))
+        let all = triangle::bounds_of(&self.triangles).into_iter().chain(self.instance_bounds());
+        let around = all.reduce(|[low, high], [lower, upper]| [low.min(lower), high.max(upper)]);
+        around.unwrap_or([Vec3::ZERO; 2]).into()
     }
 
     /// Returns the camera of this name, or the first one for `None`.
@@ -227,7 +231,11 @@ impl Scene {
 
     /// Number of triangles that emit light.
     pub fn emissive_triangles(&self) -> usize {
-        self.triangles.iter().filter(|triangle| self.emits(triangle)).count()
+        let number =
+            |triangles: &[Triangle]| triangles.iter().filter(|triangle| self.emits(triangle)).count();
+        let groups: Vec<usize> = self.groups.iter().map(|group| number(group)).collect();
+        let of_instances = self.instances.iter().map(|instance| groups[instance.group as usize]);
+        number(&self.triangles) + of_instances.sum::<usize>()
     }
 
     fn emits(&self, triangle: &Triangle) -> bool {
@@ -238,7 +246,7 @@ impl Scene {
     pub(crate) fn has_light(&self) -> bool {
         self.lights.iter().any(|light| light.intensity.max_element() > 0.0)
             || self.environment.as_ref().is_some_and(Environment::is_lit)
-            || self.triangles.iter().any(|triangle| self.emits(triangle))
+            || self.stored_triangles().any(|triangle| self.emits(triangle))
     }
 
     /// Returns whether Blender's exporter wrote the file.
@@ -257,7 +265,7 @@ impl Scene {
     pub fn is_specular(&self) -> bool {
         *self.known.is_specular.get_or_init(|| {
             let is_specular = self.specular_materials();
-            self.triangles.iter().any(|triangle| is_specular.get(triangle.material as usize) == Some(&true))
+            self.stored_triangles().any(|triangle| is_specular.get(triangle.material as usize) == Some(&true))
         })
     }
 
@@ -277,7 +285,7 @@ impl Scene {
     pub fn uncovered_materials(&self) -> Vec<bool> {
         let mut uncovered: Vec<bool> =
             self.materials.iter().map(|material| self.is_uncovered(material)).collect();
-        for triangle in &self.triangles {
+        for triangle in self.stored_triangles() {
             let attributes = self.attributes.get(triangle.attributes as usize);
             let has_alpha =
                 attributes.is_some_and(|list| list.colours.iter().any(|&[.., alpha]| alpha < 1.0));

@@ -38,6 +38,13 @@ impl Triangle {
     }
 }
 
+/// Lower and upper corner of the box around triangles, metres; `None` if there are none.
+pub(crate) fn bounds_of(triangles: &[Triangle]) -> Option<[Vec3; 2]> {
+    let mut vertices = triangles.iter().flat_map(|triangle| triangle.vertices);
+    let first = vertices.next()?;
+    Some(vertices.fold([first; 2], |[low, high], vertex| [low.min(vertex), high.max(vertex)]))
+}
+
 /// Vertex attributes of a triangle's corners beyond their positions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VertexAttributes {

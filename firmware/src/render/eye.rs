@@ -28,7 +28,7 @@ pub struct View {
     /// The surface, with reflection and emission multiplied by the throughput of the eye path.
     pub surface: Surface,
     /// Hit of the eye ray, from which the surface can be read again; `None` behind perfectly specular
-    /// surfaces, and if a random choice between layers was made.
+    /// surfaces, on an instance, and if a random choice between layers was made.
     pub seen: Option<Seen>,
     /// True if no perfectly specular surface lies between the eye and the surface.
     pub is_first: bool,
@@ -98,7 +98,7 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
     Ok(Sight::Surface(View {
         depth: if is_first { depth(context, &surface) } else { path.first_distance * along_axis },
         surface: surface.dimmed(path.throughput),
-        seen: is_stored.then(|| Seen::new(&hit)),
+        seen: if is_stored { Seen::new(&hit) } else { None },
         is_first,
         film,
     }))
@@ -108,17 +108,6 @@ pub fn view<M: MemoryPort>(context: &mut Context<M>, pixel: PixelSample) -> Resu
 fn background<M: MemoryPort>(context: &mut Context<M>, path: &SpecularPath) -> Result<Sight, Fault> {
     let radiance = environment_radiance(context.scene, context.memory, path.ray.direction)?;
     Ok(Sight::Background(radiance * path.throughput))
-}
-
-/// Finds the first hit of the eye ray through position `film` of the picture.
-///
-/// # Errors
-/// If the card image is invalid.
-pub fn look<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Seen>, Fault> {
-    context.memory.enter(Stage::Eye);
-    context.counters.eye_rays += 1;
-    let hit = closest_hit(context.scene, context.memory, &eye_ray(context, film))?;
-    Ok(hit.map(|hit| Seen::new(&hit)))
 }
 
 /// Reads the surface at a stored hit of the eye ray through position `film` of the picture into `surface`.
@@ -140,9 +129,16 @@ pub fn surface<M: MemoryPort>(
 /// # Errors
 /// If the card image is invalid.
 pub fn see<M: MemoryPort>(context: &mut Context<M>, film: [f32; 2]) -> Result<Option<Surface>, Fault> {
-    let Some(seen) = look(context, film)? else { return Ok(None) };
+    context.memory.enter(Stage::Eye);
+    context.counters.eye_rays += 1;
+    let ray = eye_ray(context, film);
+    let Some(hit) = closest_hit(context.scene, context.memory, &ray)? else { return Ok(None) };
     let mut found = Surface::NOWHERE;
-    surface(context, film, &seen, &mut found)?;
+    // Read as a stored hit is, whose rounding differs.
+    match Seen::new(&hit) {
+        Some(seen) => seen.surface(context.scene, context.memory, &ray, &mut found)?,
+        None => read_surface(context.scene, context.memory, &ray, &hit, &|_| 0.0, &mut found)?,
+    }
     Ok(Some(found))
 }
 

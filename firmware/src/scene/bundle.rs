@@ -11,15 +11,16 @@ use core::ops::ControlFlow;
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, WideNode};
+use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, Instance, NO_INSTANCE, WideNode};
 use photoncard_shared::message::{Fault, Invariant};
 
-use super::bvh::{BvhStack, Passed, Search, closest_hit, meet_leaf, transmittance};
+use super::bvh::{BvhStack, Passed, STACK, Search, closest_hit, meet_leaf, transmittance};
 use super::slabs::Slabs;
+use super::triangles::{in_group, placed_leaf};
 use super::{Hit, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
-use crate::wide_tree::{BEYOND, Descent, Order};
+use crate::wide_tree::{BEYOND, Descent, END_OF_GROUP, Order};
 
 /// Maximum number of rays of a bundle.
 pub const BUNDLE_RAYS: usize = LANES;
@@ -104,6 +105,52 @@ struct Rays<'a, S> {
     searches: &'a mut [S; BUNDLE_RAYS],
 }
 
+/// Kernel of [`Rays::meet_group`].
+struct InGroup<'a, 'r, 'd, M, S> {
+    scene: &'a SceneImage,
+    memory: &'a mut M,
+    /// Index of the instance's line, and the instance.
+    instance: (u32, &'a Instance),
+    descent: &'a mut Descent<'d, STACK>,
+    rays: &'a mut Rays<'r, S>,
+    here: u32,
+}
+
+impl<M: MemoryPort, S: Search> Kernel for InGroup<'_, '_, '_, M, S> {
+    type Output = Result<u32, Fault>;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Self::Output {
+        let Self { scene, memory, instance: (index, instance), descent, rays, here: all } = self;
+        let mut waiting = all;
+        let visits_left = descent.begin_group(instance.root, all)?;
+        while let Some((bits, child)) = descent.pop()? {
+            let here = rays.within(isa, bits) & waiting;
+            let others = 1..here.count_ones();
+            match child {
+                Child::Leaf(END_OF_GROUP) => break,
+                _ if here == 0 => {}
+                Child::Node(node) => {
+                    for _ in others {
+                        scene.line(memory, SectionKind::Nodes, node, 0..LINE_BYTES as u32)?;
+                    }
+                    descent
+                        .enter(isa, memory, node, S::ORDER, |line| rays.enter(isa, BvhNode(line), here))?;
+                }
+                Child::Leaf(leaf) => {
+                    for _ in others {
+                        descent.leaf(memory, leaf)?;
+                    }
+                    let line = placed_leaf(descent.leaf(memory, leaf)?, instance, leaf)?;
+                    waiting &= !rays.meet(isa, (scene, memory), ([leaf, index], &line), here)?;
+                }
+            }
+        }
+        descent.end_group(visits_left);
+        Ok(all & !waiting)
+    }
+}
+
 /// Removes the lowest set bit and returns its index; `None` if no bit is set.
 #[inline(always)]
 fn take(rays: &mut u32) -> Option<usize> {
@@ -143,7 +190,13 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
                         descent.leaf(memory, leaf)?;
                     }
                     let line = *descent.leaf(memory, leaf)?;
-                    waiting &= !rays.meet(isa, (scene, memory), (leaf, BvhLeaf(&line)), here)?;
+                    let done = match Instance::read(&line) {
+                        None => rays.meet(isa, (scene, memory), ([leaf, NO_INSTANCE], &line), here)?,
+                        Some(instance) => {
+                            rays.meet_group((scene, memory), (leaf, &instance), &mut descent, here)?
+                        }
+                    };
+                    waiting &= !done;
                 }
             }
         }
@@ -199,15 +252,36 @@ impl<'a, S: Search> Rays<'a, S> {
         bits
     }
 
-    /// Finds the hits of the rays `here` in a leaf. Returns the rays that need no further hit.
+    /// Finds the hits of the rays `here` in an instance's group. Returns the rays that need no further hit.
+    #[inline(never)]
+    fn meet_group<M: MemoryPort>(
+        &mut self,
+        (scene, memory): (&SceneImage, &mut M),
+        instance: (u32, &Instance),
+        descent: &mut Descent<STACK>,
+        here: u32,
+    ) -> Result<u32, Fault> {
+        for way in &mut self.ways {
+            way.slabs = Slabs::new(&in_group(way.ray, instance.1));
+        }
+        let done = simd::run(InGroup { scene, memory, instance, descent, rays: self, here })?;
+        for way in &mut self.ways {
+            way.slabs = Slabs::new(way.ray);
+        }
+        Ok(done)
+    }
+
+    /// Finds the hits of the rays `here` in a leaf, given by its index and that of its instance. Returns the
+    /// rays that need no further hit.
     #[inline(always)]
     fn meet<M: MemoryPort>(
         &mut self,
         isa: impl Isa,
         (scene, memory): (&SceneImage, &mut M),
-        (leaf, line): (u32, BvhLeaf),
+        (place, line): ([u32; 2], &[u8; LINE_BYTES]),
         mut here: u32,
     ) -> Result<u32, Fault> {
+        let line = BvhLeaf(line);
         let corners = line.all_corners();
         let mut done = 0;
         while let Some(index) = take(&mut here) {
@@ -222,7 +296,7 @@ impl<'a, S: Search> Rays<'a, S> {
             if sheared.may_meet == 0 {
                 continue;
             }
-            let place = (way.ray, &way.frame, leaf);
+            let place = (way.ray, &way.frame, place);
             let limit = f32::from_bits(*until);
             match meet_leaf(scene, memory, place, (line, &sheared), limit, search)? {
                 ControlFlow::Continue(distance) => *until = distance.to_bits(),

@@ -1,22 +1,27 @@
 //! Ray caster: traversal of a bounding volume hierarchy. Nodes have sixteen children and leaves up to eight
-//! triangles; each is one line.
+//! triangles; each is one line. A leaf without triangles is an [`Instance`] of a group, which has a hierarchy
+//! of its own. The group's boxes are tested in its space, and its triangles in world space, so that an
+//! instance and copies of its triangles at the same positions are hit alike.
 
 use core::ops::ControlFlow;
 
 use glam::Vec3;
 use photoncard_shared::budget::BVH_STACK;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, Triangle, WideNode};
+use photoncard_shared::layout::{
+    BvhLeaf, BvhNode, Child, Instance, LEAF_TRIANGLES, NO_INSTANCE, TriangleId, WideNode,
+};
 use photoncard_shared::message::Fault;
 
 use super::coverage::is_met;
 use super::flat_glass::of_flat_glass;
 use super::slabs::Slabs;
 use super::triangle::ShearedLeaf;
+use super::triangles::{in_group, placed_leaf};
 use super::{Hit, Intersection, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
-use crate::wide_tree::{Descent, Order, Stack};
+use crate::wide_tree::{Descent, END_OF_GROUP, Order, Stack};
 
 /// Closest hit of a ray. The lower triangle index breaks ties between equal distances.
 ///
@@ -92,9 +97,9 @@ pub(super) trait Search {
     /// True if the search continues behind flat glass.
     const PASSES_FLAT_GLASS: bool;
 
-    /// Takes a hit of triangle `index`, which is in slot `at.1` of the leaf `at.0`. Returns the maximum
+    /// Takes a hit of a triangle, which is in slot `at.1` of the leaf `at.0`. Returns the maximum
     /// distance of further hits, or [`ControlFlow::Break`] if no further hit is needed.
-    fn meet(&mut self, hit: Intersection, index: u32, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
+    fn meet(&mut self, hit: Intersection, id: TriangleId, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
 
     /// Takes a hit of flat glass with a transmittance. Returns [`ControlFlow::Break`] if no further hit is
     /// needed.
@@ -111,20 +116,20 @@ impl Search for Option<Hit> {
     fn meet(
         &mut self,
         found: Intersection,
-        index: u32,
+        id: TriangleId,
         (leaf, slot): (BvhLeaf, usize),
     ) -> ControlFlow<(), f32> {
         let nearest = match self {
             Some(hit) => {
                 let distance = hit.intersection.distance;
-                if found.distance > distance || found.distance == distance && index > hit.index {
+                if found.distance > distance || found.distance == distance && id > hit.id {
                     return ControlFlow::Continue(distance);
                 }
                 found.distance
             }
             None => found.distance,
         };
-        *self = Some(Hit { intersection: found, triangle: leaf.triangle(slot), index });
+        *self = Some(Hit { intersection: found, triangle: leaf.triangle(slot), id });
         ControlFlow::Continue(nearest)
     }
 }
@@ -146,7 +151,7 @@ impl Search for Passed {
     const PASSES_FLAT_GLASS: bool = true;
 
     #[inline(always)]
-    fn meet(&mut self, _: Intersection, _: u32, _: (BvhLeaf, usize)) -> ControlFlow<(), f32> {
+    fn meet(&mut self, _: Intersection, _: TriangleId, _: (BvhLeaf, usize)) -> ControlFlow<(), f32> {
         self.0 = Vec3::ZERO;
         ControlFlow::Break(())
     }
@@ -181,13 +186,18 @@ fn descend<S: Search>(
                 let line = descent.leaf(memory, leaf)?;
                 let corners = BvhLeaf(line).all_corners();
                 let sheared = frame.leaf(isa, BvhLeaf(line), &corners);
-                if sheared.may_meet == 0 {
-                    continue;
-                }
-                // The line is copied, because reading textures of cut-outs borrows the memory too.
-                let line = *line;
-                let place = (ray, &frame, leaf);
-                match meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)? {
+                let met = if sheared.may_meet == 0 {
+                    // An instance looks like a leaf without triangles.
+                    let Some(instance) = Instance::read(line) else { continue };
+                    let group = (leaf, &instance, &mut descent);
+                    meet_group(scene, memory, (ray, &frame), group, until, search)?
+                } else {
+                    // A copy, because reading textures of cut-outs borrows the memory too.
+                    let line = *line;
+                    let place = (ray, &frame, [leaf, NO_INSTANCE]);
+                    meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)?
+                };
+                match met {
                     ControlFlow::Continue(distance) => until = distance,
                     ControlFlow::Break(()) => return Ok(()),
                 }
@@ -197,7 +207,68 @@ fn descend<S: Search>(
     Ok(())
 }
 
-pub(super) type BvhStack = Stack<{ BVH_STACK + LANES }>;
+pub(super) type BvhStack = Stack<STACK>;
+
+/// Entries of a [`BvhStack`].
+pub(super) const STACK: usize = BVH_STACK + LANES;
+
+/// Follows a ray through the group of an instance, as [`meet_leaf`] does through a leaf.
+#[inline(never)]
+fn meet_group<M: MemoryPort, S: Search>(
+    scene: &SceneImage,
+    memory: &mut M,
+    way: (&Ray, &RayFrame),
+    group: (u32, &Instance, &mut Descent<STACK>),
+    until: f32,
+    search: &mut S,
+) -> Result<ControlFlow<(), f32>, Fault> {
+    simd::run(InGroup { scene, memory, way, group, until, search })
+}
+
+/// Kernel of [`meet_group`].
+struct InGroup<'a, 's, 'd, M, S> {
+    scene: &'a SceneImage,
+    memory: &'a mut M,
+    way: (&'a Ray, &'a RayFrame),
+    /// Index of the instance's line, the instance, and the traversal that has met it.
+    group: (u32, &'a Instance, &'a mut Descent<'d, STACK>),
+    until: f32,
+    search: &'s mut S,
+}
+
+impl<M: MemoryPort, S: Search> Kernel for InGroup<'_, '_, '_, M, S> {
+    type Output = Result<ControlFlow<(), f32>, Fault>;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Self::Output {
+        let Self { scene, memory, way: (ray, frame), group: (index, instance, descent), mut until, search } =
+            self;
+        let slabs = Slabs::new(&in_group(ray, instance));
+        let visits_left = descent.begin_group(instance.root, 0)?;
+        // The group ends with a leaf at the distance 0, which every limit includes.
+        while let Some(part) = descent.next(until.to_bits())? {
+            match part {
+                Child::Leaf(END_OF_GROUP) => break,
+                Child::Node(node) => descent.enter(isa, memory, node, S::ORDER, |line| {
+                    let children = WideNode(line).children() as usize;
+                    slabs.enter(isa, BvhNode(line), children, until)
+                })?,
+                Child::Leaf(leaf) => {
+                    let line = placed_leaf(descent.leaf(memory, leaf)?, instance, leaf)?;
+                    let corners = BvhLeaf(&line).all_corners();
+                    let sheared = frame.leaf(isa, BvhLeaf(&line), &corners);
+                    let place = (ray, frame, [leaf, index]);
+                    match meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)? {
+                        ControlFlow::Continue(distance) => until = distance,
+                        ControlFlow::Break(()) => return Ok(ControlFlow::Break(())),
+                    }
+                }
+            }
+        }
+        descent.end_group(visits_left);
+        Ok(ControlFlow::Continue(until))
+    }
+}
 
 /// Passes the hits of a ray in a leaf, up to the distance `until`, to `search`. Returns the new maximum
 /// distance, or [`ControlFlow::Break`] if no further hit is needed.
@@ -205,7 +276,7 @@ pub(super) type BvhStack = Stack<{ BVH_STACK + LANES }>;
 pub(super) fn meet_leaf<S: Search>(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    (ray, frame, leaf): (&Ray, &RayFrame, u32),
+    (ray, frame, [leaf, instance]): (&Ray, &RayFrame, [u32; 2]),
     (line, sheared): (BvhLeaf, &ShearedLeaf),
     mut until: f32,
     search: &mut S,
@@ -217,32 +288,21 @@ pub(super) fn meet_leaf<S: Search>(
         // The exact test excludes most of the triangles in `may_meet`.
         let Some(intersection) = frame.intersect_slot(sheared, slot, until) else { continue };
         let index = leaf.wrapping_mul(LEAF_TRIANGLES as u32).wrapping_add(slot as u32);
-        let weights = intersection.barycentric;
-        if line.is_cut_out(slot) && !is_met(scene, memory, ray, (index, &line.triangle(slot)), weights)? {
+        let (id, weights) = (TriangleId { index, instance }, intersection.barycentric);
+        if line.is_cut_out(slot) && !is_met(scene, memory, ray, (id, &line.triangle(slot)), weights)? {
             continue;
         }
         if S::PASSES_FLAT_GLASS && line.is_flat_glass(slot) {
-            let transmittance = of_flat_glass(scene, memory, ray, (index, &line.triangle(slot)), weights)?;
+            let transmittance = of_flat_glass(scene, memory, ray, (id, &line.triangle(slot)), weights)?;
             match search.pass(transmittance) {
                 ControlFlow::Continue(()) => continue,
                 ControlFlow::Break(()) => return Ok(ControlFlow::Break(())),
             }
         }
-        match search.meet(intersection, index, (line, slot)) {
+        match search.meet(intersection, id, (line, slot)) {
             ControlFlow::Continue(distance) => until = distance,
             ControlFlow::Break(()) => return Ok(ControlFlow::Break(())),
         }
     }
     Ok(ControlFlow::Continue(until))
-}
-
-#[inline(always)]
-pub(super) fn read_triangle(
-    scene: &SceneImage,
-    memory: &mut impl MemoryPort,
-    index: u32,
-) -> Result<Triangle, Fault> {
-    let [leaf, slot] = [index / LEAF_TRIANGLES as u32, index % LEAF_TRIANGLES as u32];
-    let line = scene.line(memory, SectionKind::Triangles, leaf, BvhLeaf::OF_TRIANGLE)?;
-    Ok(BvhLeaf(line).triangle(slot as usize))
 }

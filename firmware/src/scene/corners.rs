@@ -2,11 +2,15 @@
 
 use glam::Vec3;
 use photoncard_shared::image::{LEAF_ATTRIBUTES_PER_LINE, SectionKind};
-use photoncard_shared::layout::{Attributes, LEAF_TRIANGLES, LeafAttributes, NO_TEXTURE, Record, Tangents};
+use photoncard_shared::layout::{
+    Attributes, Instance, LEAF_TRIANGLES, LeafAttributes, NO_INSTANCE, NO_TEXTURE, Record, Tangents,
+    TriangleId, placed_normal, placed_vector,
+};
 use photoncard_shared::message::Fault;
 
 use super::SceneImage;
 use super::texture::{read_texture, sample_texture};
+use super::triangles::read_instance;
 use crate::memory::MemoryPort;
 use crate::vector::unit;
 
@@ -16,17 +20,19 @@ const ATTRIBUTES_PER_LINE: u32 = Attributes::PER_LINE as u32;
 pub(super) struct Corners {
     leaf: LeafAttributes,
     slot: u32,
+    /// Index of the line of the triangle's instance, or [`NO_INSTANCE`].
+    instance: u32,
     attributes: Attributes,
     weights: [f32; 3],
 }
 
 impl Corners {
-    /// Reads the attributes of triangle `index`, for the point with barycentric `weights`; `None` if the
+    /// Reads the attributes of a triangle, for the point with barycentric `weights`; `None` if the
     /// triangle has no attributes.
     pub(super) fn read(
         scene: &SceneImage,
         memory: &mut impl MemoryPort,
-        index: u32,
+        TriangleId { index, instance }: TriangleId,
         weights: [f32; 3],
     ) -> Result<Option<Self>, Fault> {
         if scene.header.section(SectionKind::LeafAttributes).records == 0 {
@@ -35,8 +41,14 @@ impl Corners {
         let [leaf, slot] = [index / LEAF_TRIANGLES as u32, index % LEAF_TRIANGLES as u32];
         let entry = scene.record::<4, LEAF_ATTRIBUTES_PER_LINE>(memory, SectionKind::LeafAttributes, leaf)?;
         let Some(leaf) = LeafAttributes::read(u32::from_le_bytes(*entry)) else { return Ok(None) };
-        let attributes = Attributes::read(record(scene, memory, leaf.record(slot, 0))?);
-        Ok(Some(Self { leaf, slot, attributes, weights }))
+        let mut attributes = Attributes::read(record(scene, memory, leaf.record(slot, 0))?);
+        if let Some(normals) = attributes.normals.as_mut()
+            && instance != NO_INSTANCE
+        {
+            let Instance { to_group, .. } = read_instance(scene, memory, instance)?;
+            normals.iter_mut().for_each(|normal| *normal = placed_normal(&to_group, *normal));
+        }
+        Ok(Some(Self { leaf, slot, instance, attributes, weights }))
     }
 
     /// Interpolated unit shading normal on the front; `None` for a triangle without shading normals.
@@ -54,7 +66,11 @@ impl Corners {
         front_normal: Vec3,
     ) -> Result<[Vec3; 3], Fault> {
         let bytes = record(scene, memory, Tangents::locate(self.leaf, self.slot))?;
-        let Tangents { directions, signs } = Tangents::read(bytes, self.slot);
+        let Tangents { mut directions, signs } = Tangents::read(bytes, self.slot);
+        if self.instance != NO_INSTANCE {
+            let Instance { to_world, .. } = read_instance(scene, memory, self.instance)?;
+            directions.iter_mut().for_each(|tangent| *tangent = placed_vector(&to_world, *tangent));
+        }
         let tangent = self.interpolated(directions);
         let sign: f32 = signs.into_iter().zip(self.weights).map(|(sign, weight)| sign * weight).sum();
         let normal = self.attributes.normals.map_or(front_normal, |normals| self.interpolated(normals));

@@ -2,7 +2,9 @@
 //! cutoff are cut out. With `BLEND`, a ray hits the surface with the probability alpha.
 
 use glam::Vec3;
-use photoncard_shared::layout::{BLENDS, DOUBLE_SIDED, Material, Reflectance, Triangle};
+use photoncard_shared::layout::{
+    BLENDS, DOUBLE_SIDED, Material, NO_INSTANCE, Reflectance, Triangle, TriangleId,
+};
 use photoncard_shared::message::Fault;
 
 use super::corners::Corners;
@@ -22,7 +24,7 @@ pub(super) fn is_met(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     ray: &Ray,
-    (index, triangle): (u32, &Triangle),
+    (id, triangle): (TriangleId, &Triangle),
     weights: [f32; 3],
 ) -> Result<bool, Fault> {
     let material = read_material(scene, memory, triangle.material)?;
@@ -31,8 +33,8 @@ pub(super) fn is_met(
     if material.flags & (BLENDS | DOUBLE_SIDED) == BLENDS && !is_glass && is_back(ray, triangle) {
         return Ok(false);
     }
-    let coverage = coverage(scene, memory, &material, index, weights)?;
-    Ok(coverage >= 1.0 || chance(ray, index) < coverage)
+    let coverage = coverage(scene, memory, &material, id, weights)?;
+    Ok(coverage >= 1.0 || chance(ray, id) < coverage)
 }
 
 fn is_back(ray: &Ray, triangle: &Triangle) -> bool {
@@ -40,7 +42,7 @@ fn is_back(ray: &Ray, triangle: &Triangle) -> bool {
     (b - a).cross(c - a).dot(ray.direction) > 0.0
 }
 
-/// Coverage of triangle `index` at the point with barycentric `weights`: 0 or 1 with cut-outs, alpha with
+/// Coverage of a triangle at the point with barycentric `weights`: 0 or 1 with cut-outs, alpha with
 /// partial coverage.
 ///
 /// # Errors
@@ -50,10 +52,10 @@ pub(super) fn coverage(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     material: &Material,
-    index: u32,
+    id: TriangleId,
     weights: [f32; 3],
 ) -> Result<f32, Fault> {
-    let Some(corners) = Corners::read(scene, memory, index, weights)? else { return Ok(1.0) };
+    let Some(corners) = Corners::read(scene, memory, id, weights)? else { return Ok(1.0) };
     let [base, ..] = material.textures;
     let [.., texture] = corners.texture(scene, memory, base)?;
     let [.., colour] = corners.colour();
@@ -71,10 +73,10 @@ pub(super) fn covered(material: &Material, alpha: f32) -> f32 {
     }
 }
 
-/// Random number in [0, 1): a hash of a ray and a triangle's index.
-fn chance(ray: &Ray, triangle: u32) -> f32 {
+/// Random number in [0, 1): a hash of a ray and a triangle.
+fn chance(ray: &Ray, TriangleId { index, instance }: TriangleId) -> f32 {
     let [a, b, c] = ray.origin.to_array().map(f32::to_bits);
     let [d, e, f] = ray.direction.to_array().map(f32::to_bits);
-    let key = [a, b, c, d, e, f].into_iter().fold(triangle, |key, bits| hash(key.wrapping_add(bits)));
-    unit_interval(key)
+    let key = [a, b, c, d, e, f].into_iter().fold(index, |key, bits| hash(key.wrapping_add(bits)));
+    unit_interval(if instance == NO_INSTANCE { key } else { hash(key.wrapping_add(instance)) })
 }

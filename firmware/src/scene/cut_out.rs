@@ -1,15 +1,16 @@
 //! Test whether a point of a triangle is cut out.
 
 use glam::Vec3;
+use photoncard_shared::layout::TriangleId;
 use photoncard_shared::message::Fault;
 
 use super::SceneImage;
-use super::bvh::read_triangle;
 use super::coverage::coverage;
 use super::materials::read_material;
+use super::triangles::read_triangle;
 use crate::memory::MemoryPort;
 
-/// Returns true if triangle `index` has no cut-out at a point, metres. A point off the triangle's plane is
+/// Returns true if a triangle has no cut-out at a point, metres. A point off the triangle's plane is
 /// projected onto it.
 ///
 /// # Errors
@@ -17,14 +18,14 @@ use crate::memory::MemoryPort;
 pub fn is_there(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
-    index: u32,
+    id: TriangleId,
     place: Vec3,
 ) -> Result<bool, Fault> {
-    let triangle = read_triangle(scene, memory, index)?;
+    let triangle = read_triangle(scene, memory, id)?;
     let material = read_material(scene, memory, triangle.material)?;
     let [a, b, c] = triangle.vertices.map(Vec3::from_array);
     let normal = (b - a).cross(c - a);
     let weight = |from: Vec3, to: Vec3| (to - from).cross(place - from).dot(normal) / normal.length_squared();
     let weights = [weight(b, c), weight(c, a), weight(a, b)];
-    Ok(coverage(scene, memory, &material, index, weights)? > 0.0)
+    Ok(coverage(scene, memory, &material, id, weights)? > 0.0)
 }

@@ -1,7 +1,7 @@
 //! Flat glass: thin walls and panes, which shadow rays pass.
 
 use glam::Vec3;
-use photoncard_shared::layout::Triangle;
+use photoncard_shared::layout::{Triangle, TriangleId};
 use photoncard_shared::message::Fault;
 
 use super::surface::{Surface, surface_of};
@@ -17,7 +17,7 @@ pub(super) fn of_flat_glass(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     ray: &Ray,
-    place: (u32, &Triangle),
+    place: (TriangleId, &Triangle),
     weights: [f32; 3],
 ) -> Result<Vec3, Fault> {
     let mut surface = Surface::NOWHERE;

@@ -17,6 +17,7 @@ mod specular;
 mod surface;
 mod texture;
 mod triangle;
+mod triangles;
 
 pub use bundle::{BUNDLE_RAYS, Bundle, closest_hits, transmittances};
 pub use bvh::{ClosestHit, Passed, ShadowRay, closest_hit, transmittance};

@@ -1,9 +1,10 @@
 //! A hit stored in twelve bytes, from which the surface can be read again.
 
+use photoncard_shared::layout::{NO_INSTANCE, TriangleId};
 use photoncard_shared::message::Fault;
 
-use super::bvh::read_triangle;
 use super::surface::surface_of;
+use super::triangles::read_triangle;
 use super::{Hit, Ray, SceneImage, Surface};
 use crate::memory::MemoryPort;
 
@@ -18,8 +19,8 @@ pub struct Seen {
 impl Seen {
     /// Arbitrary initial value.
     pub const NOWHERE: Self = Self { triangle: 0, weights: [0.0; 2] };
-    /// Marks a point that cannot be stored, because it lies behind specular surfaces or on a layer chosen at
-    /// random. Its eye path must be traced again.
+    /// Marks a point that cannot be stored, because it lies behind specular surfaces, on a layer chosen at
+    /// random or on an instance. Its eye path must be traced again.
     pub const ELSEWHERE: Self = Self { triangle: u32::MAX, ..Self::NOWHERE };
 
     /// Returns true for [`Self::ELSEWHERE`].
@@ -28,10 +29,11 @@ impl Seen {
         self.triangle == u32::MAX
     }
 
-    /// The point of a hit.
-    pub fn new(hit: &Hit) -> Self {
+    /// The point of a hit; `None` on an instance, whose transform does not fit.
+    pub fn new(hit: &Hit) -> Option<Self> {
         let [_, v, w] = hit.intersection.barycentric;
-        Self { triangle: hit.index, weights: [v, w] }
+        let TriangleId { index, instance } = hit.id;
+        (instance == NO_INSTANCE).then_some(Self { triangle: index, weights: [v, w] })
     }
 
     /// Reads the surface at the point into `surface`, on the side of the ray's origin. If the material has
@@ -47,8 +49,9 @@ impl Seen {
         ray: &Ray,
         surface: &mut Surface,
     ) -> Result<(), Fault> {
-        let triangle = read_triangle(scene, memory, self.triangle)?;
+        let id = TriangleId::lone(self.triangle);
+        let triangle = read_triangle(scene, memory, id)?;
         let [v, w] = self.weights;
-        surface_of(scene, memory, ray, (self.triangle, &triangle), [1.0 - v - w, v, w], &|_| 0.0, surface)
+        surface_of(scene, memory, ray, (id, &triangle), [1.0 - v - w, v, w], &|_| 0.0, surface)
     }
 }

@@ -4,6 +4,7 @@
 use glam::Vec3;
 use photoncard_shared::layout::{
     BLENDS, DOUBLE_SIDED, HAS_ATTRIBUTES, LayerTexture, Material, NO_TEXTURE, PANE, Reflectance, Triangle,
+    TriangleId,
 };
 use photoncard_shared::message::Fault;
 
@@ -155,8 +156,8 @@ pub fn read_surface(
     random: &dyn Fn(u32) -> f32,
     surface: &mut Surface,
 ) -> Result<(), Fault> {
-    let Hit { intersection, triangle, index } = hit;
-    surface_of(scene, memory, ray, (*index, triangle), intersection.barycentric, random, surface)?;
+    let Hit { intersection, triangle, id } = hit;
+    surface_of(scene, memory, ray, (*id, triangle), intersection.barycentric, random, surface)?;
     surface.distance = intersection.distance;
     Ok(())
 }
@@ -167,7 +168,7 @@ pub(super) fn surface_of(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     ray: &Ray,
-    (index, triangle): (u32, &Triangle),
+    (id, triangle): (TriangleId, &Triangle),
     weights: [f32; 3],
     random: &dyn Fn(u32) -> f32,
     surface: &mut Surface,
@@ -194,7 +195,7 @@ pub(super) fn surface_of(
         }
     } else if is_visible || matches!(material.reflectance, Reflectance::Glass { .. }) {
         surface.emission = if is_visible { material.emission.into() } else { Vec3::ZERO };
-        finish(scene, memory, surface, (index, weights, is_front), &material, random)?;
+        finish(scene, memory, surface, (id, weights, is_front), &material, random)?;
     }
     Ok(())
 }
@@ -211,13 +212,13 @@ fn finish(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     surface: &mut Surface,
-    (index, weights, is_front): (u32, [f32; 3], bool),
+    (id, weights, is_front): (TriangleId, [f32; 3], bool),
     material: &Material,
     random: &dyn Fn(u32) -> f32,
 ) -> Result<(), Fault> {
     let Surface { outgoing, geometric_normal, .. } = *surface;
     let has_corners = material.flags & HAS_ATTRIBUTES != 0;
-    let corners = if has_corners { Corners::read(scene, memory, index, weights)? } else { None };
+    let corners = if has_corners { Corners::read(scene, memory, id, weights)? } else { None };
     let mut texel = Texel::WHITE;
     if let Some(corners) = &corners {
         let [base, metallic_roughness, emissive] = material.textures;

@@ -6,7 +6,7 @@
 //! edge function that is zero in `f32` is computed again in `f64`, in which the products are exact.
 
 use glam::Vec3;
-use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, Triangle, VERTEX_LANES};
+use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, Triangle, TriangleId, VERTEX_LANES};
 
 use super::Ray;
 use crate::simd::{HALF_LANES, Isa, LANES};
@@ -38,10 +38,10 @@ pub struct Intersection {
 pub struct Hit {
     /// Distance and barycentric coordinates.
     pub intersection: Intersection,
-    /// The triangle.
+    /// The triangle, in world space.
     pub triangle: Triangle,
-    /// Index of the triangle in the card image.
-    pub index: u32,
+    /// Which triangle it is.
+    pub id: TriangleId,
 }
 
 #[inline(always)]

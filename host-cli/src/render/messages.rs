@@ -167,7 +167,7 @@ fn loaded(path: &Path, picture: &Picture, scene: &Scene, camera: &Camera) -> Str
         count => format!(" (and {count} of zero area, left out)"),
     };
     let contents = [
-        format!("{}{left_out}", counted(scene.triangles.len(), "triangle")),
+        format!("{}{left_out}", counted(scene.placed_triangles() as usize, "triangle")),
         counted(scene.materials.len(), "material"),
         counted(scene.images.len(), "image"),
         lights(scene),

@@ -11,7 +11,8 @@ use serde_json::{Value, json};
 pub(super) fn contents(scene: &Scene, animations: &[Animation]) -> Value {
     let (lower, upper) = scene.bounds();
     json!({
-        "triangles": scene.triangles.len(),
+        "triangles": scene.placed_triangles(),
+        "instances": scene.instances.len(),
         "emissive_triangles": scene.emissive_triangles(),
         "skipped_triangles": scene.skipped_triangles,
         "bounds": [scene.in_file(lower).to_array(), scene.in_file(upper).to_array()],

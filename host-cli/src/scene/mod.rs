@@ -50,8 +50,12 @@ fn geometry(scene: &Scene) -> [String; 5] {
     let size = upper - lower;
     let [lower, upper] = [lower, upper].map(|corner| scene.in_file(corner));
     let emissive = scene.emissive_triangles();
+    let instances = match scene.instances.len() {
+        0 => String::new(),
+        count => format!(", in {count} instances of {} groups and alone", scene.groups.len()),
+    };
     [
-        format!("triangles   {}, {emissive} of them emissive", scene.triangles.len()),
+        format!("triangles   {}, {emissive} of them emissive{instances}", scene.placed_triangles()),
         format!("left out    {} of zero area", scene.skipped_triangles),
         format!("size        {} x {} x {} m, from {lower} to {upper}", size.x, size.y, size.z),
         attributes(scene),

@@ -140,7 +140,7 @@ impl Sketch {
     /// channel value of the scene's.
     pub(super) fn new(scene: &Scene) -> Self {
         let mut materials = BTreeSet::new();
-        let triangles = scene.triangles.iter().filter(|triangle| materials.insert(triangle.material));
+        let triangles = scene.stored_triangles().filter(|triangle| materials.insert(triangle.material));
         let environment = scene.environment.as_ref().map(|map| {
             let brightest = map.texels.as_flattened().iter().copied().fold(0.0, f32::max);
             Environment { width: 1, height: 1, texels: vec![[brightest; 3]], strength: map.strength }

@@ -5,7 +5,7 @@
 
 use core::ops::Range;
 
-use super::{read_f32, read_u32, write_f32, write_u32};
+use super::{Rows, read_f32, read_u32, write_f32, write_u32};
 use crate::address::LINE_BYTES;
 
 /// Maximum number of triangles of a leaf. A triangle's index is `LEAF_TRIANGLES * leaf + slot`.
@@ -177,6 +177,24 @@ impl BvhLeaf<'_> {
         self.0.get(index).copied().unwrap_or(0)
     }
 
+    /// The leaf with its vertices moved by an affine transform.
+    #[inline(always)]
+    pub fn placed(&self, rows: &Rows) -> [u8; LINE_BYTES] {
+        let coordinates = [self.coordinates(0), self.coordinates(1), self.coordinates(2)];
+        let mut line = *self.0;
+        for (axis, &[a, b, c, d]) in rows.iter().enumerate() {
+            let mut lanes = [0.0; VERTEX_LANES];
+            let [x, y, z] = &coordinates;
+            for (((lane, x), y), z) in lanes.iter_mut().zip(x).zip(y).zip(z) {
+                *lane = a * x + b * y + c * z + d;
+            }
+            for (vertex, &coordinate) in lanes.iter().take(LEAF_VERTICES).enumerate() {
+                write_f32(&mut line, COORDINATE_BYTES * axis + 4 * vertex, coordinate);
+            }
+        }
+        line
+    }
+
     /// Encodes a leaf. Returns `None` if there are no triangles, more triangles, vertices or materials than a
     /// leaf can hold, or a material index of [`MAX_MATERIALS`] or more.
     pub fn encode(triangles: &[Triangle]) -> Option<[u8; LINE_BYTES]> {
@@ -250,6 +268,7 @@ mod tests {
     use std::vec::Vec;
 
     use super::*;
+    use crate::layout::placed_point;
     use crate::layout::tests::random;
 
     fn apart(number: usize) -> Triangle {
@@ -301,6 +320,21 @@ mod tests {
         let mesh = mesh();
         for count in 1..=mesh.len() {
             survive(&mesh[..count]);
+        }
+    }
+
+    #[test]
+    fn a_placed_leaf_has_the_placed_vertices() {
+        let rows = [[1.0, 2.0, 0.0, 1.0], [0.5, 0.0, -1.0, 0.0], [0.0, 4.0, 1.0, -7.0]];
+        let mesh = mesh();
+        let placed = mesh.iter().map(|triangle| Triangle {
+            vertices: triangle.vertices.map(|vertex| placed_point(&rows, vertex)),
+            ..*triangle
+        });
+        let line = BvhLeaf::encode(&mesh).expect("fits");
+        let line = BvhLeaf(&line).placed(&rows);
+        for (slot, triangle) in placed.enumerate() {
+            assert_eq!(BvhLeaf(&line).triangle(slot), triangle);
         }
     }
 

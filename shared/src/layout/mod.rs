@@ -8,6 +8,7 @@
 //! | [`PhotonLeaf`] of [`IrradiancePoint`]s | 128 | 1 |
 //! | [`BvhNode`] | 128 | 1 |
 //! | [`BvhLeaf`], up to eight triangles | 128 | 1 |
+//! | [`Instance`] of a group of triangles, among the leaves | 128 | 1 |
 //! | [`Attributes`] | 64 | 2 |
 //! | [`Tangents`] of four triangles | 64 | 2 |
 //! | [`LeafAttributes`] | 4 | 32 |
@@ -25,12 +26,14 @@
 
 use crate::address::LINE_BYTES;
 
+mod affine;
 mod attributes;
 mod bvh_leaf;
 mod bvh_node;
 mod direction;
 mod distant_light;
 mod emitter;
+mod instance;
 mod irradiance_point;
 mod kernel;
 mod layers;
@@ -44,12 +47,14 @@ mod tangents;
 mod texture;
 mod wide_node;
 
+pub use affine::{Rows, placed_normal, placed_point, placed_vector};
 pub use attributes::{Attributes, LeafAttributes, NO_ATTRIBUTES};
 pub use bvh_leaf::{BvhLeaf, LEAF_TRIANGLES, LEAF_VERTICES, MAX_MATERIALS, Triangle, VERTEX_LANES};
 pub use bvh_node::{BvhAxis, BvhNode, NodeBox};
 pub use direction::{decode_direction, decode_normal, encode_direction, encode_normal, normal_class};
 pub use distant_light::DistantLight;
 pub use emitter::{Emitter, EmitterKind};
+pub use instance::{Instance, NO_INSTANCE, TriangleId};
 pub use irradiance_point::IrradiancePoint;
 pub use kernel::{encode_kernel, kernel_share};
 pub use layers::{LayerTexture, Layers};

@@ -18,6 +18,7 @@ mod flat_glass;
 mod furnace;
 mod glossy;
 mod imports;
+mod instances;
 mod irradiance_cache;
 mod kept_records;
 mod layers;

@@ -13,7 +13,7 @@ use photoncard_firmware::scene::{
 use photoncard_firmware::simd::Level;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES};
+use photoncard_shared::layout::{BvhLeaf, LEAF_TRIANGLES, TriangleId};
 use photoncard_tests::{camera, glass, lambertian, scene};
 
 fn packed(triangles: Vec<Triangle>) -> PackedScene {
@@ -108,8 +108,11 @@ fn brute_force(image: &SceneImage, memory: &mut Lines, ray: &Ray) -> Option<Hit>
             if let Some(intersection) = frame.intersect(&triangle.vertices, until)
                 && nearest.is_none_or(|hit| intersection.distance < hit.intersection.distance)
             {
-                nearest =
-                    Some(Hit { intersection, triangle, index: leaf * LEAF_TRIANGLES as u32 + slot as u32 });
+                nearest = Some(Hit {
+                    intersection,
+                    triangle,
+                    id: TriangleId::lone(leaf * LEAF_TRIANGLES as u32 + slot as u32),
+                });
             }
         }
     }

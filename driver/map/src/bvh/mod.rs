@@ -4,10 +4,10 @@
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::{Bvh2, node::Bvh2Node};
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
-use photoncard_scene::Triangle;
+use photoncard_scene::{Instance, Triangle};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::BVH_STACK;
-use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, MAX_MATERIALS, NodeBox};
+use photoncard_shared::layout::{self, BvhLeaf, BvhNode, LEAF_TRIANGLES, Links, MAX_MATERIALS, NodeBox};
 use rayon::prelude::*;
 
 use crate::fold::{Folded, Tree};
@@ -19,13 +19,14 @@ mod reinsertion;
 pub struct Hierarchy {
     /// [`BvhNode`] records; the root is the first.
     pub nodes: Vec<[u8; LINE_BYTES]>,
-    /// [`BvhLeaf`] records, of up to [`LEAF_TRIANGLES`] triangles each.
+    /// [`BvhLeaf`] records, of up to [`LEAF_TRIANGLES`] triangles each, and [`layout::Instance`] records.
     pub leaves: Vec<[u8; LINE_BYTES]>,
-    /// For each leaf, the indices of its triangles in the list given to [`build`], by slot.
+    /// For each leaf, the indices of its triangles, by slot: of the triangles given to [`build`], then of its
+    /// groups one after the other. Empty for an instance.
     pub leaf_triangles: Vec<LeafTriangles>,
 }
 
-/// Indices of a leaf's triangles in the list given to [`build`], by slot.
+/// Indices of a leaf's triangles, by slot.
 pub type LeafTriangles = heapless::Vec<u32, LEAF_TRIANGLES>;
 
 /// Flags that leaves store for their triangles, indexed by material; false past the end of a list.
@@ -37,7 +38,31 @@ pub struct Finishes<'a> {
     pub flat_glass: &'a [bool],
 }
 
-/// Triangles with the flags of their materials, from which leaves are encoded.
+/// Triangles in world space, and instances of groups of triangles.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Content<'a> {
+    /// Triangles in world space.
+    pub triangles: &'a [Triangle],
+    /// Groups of triangles, each in a space of its own.
+    pub groups: &'a [Vec<Triangle>],
+    /// Instances of the groups.
+    pub instances: &'a [Instance],
+}
+
+impl<'a> Content<'a> {
+    /// Triangles in the order in which [`Hierarchy::leaf_triangles`] counts them: those in world space, then
+    /// those of the groups.
+    fn stored(&self) -> impl Iterator<Item = &'a Triangle> {
+        self.triangles.iter().chain(self.groups.iter().flatten())
+    }
+
+    fn boxes(&self) -> Vec<Aabb> {
+        self.triangles.iter().map(bounding_box).collect()
+    }
+}
+
+/// Triangles with the flags of their materials, from which leaves are encoded. Indices from the number of
+/// triangles on are those of instances, which have lines of their own.
 struct Mesh<'a> {
     triangles: &'a [Triangle],
     finishes: Finishes<'a>,
@@ -93,45 +118,162 @@ const REINSERTED: [f32; 2] = [0.2, 0.4];
 /// sort order.
 const SEARCH_DEPTH: usize = 2;
 
-/// Builds the hierarchy of at least one triangle. The result depends neither on the machine nor on threads.
+/// Builds the hierarchy of at least one triangle or instance. The result depends neither on the machine nor
+/// on threads.
 ///
 /// # Errors
 /// If there are too many triangles or materials, a corner is not finite or too far away, or a traversal could
 /// overflow the chip's stack.
-pub fn build(triangles: &[Triangle], finishes: Finishes) -> Result<Hierarchy, HierarchyError> {
-    if triangles.len() > MAX_TRIANGLES {
-        return Err(HierarchyError::TooMany { triangles: triangles.len() });
-    }
-    if let Some(triangle) = triangles.iter().find(|triangle| triangle.material >= MAX_MATERIALS) {
-        return Err(HierarchyError::TooManyMaterials { material: triangle.material });
-    }
-    let boxes: Vec<Aabb> = triangles.iter().map(bounding_box).collect();
-    // `min` and `max` skip NaN, so the corners themselves are checked.
-    let is_finite = triangles.iter().flat_map(|triangle| triangle.vertices).all(glam::Vec3::is_finite);
-    let all = boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds));
-    if !is_finite || !all.half_area().is_finite() {
+pub fn build(content: Content, finishes: Finishes) -> Result<Hierarchy, HierarchyError> {
+    check(content)?;
+    let padding = paddings(content);
+    let groups: Vec<Vec<Aabb>> =
+        content.groups.iter().zip(&padding).map(|(group, &padding)| padded_boxes(group, padding)).collect();
+    let mut boxes = content.boxes();
+    boxes.extend(content.instances.iter().map(|instance| around_instance(instance, &groups)));
+    if !boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds)).half_area().is_finite() {
         return Err(HierarchyError::NotFinite);
     }
-    let parts = Parts::new(&boxes);
-    let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, &boxes)).collect();
-    let binary = binary(&around_parts);
-    let mesh = &Mesh { triangles, finishes };
-    let mut folded = Folded::new(tree(&binary, &parts, &boxes, mesh));
-    if folded.stack > BVH_STACK {
+    let mesh = |triangles| Mesh { triangles, finishes };
+    let parts = content.groups.iter().zip(&groups).map(|(group, boxes)| (mesh(group.as_slice()), boxes));
+    let parts: Vec<_> = std::iter::once((mesh(content.triangles), &boxes)).chain(parts).collect();
+    let mut folded: Vec<_> = parts.iter().map(|(mesh, boxes)| fold(mesh, boxes)).collect();
+    if entries(&folded) > BVH_STACK {
         // A tree of median splits is slower to traverse, but has minimum depth.
-        let mut indices: Vec<u32> = (0..triangles.len() as u32).collect();
-        folded = Folded::new(halves(&mut indices, &boxes, mesh));
+        folded = parts.iter().map(|(mesh, boxes)| fold_halves(mesh, boxes)).collect();
     }
-    let Folded { nodes, leaves, stack } = folded;
-    if stack > BVH_STACK {
-        return Err(HierarchyError::TooDeep { entries: stack });
+    let entries = entries(&folded);
+    if entries > BVH_STACK {
+        return Err(HierarchyError::TooDeep { entries });
     }
-    let nodes = nodes.par_iter().map(|node| BvhNode::encode(&node.children, node.links));
-    let nodes = nodes.collect::<Option<_>>().ok_or(HierarchyError::NotFinite)?;
-    let lines = leaves.par_iter().map(|indices| {
-        mesh.encode(indices).unwrap_or_else(|| unreachable!("a leaf of {} triangles", indices.len()))
-    });
-    Ok(Hierarchy { nodes, leaves: lines.collect(), leaf_triangles: leaves })
+    joined(folded, content, finishes)
+}
+
+/// Checks that a card can index all triangles and their materials, and that all corners are finite.
+fn check(content: Content) -> Result<(), HierarchyError> {
+    let triangles = content.stored().count() + content.instances.len();
+    if triangles > MAX_TRIANGLES {
+        return Err(HierarchyError::TooMany { triangles });
+    }
+    if let Some(triangle) = content.stored().find(|triangle| triangle.material >= MAX_MATERIALS) {
+        return Err(HierarchyError::TooManyMaterials { material: triangle.material });
+    }
+    // `min` and `max` of boxes skip NaN, so the corners themselves are checked.
+    let is_finite = content.stored().flat_map(|triangle| triangle.vertices).all(glam::Vec3::is_finite);
+    if is_finite { Ok(()) } else { Err(HierarchyError::NotFinite) }
+}
+
+/// Rounding error of a point that is transformed to a group's space, relative to the sum of its terms.
+const ROUNDING: f32 = 32.0 * f32::EPSILON;
+
+/// Margin of the boxes of each group for the rounding of the rays that are transformed to its space, in this
+/// space. Rays begin within the scene or at most at 30 times its distance from the origin.
+fn paddings(content: Content) -> Vec<f32> {
+    let groups: Vec<Aabb> =
+        content.groups.iter().map(|group| around_all(&padded_boxes(group, 0.0))).collect();
+    let greatest = |bounds: &Aabb| bounds.min.abs().max(bounds.max.abs()).max_element();
+    let outside = content.boxes().into_iter().chain(content.instances.iter().map(|instance| {
+        let Aabb { min, max } = groups[instance.group as usize];
+        let [min, max] = instance.bounds([min.into(), max.into()]);
+        Aabb { min: min.into(), max: max.into() }
+    }));
+    let reach = outside.map(|bounds| greatest(&bounds)).fold(0.0, f32::max);
+    let mut padding = vec![0.0_f32; groups.len()];
+    for instance in content.instances {
+        let group = instance.group as usize;
+        let terms = |[a, b, c, d]: &[f32; 4]| (a.abs() + b.abs() + c.abs()) * reach + d.abs();
+        let terms = instance.to_group.iter().map(terms).fold(greatest(&groups[group]), f32::max);
+        padding[group] = padding[group].max(ROUNDING * terms);
+    }
+    padding
+}
+
+fn padded_boxes(triangles: &[Triangle], padding: f32) -> Vec<Aabb> {
+    let padded = |triangle| {
+        let Aabb { min, max } = bounding_box(triangle);
+        Aabb { min: min - padding, max: max + padding }
+    };
+    triangles.iter().map(padded).collect()
+}
+
+fn around_all(boxes: &[Aabb]) -> Aabb {
+    boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds))
+}
+
+/// Box around an instance, with a margin for the rounding of its vertices. `groups` are the boxes of the
+/// groups' triangles.
+fn around_instance(instance: &Instance, groups: &[Vec<Aabb>]) -> Aabb {
+    let Aabb { min, max } = around_all(&groups[instance.group as usize]);
+    let [min, max] = instance.bounds([min.into(), max.into()]);
+    let margin = ROUNDING * min.abs().max(max.abs()).max_element();
+    Aabb { min: (min - margin).into(), max: (max + margin).into() }
+}
+
+type FoldedTree = Folded<LeafTriangles, NodeBox>;
+
+/// Builds and folds the tree of the triangles and instances in boxes.
+fn fold(mesh: &Mesh, boxes: &[Aabb]) -> FoldedTree {
+    let parts = Parts::new(boxes);
+    let around_parts: Vec<Aabb> = parts.iter().map(|part| around(part, boxes)).collect();
+    Folded::new(tree(&binary(&around_parts), &parts, boxes, mesh))
+}
+
+/// [`fold`] by median splits.
+fn fold_halves(mesh: &Mesh, boxes: &[Aabb]) -> FoldedTree {
+    let mut indices: Vec<u32> = (0..boxes.len() as u32).collect();
+    Folded::new(halves(&mut indices, boxes, mesh))
+}
+
+/// Maximum number of stack entries of a traversal of the first tree, which can meet an instance of each
+/// other tree.
+fn entries(folded: &[FoldedTree]) -> usize {
+    let [scene, groups @ ..] = folded else { return 0 };
+    // A mark is pushed below the root of a group.
+    let of_groups = groups.iter().map(|group| group.stack + 1).max();
+    scene.stack + of_groups.unwrap_or(0)
+}
+
+/// Encodes the hierarchy of a scene and, behind it, those of its groups.
+fn joined(
+    folded: Vec<FoldedTree>,
+    content: Content,
+    finishes: Finishes,
+) -> Result<Hierarchy, HierarchyError> {
+    let mut hierarchy = Hierarchy { nodes: Vec::new(), leaves: Vec::new(), leaf_triangles: Vec::new() };
+    let (mut roots, mut first_triangle) = (Vec::new(), 0);
+    // Leaves that hold an instance, each with its index.
+    let mut instances: Vec<(usize, u32)> = Vec::new();
+    let meshes = std::iter::once(content.triangles).chain(content.groups.iter().map(Vec::as_slice));
+    for (Folded { nodes, leaves, .. }, triangles) in folded.into_iter().zip(meshes) {
+        let (first_node, first_leaf) = (hierarchy.nodes.len() as u32, hierarchy.leaves.len() as u32);
+        roots.push(first_node);
+        let mesh = &Mesh { triangles, finishes };
+        let encoded = nodes.par_iter().map(|node| {
+            let Links { leaves, first_leaf: leaf, first_node: child } = node.links;
+            let links = Links { leaves, first_leaf: first_leaf + leaf, first_node: first_node + child };
+            BvhNode::encode(&node.children, links)
+        });
+        hierarchy.nodes.extend(encoded.collect::<Option<Vec<_>>>().ok_or(HierarchyError::NotFinite)?);
+        let lines = leaves.par_iter().map(|indices| mesh.encode(indices).unwrap_or([0; LINE_BYTES]));
+        hierarchy.leaves.par_extend(lines);
+        let of_stored = |indices: LeafTriangles| -> LeafTriangles {
+            let triangles = indices.into_iter().filter(|&index| (index as usize) < triangles.len());
+            triangles.map(|index| first_triangle + index).collect()
+        };
+        if roots.len() == 1 {
+            let instance = |indices: &LeafTriangles| indices.first()?.checked_sub(triangles.len() as u32);
+            instances
+                .extend((0..).zip(&leaves).filter_map(|(leaf, indices)| Some((leaf, instance(indices)?))));
+        }
+        hierarchy.leaf_triangles.extend(leaves.into_iter().map(of_stored));
+        first_triangle += triangles.len() as u32;
+    }
+    for (leaf, instance) in instances {
+        let Instance { group, to_world, to_group } = content.instances[instance as usize];
+        let root = roots[1 + group as usize];
+        hierarchy.leaves[leaf] = layout::Instance { to_world, to_group, root }.to_bytes();
+    }
+    Ok(hierarchy)
 }
 
 /// Builder's tree of boxes. Each box has a leaf of its own; leaves of several triangles are made when the
@@ -200,10 +342,20 @@ impl Mesh<'_> {
         layout::Triangle { vertices, material, cut_out, flat_glass }
     }
 
-    /// Encodes a leaf with the triangles `indices`; `None` if they exceed one line.
+    /// Returns whether the triangles or instances `indices` fit in one leaf.
+    fn fits(&self, indices: &LeafTriangles) -> bool {
+        match indices.iter().any(|&index| index as usize >= self.triangles.len()) {
+            true => indices.len() == 1,
+            false => self.encode(indices).is_some(),
+        }
+    }
+
+    /// Encodes a leaf with the triangles `indices`; `None` if they exceed one line or are instances.
     fn encode(&self, indices: &[u32]) -> Option<[u8; LINE_BYTES]> {
-        let records: heapless::Vec<_, LEAF_TRIANGLES> =
-            indices.iter().map(|&index| self.record(&self.triangles[index as usize])).collect();
+        let records: heapless::Vec<_, LEAF_TRIANGLES> = indices
+            .iter()
+            .filter_map(|&index| Some(self.record(self.triangles.get(index as usize)?)))
+            .collect();
         BvhLeaf::encode(&records)
     }
 }
@@ -251,7 +403,7 @@ fn halves(indices: &mut [u32], boxes: &[Aabb], mesh: &Mesh) -> Tree<LeafTriangle
     let area = bounds.half_area();
     let node_box = NodeBox { lower: bounds.min.to_array(), upper: bounds.max.to_array() };
     if let Ok(leaf) = LeafTriangles::from_slice(indices)
-        && mesh.encode(&leaf).is_some()
+        && mesh.fits(&leaf)
     {
         return Tree::leaf(leaf, node_box, LEAF_COST * area);
     }
@@ -270,7 +422,7 @@ fn both(parts: &[Tree<LeafTriangles, NodeBox>; 2], mesh: &Mesh) -> Option<LeafTr
         indices.extend_from_slice(part.as_leaf()?).ok()?;
     }
     indices.sort_unstable();
-    mesh.encode(&indices).is_some().then_some(indices)
+    mesh.fits(&indices).then_some(indices)
 }
 
 #[cfg(test)]
@@ -280,6 +432,10 @@ mod tests {
     use photoncard_shared::layout::{Child, WideNode};
 
     use super::*;
+
+    fn built(triangles: &[Triangle]) -> Result<Hierarchy, HierarchyError> {
+        build(Content { triangles, ..Content::default() }, Finishes::default())
+    }
 
     fn triangles(count: u32) -> Vec<Triangle> {
         let random = |i: u32, k: u32| (hash(hash(i).wrapping_add(k)) >> 8) as f32 / 16_777_216.0;
@@ -319,7 +475,7 @@ mod tests {
     #[test]
     fn every_triangle_is_in_one_leaf_and_within_the_boxes_above_it() {
         for count in [1, 2, 3, 4, 17, 1000, 20_000] {
-            let hierarchy = build(&triangles(count), Finishes::default()).expect("builds");
+            let hierarchy = built(&triangles(count)).expect("builds");
             let everywhere = NodeBox { lower: [-9.0; 3], upper: [9.0; 3] };
             let mut found = Vec::new();
             walk(&hierarchy, Child::Node(0), everywhere, &mut found);
@@ -341,7 +497,7 @@ mod tests {
                     [[a, b, c], [a, c, d]].map(|vertices| Triangle::new(vertices, hash(x + y) % materials))
                 })
                 .collect();
-            let hierarchy = build(&mesh, Finishes::default()).expect("builds");
+            let hierarchy = built(&mesh).expect("builds");
             let bits = |triangle: layout::Triangle| {
                 (triangle.vertices.map(|vertex| vertex.map(f32::to_bits)), triangle.material)
             };
@@ -371,10 +527,7 @@ mod tests {
         for coordinate in [f32::NAN, f32::INFINITY, 1e30] {
             let mut triangles = triangles(20);
             triangles[7].vertices[1] = Vec3::splat(coordinate);
-            assert!(
-                matches!(build(&triangles, Finishes::default()), Err(HierarchyError::NotFinite)),
-                "{coordinate}"
-            );
+            assert!(matches!(built(&triangles), Err(HierarchyError::NotFinite)), "{coordinate}");
         }
     }
 
@@ -391,7 +544,7 @@ mod tests {
             let squares: Vec<Triangle> = squares.collect();
             let boxes: Vec<Aabb> = squares.iter().map(bounding_box).collect();
             assert_eq!(Parts::new(&boxes).iter().count(), 1);
-            let hierarchy = build(&squares, Finishes::default()).expect("builds");
+            let hierarchy = built(&squares).expect("builds");
             let mut found: Vec<u32> = hierarchy.leaf_triangles.iter().flatten().copied().collect();
             found.sort_unstable();
             assert!(found.into_iter().eq(0..50_000));
@@ -401,7 +554,7 @@ mod tests {
     #[test]
     fn coincident_triangles_are_built() {
         let [triangle] = triangles(1)[..] else { unreachable!() };
-        let hierarchy = build(&vec![triangle; 5000], Finishes::default()).expect("builds");
+        let hierarchy = built(&vec![triangle; 5000]).expect("builds");
         assert!((5000 / LEAF_TRIANGLES..5000 / 3).contains(&hierarchy.leaves.len()));
     }
 }

@@ -6,7 +6,10 @@ use photoncard_firmware::scene::SceneImage;
 use photoncard_firmware::simd::{Isa, Kernel, LANES, run};
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BvhAxis, BvhLeaf, BvhNode, Child, LEAF_TRIANGLES, WideNode};
+use photoncard_shared::layout::{
+    BvhAxis, BvhLeaf, BvhNode, Child, Instance, LEAF_TRIANGLES, NO_INSTANCE, TriangleId, WideNode,
+    placed_point,
+};
 use photoncard_shared::message::{Fault, FaultCode};
 
 use super::lanes::{cross, dot, greatest, least, minus};
@@ -33,20 +36,30 @@ const MAX_EXTENT: f32 = 1e4;
 
 /// A triangle that may intersect a ball, in the ball's coordinates.
 pub(super) struct NearTriangle {
-    /// Index of the triangle in the card image.
-    pub(super) index: u32,
+    pub(super) id: TriangleId,
     pub(super) corners: [Vec3; 3],
     /// True if a coordinate exceeds [`MAX_EXTENT`].
     pub(super) is_large: bool,
 }
 
+impl Ball {
+    /// A ball in the space of an instance's group that contains this one.
+    fn in_group(self, instance: &Instance) -> Self {
+        let rows = instance.to_group.map(|[a, b, c, _]| Vec3::new(a, b, c));
+        // The Frobenius norm is at least the factor by which the transform stretches any vector.
+        let stretch = rows.map(Vec3::length_squared).iter().sum::<f32>().sqrt();
+        let centre = placed_point(&instance.to_group, self.centre.to_array()).into();
+        Self { centre, radius: self.radius * stretch }
+    }
+}
+
 impl LeafNearBall {
     #[inline(always)]
-    fn triangle(&self, leaf: u32, slot: usize) -> NearTriangle {
+    fn triangle(&self, [leaf, instance]: [u32; 2], slot: usize) -> NearTriangle {
         let [a, b, c] = &self.corners;
         let corner = |[x, y, z]: &[[f32; LEAF_TRIANGLES]; 3]| Vec3::new(x[slot], y[slot], z[slot]);
         NearTriangle {
-            index: leaf.saturating_mul(LEAF_TRIANGLES as u32) + slot as u32,
+            id: TriangleId { index: leaf.saturating_mul(LEAF_TRIANGLES as u32) + slot as u32, instance },
             corners: [corner(a), corner(b), corner(c)],
             is_large: self.large >> slot & 1 != 0,
         }
@@ -116,13 +129,29 @@ pub(super) fn for_each_near(
     stack: &mut Vec<Child>,
     visit: &mut impl FnMut(&NearTriangle) -> bool,
 ) -> Result<bool, Fault> {
-    let Ball { centre, radius } = ball;
     stack.clear();
-    stack.push(Child::Node(0));
+    for_each_below((scene, memory), (0, None), ball, stack, visit)
+}
+
+/// Does [`for_each_near`] for the tree with this root: of the scene, or of the group of the instance at an
+/// index. `stack` keeps what it has.
+#[inline(always)]
+fn for_each_below(
+    (scene, memory): (&SceneImage, Lines),
+    (root, instance): (u32, Option<(u32, &Instance)>),
+    ball: Ball,
+    stack: &mut Vec<Child>,
+    visit: &mut impl FnMut(&NearTriangle) -> bool,
+) -> Result<bool, Fault> {
+    let Ball { centre, radius } = instance.map_or(ball, |(_, instance)| ball.in_group(instance));
+    let bottom = stack.len();
+    stack.push(Child::Node(root));
     // In a sound tree each node and leaf is visited at most once; more visits mean a cycle.
     let parts = [SectionKind::Nodes, SectionKind::Triangles].map(|kind| scene.header.section(kind).records);
     let mut visits_left = u64::from(parts[0]) + u64::from(parts[1]);
-    while let Some(part) = stack.pop() {
+    while stack.len() > bottom
+        && let Some(part) = stack.pop()
+    {
         let cycle = Fault { code: FaultCode::Depth, detail: 0 };
         visits_left = visits_left.checked_sub(1).ok_or(cycle)?;
         match part {
@@ -136,13 +165,28 @@ pub(super) fn for_each_near(
                 }
             }
             Child::Leaf(leaf) => {
-                let line = BvhLeaf(line(scene, memory, SectionKind::Triangles, leaf)?);
-                let triangles = run(NearTriangles { leaf: line, ball });
+                let line = line(scene, memory, SectionKind::Triangles, leaf)?;
+                let placed;
+                let (line, index) = match (Instance::read(line), instance) {
+                    (None, None) => (line, NO_INSTANCE),
+                    (None, Some((index, instance))) => {
+                        placed = BvhLeaf(line).placed(&instance.to_world);
+                        (&placed, index)
+                    }
+                    (Some(_), Some(_)) => return Err(Fault { code: FaultCode::Record, detail: leaf }),
+                    (Some(instance), None) => {
+                        if !for_each_in_group((scene, memory), (leaf, &instance), ball, stack, visit)? {
+                            return Ok(false);
+                        }
+                        continue;
+                    }
+                };
+                let triangles = run(NearTriangles { leaf: BvhLeaf(line), ball });
                 let mut near = triangles.near;
                 while near != 0 {
                     let slot = near.trailing_zeros() as usize % LEAF_TRIANGLES;
                     near &= near - 1;
-                    if !visit(&triangles.triangle(leaf, slot)) {
+                    if !visit(&triangles.triangle([leaf, index], slot)) {
                         return Ok(false);
                     }
                 }
@@ -150,6 +194,19 @@ pub(super) fn for_each_near(
         }
     }
     Ok(true)
+}
+
+/// Does [`for_each_near`] for the group of the instance at an index.
+#[inline(never)]
+fn for_each_in_group(
+    image: (&SceneImage, Lines),
+    (index, instance): (u32, &Instance),
+    ball: Ball,
+    stack: &mut Vec<Child>,
+    visit: &mut dyn FnMut(&NearTriangle) -> bool,
+) -> Result<bool, Fault> {
+    let group = (instance.root, Some((index, instance)));
+    for_each_below(image, group, ball, stack, &mut |triangle| visit(triangle))
 }
 
 /// Reads line `index` of a section.

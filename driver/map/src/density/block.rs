@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
+use photoncard_shared::layout::TriangleId;
 
 use super::lanes::{LaneVector, at, cross, dot, greatest, least, minus};
 use super::sides::Sides;
@@ -10,8 +11,7 @@ use super::sides::Sides;
 #[derive(Default)]
 pub(super) struct Block {
     pub(super) corners: [LaneVector; 3],
-    /// Indices of the triangles in the card image.
-    pub(super) indices: [u32; LANES],
+    pub(super) triangles: [Option<TriangleId>; LANES],
     pub(super) sides: [Sides; LANES],
     /// Bit mask of the triangles whose back faces the inside of a solid.
     pub(super) are_solid: u32,

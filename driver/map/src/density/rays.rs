@@ -3,6 +3,7 @@
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::scene::{Ray, SceneImage, closest_hit};
+use photoncard_shared::layout::TriangleId;
 use photoncard_shared::message::Fault;
 
 /// Hit of a ray on a triangle.
@@ -11,8 +12,7 @@ pub(super) struct Met {
     pub(super) distance: f32,
     /// Unit normal of the triangle's front.
     pub(super) normal: Vec3,
-    /// Index of the triangle in the card image.
-    pub(super) triangle: u32,
+    pub(super) triangle: TriangleId,
 }
 
 /// Finds the nearest triangle along a ray.
@@ -20,7 +20,7 @@ pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -
     let Some(hit) = closest_hit(scene, &mut memory, ray)? else { return Ok(None) };
     let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
     let normal = (b - a).cross(c - a).normalize_or_zero();
-    Ok(Some(Met { distance: hit.intersection.distance, normal, triangle: hit.index }))
+    Ok(Some(Met { distance: hit.intersection.distance, normal, triangle: hit.id }))
 }
 
 /// Finds all triangles on the segment between two points. After each hit the ray continues `step` metres

@@ -34,7 +34,8 @@ impl Kernel for CrossAll<'_> {
                     let (heights, misses) = shadows.cross(triangle, batch);
                     if isa.below(&misses, 1) != 0 {
                         let is_front = shadows.is_front[triangle] != 0.0;
-                        let face = (block.indices[triangle], block.sides[triangle], is_front);
+                        let Some(id) = block.triangles[triangle] else { continue };
+                        let face = (id, block.sides[triangle], is_front);
                         layers.push(Layer::new((&heights, &misses), face, shadows.slopes[triangle]));
                     }
                 }

@@ -1,13 +1,16 @@
 //! Front and back of every triangle: the normals with which photons are stored, and whether the triangle
 //! bounds a solid.
 
+use std::collections::BTreeSet;
+
 use glam::Vec3;
 use photoncard_firmware::memory::MemoryPort;
 use photoncard_firmware::scene::{SceneImage, keeps_photons};
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    BLENDS, BvhLeaf, DOUBLE_SIDED, LEAF_TRIANGLES, Layers, Material, Record, Reflectance, encode_normal,
+    BLENDS, BvhLeaf, DOUBLE_SIDED, Instance, LEAF_TRIANGLES, Layers, Material, NO_INSTANCE, Record,
+    Reflectance, TriangleId, WideNode, encode_normal,
 };
 use photoncard_shared::message::{Fault, FaultCode};
 use rayon::prelude::*;
@@ -27,6 +30,19 @@ pub(super) struct Sides {
 }
 
 impl Sides {
+    /// The sides of a triangle with these corners in world space, from those in the space of its group.
+    #[inline(always)]
+    pub(super) fn turned(mut self, triangle: TriangleId, [a, b, c]: [Vec3; 3]) -> Self {
+        if triangle.instance != NO_INSTANCE {
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            let codes = [normal, -normal].map(|normal| encode_normal(normal.to_array()));
+            for (own, code) in self.normals.iter_mut().zip(codes) {
+                *own = own.map(|_| code);
+            }
+        }
+        self
+    }
+
     /// Code of the normal of a side; `None` if no photons are stored there.
     #[inline(always)]
     pub(super) fn normal(&self, is_front: bool) -> Option<u8> {
@@ -99,26 +115,30 @@ impl SideTable {
         let has_cut_outs = sides.iter().any(|sides| sides.has_cut_outs);
         let mut table = Self { sides, has_cut_outs };
         if finishes.iter().any(|finish| finish.is_double_sided) {
-            table.find_closed_sheets(leaves, &finishes);
+            let starts = first_leaves(image);
+            for (&first, end) in starts.iter().zip(starts.iter().skip(1).copied().chain([leaves.len()])) {
+                table.find_closed_sheets(&leaves[first..end], first, &finishes);
+            }
         }
         Ok(table)
     }
 
-    /// Sides of a triangle of the card image; for an index out of range, sides without photons.
+    /// Sides of a triangle, in the space of its group; for an index out of range, sides without photons.
     #[inline(always)]
-    pub(super) fn of(&self, triangle: u32) -> Sides {
-        self.sides.get(triangle as usize).copied().unwrap_or_default()
+    pub(super) fn of(&self, triangle: TriangleId) -> Sides {
+        self.sides.get(triangle.index as usize).copied().unwrap_or_default()
     }
 
     /// Marks double-sided triangles that form closed surfaces as solid, because no light enters, unless they
     /// emit or transmit light. A surface is closed if each edge of its triangles is shared with one other
     /// triangle, which has the edge in the opposite direction. Where meshes touch and more than two triangles
     /// share an edge, two triangles bound a solid together if they are neighbours by angle around the edge
-    /// and no other solid lies between them.
-    fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
+    /// and no other solid lies between them. `leaves` are those of the scene or of a group; the first of them
+    /// has the index `first`.
+    fn find_closed_sheets(&mut self, leaves: &[Line], first: usize, finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
-        for (leaf, line) in leaves.iter().enumerate() {
+        for (leaf, line) in (first..).zip(leaves) {
             let leaf_triangles = BvhLeaf(&line.0);
             for slot in 0..leaf_triangles.triangles() as usize {
                 let index = leaf * LEAF_TRIANGLES + slot;
@@ -169,6 +189,16 @@ impl SideTable {
             self.sides[*index].is_solid = !is_mesh_open[meshes.root(sheet)];
         }
     }
+}
+
+/// Indices of the first leaf of the scene and of that of each group, ascending.
+fn first_leaves(image: &CardImage) -> Vec<usize> {
+    let nodes = image.section(SectionKind::Nodes);
+    let instances = image.section(SectionKind::Triangles).iter().filter_map(|line| Instance::read(&line.0));
+    let roots: BTreeSet<u32> = instances.map(|instance| instance.root).collect();
+    // The leaves of a tree are in the order of its nodes, of which the root is the first.
+    let first = |root: u32| Some(WideNode(&nodes.get(root as usize)?.0).links().first_leaf as usize);
+    std::iter::once(0).chain(roots.into_iter().filter_map(first)).collect()
 }
 
 fn transmits_diffusely(

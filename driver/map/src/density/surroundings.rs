@@ -80,13 +80,13 @@ impl Surroundings {
         let mut plane: Option<Vec3> = None;
         let mut stack = std::mem::take(&mut self.stack);
         let is_plane = for_each_near(scene, memory, ball, &mut stack, &mut |triangle| {
-            let &NearTriangle { index, corners, .. } = triangle;
+            let &NearTriangle { id, corners, .. } = triangle;
             let [a, b, c] = corners;
             let normal = (b - a).cross(c - a).normalize_or_zero();
             let is_along = normal.dot(*plane.get_or_insert(normal)) >= MIN_PLAIN_COSINE;
             let is_at = normal.dot(a).abs() <= lift;
-            let is_side = sides.of(index).normal(true) == Some(wall.normal);
-            let is_whole = !sides.of(index).has_cut_outs;
+            let own = sides.of(id).turned(id, corners);
+            let (is_side, is_whole) = (own.normal(true) == Some(wall.normal), !own.has_cut_outs);
             is_along && is_at && is_side && is_whole && triangles.push(corners).is_ok()
         });
         self.stack = stack;
@@ -97,7 +97,7 @@ impl Surroundings {
     /// Adds a triangle. Returns false if the list is full or the triangle is too large.
     #[inline(always)]
     fn add(&mut self, triangle: &NearTriangle, sides: &SideTable) -> bool {
-        let &NearTriangle { index, ref corners, is_large } = triangle;
+        let &NearTriangle { id, ref corners, is_large } = triangle;
         if self.triangles == MAX_TRIANGLES || is_large {
             return false;
         }
@@ -113,7 +113,7 @@ impl Surroundings {
             for (lanes, corner) in block.corners.iter_mut().zip(corners) {
                 set(lanes, lane, *corner);
             }
-            (block.indices[lane], block.sides[lane]) = (index, sides.of(index));
+            (block.triangles[lane], block.sides[lane]) = (Some(id), sides.of(id).turned(id, *corners));
             block.are_solid |= u32::from(block.sides[lane].is_solid) << lane;
         }
         true

@@ -54,7 +54,7 @@ impl Targets {
     /// Targets around all surfaces of a scene that reflect or transmit specularly. Every caustic photon hits
     /// one of them.
     pub(super) fn specular(scene: &Scene) -> Self {
-        Self::around(scene, &scene.specular_materials(), 1.0)
+        Self::around(scene, &scene.specular_materials(), std::iter::empty(), 1.0)
     }
 
     /// Targets around all surfaces of a scene except lamps, whose reflection of other light is hardly
@@ -66,13 +66,27 @@ impl Targets {
             emission(material) <= LAMP_SHARE * greatest || material.emissive_texture.is_some()
         };
         let is_lit: Vec<_> = scene.materials.iter().map(is_lit).collect();
-        Self::around(scene, &is_lit, AIMED_SHARE)
+        // Instances do not emit. A triangle has the corners of an instance's box.
+        let boxes = scene.instance_bounds().map(|[low, high]| [low, high, low.with_y(high.y)]);
+        Self::around(scene, &is_lit, boxes, AIMED_SHARE)
     }
 
-    /// Targets around the surfaces of the chosen materials.
-    fn around(scene: &Scene, is_chosen: &[bool], share: f32) -> Self {
+    /// Targets around the triangles of the chosen materials, and around others.
+    fn around(
+        scene: &Scene,
+        is_chosen: &[bool],
+        others: impl Iterator<Item = [Vec3; 3]>,
+        share: f32,
+    ) -> Self {
         let triangles = scene.triangles.iter().filter(|triangle| is_chosen[triangle.material as usize]);
-        Self::holding(triangles.map(|triangle| (triangle.vertices, None)).collect(), share)
+        Self::holding(
+            triangles
+                .map(|triangle| triangle.vertices)
+                .chain(others)
+                .map(|corners| (corners, None))
+                .collect(),
+            share,
+        )
     }
 
     /// Targets around boxes, given by their lower and upper corners and their weights: the variance that a

@@ -1,7 +1,7 @@
 //! Encodes vertex attributes of triangles as records of the card image.
 
 use photoncard_scene::{NO_ATTRIBUTES, Scene, Triangle, VertexAttributes};
-use photoncard_shared::layout::{self, LeafAttributes, Record, Tangents};
+use photoncard_shared::layout::{self, LEAF_TRIANGLES, LeafAttributes, Record, Tangents};
 
 use crate::bvh::LeafTriangles;
 use crate::light::Lights;
@@ -23,8 +23,11 @@ impl PackedCorners {
         (leaves, uncovered): (&[LeafTriangles], &[bool]),
     ) -> Self {
         let mut packed = Self { leaves: Vec::with_capacity(leaves.len()), records: Vec::new() };
+        let stored: Vec<&Triangle> = scene.stored_triangles().collect();
         for leaf in leaves {
-            let entry = packed.append(scene, lights, (leaf, uncovered));
+            let triangles: heapless::Vec<_, LEAF_TRIANGLES> =
+                leaf.iter().map(|&index| (index, stored[index as usize])).collect();
+            let entry = packed.append(scene, lights, (&triangles, uncovered));
             packed.leaves.push(entry);
         }
         if packed.records.is_empty() {
@@ -33,18 +36,19 @@ impl PackedCorners {
         packed
     }
 
-    /// Appends the records of a leaf. Returns its encoded [`LeafAttributes`].
+    /// Appends the records of a leaf with these triangles and their indices. Returns its encoded
+    /// [`LeafAttributes`].
     fn append(
         &mut self,
         scene: &Scene,
         lights: &Lights,
-        (leaf, uncovered): (&LeafTriangles, &[bool]),
+        (leaf, uncovered): (&[(u32, &Triangle)], &[bool]),
     ) -> u32 {
-        let triangles = || leaf.iter().map(|&index| &scene.triangles[index as usize]);
+        let triangles = || leaf.iter().map(|&(_, triangle)| triangle);
         let materials = || triangles().map(|triangle| &scene.materials[triangle.material as usize]);
         let has_corners = triangles().any(|triangle| triangle.attributes != NO_ATTRIBUTES);
         let has_cut_outs = triangles().any(|triangle| uncovered[triangle.material as usize]);
-        let has_emitters = leaf.iter().any(|&index| lights.of_triangle(index).is_some());
+        let has_emitters = leaf.iter().any(|&(index, _)| lights.of_triangle(index).is_some());
         if !has_corners && !has_cut_outs && !has_emitters {
             return layout::NO_ATTRIBUTES;
         }
@@ -57,8 +61,7 @@ impl PackedCorners {
         // At most 2^28 triangles have at most two records each, and two per leaf for tangents: the upper bit
         // is free.
         let first = self.records.len() as u32;
-        for &index in leaf {
-            let triangle = &scene.triangles[index as usize];
+        for &(index, triangle) in leaf {
             let emitter = lights.of_triangle(index);
             let attributes =
                 scene.attributes.get(triangle.attributes as usize).unwrap_or(&VertexAttributes::NONE);

@@ -19,7 +19,7 @@ pub(super) fn layers(scene: &Scene) -> Vec<[u8; layout::Layers::BYTES]> {
 /// Records of a scene's materials. `uncovered` are [`Scene::uncovered_materials`].
 pub(super) fn records(scene: &Scene, lights: &Lights, uncovered: &[bool]) -> Vec<layout::Material> {
     let mut has_attributes = vec![false; scene.materials.len()];
-    for (index, triangle) in (0..).zip(&scene.triangles) {
+    for (index, triangle) in (0..).zip(scene.stored_triangles()) {
         let has_any = triangle.attributes != NO_ATTRIBUTES || lights.of_triangle(index).is_some();
         has_attributes[triangle.material as usize] |= has_any;
     }
@@ -43,7 +43,7 @@ pub(super) fn bare_record(material: &Material) -> layout::Material {
 /// Returns whether any triangle's material stores photons. The chip's code decides this from the card image.
 pub(super) fn keep_photons(scene: &Scene, (image, mut memory): (SceneImage, Lines)) -> bool {
     let mut is_used = vec![false; scene.materials.len()];
-    for triangle in &scene.triangles {
+    for triangle in scene.stored_triangles() {
         is_used[triangle.material as usize] = true;
     }
     let mut used = scene.materials.iter().zip(is_used).filter(|(_, is_used)| *is_used);

@@ -15,7 +15,7 @@ use photoncard_shared::layout::{
 };
 use photoncard_shared::message::SumScale;
 
-use crate::bvh::{self, Finishes, LeafTriangles};
+use crate::bvh::{self, Content, Finishes, LeafTriangles};
 use crate::detail;
 use crate::light::{Lights, Sources};
 
@@ -56,8 +56,11 @@ impl PackedScene {
     /// If the geometry exceeds a chip's limits or this process's memory, or there are more textures or lights
     /// than a chip can index.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
-        allocation::check(BYTES_OF_A_TRIANGLE * scene.triangles.len() as u64)
-            .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles: scene.triangles.len(), bytes })?;
+        let expanded = scene.expanded();
+        let scene = expanded.as_ref().unwrap_or(scene);
+        let triangles = scene.stored_triangles().count() + scene.instances.len();
+        allocation::check(BYTES_OF_A_TRIANGLE * triangles as u64)
+            .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles, bytes })?;
         let part = detail::detailed_part(scene);
         let split = part.map(|part| detail::split_around(scene, part));
         let scene = split.as_ref().unwrap_or(scene);
@@ -143,7 +146,9 @@ fn write(scene: &Scene, lights: &Lights) -> Result<CardImage, PackError> {
     let glazing = Glazing::new(scene);
     let flat_glass = glazing.is_flat(scene);
     let cut_out = glazing.of_materials(&uncovered);
-    let hierarchy = bvh::build(&glazing.triangles, Finishes { cut_out: &cut_out, flat_glass: &flat_glass })?;
+    let content =
+        Content { triangles: &glazing.triangles, groups: &scene.groups, instances: &scene.instances };
+    let hierarchy = bvh::build(content, Finishes { cut_out: &cut_out, flat_glass: &flat_glass })?;
     let corners = PackedCorners::new(scene, lights, (&hierarchy.leaf_triangles, &uncovered));
     let textures = textures::records(scene, lights.environment())?;
     let indices = indices_in_image(scene, &hierarchy.leaf_triangles);
@@ -187,8 +192,10 @@ fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
     let mut indices = vec![0; scene.triangles.len()];
     for (leaf, triangles) in leaves.iter().enumerate() {
         for (slot, &triangle) in triangles.iter().enumerate() {
-            // `bvh` has checked that indices fit.
-            indices[triangle as usize] = (leaf * LEAF_TRIANGLES + slot) as u32;
+            // Triangles of groups follow those of the scene. `bvh` has checked that indices fit.
+            if let Some(index) = indices.get_mut(triangle as usize) {
+                *index = (leaf * LEAF_TRIANGLES + slot) as u32;
+            }
         }
     }
     indices
@@ -202,8 +209,7 @@ fn indices_in_image(scene: &Scene, leaves: &[LeafTriangles]) -> Vec<u32> {
 /// 2^15 times the typical radiance, and 2^4 times the brightest radiance on average: shadow rays next to an
 /// emitter can contribute a thousand times as much.
 fn radiance_unit(scene: &Scene, lights: &Lights) -> f32 {
-    let area: f64 = scene.triangles.iter().map(|triangle| triangle.area() as f64).sum();
-    let typical = lights.power() / (std::f64::consts::PI * area.max(f64::MIN_POSITIVE));
+    let typical = lights.power() / (std::f64::consts::PI * scene.area().max(f64::MIN_POSITIVE));
     let environment = lights.environment().map_or(0.0, |environment| environment.brightest);
     let brightest = scene.materials.iter().map(|m| m.emission.max_element()).fold(environment, f32::max);
     power_of_two_above((16.0 * typical).max(f64::from(brightest) / 128.0))

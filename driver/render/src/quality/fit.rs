@@ -354,7 +354,7 @@ impl Quality {
         let Some(level) = self.level(finish) else { return Ok(None) };
         let of = Pictured {
             pixels: f64::from(settings.picture.width) * f64::from(settings.picture.height),
-            triangles: scene.triangles.len(),
+            triangles: scene.stored_triangles().count(),
             is_cached: settings.integrator.irradiance_error.is_some(),
         };
         let is_short = time_limit.is_some_and(|seconds| seconds < SECONDS_FOR_FULL_PILOT);

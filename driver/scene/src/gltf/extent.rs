@@ -98,9 +98,9 @@ impl Extent<'_, '_, '_> {
                 add(&world);
                 continue;
             };
-            placed = placed.saturating_add(triangles.saturating_mul(instances.count));
+            placed = placed.saturating_add(instances.count);
             if placed > MAX_TRIANGLES as u64 {
-                // The loader refuses a scene of so many triangles.
+                // The loader refuses a scene of so many instances.
                 break;
             }
             // An instance without a valid transform is skipped here, and the loader reports it.

@@ -1,8 +1,10 @@
-//! Converts meshes to triangles in world space, for every node and instance.
+//! Converts meshes to triangles in world space, for every node and instance. A mesh that is placed often
+//! becomes a group, and its copies instances of the group.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
+use glam::{DMat4, DVec3};
 use photoncard_picture::allocation;
 
 use super::accessor::Source;
@@ -13,9 +15,10 @@ use super::pose::Pose;
 use super::primitive::Primitive;
 use super::room::Room;
 use super::topology::Topology;
+use super::transform::Transform;
 use super::vertex::VertexReader;
 use crate::error::SceneError;
-use crate::{Scene, Triangle};
+use crate::{Instance, Scene, Triangle};
 
 /// Conversion of meshes to triangles of the scene.
 pub(super) struct MeshPlacer<'a> {
@@ -23,12 +26,22 @@ pub(super) struct MeshPlacer<'a> {
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,
     /// Number of counted instances of each mesh.
     placed: BTreeMap<usize, u64>,
-    /// Number of triangles and primitives of all counted instances, including triangles of zero area.
-    work: u64,
+    /// Meshes that are placed as instances of groups.
+    grouped: BTreeSet<usize>,
+    /// Index in the scene of the group of each mesh that is placed, mirrored or not.
+    groups: BTreeMap<(usize, bool), u32>,
     /// Indices of meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
     /// Indices of meshes with a primitive whose last vertices form no whole triangle.
     pub(super) incomplete: BTreeSet<usize>,
+}
+
+/// Minimum number of triangles that groups save, for a mesh to be placed as instances of a group. Instances
+/// cost a transform of each ray and leaf.
+const MIN_SAVED: u64 = 1 << 18;
+
+fn triangles_and_primitives(primitives: &[Primitive<'_>]) -> u64 {
+    primitives.iter().fold(0, |sum: u64, primitive| sum.saturating_add(primitive.triangles).saturating_add(1))
 }
 
 impl<'a> MeshPlacer<'a> {
@@ -37,35 +50,51 @@ impl<'a> MeshPlacer<'a> {
             source,
             prepared: BTreeMap::new(),
             placed: BTreeMap::new(),
-            work: 0,
+            grouped: BTreeSet::new(),
+            groups: BTreeMap::new(),
             not_finite: NotFinite::default(),
             incomplete: BTreeSet::new(),
         }
     }
 
-    /// Counts the triangles and primitives of `instances` instances of mesh `index`. Returns an error if
-    /// there are more than [`MAX_TRIANGLES`] in all.
-    pub(super) fn count(
-        &mut self,
-        index: usize,
-        instances: u64,
-        scene: &mut Scene,
-    ) -> Result<(), SceneError> {
-        let primitives = self.primitives(index, scene)?;
-        let of_one = primitives
-            .iter()
-            .fold(0_u64, |sum, primitive| sum.saturating_add(primitive.triangles).saturating_add(1));
-        self.work = self.work.saturating_add(of_one.saturating_mul(instances));
-        if self.work > MAX_TRIANGLES as u64 {
+    /// Counts `instances` instances of mesh `index`.
+    pub(super) fn count(&mut self, index: usize, instances: u64) {
+        let placed = self.placed.entry(index).or_default();
+        *placed = placed.saturating_add(instances);
+    }
+
+    /// Decides which of the counted meshes are placed as instances of groups.
+    pub(super) fn choose_groups(&mut self, scene: &Scene) {
+        let focuses = scene.specular_materials();
+        let is_plain = |primitive: &Primitive<'_>| {
+            let material = primitive.material as usize;
+            primitive.influences.is_empty()
+                && primitive.targets.is_empty()
+                && !focuses[material]
+                && !scene.materials[material].is_emissive()
+        };
+        for (&mesh, &times) in &self.placed {
+            let Some(primitives) = self.prepared.get(&mesh) else { continue };
+            let saved = triangles_and_primitives(primitives).saturating_mul(times.saturating_sub(1));
+            if saved >= MIN_SAVED && primitives.iter().all(is_plain) {
+                self.grouped.insert(mesh);
+            }
+        }
+    }
+
+    /// Checks that all counted meshes together have at most [`MAX_TRIANGLES`] triangles and instances, and
+    /// that a card has room for them.
+    pub(super) fn check_room(&self, room: &mut Room) -> Result<(), SceneError> {
+        let work = self.placed.iter().fold(0_u64, |work, (mesh, &times)| {
+            let of_one = self.prepared.get(mesh).map_or(0, |primitives| triangles_and_primitives(primitives));
+            work.saturating_add(self.copies(*mesh, times).saturating_mul(of_one)).saturating_add(times)
+        });
+        if work > MAX_TRIANGLES as u64 {
             let file = self.source.document.path.clone();
             return Err(SceneError::TooManyTriangles { file, limit: MAX_TRIANGLES });
         }
-        *self.placed.entry(index).or_default() += instances;
-        Ok(())
-    }
-
-    /// Checks that a card's memory can hold all counted triangles.
-    pub(super) fn check_room(&self, room: &mut Room) -> Result<(), SceneError> {
+        let of_groups = self.grouped.iter().map(|mesh| self.placed.get(mesh).copied().unwrap_or(0));
+        room.instances(of_groups.sum())?;
         let triangles = self.placed().map(|(primitive, times)| primitive.triangles * times).sum();
         // Shared vertices are counted only if an upper bound of the triangles' size exceeds the memory.
         if room.fits_any(triangles) {
@@ -82,16 +111,34 @@ impl<'a> MeshPlacer<'a> {
         room.triangles(triangles, bytes)
     }
 
-    /// Counted primitives, each with its number of instances.
+    /// Number of copies of the triangles of a mesh that is placed `times` times.
+    fn copies(&self, mesh: usize, times: u64) -> u64 {
+        if self.grouped.contains(&mesh) { times.min(1) } else { times }
+    }
+
+    /// Counted primitives, each with its number of copies.
     fn placed(&self) -> impl Iterator<Item = (&Primitive<'a>, u64)> {
         self.placed.iter().flat_map(|(mesh, &times)| {
+            let times = self.copies(*mesh, times);
             let primitives = self.prepared.get(mesh).into_iter().flat_map(|primitives| primitives.iter());
             primitives.map(move |primitive| (primitive, times))
         })
     }
 
-    /// Adds the triangles of mesh `index` to `scene` in world space.
+    /// Adds mesh `index` to `scene` in world space: an instance of its group, or its triangles.
     pub(super) fn place(
+        &mut self,
+        index: usize,
+        pose: &Pose<'_>,
+        scene: &mut Scene,
+    ) -> Result<(), SceneError> {
+        if self.grouped.contains(&index) && self.place_instance(index, pose.world(), scene)? {
+            return Ok(());
+        }
+        self.place_triangles(index, pose, scene)
+    }
+
+    fn place_triangles(
         &mut self,
         index: usize,
         pose: &Pose<'_>,
@@ -99,6 +146,31 @@ impl<'a> MeshPlacer<'a> {
     ) -> Result<(), SceneError> {
         let primitives = self.primitives(index, scene)?;
         primitives.iter().try_for_each(|primitive| self.place_primitive(index, primitive, pose, scene))
+    }
+
+    /// Adds an instance of mesh `index`. Returns false if the transform has no inverse.
+    fn place_instance(
+        &mut self,
+        index: usize,
+        world: &Transform,
+        scene: &mut Scene,
+    ) -> Result<bool, SceneError> {
+        // The group of mirrored instances is mirrored itself, so that its transforms are not.
+        let mirror = DMat4::from_scale(DVec3::new(if world.is_mirror { -1.0 } else { 1.0 }, 1.0, 1.0));
+        let known = self.groups.get(&(index, world.is_mirror)).copied();
+        let group = known.unwrap_or(scene.groups.len() as u32);
+        let Some(instance) = Instance::new(group, &(world.matrix * mirror)) else { return Ok(false) };
+        if known.is_none() {
+            let outside = std::mem::take(&mut scene.triangles);
+            self.place_triangles(index, &Pose::new(mirror, None, &[]), scene)?;
+            let triangles = std::mem::replace(&mut scene.triangles, outside);
+            scene.groups.push(triangles);
+            self.groups.insert((index, world.is_mirror), group);
+        }
+        allocation::push(&mut scene.instances, instance).map_err(|error| {
+            SceneError::memory(&self.source.document.path, "placing its instances", error)
+        })?;
+        Ok(true)
     }
 
     /// Returns whether mesh `index` has a primitive of triangles.

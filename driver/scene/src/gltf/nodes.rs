@@ -50,6 +50,7 @@ pub(super) fn place(
         worlds: Vec::new(),
     };
     nodes.iter().try_for_each(|(index, _)| placer.count(*index, scene))?;
+    placer.meshes.choose_groups(scene);
     placer.meshes.check_room(room)?;
     let nodes = walk(document, poses, Some(placer.anchor(anchor, scene)?))?;
     placer.worlds = vec![None; document.root.nodes.len()];
@@ -100,7 +101,8 @@ impl<'a> Placer<'a> {
             Some(_) => None,
             None => Instances::of(self.source, index, node)?,
         };
-        self.meshes.count(mesh, instances.map_or(1, |instances| instances.count), scene)
+        self.meshes.count(mesh, instances.map_or(1, |instances| instances.count));
+        Ok(())
     }
 
     /// Offset of the scene's origin, computed on first use from the scene at rest.

@@ -23,6 +23,11 @@ impl<'s> Pose<'s> {
         Self { transform: Transform::new(world), skin, weights }
     }
 
+    /// World transform of meshes without joints.
+    pub(super) fn world(&self) -> &Transform {
+        &self.transform
+    }
+
     /// World transform of a vertex.
     ///
     /// # Errors

@@ -52,6 +52,13 @@ impl Room {
         self.take(tiles * LINE_BYTES as u64, || "images and materials".to_owned())
     }
 
+    /// Adds the card memory of the lines of instances.
+    pub(super) fn instances(&mut self, count: u64) -> Result<(), SceneError> {
+        self.take(count.saturating_mul(LINE_BYTES as u64), || {
+            format!("{count} instances, images and materials")
+        })
+    }
+
     /// Returns whether the lower bound for `triangles` triangles fits even if they share no vertices and have
     /// all attributes.
     pub(super) fn fits_any(&self, triangles: u64) -> bool {

@@ -182,7 +182,7 @@ impl SceneFile {
         nodes::place(&source, &poses, *light_units, anchor, &mut scene, &mut room.clone(), &mut notices)?;
         scene.offset = anchor.get().map_or(DVec3::ZERO, |anchor| anchor.offset);
         let file = || document.path.clone();
-        match (scene.triangles.is_empty(), scene.skipped_triangles) {
+        match (scene.placed_triangles() == 0, scene.skipped_triangles) {
             (true, 0) => return Err(SceneError::NoGeometry { file: file() }),
             (true, skipped) => return Err(SceneError::OnlyZeroArea { file: file(), skipped }),
             _ => {}

@@ -8,7 +8,7 @@ use super::animation::NodePose;
 /// Affine transform, and its matrix for normals.
 #[derive(Clone)]
 pub(super) struct Transform {
-    matrix: DMat4,
+    pub(super) matrix: DMat4,
     normals: DMat3,
     /// True if the transform mirrors, which swaps the front and the back of triangles.
     pub(super) is_mirror: bool,

@@ -8,6 +8,7 @@ mod draco;
 mod errors;
 mod framing;
 mod glass;
+mod instances;
 mod ktx2;
 mod layers;
 mod loading;

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BLENDS, Emitter, EmitterKind, NO_TEXTURE, Record, Triangle};
+use photoncard_shared::layout::{BLENDS, Emitter, EmitterKind, NO_TEXTURE, Record, Triangle, TriangleId};
 use photoncard_shared::message::Fault;
 
 use super::choice::Fraction;
@@ -58,7 +58,8 @@ pub fn emitter_point(
     let [a, b, c] = vertices.map(Vec3::from_array);
     let [p, q] = square_to_triangle(square);
     let emission = if varies {
-        let place = (triangle, &Triangle { vertices, material, cut_out: true, flat_glass: false });
+        let place =
+            (TriangleId::lone(triangle), &Triangle { vertices, material, cut_out: true, flat_glass: false });
         emission_at(scene, memory, emitter, place, [1.0 - p - q, p, q])?
     } else {
         emitter.emission.into()
@@ -77,19 +78,19 @@ fn emission_at(
     scene: &SceneImage,
     memory: &mut impl MemoryPort,
     emitter: &Emitter,
-    (index, triangle): (u32, &Triangle),
+    (id, triangle): (TriangleId, &Triangle),
     weights: [f32; 3],
 ) -> Result<Vec3, Fault> {
     let material = read_material(scene, memory, triangle.material)?;
     let mut emission = Vec3::from_array(emitter.emission);
     if material.cutoff > 0.0 || material.flags & BLENDS != 0 {
-        emission *= coverage(scene, memory, &material, index, weights)?;
+        emission *= coverage(scene, memory, &material, id, weights)?;
     }
     let [.., texture] = material.textures;
     if texture == NO_TEXTURE {
         return Ok(emission);
     }
-    let Some(corners) = Corners::read(scene, memory, index, weights)? else { return Ok(emission) };
+    let Some(corners) = Corners::read(scene, memory, id, weights)? else { return Ok(emission) };
     let [red, green, blue, _] = corners.texture(scene, memory, texture)?;
     Ok(emission * Vec3::new(red, green, blue))
 }

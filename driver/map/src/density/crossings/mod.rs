@@ -8,6 +8,7 @@
 use std::cmp::Reverse;
 
 use photoncard_firmware::simd::{Isa, Kernel, LANES, run};
+use photoncard_shared::layout::TriangleId;
 
 use super::chords::{BATCHES, Batch, Chords};
 use super::lanes::Lane;
@@ -25,8 +26,7 @@ pub(super) struct Layer {
     /// Ratio of the surface area to its projection on the disc, `1 / cos`.
     slope: f32,
     face: u32,
-    /// Index of the triangle in the card image.
-    pub(super) triangle: u32,
+    pub(super) triangle: TriangleId,
 }
 
 /// Sort key of a crossing: greater for greater heights and, at equal heights, for front faces; never 0 for
@@ -78,7 +78,7 @@ impl Layer {
     #[inline(always)]
     pub(super) fn new(
         (heights, misses): (&Lane, &[u32; LANES]),
-        (triangle, sides, is_front): (u32, Sides, bool),
+        (triangle, sides, is_front): (TriangleId, Sides, bool),
         slope: f32,
     ) -> Self {
         let mut keys = [0; LANES];

@@ -26,7 +26,7 @@ fn layers(count: u32) -> Vec<Layer> {
         keys: std::array::from_fn(|lane| random(layer, lane as u32) % 7),
         slope: layer as f32,
         face: random(layer, 16),
-        triangle: 0,
+        triangle: TriangleId::lone(0),
     };
     (0..count).map(layer).collect()
 }

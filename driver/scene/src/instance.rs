@@ -1,0 +1,66 @@
+//! Groups of triangles, and their instances in the scene.
+
+use glam::{DMat4, Vec3};
+use photoncard_shared::layout::{Rows, placed_normal, placed_point};
+
+use crate::triangle::VertexAttributes;
+
+/// A copy of a group of triangles, placed by a transform.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Instance {
+    /// Index into [`SceneContents::groups`](crate::SceneContents::groups).
+    pub group: u32,
+    /// Transform from the group's space to the world. It does not mirror.
+    pub to_world: Rows,
+    /// Inverse of [`Self::to_world`].
+    pub to_group: Rows,
+}
+
+/// Minimum and maximum of the absolute values of a transform's determinant at which it has an inverse in
+/// single precision.
+const DETERMINANTS: [f64; 2] = [1e-18, 1e18];
+
+impl Instance {
+    /// Creates an instance; `None` if the transform mirrors, or is too close to one without an inverse.
+    pub fn new(group: u32, to_world: &DMat4) -> Option<Self> {
+        let [least, greatest] = DETERMINANTS;
+        let determinant = to_world.determinant();
+        let to_world = rows(to_world);
+        let of_rounded = DMat4::from_cols_array(&columns(&to_world));
+        let to_group = rows(&of_rounded.inverse());
+        let is_finite = to_world.iter().chain(&to_group).flatten().all(|value| value.is_finite());
+        (is_finite && (least..greatest).contains(&determinant)).then_some(Self { group, to_world, to_group })
+    }
+
+    /// Lower and upper corner of the box around the instance, metres, given those of its group.
+    pub fn bounds(&self, [lower, upper]: [Vec3; 2]) -> [Vec3; 2] {
+        let corner = |which: usize| {
+            let side = |axis: usize| if which >> axis & 1 == 0 { lower[axis] } else { upper[axis] };
+            Vec3::from(placed_point(&self.to_world, [side(0), side(1), side(2)]))
+        };
+        (1..8).map(corner).fold([corner(0); 2], |[low, high], corner| [low.min(corner), high.max(corner)])
+    }
+
+    /// Factor by which the transform enlarges areas, averaged over directions as for a uniform scale.
+    pub fn area_factor(&self) -> f64 {
+        let matrix = DMat4::from_cols_array(&columns(&self.to_world));
+        matrix.determinant().abs().powf(2.0 / 3.0)
+    }
+
+    /// Attributes of a copy of a triangle of the group.
+    pub(crate) fn attributes(&self, attributes: &VertexAttributes) -> VertexAttributes {
+        let placed = |normal: Vec3| placed_normal(&self.to_group, normal.to_array()).into();
+        let normals =
+            attributes.normals.map(|normals| normals.map(|normal| Vec3::normalize_or_zero(placed(normal))));
+        VertexAttributes { normals, ..*attributes }
+    }
+}
+
+fn rows(matrix: &DMat4) -> Rows {
+    [0, 1, 2].map(|row| matrix.row(row).as_vec4().to_array())
+}
+
+fn columns([x, y, z]: &Rows) -> [f64; 16] {
+    let rows = [x, y, z, &[0.0, 0.0, 0.0, 1.0]];
+    std::array::from_fn(|index| f64::from(rows[index % 4][index / 4]))
+}

@@ -1,0 +1,133 @@
+//! Contents of a scene with its instances: extent, numbers, and expansion to triangles.
+
+use std::collections::BTreeSet;
+
+use glam::Vec3;
+use photoncard_shared::layout::{placed_point, placed_vector};
+
+use crate::Scene;
+use crate::contents::SceneContents;
+use crate::instance::Instance;
+use crate::triangle::{NO_TANGENTS, Triangle, bounds_of};
+
+impl Scene {
+    /// Boxes around the instances, each by its lower and upper corner, metres.
+    pub fn instance_bounds(&self) -> impl Iterator<Item = [Vec3; 2]> {
+        let groups: Vec<_> = self.groups.iter().map(|group| bounds_of(group)).collect();
+        self.instances
+            .iter()
+            .filter_map(move |instance| groups[instance.group as usize].map(|bounds| instance.bounds(bounds)))
+    }
+
+    /// Number of triangles in the scene, those of all instances included.
+    pub fn placed_triangles(&self) -> u64 {
+        let of_instance = |instance: &Instance| self.groups[instance.group as usize].len() as u64;
+        self.triangles.len() as u64 + self.instances.iter().map(of_instance).sum::<u64>()
+    }
+
+    /// Area of all surfaces, m^2. That of an instance is its group's times [`Instance::area_factor`].
+    pub fn area(&self) -> f64 {
+        let of =
+            |triangles: &[Triangle]| triangles.iter().map(|triangle| triangle.area() as f64).sum::<f64>();
+        let groups: Vec<f64> = self.groups.iter().map(|group| of(group)).collect();
+        let of_instance = |instance: &Instance| groups[instance.group as usize] * instance.area_factor();
+        of(&self.triangles) + self.instances.iter().map(of_instance).sum::<f64>()
+    }
+
+    /// Returns whether instances of a group must be expanded to triangles: a material of the group emits,
+    /// focuses or transmits light.
+    fn must_expand(&self, group: &[Triangle], focuses: &[bool]) -> bool {
+        let materials: BTreeSet<u32> = group.iter().map(|triangle| triangle.material).collect();
+        materials
+            .into_iter()
+            .any(|material| focuses[material as usize] || self.materials[material as usize].is_emissive())
+    }
+
+    /// The scene with instances expanded to triangles where lights or caustics need these; `None` if no
+    /// instance must be expanded.
+    pub fn expanded(&self) -> Option<Self> {
+        let focuses = self.specular_materials();
+        let expands: Vec<bool> = self.groups.iter().map(|group| self.must_expand(group, &focuses)).collect();
+        let has = |instance: &Instance| expands[instance.group as usize];
+        self.instances.iter().any(has).then(|| {
+            self.clone().with(|scene| {
+                let (expanded, kept) = std::mem::take(&mut scene.instances).into_iter().partition(has);
+                scene.instances = kept;
+                Vec::into_iter(expanded).for_each(|instance| scene.add_triangles(&instance));
+            })
+        })
+    }
+}
+
+impl SceneContents {
+    /// Adds the triangles of an instance in world space, with attributes of their own.
+    fn add_triangles(&mut self, instance: &Instance) {
+        for triangle in &self.groups[instance.group as usize] {
+            let vertices =
+                triangle.vertices.map(|vertex| placed_point(&instance.to_world, vertex.to_array()).into());
+            let mut placed = Triangle { vertices, ..*triangle };
+            if let Some(attributes) = self.attributes.get(triangle.attributes as usize) {
+                let mut attributes = instance.attributes(attributes);
+                if attributes.tangents != NO_TANGENTS {
+                    let tangents = self.tangents[attributes.tangents as usize].map(|tangent| {
+                        let along = placed_vector(&instance.to_world, tangent.truncate().to_array());
+                        Vec3::from(along).normalize_or_zero().extend(tangent.w)
+                    });
+                    attributes.tangents = self.tangents.len() as u32;
+                    self.tangents.push(tangents);
+                }
+                placed.attributes = self.attributes.len() as u32;
+                self.attributes.push(attributes);
+            }
+            self.triangles.push(placed);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DMat4, DQuat, DVec3};
+
+    use super::*;
+    use crate::Material;
+
+    fn turned(angle: f64, scale: f64) -> DMat4 {
+        let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), angle);
+        DMat4::from_scale_rotation_translation(DVec3::splat(scale), turn, DVec3::new(4.0, -5.0, 6.0))
+    }
+
+    fn scene(material: Material) -> Scene {
+        let group = vec![Triangle::new([Vec3::ZERO, Vec3::X, Vec3::Y], 0)];
+        Scene::default().with(|scene| {
+            scene.materials = vec![material];
+            scene.groups = vec![group];
+            scene.instances =
+                (0..3).filter_map(|index| Instance::new(0, &turned(f64::from(index), 2.0))).collect();
+        })
+    }
+
+    #[test]
+    fn a_transform_that_mirrors_or_flattens_places_no_instance() {
+        assert!(Instance::new(0, &turned(1.0, 3.0)).is_some());
+        assert!(Instance::new(0, &turned(1.0, -3.0)).is_none());
+        assert!(Instance::new(0, &turned(1.0, 0.0)).is_none());
+        assert!(Instance::new(0, &DMat4::from_scale(DVec3::new(1.0, 0.0, 1.0))).is_none());
+        assert!(Instance::new(0, &DMat4::from_scale(DVec3::splat(f64::NAN))).is_none());
+    }
+
+    #[test]
+    fn expanded_instances_have_the_bounds_the_area_and_the_number_of_the_instances() {
+        let matte = scene(Material::lambertian("leaf", Vec3::ONE));
+        assert!(matte.expanded().is_none(), "matte groups stay");
+        let mut lamp = Material::lambertian("lamp", Vec3::ONE);
+        lamp.emission = Vec3::ONE;
+        let lamp = scene(lamp);
+        let expanded = lamp.expanded().expect("emits");
+        assert_eq!((expanded.triangles.len(), expanded.instances.len()), (3, 0));
+        assert_eq!(lamp.placed_triangles(), 3);
+        assert!((lamp.area() - expanded.area()).abs() < 1e-5 && (lamp.area() - 6.0).abs() < 1e-5);
+        let [(lower, upper), (low, high)] = [lamp.bounds(), expanded.bounds()];
+        // The box of a turned box contains the turned triangle.
+        assert!(lower.cmple(low).all() && upper.cmpge(high).all() && lower.distance(low) < 2.0);
+    }
+}

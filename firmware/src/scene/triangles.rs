@@ -1,0 +1,68 @@
+//! Triangles and instances in card memory.
+
+use photoncard_shared::address::LINE_BYTES;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{
+    BvhLeaf, Instance, LEAF_TRIANGLES, NO_INSTANCE, Triangle, TriangleId, placed_point, placed_vector,
+};
+use photoncard_shared::message::{Fault, FaultCode};
+
+use super::{Ray, SceneImage};
+use crate::memory::MemoryPort;
+
+/// Reads a triangle, in world space.
+///
+/// # Errors
+/// If the card image is invalid.
+#[inline(always)]
+pub(super) fn read_triangle(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    TriangleId { index, instance }: TriangleId,
+) -> Result<Triangle, Fault> {
+    let [leaf, slot] = [index / LEAF_TRIANGLES as u32, index % LEAF_TRIANGLES as u32];
+    let line = scene.line(memory, SectionKind::Triangles, leaf, BvhLeaf::OF_TRIANGLE)?;
+    let mut triangle = BvhLeaf(line).triangle(slot as usize);
+    if instance != NO_INSTANCE {
+        let Instance { to_world, .. } = read_instance(scene, memory, instance)?;
+        triangle.vertices = triangle.vertices.map(|vertex| placed_point(&to_world, vertex));
+    }
+    Ok(triangle)
+}
+
+/// Reads the instance in line `index` of the leaves.
+///
+/// # Errors
+/// [`FaultCode::Record`] if the line is a leaf with triangles, or there is none.
+pub(super) fn read_instance(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    index: u32,
+) -> Result<Instance, Fault> {
+    let line = scene.line(memory, SectionKind::Triangles, index, 0..LINE_BYTES as u32)?;
+    Instance::read(line).ok_or(Fault { code: FaultCode::Record, detail: index })
+}
+
+/// A ray in the space of an instance's group. Distances along it are those along the ray in world space.
+#[inline(always)]
+pub(super) fn in_group(ray: &Ray, instance: &Instance) -> Ray {
+    let origin = placed_point(&instance.to_group, ray.origin.to_array()).into();
+    let direction = placed_vector(&instance.to_group, ray.direction.to_array()).into();
+    Ray { origin, direction, ..*ray }
+}
+
+/// A leaf of an instance's group, in world space.
+///
+/// # Errors
+/// [`FaultCode::Record`] if the leaf is an instance.
+#[inline(always)]
+pub(super) fn placed_leaf(
+    line: &[u8; LINE_BYTES],
+    instance: &Instance,
+    leaf: u32,
+) -> Result<[u8; LINE_BYTES], Fault> {
+    if BvhLeaf(line).triangles() == 0 {
+        return Err(Fault { code: FaultCode::Record, detail: leaf });
+    }
+    Ok(BvhLeaf(line).placed(&instance.to_world))
+}

@@ -1,0 +1,258 @@
+//! An instance of a group of triangles looks like copies of its triangles, costs little memory, and is
+//! rendered alike by all chips and orders.
+
+use glam::{DMat4, DQuat, DVec3, Vec2, Vec3};
+use photoncard_driver::film::Film;
+use photoncard_driver::pack::PackedScene;
+use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Schedule};
+use photoncard_driver::scene::{
+    Environment, Instance, Material, Scene, SceneContents, Triangle, VertexAttributes,
+};
+use photoncard_driver::scheduler::GatherOrder;
+use photoncard_firmware::memory::Lines;
+use photoncard_firmware::sampler::hash;
+use photoncard_firmware::scene::{
+    BUNDLE_RAYS, Hit, Ray, closest_hit, closest_hits, transmittance, transmittances,
+};
+use photoncard_shared::address::Line;
+use photoncard_shared::image::SectionKind;
+use photoncard_shared::layout::{self, placed_normal, placed_point};
+use photoncard_shared::message::FaultCode;
+use photoncard_tests::{camera, glass, lambertian, mean, quad, radiances, render_or_panic, scene};
+
+const GROUND: u32 = 0;
+const LEAF: u32 = 1;
+
+/// Pseudo-random number in [0, 1).
+fn random(index: u32, dimension: u32) -> f32 {
+    (hash(hash(index).wrapping_add(dimension)) >> 8) as f32 / 16_777_216.0
+}
+
+fn random_point(index: u32, dimension: u32) -> Vec3 {
+    Vec3::from([0, 1, 2].map(|axis| random(index, dimension + axis))) * 2.0 - 1.0
+}
+
+/// Triangles of the size of leaves in a ball of radius 1.
+fn crown(count: u32) -> Vec<Triangle> {
+    let leaf = |index: u32| {
+        let middle = random_point(index, 9).clamp_length_max(1.0);
+        [0, 3, 6].map(|corner| middle + 0.3 * random_point(index, corner))
+    };
+    (0..count).map(|index| Triangle::new(leaf(index), LEAF)).collect()
+}
+
+/// Transforms that turn, stretch unequally and shift.
+fn transforms(count: u32) -> impl Iterator<Item = DMat4> {
+    (0..count).map(|index| {
+        let vector = |dimension| random_point(1000 + index, dimension).as_dvec3();
+        let turn = DQuat::from_axis_angle(vector(0).normalize(), 3.0 * vector(3).x);
+        let place = vector(6) * DVec3::new(6.0, 1.0, 6.0);
+        DMat4::from_scale_rotation_translation(DVec3::splat(0.8) + 0.5 * vector(9).abs(), turn, place)
+    })
+}
+
+/// Ground under instances of a crown, in the light of a sky.
+fn forest(material: Material) -> Scene {
+    let corners = [[-9., -9.], [-9., 9.], [9., 9.], [9., -9.]].map(|[x, z]| Vec3::new(x, -2.0, z));
+    let eye = camera(Vec3::new(0.0, 2.0, 12.0), Vec3::new(0.0, -0.2, -1.0));
+    scene(quad(corners, GROUND).to_vec(), vec![lambertian("ground", 0.5), material], eye).with(|scene| {
+        scene.groups = vec![crown(200)];
+        scene.instances = transforms(12).filter_map(|transform| Instance::new(0, &transform)).collect();
+        assert_eq!(scene.instances.len(), 12);
+        scene.environment =
+            Some(Environment { width: 1, height: 1, texels: vec![[1.0, 1.2, 1.5]], strength: 1.0 });
+    })
+}
+
+fn matte() -> Material {
+    let mut material = lambertian("leaf", 0.6);
+    material.double_sided = true;
+    material
+}
+
+/// The scene with copies of the triangles in place of the instances.
+fn copied(scene: &Scene) -> Scene {
+    scene.clone().with(|scene| {
+        for instance in std::mem::take(&mut scene.instances) {
+            for triangle in &scene.groups[0] {
+                let place = |vertex: Vec3| placed_point(&instance.to_world, vertex.to_array()).into();
+                let attributes = scene.attributes.get(triangle.attributes as usize).map(|attributes| {
+                    let turned =
+                        |normal: Vec3| Vec3::from(placed_normal(&instance.to_group, normal.to_array()));
+                    let normals =
+                        attributes.normals.map(|normals| normals.map(|normal| turned(normal).normalize()));
+                    VertexAttributes { normals, ..*attributes }
+                });
+                let mut copy = Triangle { vertices: triangle.vertices.map(place), ..*triangle };
+                if let Some(attributes) = attributes {
+                    copy.attributes = scene.attributes.len() as u32;
+                    scene.attributes.push(attributes);
+                }
+                scene.triangles.push(copy);
+            }
+        }
+        scene.groups.clear();
+    })
+}
+
+fn rays(count: u32) -> Vec<Ray> {
+    let ray = |index: u32| {
+        let from = random_point(index, 20) * Vec3::new(12.0, 6.0, 12.0);
+        let towards = (random_point(index, 23) * Vec3::new(6.0, 2.0, 6.0) - from).normalize();
+        Ray {
+            max_distance: if index.is_multiple_of(3) { 7.0 } else { f32::INFINITY },
+            ..Ray::new(from, towards)
+        }
+    };
+    (0..count).map(ray).collect()
+}
+
+#[test]
+fn rays_hit_instances_exactly_as_copies_of_their_triangles() {
+    let scene = forest(matte());
+    let [instances, copies] = [&scene, &copied(&scene)].map(|scene| PackedScene::new(scene).expect("packs"));
+    let [(image, mut memory), (of_copies, mut memory_of_copies)] = [instances.view(), copies.view()];
+    let rays = rays(20_000);
+    let met = |hit: Option<Hit>| hit.map(|hit| (hit.intersection, hit.triangle));
+    let mut on_instances = 0;
+    for ray in &rays {
+        let hit = closest_hit(&image, &mut memory, ray).expect("sound");
+        let of_copy = closest_hit(&of_copies, &mut memory_of_copies, ray).expect("sound");
+        assert_eq!(met(hit), met(of_copy), "{ray:?}");
+        on_instances += u32::from(hit.is_some_and(|hit| hit.triangle.material == LEAF));
+        let passed = transmittance(&image, &mut memory, ray).expect("sound");
+        assert_eq!(passed, transmittance(&of_copies, &mut memory_of_copies, ray).expect("sound"));
+    }
+    assert!(on_instances > 5000, "{on_instances}");
+    for bundle in rays.chunks(BUNDLE_RAYS) {
+        let mut hits = [None; BUNDLE_RAYS];
+        closest_hits(&image, &mut memory, bundle, &mut hits).expect("sound");
+        let passed = transmittances(&image, &mut memory, bundle).expect("sound");
+        for ((ray, hit), passed) in bundle.iter().zip(hits).zip(passed) {
+            assert_eq!(hit, closest_hit(&image, &mut memory, ray).expect("sound"));
+            assert_eq!(passed.0, transmittance(&image, &mut memory, ray).expect("sound"));
+        }
+    }
+}
+
+fn settings(order: GatherOrder, card: &str) -> RenderSettings {
+    let mut settings = RenderSettings {
+        picture: Picture { width: 48, height: 32, ..Picture::default() },
+        photons: PhotonMaps { count: 20_000, neighbors: 30, ..PhotonMaps::default() },
+        integrator: Integrator { gather_rays: 8, samples: 4, ..Integrator::default() },
+        schedule: Schedule { order, ..Schedule::default() },
+        ..RenderSettings::default()
+    };
+    settings.cards.addresses = vec![card.parse().expect("an address")];
+    settings
+}
+
+fn pictured(scene: &Scene, order: GatherOrder, card: &str) -> Film {
+    render_or_panic(scene, &settings(order, card)).film
+}
+
+/// Mean radiance of blocks of 8x8 pixels.
+fn blocks(film: &Film) -> Vec<f64> {
+    let pixels = radiances(film);
+    let block = |index: usize| {
+        let first = 8 * (index % 6) + 8 * 48 * (index / 6);
+        let rows = (0..8).flat_map(|row| pixels[first + 48 * row..][..8].to_vec());
+        mean(&rows.collect::<Vec<_>>())
+    };
+    (0..24).map(block).collect()
+}
+
+#[test]
+fn instances_are_lit_as_copies_of_their_triangles() {
+    let bent = forest(matte()).with(|scene| {
+        let SceneContents { groups, attributes, .. } = scene;
+        for (index, triangle) in (0..).zip(&mut groups[0]) {
+            triangle.attributes = index;
+            let normal = triangle.scaled_normal().normalize();
+            let normals = Some(
+                [0.0, 0.2, -0.2].map(|bend| (normal + bend * normal.any_orthonormal_vector()).normalize()),
+            );
+            attributes.push(VertexAttributes {
+                normals,
+                coordinates: [[Vec2::ZERO; 3]; 2],
+                ..VertexAttributes::NONE
+            });
+        }
+    });
+    for scene in [forest(matte()), bent] {
+        let [instances, copies] =
+            [&scene, &copied(&scene)].map(|scene| blocks(&pictured(scene, GatherOrder::Sort, "emulated:1")));
+        let ratio = instances.iter().sum::<f64>() / copies.iter().sum::<f64>();
+        assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+        for (instance, copy) in instances.iter().zip(&copies) {
+            assert!((instance / copy - 1.0).abs() < 0.08, "{instance} {copy}");
+        }
+    }
+}
+
+#[test]
+fn instances_have_the_same_pixels_on_all_chips_and_in_all_orders() {
+    let scene = forest(matte());
+    let first = pictured(&scene, GatherOrder::Naive, "emulated:1");
+    let others = [
+        (GatherOrder::Sort, "emulated:3"),
+        (GatherOrder::DirectionBins, "emulated-micro:1"),
+        (GatherOrder::Hash, "emulated-large:2"),
+    ];
+    for (order, card) in others {
+        assert!(first.sums().eq(pictured(&scene, order, card).sums()), "{order:?} {card}");
+    }
+}
+
+#[test]
+fn instances_of_a_material_that_emits_or_focuses_are_expanded() {
+    let mut lamp = matte();
+    lamp.emission = Vec3::splat(3.0);
+    for (material, expands) in [(matte(), false), (lamp, true), (glass("glass", Vec3::ONE, true), true)] {
+        let scene = forest(material);
+        let packed = PackedScene::new(&scene).expect("packs");
+        let (image, mut memory) = packed.view();
+        let has_instance = rays(2000).iter().any(|ray| {
+            let hit = closest_hit(&image, &mut memory, ray).expect("sound");
+            hit.is_some_and(|hit| hit.id.instance != layout::NO_INSTANCE)
+        });
+        assert_eq!(has_instance, !expands);
+    }
+}
+
+/// Replaces the instances of a card image, and returns the fault of the rays that meet one.
+fn fault_with(change: impl Fn(&mut layout::Instance)) -> Option<FaultCode> {
+    let packed = PackedScene::new(&forest(matte())).expect("packs");
+    let (image, Lines(lines)) = packed.view();
+    let mut lines: Vec<Line> = lines.to_vec();
+    let section = image.header.section(SectionKind::Triangles);
+    for line in &mut lines[section.first_line as usize..][..section.records as usize] {
+        if let Some(mut instance) = layout::Instance::read(&line.0) {
+            change(&mut instance);
+            line.0 = instance.to_bytes();
+        }
+    }
+    let mut memory = Lines(&lines);
+    let mut found = None;
+    for bundle in rays(512).chunks(BUNDLE_RAYS) {
+        let mut hits = [None; BUNDLE_RAYS];
+        let faults = [
+            bundle.iter().find_map(|ray| closest_hit(&image, &mut memory, ray).err()),
+            closest_hits(&image, &mut memory, bundle, &mut hits).err(),
+            transmittances(&image, &mut memory, bundle).err(),
+        ];
+        found = found.or(faults.into_iter().flatten().next());
+    }
+    found.map(|fault| fault.code)
+}
+
+#[test]
+fn an_unsound_instance_is_a_fault() {
+    assert_eq!(fault_with(|_| {}), None);
+    // The root of the scene, whose leaves are instances: the group would contain itself.
+    assert_eq!(fault_with(|instance| instance.root = 0), Some(FaultCode::Record));
+    assert_eq!(fault_with(|instance| instance.root = u32::MAX), Some(FaultCode::Record));
+    // A transform of numbers that are none meets nothing, or anything.
+    fault_with(|instance| instance.to_group = [[f32::NAN; 4]; 3]);
+    fault_with(|instance| instance.to_world = [[f32::INFINITY; 4]; 3]);
+}
