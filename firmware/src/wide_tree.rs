@@ -57,6 +57,13 @@ pub(crate) enum Order {
     Any,
 }
 
+/// State of a traversal outside the group that it is in.
+pub(crate) struct Outside {
+    /// Number of stack entries.
+    entries: usize,
+    visits_left: u64,
+}
+
 /// Traversal of one tree, with its stack.
 pub(crate) struct Descent<'s, const ENTRIES: usize> {
     scene: &'s SceneImage,
@@ -95,25 +102,27 @@ impl<'s, const ENTRIES: usize> Descent<'s, ENTRIES> {
         Self { scene, nodes, leaves, stack, visits_left: parts.into_iter().sum() }
     }
 
-    /// Begins the traversal of a group's tree with this root, whose distance bits are `bits`. After the
-    /// group's last node or leaf, the traversal returns the leaf [`END_OF_GROUP`]. Returns the argument of
-    /// [`Self::end_group`].
+    /// Begins the traversal of the group's tree with this root, whose distance bits are `bits`. After the group's last node or leaf, the
+    /// traversal returns the leaf [`END_OF_GROUP`]. Returns the argument of [`Self::end_group`].
     ///
     /// # Errors
     /// [`FaultCode::Depth`] if the stack overflows.
     #[inline(always)]
-    pub(crate) fn begin_group(&mut self, root: u32, bits: u32) -> Result<u64, Fault> {
+    pub(crate) fn begin_group(&mut self, root: u32, bits: u32) -> Result<Outside, Fault> {
         let depth = Fault { code: FaultCode::Depth, detail: root };
         // A root with the bit LEAF occurs in unsound card images only.
         let parts = [u64::from(LEAF | END_OF_GROUP), u64::from(bits) << 32 | u64::from(root & !LEAF)];
+        let outside = Outside { entries: self.stack.len(), visits_left: self.visits_left };
         self.stack.extend_from_slice(&parts).map_err(|_| depth)?;
         let parts = [self.nodes, self.leaves].map(|kind| u64::from(self.scene.header.section(kind).records));
-        Ok(core::mem::replace(&mut self.visits_left, parts.into_iter().sum()))
+        self.visits_left = parts.into_iter().sum();
+        Ok(outside)
     }
 
     /// Returns to the tree around a group.
     #[inline(always)]
-    pub(crate) fn end_group(&mut self, visits_left: u64) {
+    pub(crate) fn end_group(&mut self, Outside { entries, visits_left }: Outside) {
+        self.stack.truncate(entries);
         self.visits_left = visits_left;
     }
 

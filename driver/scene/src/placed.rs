@@ -1,14 +1,12 @@
 //! Contents of a scene with its instances: extent, numbers, and expansion to triangles.
 
-use std::collections::BTreeSet;
-
 use glam::Vec3;
 use photoncard_shared::layout::{placed_point, placed_vector};
 
-use crate::Scene;
 use crate::contents::SceneContents;
 use crate::instance::Instance;
 use crate::triangle::{NO_TANGENTS, Triangle, bounds_of};
+use crate::{Material, Reflection, Scene, Transmission};
 
 impl Scene {
     /// Boxes around the instances, each by its lower and upper corner, metres.
@@ -34,27 +32,37 @@ impl Scene {
         of(&self.triangles) + self.instances.iter().map(of_instance).sum::<f64>()
     }
 
-    /// Returns whether instances of a group must be expanded to triangles: a material of the group emits,
-    /// focuses or transmits light.
-    fn must_expand(&self, group: &[Triangle], focuses: &[bool]) -> bool {
-        let materials: BTreeSet<u32> = group.iter().map(|triangle| triangle.material).collect();
+    /// Returns for each material whether its triangles must be in world space, because lights, caustics and
+    /// the form of glass are found there: it emits, focuses or transmits light.
+    pub(crate) fn copied_materials(&self) -> Vec<bool> {
+        let transmits = |material: &Material| match material.reflection {
+            Reflection::MetallicRoughness { transmission: Some(Transmission { factor, .. }), .. } => {
+                factor > 0.0
+            }
+            _ => false,
+        };
+        let focuses = self.specular_materials().into_iter();
+        let materials = self.materials.iter().zip(focuses);
         materials
-            .into_iter()
-            .any(|material| focuses[material as usize] || self.materials[material as usize].is_emissive())
+            .map(|(material, focuses)| focuses || material.is_emissive() || transmits(material))
+            .collect()
     }
 
-    /// The scene with instances expanded to triangles where lights or caustics need these; `None` if no
-    /// instance must be expanded.
-    pub fn expanded(&self) -> Option<Self> {
-        let focuses = self.specular_materials();
-        let expands: Vec<bool> = self.groups.iter().map(|group| self.must_expand(group, &focuses)).collect();
-        let has = |instance: &Instance| expands[instance.group as usize];
-        self.instances.iter().any(has).then(|| {
-            self.clone().with(|scene| {
-                let (expanded, kept) = std::mem::take(&mut scene.instances).into_iter().partition(has);
-                scene.instances = kept;
-                Vec::into_iter(expanded).for_each(|instance| scene.add_triangles(&instance));
-            })
+    /// Returns for each group whether its instances must be expanded to triangles: a material of the group
+    /// emits, focuses or transmits light. A file is loaded without such groups, but materials can change.
+    pub fn expanded_groups(&self) -> Vec<bool> {
+        let copied = self.copied_materials();
+        let expands = |group: &Vec<Triangle>| group.iter().any(|triangle| copied[triangle.material as usize]);
+        self.groups.iter().map(expands).collect()
+    }
+
+    /// The scene with the instances of the chosen groups expanded to triangles in world space.
+    pub fn expanded(&self, groups: &[bool]) -> Self {
+        self.clone().with(|scene| {
+            let instances = std::mem::take(&mut scene.instances).into_iter();
+            let (expanded, kept) = instances.partition(|instance| groups[instance.group as usize]);
+            scene.instances = kept;
+            Vec::into_iter(expanded).for_each(|instance| scene.add_triangles(&instance));
         })
     }
 }
@@ -118,11 +126,12 @@ mod tests {
     #[test]
     fn expanded_instances_have_the_bounds_the_area_and_the_number_of_the_instances() {
         let matte = scene(Material::lambertian("leaf", Vec3::ONE));
-        assert!(matte.expanded().is_none(), "matte groups stay");
+        assert_eq!(matte.expanded_groups(), [false], "matte groups stay");
         let mut lamp = Material::lambertian("lamp", Vec3::ONE);
         lamp.emission = Vec3::ONE;
         let lamp = scene(lamp);
-        let expanded = lamp.expanded().expect("emits");
+        assert_eq!(lamp.expanded_groups(), [true]);
+        let expanded = lamp.expanded(&[true]);
         assert_eq!((expanded.triangles.len(), expanded.instances.len()), (3, 0));
         assert_eq!(lamp.placed_triangles(), 3);
         assert!((lamp.area() - expanded.area()).abs() < 1e-5 && (lamp.area() - 6.0).abs() < 1e-5);

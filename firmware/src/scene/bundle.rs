@@ -11,12 +11,12 @@ use core::ops::ControlFlow;
 use heapless::Vec;
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, Instance, NO_INSTANCE, WideNode};
+use photoncard_shared::layout::{BvhLeaf, BvhNode, Child, Instance, WideNode};
 use photoncard_shared::message::{Fault, Invariant};
 
-use super::bvh::{BvhStack, Passed, STACK, Search, closest_hit, meet_leaf, transmittance};
+use super::bvh::{BvhStack, Passed, Search, closest_hit, enter, leave, meet_leaf, moved_leaf, transmittance};
 use super::slabs::Slabs;
-use super::triangles::{in_group, placed_leaf};
+use super::triangles::in_group;
 use super::{Hit, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
@@ -105,52 +105,6 @@ struct Rays<'a, S> {
     searches: &'a mut [S; BUNDLE_RAYS],
 }
 
-/// Kernel of [`Rays::meet_group`].
-struct InGroup<'a, 'r, 'd, M, S> {
-    scene: &'a SceneImage,
-    memory: &'a mut M,
-    /// Index of the instance's line, and the instance.
-    instance: (u32, &'a Instance),
-    descent: &'a mut Descent<'d, STACK>,
-    rays: &'a mut Rays<'r, S>,
-    here: u32,
-}
-
-impl<M: MemoryPort, S: Search> Kernel for InGroup<'_, '_, '_, M, S> {
-    type Output = Result<u32, Fault>;
-
-    #[inline(always)]
-    fn run(self, isa: impl Isa) -> Self::Output {
-        let Self { scene, memory, instance: (index, instance), descent, rays, here: all } = self;
-        let mut waiting = all;
-        let visits_left = descent.begin_group(instance.root, all)?;
-        while let Some((bits, child)) = descent.pop()? {
-            let here = rays.within(isa, bits) & waiting;
-            let others = 1..here.count_ones();
-            match child {
-                Child::Leaf(END_OF_GROUP) => break,
-                _ if here == 0 => {}
-                Child::Node(node) => {
-                    for _ in others {
-                        scene.line(memory, SectionKind::Nodes, node, 0..LINE_BYTES as u32)?;
-                    }
-                    descent
-                        .enter(isa, memory, node, S::ORDER, |line| rays.enter(isa, BvhNode(line), here))?;
-                }
-                Child::Leaf(leaf) => {
-                    for _ in others {
-                        descent.leaf(memory, leaf)?;
-                    }
-                    let line = placed_leaf(descent.leaf(memory, leaf)?, instance, leaf)?;
-                    waiting &= !rays.meet(isa, (scene, memory), ([leaf, index], &line), here)?;
-                }
-            }
-        }
-        descent.end_group(visits_left);
-        Ok(all & !waiting)
-    }
-}
-
 /// Removes the lowest set bit and returns its index; `None` if no bit is set.
 #[inline(always)]
 fn take(rays: &mut u32) -> Option<usize> {
@@ -170,6 +124,7 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
         let mut stack = BvhStack::new();
         let sections = [SectionKind::Nodes, SectionKind::Triangles];
         let mut descent = Descent::with_root(scene, sections, &mut stack, waiting);
+        let mut group = None;
         while waiting != 0
             && let Some((bits, child)) = descent.pop()?
         {
@@ -177,6 +132,10 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
             // Each ray requests the line once; the first ray's request is the read below.
             let others = 1..here.count_ones();
             match child {
+                Child::Leaf(END_OF_GROUP) => {
+                    rays.set_space(None);
+                    leave(&mut group, &mut descent);
+                }
                 _ if here == 0 => {}
                 Child::Node(node) => {
                     for _ in others {
@@ -189,14 +148,19 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
                     for _ in others {
                         descent.leaf(memory, leaf)?;
                     }
-                    let line = *descent.leaf(memory, leaf)?;
-                    let done = match Instance::read(&line) {
-                        None => rays.meet(isa, (scene, memory), ([leaf, NO_INSTANCE], &line), here)?,
-                        Some(instance) => {
-                            rays.meet_group((scene, memory), (leaf, &instance), &mut descent, here)?
+                    let mut moved = [0; LINE_BYTES];
+                    let (line, instance) =
+                        moved_leaf(descent.leaf(memory, leaf)?, group.as_ref(), &mut moved);
+                    let line = *line;
+                    match Instance::read(&line) {
+                        None => {
+                            waiting &= !rays.meet(isa, (scene, memory), ([leaf, instance], &line), here)?;
                         }
-                    };
-                    waiting &= !done;
+                        Some(instance) => {
+                            rays.set_space(Some(&instance));
+                            enter(&mut group, (leaf, instance), &mut descent, here)?;
+                        }
+                    }
                 }
             }
         }
@@ -252,23 +216,16 @@ impl<'a, S: Search> Rays<'a, S> {
         bits
     }
 
-    /// Finds the hits of the rays `here` in an instance's group. Returns the rays that need no further hit.
+    /// Sets the rays for tests of boxes in the space of an instance's group, or in world space.
+    #[cold]
     #[inline(never)]
-    fn meet_group<M: MemoryPort>(
-        &mut self,
-        (scene, memory): (&SceneImage, &mut M),
-        instance: (u32, &Instance),
-        descent: &mut Descent<STACK>,
-        here: u32,
-    ) -> Result<u32, Fault> {
+    fn set_space(&mut self, instance: Option<&Instance>) {
         for way in &mut self.ways {
-            way.slabs = Slabs::new(&in_group(way.ray, instance.1));
+            way.slabs = match instance {
+                Some(instance) => Slabs::new(&in_group(way.ray, instance)),
+                None => Slabs::new(way.ray),
+            };
         }
-        let done = simd::run(InGroup { scene, memory, instance, descent, rays: self, here })?;
-        for way in &mut self.ways {
-            way.slabs = Slabs::new(way.ray);
-        }
-        Ok(done)
     }
 
     /// Finds the hits of the rays `here` in a leaf, given by its index and that of its instance. Returns the

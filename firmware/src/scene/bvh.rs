@@ -6,22 +6,23 @@
 use core::ops::ControlFlow;
 
 use glam::Vec3;
+use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::budget::BVH_STACK;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
     BvhLeaf, BvhNode, Child, Instance, LEAF_TRIANGLES, NO_INSTANCE, TriangleId, WideNode,
 };
-use photoncard_shared::message::Fault;
+use photoncard_shared::message::{Fault, FaultCode};
 
 use super::coverage::is_met;
 use super::flat_glass::of_flat_glass;
 use super::slabs::Slabs;
 use super::triangle::ShearedLeaf;
-use super::triangles::{in_group, placed_leaf};
+use super::triangles::{in_group, place_leaf};
 use super::{Hit, Intersection, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
-use crate::wide_tree::{Descent, END_OF_GROUP, Order, Stack};
+use crate::wide_tree::{Descent, END_OF_GROUP, Order, Outside, Stack};
 
 /// Closest hit of a ray. The lower triangle index breaks ties between equal distances.
 ///
@@ -172,32 +173,40 @@ fn descend<S: Search>(
     search: &mut S,
 ) -> Result<(), Fault> {
     let frame = RayFrame::new(ray);
-    let slabs = Slabs::new(ray);
+    let mut slabs = Slabs::new(ray);
     let mut until = ray.max_distance;
     let mut stack = BvhStack::new();
     let mut descent = Descent::new(scene, SectionKind::Nodes, SectionKind::Triangles, &mut stack);
+    let mut group: Option<Group> = None;
+    // A group ends with a leaf at the distance 0, which every limit includes.
     while let Some(part) = descent.next(until.to_bits())? {
         match part {
             Child::Node(node) => descent.enter(isa, memory, node, S::ORDER, |line| {
                 let children = WideNode(line).children() as usize;
                 slabs.enter(isa, BvhNode(line), children, until)
             })?,
+            Child::Leaf(END_OF_GROUP) => {
+                slabs = Slabs::new(ray);
+                leave(&mut group, &mut descent);
+            }
             Child::Leaf(leaf) => {
                 let line = descent.leaf(memory, leaf)?;
+                let mut moved = [0; LINE_BYTES];
+                let (line, instance) = moved_leaf(line, group.as_ref(), &mut moved);
                 let corners = BvhLeaf(line).all_corners();
                 let sheared = frame.leaf(isa, BvhLeaf(line), &corners);
-                let met = if sheared.may_meet == 0 {
+                if sheared.may_meet == 0 {
                     // An instance looks like a leaf without triangles.
-                    let Some(instance) = Instance::read(line) else { continue };
-                    let group = (leaf, &instance, &mut descent);
-                    meet_group(scene, memory, (ray, &frame), group, until, search)?
-                } else {
-                    // A copy, because reading textures of cut-outs borrows the memory too.
-                    let line = *line;
-                    let place = (ray, &frame, [leaf, NO_INSTANCE]);
-                    meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)?
-                };
-                match met {
+                    if let Some(instance) = Instance::read(line) {
+                        slabs = Slabs::new(&in_group(ray, &instance));
+                        enter(&mut group, (leaf, instance), &mut descent, 0)?;
+                    }
+                    continue;
+                }
+                // The line is copied, because reading textures of cut-outs borrows the memory too.
+                let line = *line;
+                let place = (ray, &frame, [leaf, instance]);
+                match meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)? {
                     ControlFlow::Continue(distance) => until = distance,
                     ControlFlow::Break(()) => return Ok(()),
                 }
@@ -207,68 +216,62 @@ fn descend<S: Search>(
     Ok(())
 }
 
+/// Group of an instance that a traversal is in.
+pub(super) struct Group {
+    /// Index of the instance's line.
+    index: u32,
+    instance: Instance,
+    outside: Outside,
+}
+
+/// Enters the group of an instance, whose root gets the distance bits `bits`.
+///
+/// # Errors
+/// [`FaultCode::Record`] in the group of another instance, [`FaultCode::Depth`] if the stack overflows.
+#[cold]
+#[inline(never)]
+pub(super) fn enter(
+    group: &mut Option<Group>,
+    (index, instance): (u32, Instance),
+    descent: &mut Descent<STACK>,
+    bits: u32,
+) -> Result<(), Fault> {
+    if group.is_some() {
+        return Err(Fault { code: FaultCode::Record, detail: index });
+    }
+    let outside = descent.begin_group(instance.root, bits)?;
+    *group = Some(Group { index, instance, outside });
+    Ok(())
+}
+
+/// Leaves a group at its end.
+#[cold]
+#[inline(never)]
+pub(super) fn leave(group: &mut Option<Group>, descent: &mut Descent<STACK>) {
+    if let Some(Group { outside, .. }) = group.take() {
+        descent.end_group(outside);
+    }
+}
+
+/// The leaf `line` in world space, and the index of its instance. In a group the leaf is written to `moved`.
+#[inline(always)]
+pub(super) fn moved_leaf<'l>(
+    line: &'l [u8; LINE_BYTES],
+    group: Option<&Group>,
+    moved: &'l mut [u8; LINE_BYTES],
+) -> (&'l [u8; LINE_BYTES], u32) {
+    let Some(Group { index, instance, .. }) = group else { return (line, NO_INSTANCE) };
+    if BvhLeaf(line).triangles() == 0 {
+        return (line, *index);
+    }
+    place_leaf(line, instance, moved);
+    (moved, *index)
+}
+
 pub(super) type BvhStack = Stack<STACK>;
 
 /// Entries of a [`BvhStack`].
 pub(super) const STACK: usize = BVH_STACK + LANES;
-
-/// Follows a ray through the group of an instance, as [`meet_leaf`] does through a leaf.
-#[inline(never)]
-fn meet_group<M: MemoryPort, S: Search>(
-    scene: &SceneImage,
-    memory: &mut M,
-    way: (&Ray, &RayFrame),
-    group: (u32, &Instance, &mut Descent<STACK>),
-    until: f32,
-    search: &mut S,
-) -> Result<ControlFlow<(), f32>, Fault> {
-    simd::run(InGroup { scene, memory, way, group, until, search })
-}
-
-/// Kernel of [`meet_group`].
-struct InGroup<'a, 's, 'd, M, S> {
-    scene: &'a SceneImage,
-    memory: &'a mut M,
-    way: (&'a Ray, &'a RayFrame),
-    /// Index of the instance's line, the instance, and the traversal that has met it.
-    group: (u32, &'a Instance, &'a mut Descent<'d, STACK>),
-    until: f32,
-    search: &'s mut S,
-}
-
-impl<M: MemoryPort, S: Search> Kernel for InGroup<'_, '_, '_, M, S> {
-    type Output = Result<ControlFlow<(), f32>, Fault>;
-
-    #[inline(always)]
-    fn run(self, isa: impl Isa) -> Self::Output {
-        let Self { scene, memory, way: (ray, frame), group: (index, instance, descent), mut until, search } =
-            self;
-        let slabs = Slabs::new(&in_group(ray, instance));
-        let visits_left = descent.begin_group(instance.root, 0)?;
-        // The group ends with a leaf at the distance 0, which every limit includes.
-        while let Some(part) = descent.next(until.to_bits())? {
-            match part {
-                Child::Leaf(END_OF_GROUP) => break,
-                Child::Node(node) => descent.enter(isa, memory, node, S::ORDER, |line| {
-                    let children = WideNode(line).children() as usize;
-                    slabs.enter(isa, BvhNode(line), children, until)
-                })?,
-                Child::Leaf(leaf) => {
-                    let line = placed_leaf(descent.leaf(memory, leaf)?, instance, leaf)?;
-                    let corners = BvhLeaf(&line).all_corners();
-                    let sheared = frame.leaf(isa, BvhLeaf(&line), &corners);
-                    let place = (ray, frame, [leaf, index]);
-                    match meet_leaf(scene, memory, place, (BvhLeaf(&line), &sheared), until, search)? {
-                        ControlFlow::Continue(distance) => until = distance,
-                        ControlFlow::Break(()) => return Ok(ControlFlow::Break(())),
-                    }
-                }
-            }
-        }
-        descent.end_group(visits_left);
-        Ok(ControlFlow::Continue(until))
-    }
-}
 
 /// Passes the hits of a ray in a leaf, up to the distance `until`, to `search`. Returns the new maximum
 /// distance, or [`ControlFlow::Break`] if no further hit is needed.

@@ -51,18 +51,9 @@ pub(super) fn in_group(ray: &Ray, instance: &Instance) -> Ray {
     Ray { origin, direction, ..*ray }
 }
 
-/// A leaf of an instance's group, in world space.
-///
-/// # Errors
-/// [`FaultCode::Record`] if the leaf is an instance.
-#[inline(always)]
-pub(super) fn placed_leaf(
-    line: &[u8; LINE_BYTES],
-    instance: &Instance,
-    leaf: u32,
-) -> Result<[u8; LINE_BYTES], Fault> {
-    if BvhLeaf(line).triangles() == 0 {
-        return Err(Fault { code: FaultCode::Record, detail: leaf });
-    }
-    Ok(BvhLeaf(line).placed(&instance.to_world))
+/// Writes a leaf of an instance's group, moved to world space, to `moved`.
+#[cold]
+#[inline(never)]
+pub(super) fn place_leaf(line: &[u8; LINE_BYTES], instance: &Instance, moved: &mut [u8; LINE_BYTES]) {
+    *moved = BvhLeaf(line).placed(&instance.to_world);
 }

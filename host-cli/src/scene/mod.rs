@@ -52,7 +52,7 @@ fn geometry(scene: &Scene) -> [String; 5] {
     let emissive = scene.emissive_triangles();
     let instances = match scene.instances.len() {
         0 => String::new(),
-        count => format!(", in {count} instances of {} groups and alone", scene.groups.len()),
+        count => format!("; {count} instances of {} meshes", scene.groups.len()),
     };
     [
         format!("triangles   {}, {emissive} of them emissive{instances}", scene.placed_triangles()),

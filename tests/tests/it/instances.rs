@@ -16,7 +16,7 @@ use photoncard_firmware::scene::{
 };
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
-use photoncard_shared::layout::{self, placed_normal, placed_point};
+use photoncard_shared::layout;
 use photoncard_shared::message::FaultCode;
 use photoncard_tests::{camera, glass, lambertian, mean, quad, radiances, render_or_panic, scene};
 
@@ -70,31 +70,6 @@ fn matte() -> Material {
     material
 }
 
-/// The scene with copies of the triangles in place of the instances.
-fn copied(scene: &Scene) -> Scene {
-    scene.clone().with(|scene| {
-        for instance in std::mem::take(&mut scene.instances) {
-            for triangle in &scene.groups[0] {
-                let place = |vertex: Vec3| placed_point(&instance.to_world, vertex.to_array()).into();
-                let attributes = scene.attributes.get(triangle.attributes as usize).map(|attributes| {
-                    let turned =
-                        |normal: Vec3| Vec3::from(placed_normal(&instance.to_group, normal.to_array()));
-                    let normals =
-                        attributes.normals.map(|normals| normals.map(|normal| turned(normal).normalize()));
-                    VertexAttributes { normals, ..*attributes }
-                });
-                let mut copy = Triangle { vertices: triangle.vertices.map(place), ..*triangle };
-                if let Some(attributes) = attributes {
-                    copy.attributes = scene.attributes.len() as u32;
-                    scene.attributes.push(attributes);
-                }
-                scene.triangles.push(copy);
-            }
-        }
-        scene.groups.clear();
-    })
-}
-
 fn rays(count: u32) -> Vec<Ray> {
     let ray = |index: u32| {
         let from = random_point(index, 20) * Vec3::new(12.0, 6.0, 12.0);
@@ -110,7 +85,8 @@ fn rays(count: u32) -> Vec<Ray> {
 #[test]
 fn rays_hit_instances_exactly_as_copies_of_their_triangles() {
     let scene = forest(matte());
-    let [instances, copies] = [&scene, &copied(&scene)].map(|scene| PackedScene::new(scene).expect("packs"));
+    let [instances, copies] =
+        [&scene, &scene.expanded(&[true])].map(|scene| PackedScene::new(scene).expect("packs"));
     let [(image, mut memory), (of_copies, mut memory_of_copies)] = [instances.view(), copies.view()];
     let rays = rays(20_000);
     let met = |hit: Option<Hit>| hit.map(|hit| (hit.intersection, hit.triangle));
@@ -180,8 +156,8 @@ fn instances_are_lit_as_copies_of_their_triangles() {
         }
     });
     for scene in [forest(matte()), bent] {
-        let [instances, copies] =
-            [&scene, &copied(&scene)].map(|scene| blocks(&pictured(scene, GatherOrder::Sort, "emulated:1")));
+        let [instances, copies] = [&scene, &scene.expanded(&[true])]
+            .map(|scene| blocks(&pictured(scene, GatherOrder::Sort, "emulated:1")));
         let ratio = instances.iter().sum::<f64>() / copies.iter().sum::<f64>();
         assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
         for (instance, copy) in instances.iter().zip(&copies) {

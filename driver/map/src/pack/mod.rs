@@ -56,11 +56,14 @@ impl PackedScene {
     /// If the geometry exceeds a chip's limits or this process's memory, or there are more textures or lights
     /// than a chip can index.
     pub fn new(scene: &Scene) -> Result<Self, PackError> {
-        let expanded = scene.expanded();
-        let scene = expanded.as_ref().unwrap_or(scene);
-        let triangles = scene.stored_triangles().count() + scene.instances.len();
+        let groups = scene.expanded_groups();
+        let expands = groups.contains(&true);
+        let stored = scene.stored_triangles().count() + scene.instances.len();
+        let triangles = if expands { scene.placed_triangles() as usize } else { stored };
         allocation::check(BYTES_OF_A_TRIANGLE * triangles as u64)
             .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles, bytes })?;
+        let expanded = expands.then(|| scene.expanded(&groups));
+        let scene = expanded.as_ref().unwrap_or(scene);
         let part = detail::detailed_part(scene);
         let split = part.map(|part| detail::split_around(scene, part));
         let scene = split.as_ref().unwrap_or(scene);

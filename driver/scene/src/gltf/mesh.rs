@@ -65,13 +65,10 @@ impl<'a> MeshPlacer<'a> {
 
     /// Decides which of the counted meshes are placed as instances of groups.
     pub(super) fn choose_groups(&mut self, scene: &Scene) {
-        let focuses = scene.specular_materials();
+        let copied = scene.copied_materials();
         let is_plain = |primitive: &Primitive<'_>| {
             let material = primitive.material as usize;
-            primitive.influences.is_empty()
-                && primitive.targets.is_empty()
-                && !focuses[material]
-                && !scene.materials[material].is_emissive()
+            primitive.influences.is_empty() && primitive.targets.is_empty() && !copied[material]
         };
         for (&mesh, &times) in &self.placed {
             let Some(primitives) = self.prepared.get(&mesh) else { continue };
