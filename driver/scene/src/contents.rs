@@ -87,7 +87,7 @@ impl SceneContents {
             sum.update(&triangle.material.to_le_bytes());
             sum.update(&triangle.attributes.to_le_bytes());
         }
-        self.groups.iter().for_each(|group| sum.update(&group.len().to_le_bytes()));
+        self.groups.iter().for_each(|group| sum.update(&(group.len() as u64).to_le_bytes()));
         for instance in &self.instances {
             sum.update(&instance.group.to_le_bytes());
             add(&mut sum, instance.to_world.as_flattened());

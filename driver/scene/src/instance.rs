@@ -1,6 +1,6 @@
 //! Groups of triangles, and their instances in the scene.
 
-use glam::{DMat4, Vec3};
+use glam::{DMat3, DMat4, DVec3, Vec3};
 use photoncard_shared::layout::{Rows, placed_normal, placed_point};
 
 use crate::triangle::VertexAttributes;
@@ -16,20 +16,27 @@ pub struct Instance {
     pub to_group: Rows,
 }
 
-/// Minimum and maximum of the absolute values of a transform's determinant at which it has an inverse in
+/// Minimum and maximum of a transform's determinant at which it has an inverse in
 /// single precision.
 const DETERMINANTS: [f64; 2] = [1e-18, 1e18];
 
 impl Instance {
+    /// Returns whether a transform mirrors; `None` if no instance can have it, as it is too close to one
+    /// without an inverse.
+    pub(crate) fn mirrors(to_world: &DMat4) -> Option<bool> {
+        let [least, greatest] = DETERMINANTS;
+        let determinant = DMat3::from_mat4(*to_world).determinant();
+        (least..greatest).contains(&determinant.abs()).then_some(determinant < 0.0)
+    }
+
     /// Creates an instance; `None` if the transform mirrors, or is too close to one without an inverse.
     pub fn new(group: u32, to_world: &DMat4) -> Option<Self> {
-        let [least, greatest] = DETERMINANTS;
-        let determinant = to_world.determinant();
+        let mirrors = Self::mirrors(to_world)?;
         let to_world = rows(to_world);
         let of_rounded = DMat4::from_cols_array(&columns(&to_world));
         let to_group = rows(&of_rounded.inverse());
         let is_finite = to_world.iter().chain(&to_group).flatten().all(|value| value.is_finite());
-        (is_finite && (least..greatest).contains(&determinant)).then_some(Self { group, to_world, to_group })
+        (is_finite && !mirrors).then_some(Self { group, to_world, to_group })
     }
 
     /// Lower and upper corner of the box around the instance, metres, given those of its group.
@@ -41,10 +48,11 @@ impl Instance {
         (1..8).map(corner).fold([corner(0); 2], |[low, high], corner| [low.min(corner), high.max(corner)])
     }
 
-    /// Factor by which the transform enlarges areas, averaged over directions as for a uniform scale.
+    /// Factor by which the transform enlarges areas: the mean over areas perpendicular to the axes.
     pub fn area_factor(&self) -> f64 {
-        let matrix = DMat4::from_cols_array(&columns(&self.to_world));
-        matrix.determinant().abs().powf(2.0 / 3.0)
+        let column = |axis: usize| DVec3::from(self.to_world.map(|row| f64::from(row[axis])));
+        let [x, y, z] = [0, 1, 2].map(column);
+        [y.cross(z), z.cross(x), x.cross(y)].map(DVec3::length).iter().sum::<f64>() / 3.0
     }
 
     /// Attributes of a copy of a triangle of the group.

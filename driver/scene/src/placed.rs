@@ -59,10 +59,23 @@ impl Scene {
     /// The scene with the instances of the chosen groups expanded to triangles in world space.
     pub fn expanded(&self, groups: &[bool]) -> Self {
         self.clone().with(|scene| {
-            let instances = std::mem::take(&mut scene.instances).into_iter();
-            let (expanded, kept) = instances.partition(|instance| groups[instance.group as usize]);
-            scene.instances = kept;
-            Vec::into_iter(expanded).for_each(|instance| scene.add_triangles(&instance));
+            let (expanded, kept) = std::mem::take(&mut scene.instances)
+                .into_iter()
+                .partition::<Vec<Instance>, _>(|instance| groups[instance.group as usize]);
+            expanded.iter().for_each(|instance| scene.add_triangles(instance));
+            // Groups without instances would still be stored on a card.
+            let mut expands = groups.iter();
+            scene.groups.retain(|_| expands.next() == Some(&false));
+            let mut next = 0;
+            let number = |expands: &bool| {
+                let number = next;
+                next += u32::from(!expands);
+                number
+            };
+            let numbers: Vec<u32> = groups.iter().map(number).collect();
+            let renumbered =
+                |instance: Instance| Instance { group: numbers[instance.group as usize], ..instance };
+            scene.instances = kept.into_iter().map(renumbered).collect();
         })
     }
 }

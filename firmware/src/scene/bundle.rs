@@ -16,7 +16,6 @@ use photoncard_shared::message::{Fault, Invariant};
 
 use super::bvh::{BvhStack, Passed, Search, closest_hit, enter, leave, meet_leaf, moved_leaf, transmittance};
 use super::slabs::Slabs;
-use super::triangles::in_group;
 use super::{Hit, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
@@ -133,7 +132,7 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
             let others = 1..here.count_ones();
             match child {
                 Child::Leaf(END_OF_GROUP) => {
-                    rays.set_space(None);
+                    rays.set_space(None, 0.0);
                     leave(&mut group, &mut descent);
                 }
                 _ if here == 0 => {}
@@ -157,7 +156,7 @@ impl<M: MemoryPort, S: Search> Kernel for Bundle<'_, M, S> {
                             waiting &= !rays.meet(isa, (scene, memory), ([leaf, instance], &line), here)?;
                         }
                         Some(instance) => {
-                            rays.set_space(Some(&instance));
+                            rays.set_space(Some(&instance), scene.header.reach);
                             enter(&mut group, (leaf, instance), &mut descent, here)?;
                         }
                     }
@@ -216,13 +215,14 @@ impl<'a, S: Search> Rays<'a, S> {
         bits
     }
 
-    /// Sets the rays for tests of boxes in the space of an instance's group, or in world space.
+    /// Sets the rays for tests of boxes in the space of an instance's group, or in world space. `reach` is the
+    /// greatest absolute coordinate of the scene.
     #[cold]
     #[inline(never)]
-    fn set_space(&mut self, instance: Option<&Instance>) {
+    fn set_space(&mut self, instance: Option<&Instance>, reach: f32) {
         for way in &mut self.ways {
             way.slabs = match instance {
-                Some(instance) => Slabs::new(&in_group(way.ray, instance)),
+                Some(instance) => Slabs::in_group(way.ray, instance, reach),
                 None => Slabs::new(way.ray),
             };
         }

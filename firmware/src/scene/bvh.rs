@@ -18,7 +18,7 @@ use super::coverage::is_met;
 use super::flat_glass::of_flat_glass;
 use super::slabs::Slabs;
 use super::triangle::ShearedLeaf;
-use super::triangles::{in_group, place_leaf};
+use super::triangles::place_leaf;
 use super::{Hit, Intersection, Ray, RayFrame, SceneImage};
 use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
@@ -198,7 +198,7 @@ fn descend<S: Search>(
                 if sheared.may_meet == 0 {
                     // An instance looks like a leaf without triangles.
                     if let Some(instance) = Instance::read(line) {
-                        slabs = Slabs::new(&in_group(ray, &instance));
+                        slabs = Slabs::in_group(ray, &instance, scene.header.reach);
                         enter(&mut group, (leaf, instance), &mut descent, 0)?;
                     }
                     continue;

@@ -8,11 +8,11 @@
 //! decreased for near planes and increased for far planes by more than its rounding error plus that of the
 //! triangle test. Boxes are enlarged by more than the rounding error of the second term and of the sum.
 
-use photoncard_shared::layout::{BvhAxis, BvhNode, NODE_CHILDREN};
+use photoncard_shared::layout::{BvhAxis, BvhNode, Instance, NODE_CHILDREN, placed_point, placed_vector};
 
 use super::Ray;
 use crate::simd::{Isa, LANES};
-use crate::vector::{max, min};
+use crate::vector::{max, max_component, min};
 use crate::wide_tree::BEYOND;
 
 /// Ray, prepared for slab tests: origin and reciprocal direction, by axis.
@@ -26,6 +26,8 @@ struct SlabAxis {
     inverse: f32,
     /// True if the reciprocal is negative, so that the upper side of a box is nearer.
     is_downwards: bool,
+    /// Margin for the rounding of a ray in a group's space, as a distance along the ray; 0 in world space.
+    slack: f32,
 }
 
 /// Margin for rounding errors, as a fraction of the distance to the planes of a node's corner.
@@ -41,6 +43,23 @@ impl Slabs {
         let [x, y, z] = ray.direction.to_array();
         let [a, b, c] = ray.origin.to_array();
         Self { axes: [SlabAxis::new(a, x), SlabAxis::new(b, y), SlabAxis::new(c, z)] }
+    }
+
+    /// Prepares a ray, in world space, for boxes in the space of an instance's group. `reach` is the greatest
+    /// absolute coordinate of the scene.
+    pub(super) fn in_group(ray: &Ray, instance: &Instance, reach: f32) -> Self {
+        let rows = &instance.to_group;
+        let [origin, direction] =
+            [placed_point(rows, ray.origin.to_array()), placed_vector(rows, ray.direction.to_array())];
+        let mut slabs = Self::new(&Ray { origin: origin.into(), direction: direction.into(), ..*ray });
+        // The ray meets the instance nearer than this. The rounding errors of its origin, of its direction
+        // over this distance, and of the triangles' vertices are relative to the terms of their sums.
+        let far = 2.0 * (reach + max_component(ray.origin.abs()));
+        for (axis, [a, b, c, d]) in slabs.axes.iter_mut().zip(rows) {
+            let terms = (a.abs() + b.abs() + c.abs()) * (2.0 * far) + d.abs();
+            axis.slack = MARGIN * terms * axis.inverse.abs();
+        }
+        slabs
     }
 
     /// Bits of the distance at which the ray enters each child's box; [`BEYOND`] if the ray misses the box or
@@ -67,14 +86,14 @@ impl SlabAxis {
     #[inline(always)]
     fn new(origin: f32, direction: f32) -> Self {
         let inverse = 1.0 / if direction.abs() < MIN_COMPONENT { MIN_COMPONENT } else { direction };
-        Self { origin, inverse, is_downwards: inverse < 0.0 }
+        Self { origin, inverse, is_downwards: inverse < 0.0, slack: 0.0 }
     }
 
     /// Distances along the ray to the planes of a node's boxes on this axis.
     #[inline(always)]
     fn planes<'a>(&self, axis: &BvhAxis<'a>) -> Planes<'a> {
         let corner = (axis.corner - self.origin) * self.inverse;
-        let margin = corner.abs() * MARGIN;
+        let margin = corner.abs() * MARGIN + self.slack;
         let (near, far) = if self.is_downwards { (axis.upper, axis.lower) } else { (axis.lower, axis.upper) };
         Planes { near, far, first: corner - margin, last: corner + margin, unit: axis.unit * self.inverse }
     }

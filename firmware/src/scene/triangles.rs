@@ -3,11 +3,11 @@
 use photoncard_shared::address::LINE_BYTES;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout::{
-    BvhLeaf, Instance, LEAF_TRIANGLES, NO_INSTANCE, Triangle, TriangleId, placed_point, placed_vector,
+    BvhLeaf, Instance, LEAF_TRIANGLES, NO_INSTANCE, Triangle, TriangleId, placed_point,
 };
 use photoncard_shared::message::{Fault, FaultCode};
 
-use super::{Ray, SceneImage};
+use super::SceneImage;
 use crate::memory::MemoryPort;
 
 /// Reads a triangle, in world space.
@@ -41,14 +41,6 @@ pub(super) fn read_instance(
 ) -> Result<Instance, Fault> {
     let line = scene.line(memory, SectionKind::Triangles, index, 0..LINE_BYTES as u32)?;
     Instance::read(line).ok_or(Fault { code: FaultCode::Record, detail: index })
-}
-
-/// A ray in the space of an instance's group. Distances along it are those along the ray in world space.
-#[inline(always)]
-pub(super) fn in_group(ray: &Ray, instance: &Instance) -> Ray {
-    let origin = placed_point(&instance.to_group, ray.origin.to_array()).into();
-    let direction = placed_vector(&instance.to_group, ray.direction.to_array()).into();
-    Ray { origin, direction, ..*ray }
 }
 
 /// Writes a leaf of an instance's group, moved to world space, to `moved`.

@@ -55,10 +55,6 @@ impl<'a> Content<'a> {
     fn stored(&self) -> impl Iterator<Item = &'a Triangle> {
         self.triangles.iter().chain(self.groups.iter().flatten())
     }
-
-    fn boxes(&self) -> Vec<Aabb> {
-        self.triangles.iter().map(bounding_box).collect()
-    }
 }
 
 /// Triangles with the flags of their materials, from which leaves are encoded. Indices from the number of
@@ -126,11 +122,11 @@ const SEARCH_DEPTH: usize = 2;
 /// overflow the chip's stack.
 pub fn build(content: Content, finishes: Finishes) -> Result<Hierarchy, HierarchyError> {
     check(content)?;
-    let padding = paddings(content);
-    let groups: Vec<Vec<Aabb>> =
-        content.groups.iter().zip(&padding).map(|(group, &padding)| padded_boxes(group, padding)).collect();
-    let mut boxes = content.boxes();
-    boxes.extend(content.instances.iter().map(|instance| around_instance(instance, &groups)));
+    let of = |triangles: &[Triangle]| -> Vec<Aabb> { triangles.iter().map(bounding_box).collect() };
+    let groups: Vec<Vec<Aabb>> = content.groups.iter().map(|group| of(group)).collect();
+    let mut boxes = of(content.triangles);
+    let around_groups: Vec<Aabb> = groups.iter().map(|boxes| around_all(boxes)).collect();
+    boxes.extend(content.instances.iter().map(|instance| around_instance(instance, &around_groups)));
     if !boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds)).half_area().is_finite() {
         return Err(HierarchyError::NotFinite);
     }
@@ -163,47 +159,17 @@ fn check(content: Content) -> Result<(), HierarchyError> {
     if is_finite { Ok(()) } else { Err(HierarchyError::NotFinite) }
 }
 
-/// Rounding error of a point that is transformed to a group's space, relative to the sum of its terms.
+/// Margin of an instance's box for the rounding of its vertices, relative to the greatest coordinate.
 const ROUNDING: f32 = 32.0 * f32::EPSILON;
-
-/// Margin of the boxes of each group for the rounding of the rays that are transformed to its space, in this
-/// space. Rays begin within the scene or at most at 30 times its distance from the origin.
-fn paddings(content: Content) -> Vec<f32> {
-    let groups: Vec<Aabb> =
-        content.groups.iter().map(|group| around_all(&padded_boxes(group, 0.0))).collect();
-    let greatest = |bounds: &Aabb| bounds.min.abs().max(bounds.max.abs()).max_element();
-    let outside = content.boxes().into_iter().chain(content.instances.iter().map(|instance| {
-        let Aabb { min, max } = groups[instance.group as usize];
-        let [min, max] = instance.bounds([min.into(), max.into()]);
-        Aabb { min: min.into(), max: max.into() }
-    }));
-    let reach = outside.map(|bounds| greatest(&bounds)).fold(0.0, f32::max);
-    let mut padding = vec![0.0_f32; groups.len()];
-    for instance in content.instances {
-        let group = instance.group as usize;
-        let terms = |[a, b, c, d]: &[f32; 4]| (a.abs() + b.abs() + c.abs()) * reach + d.abs();
-        let terms = instance.to_group.iter().map(terms).fold(greatest(&groups[group]), f32::max);
-        padding[group] = padding[group].max(ROUNDING * terms);
-    }
-    padding
-}
-
-fn padded_boxes(triangles: &[Triangle], padding: f32) -> Vec<Aabb> {
-    let padded = |triangle| {
-        let Aabb { min, max } = bounding_box(triangle);
-        Aabb { min: min - padding, max: max + padding }
-    };
-    triangles.iter().map(padded).collect()
-}
 
 fn around_all(boxes: &[Aabb]) -> Aabb {
     boxes.iter().fold(Aabb::empty(), |all, bounds| all.union(bounds))
 }
 
-/// Box around an instance, with a margin for the rounding of its vertices. `groups` are the boxes of the
-/// groups' triangles.
-fn around_instance(instance: &Instance, groups: &[Vec<Aabb>]) -> Aabb {
-    let Aabb { min, max } = around_all(&groups[instance.group as usize]);
+/// Box around an instance, with a margin for the rounding of its vertices. `groups` are the boxes around
+/// the groups.
+fn around_instance(instance: &Instance, groups: &[Aabb]) -> Aabb {
+    let Aabb { min, max } = groups[instance.group as usize];
     let [min, max] = instance.bounds([min.into(), max.into()]);
     let margin = ROUNDING * min.abs().max(max.abs()).max_element();
     Aabb { min: (min - margin).into(), max: (max + margin).into() }

@@ -10,6 +10,8 @@ use photoncard_shared::message::Fault;
 pub(super) struct Met {
     /// Distance from the ray's origin, metres.
     pub(super) distance: f32,
+    /// Corners of the triangle, metres.
+    pub(super) corners: [Vec3; 3],
     /// Unit normal of the triangle's front.
     pub(super) normal: Vec3,
     pub(super) triangle: TriangleId,
@@ -18,9 +20,10 @@ pub(super) struct Met {
 /// Finds the nearest triangle along a ray.
 pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -> Result<Option<Met>, Fault> {
     let Some(hit) = closest_hit(scene, &mut memory, ray)? else { return Ok(None) };
-    let [a, b, c] = hit.triangle.vertices.map(Vec3::from);
+    let corners = hit.triangle.vertices.map(Vec3::from);
+    let [a, b, c] = corners;
     let normal = (b - a).cross(c - a).normalize_or_zero();
-    Ok(Some(Met { distance: hit.intersection.distance, normal, triangle: hit.id }))
+    Ok(Some(Met { distance: hit.intersection.distance, corners, normal, triangle: hit.id }))
 }
 
 /// Finds all triangles on the segment between two points. After each hit the ray continues `step` metres

@@ -30,15 +30,12 @@ pub(super) struct Sides {
 }
 
 impl Sides {
-    /// The sides of a triangle with these corners in world space, from those in the space of its group.
-    #[inline(always)]
-    pub(super) fn turned(mut self, triangle: TriangleId, [a, b, c]: [Vec3; 3]) -> Self {
-        if triangle.instance != NO_INSTANCE {
-            let normal = (b - a).cross(c - a).normalize_or_zero();
-            let codes = [normal, -normal].map(|normal| encode_normal(normal.to_array()));
-            for (own, code) in self.normals.iter_mut().zip(codes) {
-                *own = own.map(|_| code);
-            }
+    /// The sides with the normals of a triangle with these corners.
+    fn turned(mut self, [a, b, c]: [Vec3; 3]) -> Self {
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        let codes = [normal, -normal].map(|normal| encode_normal(normal.to_array()));
+        for (own, code) in self.normals.iter_mut().zip(codes) {
+            *own = own.map(|_| code);
         }
         self
     }
@@ -123,10 +120,16 @@ impl SideTable {
         Ok(table)
     }
 
-    /// Sides of a triangle, in the space of its group; for an index out of range, sides without photons.
+    /// Sides of a triangle with these corners, in any unit; for an index out of range, sides without photons.
     #[inline(always)]
-    pub(super) fn of(&self, triangle: TriangleId) -> Sides {
-        self.sides.get(triangle.index as usize).copied().unwrap_or_default()
+    pub(super) fn of(&self, triangle: TriangleId, corners: [Vec3; 3]) -> Sides {
+        let sides = self.sides.get(triangle.index as usize).copied().unwrap_or_default();
+        if triangle.instance == NO_INSTANCE { sides } else { sides.turned(corners) }
+    }
+
+    /// Returns whether a triangle has cut-outs.
+    pub(super) fn is_cut_out(&self, triangle: TriangleId) -> bool {
+        self.sides.get(triangle.index as usize).is_some_and(|sides| sides.has_cut_outs)
     }
 
     /// Marks double-sided triangles that form closed surfaces as solid, because no light enters, unless they

@@ -85,7 +85,7 @@ impl Surroundings {
             let normal = (b - a).cross(c - a).normalize_or_zero();
             let is_along = normal.dot(*plane.get_or_insert(normal)) >= MIN_PLAIN_COSINE;
             let is_at = normal.dot(a).abs() <= lift;
-            let own = sides.of(id).turned(id, corners);
+            let own = sides.of(id, corners);
             let (is_side, is_whole) = (own.normal(true) == Some(wall.normal), !own.has_cut_outs);
             is_along && is_at && is_side && is_whole && triangles.push(corners).is_ok()
         });
@@ -113,7 +113,7 @@ impl Surroundings {
             for (lanes, corner) in block.corners.iter_mut().zip(corners) {
                 set(lanes, lane, *corner);
             }
-            (block.triangles[lane], block.sides[lane]) = (Some(id), sides.of(id).turned(id, *corners));
+            (block.triangles[lane], block.sides[lane]) = (Some(id), sides.of(id, *corners));
             block.are_solid |= u32::from(block.sides[lane].is_solid) << lane;
         }
         true

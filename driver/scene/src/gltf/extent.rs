@@ -118,7 +118,12 @@ impl Extent<'_, '_, '_> {
         let primitives = self.meshes.primitives(mesh, scene)?;
         let shown = primitives.iter().filter(|primitive| primitive.triangles > 0);
         let triangles = shown.clone().map(|primitive| primitive.triangles).sum();
-        let locals = Local { bounds: shown.map(local).collect(), triangles };
+        let mut bounds: Vec<Bounds> = shown.map(local).collect();
+        if self.meshes.is_grouped(mesh) {
+            // One box bounds the time, which grows with boxes times instances.
+            bounds = bounds.into_iter().reduce(Bounds::joined).into_iter().collect();
+        }
+        let locals = Local { bounds, triangles };
         self.locals.insert(mesh, locals.clone());
         Ok(locals)
     }

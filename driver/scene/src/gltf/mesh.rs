@@ -24,16 +24,38 @@ use crate::{Instance, Scene, Triangle};
 pub(super) struct MeshPlacer<'a> {
     source: &'a Source<'a>,
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,
-    /// Number of counted instances of each mesh.
-    placed: BTreeMap<usize, u64>,
+    /// Number of counted copies of each mesh.
+    placed: BTreeMap<usize, Copies>,
+    /// Number of all counted copies.
+    counted: usize,
     /// Meshes that are placed as instances of groups.
     grouped: BTreeSet<usize>,
-    /// Index in the scene of the group of each mesh that is placed, mirrored or not.
-    groups: BTreeMap<(usize, bool), u32>,
+    /// Index in the scene of the group of each mesh that is placed, mirrored or not; `None` if the group has
+    /// no area.
+    groups: BTreeMap<(usize, bool), Option<u32>>,
     /// Indices of meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
     /// Indices of meshes with a primitive whose last vertices form no whole triangle.
     pub(super) incomplete: BTreeSet<usize>,
+}
+
+/// Number of copies of a mesh, by their transforms.
+#[derive(Clone, Copy, Default)]
+struct Copies {
+    /// Copies that can be instances of the mesh's group, and of its mirrored group.
+    instances: [u64; 2],
+    others: u64,
+}
+
+impl Copies {
+    fn all(&self) -> u64 {
+        self.instances.iter().fold(self.others, |all, count| all.saturating_add(*count))
+    }
+
+    /// Number of copies whose triangles need not be stored if there are groups.
+    fn saved(&self) -> u64 {
+        self.instances.iter().fold(0, |saved: u64, count| saved.saturating_add(count.saturating_sub(1)))
+    }
 }
 
 /// Minimum number of triangles that groups save, for a mesh to be placed as instances of a group. Instances
@@ -50,6 +72,7 @@ impl<'a> MeshPlacer<'a> {
             source,
             prepared: BTreeMap::new(),
             placed: BTreeMap::new(),
+            counted: 0,
             grouped: BTreeSet::new(),
             groups: BTreeMap::new(),
             not_finite: NotFinite::default(),
@@ -57,10 +80,20 @@ impl<'a> MeshPlacer<'a> {
         }
     }
 
-    /// Counts `instances` instances of mesh `index`.
-    pub(super) fn count(&mut self, index: usize, instances: u64) {
-        let placed = self.placed.entry(index).or_default();
-        *placed = placed.saturating_add(instances);
+    /// Counts a copy of mesh `index` with this world transform, at most [`MAX_TRIANGLES`] in all.
+    pub(super) fn count(&mut self, index: usize, world: &DMat4) -> Result<(), SceneError> {
+        let Copies { instances, others } = self.placed.entry(index).or_default();
+        let counted = match Instance::mirrors(world) {
+            Some(mirrors) => &mut instances[usize::from(mirrors)],
+            None => others,
+        };
+        *counted += 1;
+        self.counted += 1;
+        if self.counted > MAX_TRIANGLES { Err(self.too_many()) } else { Ok(()) }
+    }
+
+    fn too_many(&self) -> SceneError {
+        SceneError::TooManyTriangles { file: self.source.document.path.clone(), limit: MAX_TRIANGLES }
     }
 
     /// Decides which of the counted meshes are placed as instances of groups.
@@ -70,9 +103,9 @@ impl<'a> MeshPlacer<'a> {
             let material = primitive.material as usize;
             primitive.influences.is_empty() && primitive.targets.is_empty() && !copied[material]
         };
-        for (&mesh, &times) in &self.placed {
+        for (&mesh, copies) in &self.placed {
             let Some(primitives) = self.prepared.get(&mesh) else { continue };
-            let saved = triangles_and_primitives(primitives).saturating_mul(times.saturating_sub(1));
+            let saved = triangles_and_primitives(primitives).saturating_mul(copies.saved());
             if saved >= MIN_SAVED && primitives.iter().all(is_plain) {
                 self.grouped.insert(mesh);
             }
@@ -82,16 +115,16 @@ impl<'a> MeshPlacer<'a> {
     /// Checks that all counted meshes together have at most [`MAX_TRIANGLES`] triangles and instances, and
     /// that a card has room for them.
     pub(super) fn check_room(&self, room: &mut Room) -> Result<(), SceneError> {
-        let work = self.placed.iter().fold(0_u64, |work, (mesh, &times)| {
+        let work = self.placed.iter().fold(0_u64, |work, (mesh, copies)| {
             let of_one = self.prepared.get(mesh).map_or(0, |primitives| triangles_and_primitives(primitives));
-            work.saturating_add(self.copies(*mesh, times).saturating_mul(of_one)).saturating_add(times)
+            let copied = self.copies(*mesh, copies).saturating_mul(of_one);
+            work.saturating_add(copied).saturating_add(copies.all())
         });
         if work > MAX_TRIANGLES as u64 {
-            let file = self.source.document.path.clone();
-            return Err(SceneError::TooManyTriangles { file, limit: MAX_TRIANGLES });
+            return Err(self.too_many());
         }
-        let of_groups = self.grouped.iter().map(|mesh| self.placed.get(mesh).copied().unwrap_or(0));
-        room.instances(of_groups.sum())?;
+        let of_groups = self.grouped.iter().filter_map(|mesh| self.placed.get(mesh));
+        room.instances(of_groups.map(Copies::all).sum())?;
         let triangles = self.placed().map(|(primitive, times)| primitive.triangles * times).sum();
         // Shared vertices are counted only if an upper bound of the triangles' size exceeds the memory.
         if room.fits_any(triangles) {
@@ -108,15 +141,20 @@ impl<'a> MeshPlacer<'a> {
         room.triangles(triangles, bytes)
     }
 
-    /// Number of copies of the triangles of a mesh that is placed `times` times.
-    fn copies(&self, mesh: usize, times: u64) -> u64 {
-        if self.grouped.contains(&mesh) { times.min(1) } else { times }
+    /// Number of times that the triangles of a mesh are stored.
+    fn copies(&self, mesh: usize, copies: &Copies) -> u64 {
+        if self.grouped.contains(&mesh) { copies.all() - copies.saved() } else { copies.all() }
+    }
+
+    /// Returns whether mesh `index` is placed as instances of groups.
+    pub(super) fn is_grouped(&self, index: usize) -> bool {
+        self.grouped.contains(&index)
     }
 
     /// Counted primitives, each with its number of copies.
     fn placed(&self) -> impl Iterator<Item = (&Primitive<'a>, u64)> {
-        self.placed.iter().flat_map(|(mesh, &times)| {
-            let times = self.copies(*mesh, times);
+        self.placed.iter().flat_map(|(mesh, copies)| {
+            let times = self.copies(*mesh, copies);
             let primitives = self.prepared.get(mesh).into_iter().flat_map(|primitives| primitives.iter());
             primitives.map(move |primitive| (primitive, times))
         })
@@ -154,16 +192,19 @@ impl<'a> MeshPlacer<'a> {
     ) -> Result<bool, SceneError> {
         // The group of mirrored instances is mirrored itself, so that its transforms are not.
         let mirror = DMat4::from_scale(DVec3::new(if world.is_mirror { -1.0 } else { 1.0 }, 1.0, 1.0));
-        let known = self.groups.get(&(index, world.is_mirror)).copied();
-        let group = known.unwrap_or(scene.groups.len() as u32);
-        let Some(instance) = Instance::new(group, &(world.matrix * mirror)) else { return Ok(false) };
-        if known.is_none() {
+        let Some(instance) = Instance::new(0, &(world.matrix * mirror)) else { return Ok(false) };
+        let key = (index, world.is_mirror);
+        if !self.groups.contains_key(&key) {
             let outside = std::mem::take(&mut scene.triangles);
             self.place_triangles(index, &Pose::new(mirror, None, &[]), scene)?;
             let triangles = std::mem::replace(&mut scene.triangles, outside);
-            scene.groups.push(triangles);
-            self.groups.insert((index, world.is_mirror), group);
+            let group = (!triangles.is_empty()).then_some(scene.groups.len() as u32);
+            scene.groups.extend(group.map(|_| triangles));
+            self.groups.insert(key, group);
         }
+        // A group without an area has no instances.
+        let Some(group) = self.groups.get(&key).copied().flatten() else { return Ok(true) };
+        let instance = Instance { group, ..instance };
         allocation::push(&mut scene.instances, instance).map_err(|error| {
             SceneError::memory(&self.source.document.path, "placing its instances", error)
         })?;

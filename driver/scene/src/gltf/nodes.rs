@@ -49,7 +49,7 @@ pub(super) fn place(
         skins: BTreeMap::new(),
         worlds: Vec::new(),
     };
-    nodes.iter().try_for_each(|(index, _)| placer.count(*index, scene))?;
+    nodes.iter().try_for_each(|(index, world)| placer.count(*index, world, scene))?;
     placer.meshes.choose_groups(scene);
     placer.meshes.check_room(room)?;
     let nodes = walk(document, poses, Some(placer.anchor(anchor, scene)?))?;
@@ -89,8 +89,8 @@ struct Placer<'a> {
 }
 
 impl<'a> Placer<'a> {
-    /// Counts the triangles of all instances of a node's mesh.
-    fn count(&mut self, index: usize, scene: &mut Scene) -> Result<(), SceneError> {
+    /// Counts the copies of a node's mesh.
+    fn count(&mut self, index: usize, world: &DMat4, scene: &mut Scene) -> Result<(), SceneError> {
         let node = &self.source.document.root.nodes[index];
         let Some(mesh) = node.mesh.map(|mesh| mesh.value()) else { return Ok(()) };
         // The limit is on the instances' triangles and primitives, of which an empty mesh has none.
@@ -101,7 +101,11 @@ impl<'a> Placer<'a> {
             Some(_) => None,
             None => Instances::of(self.source, index, node)?,
         };
-        self.meshes.count(mesh, instances.map_or(1, |instances| instances.count));
+        let Some(instances) = instances else { return self.meshes.count(mesh, world) };
+        for instance in 0..instances.count {
+            let local = instances.transform(self.source, instance)?;
+            self.meshes.count(mesh, &(*world * local))?;
+        }
         Ok(())
     }
 

@@ -36,6 +36,11 @@ impl Bounds {
         }
     }
 
+    /// The box around both boxes.
+    pub(super) fn joined(self, other: Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
     /// Extends the box by the transformed box `local`.
     pub(super) fn add_placed(&mut self, transform: &DMat4, local: &Self) {
         if !local.low.is_finite() {

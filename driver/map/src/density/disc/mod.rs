@@ -421,7 +421,7 @@ impl<'a> Meter<'a> {
         let [tangent, bitangent, normal] = frame.axes;
         let mut fault = None;
         for (batch, layers) in crossings.layers.iter_mut().enumerate() {
-            for layer in layers.iter_mut().filter(|layer| sides.of(layer.triangle).has_cut_outs) {
+            for layer in layers.iter_mut().filter(|layer| sides.is_cut_out(layer.triangle)) {
                 let triangle = layer.triangle;
                 layer.retain(|lane, height| {
                     let [x, y] = chords.point(batch * LANES + lane);
@@ -501,7 +501,7 @@ impl<'a> Meter<'a> {
             for met in all_on_way(scene, *memory, [place(x, y, half), place(x, y, -half)], step)? {
                 let height = half - met.distance / ball.radius;
                 let cosine = met.normal.dot(normal);
-                let face = (met.triangle, self.sides.of(met.triangle), cosine > 0.0);
+                let face = (met.triangle, self.sides.of(met.triangle, met.corners), cosine > 0.0);
                 let mut misses = [1; LANES];
                 misses[chord % LANES] = 0;
                 let layer = Layer::new((&[height; LANES], &misses), face, cosine.abs().recip());
@@ -511,7 +511,7 @@ impl<'a> Meter<'a> {
             let mut depth = 0;
             for met in all_on_way(scene, *memory, [open, open + way], step)? {
                 let change = if met.normal.dot(way) < 0.0 { 1 } else { -1 };
-                depth += if self.sides.of(met.triangle).is_solid { change } else { 0 };
+                depth += if self.sides.of(met.triangle, met.corners).is_solid { change } else { 0 };
             }
             self.crossings.set_depth(chord, depth);
         }
