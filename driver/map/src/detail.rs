@@ -38,7 +38,7 @@ pub(crate) fn detailed_part(scene: &Scene) -> Option<[Vec3; 2]> {
         let [low, high] = ends(&triangle.vertices);
         (high - low).max_element() < SHARE_OF_DETAIL * size
     };
-    let instances: Vec<_> = scene.instance_bounds().collect();
+    let instances: Vec<_> = scene.instance_bounds().map(|(_, corners)| corners).collect();
     if instances.iter().any(|[low, high]| (high - low).max_element() >= SHARE_OF_DETAIL * size) {
         return None;
     }

@@ -4,7 +4,7 @@
 //! the other surface by more than the rounding error, so that it is seen whole, shadow rays reach it, and its
 //! photons start in front.
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 use photoncard_picture::allocation::{self, OutOfMemory};
 use rayon::prelude::*;
 
@@ -34,12 +34,18 @@ impl Scene {
             return Ok(());
         }
         let tree = Tree::new(lamps);
-        let found = self.triangles.par_iter().filter(|triangle| !self.emits(triangle));
-        let mut found: Vec<(usize, DVec3)> = found
-            .flat_map_iter(|triangle| {
-                tree.overlapping(triangle).map(|lamp| (lamp, self.lift(lamp, triangle)))
-            })
-            .collect();
+        let lifts = |surface: &Triangle| {
+            let lift = |lamp| (lamp, self.lift(lamp, surface));
+            tree.overlapping(surface).map(lift).collect::<Vec<_>>()
+        };
+        let of_triangles = self.triangles.par_iter().filter(|triangle| !self.emits(triangle));
+        let of_triangles = of_triangles.flat_map_iter(lifts);
+        let instances: Vec<_> = self.instance_bounds().collect();
+        let near = instances.par_iter().filter(|(_, corners)| tree.touches(&Box3::around(*corners)));
+        let of_instances = near
+            .flat_map_iter(|(instance, _)| self.placed(instance))
+            .flat_map_iter(|surface| lifts(&surface));
+        let mut found: Vec<(usize, DVec3)> = of_triangles.chain(of_instances).collect();
         found.sort_by_key(|(lamp, _)| *lamp);
         found.dedup_by_key(|(lamp, _)| *lamp);
         for (lamp, lift) in found {
@@ -91,6 +97,13 @@ impl Box3 {
         let [a, b, c] = triangle.vertices.map(DVec3::from);
         let room = SHARED * f64::from(f32::EPSILON) * magnitude(triangle);
         Self { low: a.min(b).min(c) - room, high: a.max(b).max(c) + room }
+    }
+
+    /// Box between two corners, enlarged like that of a triangle.
+    fn around([low, high]: [Vec3; 2]) -> Self {
+        let [low, high] = [low, high].map(DVec3::from);
+        let room = SHARED * f64::from(f32::EPSILON) * low.abs().max(high.abs()).max_element();
+        Self { low: low - room, high: high + room }
     }
 
     fn union(self, other: Self) -> Self {
@@ -184,6 +197,15 @@ impl Tree {
         Self { bounds, content: Content::Halves(Box::new([Self::new(lamps), Self::new(upper)])) }
     }
 
+    /// Returns whether the box of a lamp overlaps `bounds`.
+    fn touches(&self, bounds: &Box3) -> bool {
+        self.bounds.overlaps(bounds)
+            && match &self.content {
+                Content::Halves(halves) => halves.iter().any(|half| half.touches(bounds)),
+                Content::Lamps(lamps) => lamps.iter().any(|lamp| lamp.bounds.overlaps(bounds)),
+            }
+    }
+
     /// Indices of the lamps that `surface` overlaps in their plane.
     fn overlapping(&self, surface: &Triangle) -> impl Iterator<Item = usize> {
         let mut found = Vec::new();
@@ -207,8 +229,6 @@ impl Tree {
 
 #[cfg(test)]
 mod tests {
-    use glam::Vec3;
-
     use super::*;
     use crate::{Material, Reflection, SceneContents};
 
@@ -248,6 +268,20 @@ mod tests {
                 let lift = height.round() - vertex.y;
                 assert!((1e-4..1e-3).contains(&lift), "{lift}");
             }
+        }
+    }
+
+    #[test]
+    fn a_lamp_in_the_plane_of_an_instance_is_lifted_off_it() {
+        let plain = scene([false; 2], vec![panel(3.0, 0.1, 1)]);
+        for (height, is_lifted) in [(2.0, true), (2.1, false)] {
+            let mut scene = plain.clone().with(|scene| {
+                scene.groups = vec![vec![panel(1.0, 0.0, 0)]];
+                let place = glam::DMat4::from_translation(DVec3::Y * height);
+                scene.instances = crate::Instance::new(0, &place).into_iter().collect();
+            });
+            scene.lift_lamps().unwrap();
+            assert_eq!(scene.triangles != plain.triangles, is_lifted, "{height}");
         }
     }
 

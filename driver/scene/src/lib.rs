@@ -170,7 +170,9 @@ impl Scene {
     /// Lower and upper corner of a box around the scene, metres; both zero for a scene without triangles. It
     /// is the smallest one without instances, of which it contains the boxes around their groups' boxes.
     pub fn bounds(&self) -> (Vec3, Vec3) {
-        let all = triangle::bounds_of(&self.triangles).into_iter().chain(self.instance_bounds());
+        let all = triangle::bounds_of(&self.triangles)
+            .into_iter()
+            .chain(self.instance_bounds().map(|(_, corners)| corners));
         let around = all.reduce(|[low, high], [lower, upper]| [low.min(lower), high.max(upper)]);
         around.unwrap_or([Vec3::ZERO; 2]).into()
     }

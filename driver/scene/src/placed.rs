@@ -9,12 +9,12 @@ use crate::triangle::{NO_TANGENTS, Triangle, bounds_of};
 use crate::{Material, Reflection, Scene, Transmission};
 
 impl Scene {
-    /// Boxes around the instances, each by its lower and upper corner, metres.
-    pub fn instance_bounds(&self) -> impl Iterator<Item = [Vec3; 2]> {
+    /// Instances, each with the lower and the upper corner of the box around it, metres.
+    pub fn instance_bounds(&self) -> impl Iterator<Item = (&Instance, [Vec3; 2])> {
         let groups: Vec<_> = self.groups.iter().map(|group| bounds_of(group)).collect();
         self.instances
             .iter()
-            .filter_map(move |instance| groups[instance.group as usize].map(|bounds| instance.bounds(bounds)))
+            .filter_map(move |instance| Some((instance, instance.bounds(groups[instance.group as usize]?))))
     }
 
     /// Number of triangles in the scene, those of all instances included.
@@ -81,12 +81,18 @@ impl Scene {
 }
 
 impl SceneContents {
+    /// Triangles of an instance in world space, with the attributes of the group's.
+    pub(crate) fn placed(&self, instance: &Instance) -> impl Iterator<Item = Triangle> {
+        let to_world = instance.to_world;
+        let place = move |vertex: Vec3| placed_point(&to_world, vertex.to_array()).into();
+        let group = self.groups[instance.group as usize].iter();
+        group.map(move |triangle| Triangle { vertices: triangle.vertices.map(place), ..*triangle })
+    }
+
     /// Adds the triangles of an instance in world space, with attributes of their own.
     fn add_triangles(&mut self, instance: &Instance) {
-        for triangle in &self.groups[instance.group as usize] {
-            let vertices =
-                triangle.vertices.map(|vertex| placed_point(&instance.to_world, vertex.to_array()).into());
-            let mut placed = Triangle { vertices, ..*triangle };
+        let placed: Vec<_> = self.placed(instance).collect();
+        for mut triangle in placed {
             if let Some(attributes) = self.attributes.get(triangle.attributes as usize) {
                 let mut attributes = instance.attributes(attributes);
                 if attributes.tangents != NO_TANGENTS {
@@ -97,10 +103,10 @@ impl SceneContents {
                     attributes.tangents = self.tangents.len() as u32;
                     self.tangents.push(tangents);
                 }
-                placed.attributes = self.attributes.len() as u32;
+                triangle.attributes = self.attributes.len() as u32;
                 self.attributes.push(attributes);
             }
-            self.triangles.push(placed);
+            self.triangles.push(triangle);
         }
     }
 }

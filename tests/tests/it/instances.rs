@@ -6,18 +6,21 @@ use photoncard_driver::film::Film;
 use photoncard_driver::pack::PackedScene;
 use photoncard_driver::render::{Integrator, PhotonMaps, Picture, RenderSettings, Schedule};
 use photoncard_driver::scene::{
-    Environment, Instance, Material, Scene, SceneContents, Triangle, VertexAttributes,
+    Encoding, Environment, Image, Instance, Layers, Material, NormalMap, Scene, SceneContents, Texture,
+    Triangle, VertexAttributes,
 };
 use photoncard_driver::scheduler::GatherOrder;
 use photoncard_firmware::memory::Lines;
 use photoncard_firmware::sampler::hash;
 use photoncard_firmware::scene::{
-    BUNDLE_RAYS, Hit, Ray, closest_hit, closest_hits, transmittance, transmittances,
+    BUNDLE_RAYS, Hit, Ray, SceneImage, Surface, closest_hit, closest_hits, read_surface, transmittance,
+    transmittances,
 };
 use photoncard_shared::address::Line;
 use photoncard_shared::image::SectionKind;
 use photoncard_shared::layout;
 use photoncard_shared::message::FaultCode;
+use photoncard_tests::shapes::add_textured_quad;
 use photoncard_tests::{camera, glass, lambertian, mean, quad, radiances, render_or_panic, scene};
 
 const GROUND: u32 = 0;
@@ -108,6 +111,103 @@ fn rays_hit_instances_exactly_as_copies_of_their_triangles() {
             assert_eq!(hit, closest_hit(&image, &mut memory, ray).expect("sound"));
             assert_eq!(passed.0, transmittance(&image, &mut memory, ray).expect("sound"));
         }
+    }
+}
+
+/// Forest whose leaves are squares with a round cut-out and a normal map, and tangents along u.
+fn textured_forest() -> Scene {
+    let mut layers = Layers::none(Vec3::ZERO);
+    layers.normal = Some(NormalMap { texture: 1, scale: 1.0 });
+    let texture = Some(0);
+    let leaf = Material {
+        base_texture: texture,
+        alpha_cutoff: Some(0.5),
+        layers: Some(Box::new(layers)),
+        ..matte()
+    };
+    let mut square = Scene::default();
+    for index in 0..40 {
+        let middle = random_point(index, 9).clamp_length_max(1.0);
+        let along = 0.3 * random_point(index, 0).normalize();
+        let up = 0.3 * along.any_orthonormal_vector().normalize();
+        let corners = [-along - up, along - up, along + up, up - along].map(|corner| middle + corner);
+        add_textured_quad(&mut square, corners, [[0., 1.], [1., 1.], [1., 0.], [0., 0.]], LEAF);
+        for attributes in square.attributes.len() - 2..square.attributes.len() {
+            square.attributes[attributes].tangents = square.tangents.len() as u32;
+            square.tangents.push([along.normalize().extend(1.0); 3]);
+        }
+    }
+    forest(leaf).with(|scene| {
+        let SceneContents { triangles, attributes, tangents, .. } = (*square).clone();
+        (scene.groups, scene.attributes, scene.tangents) = (vec![triangles], attributes, tangents);
+        let alpha = |index: u32| {
+            let place = Vec2::new((index % 8) as f32, (index / 8) as f32) - 3.5;
+            if place.length() < 3.0 { 0 } else { 255 }
+        };
+        let texels = (0..64).map(|index| [3 * index as u8, 200, 90, alpha(index)]).collect();
+        let image = |name: &str, encoding, (width, height), texels| {
+            let name = name.into();
+            Image { name, width, height, texels, encoding }
+        };
+        scene.images = vec![
+            image("leaf", Encoding::Srgb, (8, 8), texels),
+            image("bumps", Encoding::Linear, (1, 1), vec![[171, 100, 240, 255]]),
+        ];
+        scene.textures = vec![Texture::new(0), Texture::new(1)];
+    })
+}
+
+#[test]
+fn textures_cut_outs_and_normal_maps_of_instances_are_those_of_copies() {
+    let scene = textured_forest();
+    let [instances, copies] =
+        [&scene, &scene.expanded(&[true])].map(|scene| PackedScene::new(scene).expect("packs"));
+    let surface = |(image, mut memory): (SceneImage, Lines), ray: &Ray| {
+        let hit = closest_hit(&image, &mut memory, ray).expect("sound")?;
+        let mut surface = Surface::NOWHERE;
+        read_surface(&image, &mut memory, ray, &hit, &|_| 0.5, &mut surface).expect("sound");
+        Some((surface, hit.id.instance))
+    };
+    let (mut on_instances, mut bent) = (0, 0);
+    for ray in &rays(10_000) {
+        let [instance, copy] = [&instances, &copies].map(|packed| surface(packed.view(), ray));
+        assert_eq!(instance.is_some(), copy.is_some(), "{ray:?}");
+        let (Some((one, instance)), Some((other, _))) = (instance, copy) else { continue };
+        assert_eq!((one.position, one.geometric_normal), (other.position, other.geometric_normal));
+        assert_eq!(one.reflection, other.reflection);
+        assert!(one.normal.distance(other.normal) < 1e-4, "{} {}", one.normal, other.normal);
+        on_instances += u32::from(instance != layout::NO_INSTANCE);
+        bent += u32::from(one.normal.dot(one.geometric_normal) < 0.95);
+    }
+    assert!(on_instances > 1000 && bent > 1000, "{on_instances} {bent}");
+}
+
+#[test]
+fn instances_of_any_size_are_hit_as_copies_from_near_and_far() {
+    for (scale, distance) in [(1e-3, 1.0), (1e-3, 1e4), (1.0, 1e5), (1e3, 1.0), (1e3, 1e6)] {
+        let scene = forest(matte()).with(|scene| {
+            let place = |transform: DMat4| DMat4::from_scale(DVec3::splat(scale)) * transform;
+            scene.instances =
+                transforms(12).filter_map(|transform| Instance::new(0, &place(transform))).collect();
+        });
+        let [instances, copies] =
+            [&scene, &scene.expanded(&[true])].map(|scene| PackedScene::new(scene).expect("packs"));
+        let [(image, mut memory), (of_copies, mut memory_of_copies)] = [instances.view(), copies.view()];
+        let mut met = 0;
+        for ray in (0..4000).map(|index| {
+            let target = random_point(index, 23) * Vec3::new(6.0, 2.0, 6.0) * scale as f32;
+            let towards = random_point(index, 26).normalize();
+            Ray::new(target - towards * (distance * scale) as f32, towards)
+        }) {
+            let hit = closest_hit(&image, &mut memory, &ray).expect("sound");
+            let of_copy = closest_hit(&of_copies, &mut memory_of_copies, &ray).expect("sound");
+            // Far away many hits have equal distances. The order of the triangles, which breaks ties, is not
+            // that of the copies.
+            let distance_of = |hit: Option<Hit>| hit.map(|hit| hit.intersection.distance);
+            assert_eq!(distance_of(hit), distance_of(of_copy), "{scale} {distance} {ray:?}");
+            met += u32::from(hit.is_some_and(|hit| hit.triangle.material == LEAF));
+        }
+        assert!(met > 500, "{scale} {distance}: {met}");
     }
 }
 

@@ -145,12 +145,17 @@ pub fn build(content: Content, finishes: Finishes) -> Result<Hierarchy, Hierarch
     joined(folded, content, finishes)
 }
 
+/// Checks that a card can index this many triangles.
+///
+/// # Errors
+/// [`HierarchyError::TooMany`].
+pub(crate) fn check_number(triangles: usize) -> Result<(), HierarchyError> {
+    if triangles > MAX_TRIANGLES { Err(HierarchyError::TooMany { triangles }) } else { Ok(()) }
+}
+
 /// Checks that a card can index all triangles and their materials, and that all corners are finite.
 fn check(content: Content) -> Result<(), HierarchyError> {
-    let triangles = content.stored().count() + content.instances.len();
-    if triangles > MAX_TRIANGLES {
-        return Err(HierarchyError::TooMany { triangles });
-    }
+    check_number(content.stored().count() + content.instances.len())?;
     if let Some(triangle) = content.stored().find(|triangle| triangle.material >= MAX_MATERIALS) {
         return Err(HierarchyError::TooManyMaterials { material: triangle.material });
     }

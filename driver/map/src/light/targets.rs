@@ -67,7 +67,7 @@ impl Targets {
         };
         let is_lit: Vec<_> = scene.materials.iter().map(is_lit).collect();
         // Instances do not emit. A triangle has the corners of an instance's box.
-        let boxes = scene.instance_bounds().map(|[low, high]| [low, high, low.with_y(high.y)]);
+        let boxes = scene.instance_bounds().map(|(_, [low, high])| [low, high, low.with_y(high.y)]);
         Self::around(scene, &is_lit, boxes, AIMED_SHARE)
     }
 

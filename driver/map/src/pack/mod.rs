@@ -60,6 +60,7 @@ impl PackedScene {
         let expands = groups.contains(&true);
         let stored = scene.stored_triangles().count() + scene.instances.len();
         let triangles = if expands { scene.placed_triangles() as usize } else { stored };
+        bvh::check_number(triangles)?;
         allocation::check(BYTES_OF_A_TRIANGLE * triangles as u64)
             .map_err(|OutOfMemory { bytes }| PackError::Memory { triangles, bytes })?;
         let expanded = expands.then(|| scene.expanded(&groups));

@@ -118,7 +118,7 @@ impl Extent<'_, '_, '_> {
         let primitives = self.meshes.primitives(mesh, scene)?;
         let shown = primitives.iter().filter(|primitive| primitive.triangles > 0);
         let triangles = shown.clone().map(|primitive| primitive.triangles).sum();
-        let mut bounds: Vec<Bounds> = shown.map(local).collect();
+        let mut bounds: Vec<Bounds> = shown.map(Primitive::bounds).collect();
         if self.meshes.is_grouped(mesh) {
             // One box bounds the time, which grows with boxes times instances.
             bounds = bounds.into_iter().reduce(Bounds::joined).into_iter().collect();
@@ -127,16 +127,4 @@ impl Extent<'_, '_, '_> {
         self.locals.insert(mesh, locals.clone());
         Ok(locals)
     }
-}
-
-/// Bounds of the vertices that a primitive's triangles use.
-fn local(primitive: &Primitive<'_>) -> Bounds {
-    let mut bounds = Bounds::EMPTY;
-    for corner in (0..primitive.triangles).flat_map(|triangle| primitive.corners(triangle)) {
-        let vertex = primitive.indices.as_ref().map_or(corner, |indices| indices.unsigned(corner));
-        if vertex < primitive.positions.count {
-            bounds.add(DVec3::from(primitive.positions.vec3(vertex).map(f64::from)));
-        }
-    }
-    bounds
 }

@@ -4,13 +4,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::rc::Rc;
 
-use glam::{DMat4, DVec3};
+use glam::{DMat4, DVec3, Vec3};
 use photoncard_picture::allocation;
 
 use super::accessor::Source;
-use super::limits::MAX_TRIANGLES;
+use super::limits::{MAX_COORDINATE, MAX_TRIANGLES};
 use super::material;
 use super::not_finite::NotFinite;
+use super::offset::Bounds;
 use super::pose::Pose;
 use super::primitive::Primitive;
 use super::room::Room;
@@ -18,6 +19,7 @@ use super::topology::Topology;
 use super::transform::Transform;
 use super::vertex::VertexReader;
 use crate::error::SceneError;
+use crate::triangle::bounds_of;
 use crate::{Instance, Scene, Triangle};
 
 /// Conversion of meshes to triangles of the scene.
@@ -27,12 +29,12 @@ pub(super) struct MeshPlacer<'a> {
     /// Number of counted copies of each mesh.
     placed: BTreeMap<usize, Copies>,
     /// Number of all counted copies.
-    counted: usize,
-    /// Meshes that are placed as instances of groups.
-    grouped: BTreeSet<usize>,
-    /// Index in the scene of the group of each mesh that is placed, mirrored or not; `None` if the group has
-    /// no area.
-    groups: BTreeMap<(usize, bool), Option<u32>>,
+    counted: u64,
+    /// Meshes that are placed as instances of groups, each with the translation of its centre to the origin
+    /// of the group's space.
+    grouped: BTreeMap<usize, DMat4>,
+    /// Groups of the meshes that are placed, mirrored or not; `None` if no triangle of the group has an area.
+    groups: BTreeMap<(usize, bool), Option<Group>>,
     /// Indices of meshes with attributes that are not finite.
     pub(super) not_finite: NotFinite<BTreeSet<usize>>,
     /// Indices of meshes with a primitive whose last vertices form no whole triangle.
@@ -45,6 +47,15 @@ struct Copies {
     /// Copies that can be instances of the mesh's group, and of its mirrored group.
     instances: [u64; 2],
     others: u64,
+}
+
+/// Group of a mesh.
+#[derive(Clone, Copy)]
+struct Group {
+    /// Index in the scene.
+    index: u32,
+    /// Lower and upper corner, in the group's space.
+    bounds: [Vec3; 2],
 }
 
 impl Copies {
@@ -73,23 +84,34 @@ impl<'a> MeshPlacer<'a> {
             prepared: BTreeMap::new(),
             placed: BTreeMap::new(),
             counted: 0,
-            grouped: BTreeSet::new(),
+            grouped: BTreeMap::new(),
             groups: BTreeMap::new(),
             not_finite: NotFinite::default(),
             incomplete: BTreeSet::new(),
         }
     }
 
-    /// Counts a copy of mesh `index` with this world transform, at most [`MAX_TRIANGLES`] in all.
-    pub(super) fn count(&mut self, index: usize, world: &DMat4) -> Result<(), SceneError> {
+    /// Counts `copies` copies of mesh `index`, fewer than [`MAX_TRIANGLES`] in all, because the triangles of a
+    /// group count too. `worlds` are the copies' world transforms.
+    pub(super) fn count(
+        &mut self,
+        index: usize,
+        copies: u64,
+        worlds: impl Iterator<Item = Result<DMat4, SceneError>>,
+    ) -> Result<(), SceneError> {
+        self.counted = self.counted.saturating_add(copies);
+        if self.counted >= MAX_TRIANGLES as u64 {
+            return Err(self.too_many());
+        }
         let Copies { instances, others } = self.placed.entry(index).or_default();
-        let counted = match Instance::mirrors(world) {
-            Some(mirrors) => &mut instances[usize::from(mirrors)],
-            None => others,
-        };
-        *counted += 1;
-        self.counted += 1;
-        if self.counted > MAX_TRIANGLES { Err(self.too_many()) } else { Ok(()) }
+        for world in worlds {
+            let counted = match Instance::mirrors(&world?) {
+                Some(mirrors) => &mut instances[usize::from(mirrors)],
+                None => &mut *others,
+            };
+            *counted += 1;
+        }
+        Ok(())
     }
 
     fn too_many(&self) -> SceneError {
@@ -107,7 +129,9 @@ impl<'a> MeshPlacer<'a> {
             let Some(primitives) = self.prepared.get(&mesh) else { continue };
             let saved = triangles_and_primitives(primitives).saturating_mul(copies.saved());
             if saved >= MIN_SAVED && primitives.iter().all(is_plain) {
-                self.grouped.insert(mesh);
+                let bounds = primitives.iter().map(Primitive::bounds).reduce(Bounds::joined);
+                let centred = bounds.and_then(|bounds| bounds.centre());
+                self.grouped.extend(centred.map(|centre| (mesh, DMat4::from_translation(-centre))));
             }
         }
     }
@@ -123,7 +147,7 @@ impl<'a> MeshPlacer<'a> {
         if work > MAX_TRIANGLES as u64 {
             return Err(self.too_many());
         }
-        let of_groups = self.grouped.iter().filter_map(|mesh| self.placed.get(mesh));
+        let of_groups = self.grouped.keys().filter_map(|mesh| self.placed.get(mesh));
         room.instances(of_groups.map(Copies::all).sum())?;
         let triangles = self.placed().map(|(primitive, times)| primitive.triangles * times).sum();
         // Shared vertices are counted only if an upper bound of the triangles' size exceeds the memory.
@@ -143,12 +167,12 @@ impl<'a> MeshPlacer<'a> {
 
     /// Number of times that the triangles of a mesh are stored.
     fn copies(&self, mesh: usize, copies: &Copies) -> u64 {
-        if self.grouped.contains(&mesh) { copies.all() - copies.saved() } else { copies.all() }
+        if self.is_grouped(mesh) { copies.all() - copies.saved() } else { copies.all() }
     }
 
     /// Returns whether mesh `index` is placed as instances of groups.
     pub(super) fn is_grouped(&self, index: usize) -> bool {
-        self.grouped.contains(&index)
+        self.grouped.contains_key(&index)
     }
 
     /// Counted primitives, each with its number of copies.
@@ -167,10 +191,10 @@ impl<'a> MeshPlacer<'a> {
         pose: &Pose<'_>,
         scene: &mut Scene,
     ) -> Result<(), SceneError> {
-        if self.grouped.contains(&index) && self.place_instance(index, pose.world(), scene)? {
-            return Ok(());
+        match self.grouped.get(&index).copied() {
+            Some(centred) if self.place_instance(index, centred, pose.world(), scene)? => Ok(()),
+            _ => self.place_triangles(index, pose, scene),
         }
-        self.place_triangles(index, pose, scene)
     }
 
     fn place_triangles(
@@ -183,32 +207,51 @@ impl<'a> MeshPlacer<'a> {
         primitives.iter().try_for_each(|primitive| self.place_primitive(index, primitive, pose, scene))
     }
 
-    /// Adds an instance of mesh `index`. Returns false if the transform has no inverse.
+    /// Adds an instance of mesh `index`, whose centre `centred` moves to the origin. Returns false if the
+    /// transform has no inverse or the instance is too far from the scene's origin.
     fn place_instance(
         &mut self,
         index: usize,
+        centred: DMat4,
         world: &Transform,
         scene: &mut Scene,
     ) -> Result<bool, SceneError> {
         // The group of mirrored instances is mirrored itself, so that its transforms are not.
         let mirror = DMat4::from_scale(DVec3::new(if world.is_mirror { -1.0 } else { 1.0 }, 1.0, 1.0));
-        let Some(instance) = Instance::new(0, &(world.matrix * mirror)) else { return Ok(false) };
+        let to_group = mirror * centred;
+        let Some(instance) = Instance::new(0, &(world.matrix * to_group.inverse())) else { return Ok(false) };
         let key = (index, world.is_mirror);
         if !self.groups.contains_key(&key) {
-            let outside = std::mem::take(&mut scene.triangles);
-            self.place_triangles(index, &Pose::new(mirror, None, &[]), scene)?;
-            let triangles = std::mem::replace(&mut scene.triangles, outside);
-            let group = (!triangles.is_empty()).then_some(scene.groups.len() as u32);
-            scene.groups.extend(group.map(|_| triangles));
+            let group = self.add_group(index, to_group, scene)?;
             self.groups.insert(key, group);
         }
         // A group without an area has no instances.
-        let Some(group) = self.groups.get(&key).copied().flatten() else { return Ok(true) };
-        let instance = Instance { group, ..instance };
+        let Some(Group { index, bounds }) = self.groups.get(&key).copied().flatten() else { return Ok(true) };
+        let is_near = |corner: &Vec3| corner.abs().max_element() <= MAX_COORDINATE;
+        if !instance.bounds(bounds).iter().all(is_near) {
+            return Ok(false);
+        }
+        let instance = Instance { group: index, ..instance };
         allocation::push(&mut scene.instances, instance).map_err(|error| {
             SceneError::memory(&self.source.document.path, "placing its instances", error)
         })?;
         Ok(true)
+    }
+
+    /// Adds the group of mesh `index` to `scene`; `None` if no triangle of it has an area.
+    fn add_group(
+        &mut self,
+        index: usize,
+        to_group: DMat4,
+        scene: &mut Scene,
+    ) -> Result<Option<Group>, SceneError> {
+        let outside = std::mem::take(&mut scene.triangles);
+        self.place_triangles(index, &Pose::new(to_group, None, &[]), scene)?;
+        let triangles = std::mem::replace(&mut scene.triangles, outside);
+        let Some(bounds) = bounds_of(&triangles) else { return Ok(None) };
+        let group = Group { index: scene.groups.len() as u32, bounds };
+        scene.groups.push(triangles);
+        Ok(Some(group))
     }
 
     /// Returns whether mesh `index` has a primitive of triangles.

@@ -101,12 +101,11 @@ impl<'a> Placer<'a> {
             Some(_) => None,
             None => Instances::of(self.source, index, node)?,
         };
-        let Some(instances) = instances else { return self.meshes.count(mesh, world) };
-        for instance in 0..instances.count {
-            let local = instances.transform(self.source, instance)?;
-            self.meshes.count(mesh, &(*world * local))?;
-        }
-        Ok(())
+        let Some(instances) = instances else {
+            return self.meshes.count(mesh, 1, std::iter::once(Ok(*world)));
+        };
+        let transforms = (0..instances.count).map(|instance| instances.transform(self.source, instance));
+        self.meshes.count(mesh, instances.count, transforms.map(|local| Ok(*world * local?)))
     }
 
     /// Offset of the scene's origin, computed on first use from the scene at rest.

@@ -7,7 +7,7 @@
 
 use glam::{DMat4, DVec3};
 
-use super::vertex::MAX_COORDINATE;
+use super::limits::MAX_COORDINATE;
 
 /// Distance of a scene's centre from the origin beyond which the scene is moved, in sizes of the scene.
 const NEAR: f64 = 16.0;
@@ -39,6 +39,12 @@ impl Bounds {
     /// The box around both boxes.
     pub(super) fn joined(self, other: Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }
+    }
+
+    /// Centre of the box; `None` if it is empty or further from the origin than [`MAX_COORDINATE`].
+    pub(super) fn centre(&self) -> Option<DVec3> {
+        let is_near = self.low.abs().max(self.high.abs()).max_element() <= f64::from(MAX_COORDINATE);
+        is_near.then(|| 0.5 * (self.low + self.high))
     }
 
     /// Extends the box by the transformed box `local`.

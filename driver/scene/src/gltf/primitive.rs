@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 use std::collections::HashSet;
 
-use glam::Vec4;
+use glam::{DVec3, Vec4};
 use gltf::json;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::Semantic;
@@ -13,6 +13,7 @@ use photoncard_picture::allocation::OutOfMemory;
 use super::accessor::{Elements, Format, Integers, Source};
 use super::draco::Decoded;
 use super::morph::{self, MorphTarget};
+use super::offset::Bounds;
 use super::room::{self, Room};
 use super::topology::Topology;
 use crate::error::SceneError;
@@ -244,6 +245,18 @@ impl<'a> Primitive<'a> {
             places.insert(self.positions.vec3(vertex).map(f32::to_bits));
         }
         Ok(places.len() as u64)
+    }
+
+    /// Bounds, in the mesh's space, of the vertices that the triangles use.
+    pub(super) fn bounds(&self) -> Bounds {
+        let mut bounds = Bounds::EMPTY;
+        for corner in (0..self.triangles).flat_map(|triangle| self.corners(triangle)) {
+            let vertex = self.indices.as_ref().map_or(corner, |indices| indices.unsigned(corner));
+            if vertex < self.positions.count {
+                bounds.add(DVec3::from(self.positions.vec3(vertex).map(f64::from)));
+            }
+        }
+        bounds
     }
 
     /// Positions in the index list of a triangle's corners; vertex numbers if the primitive has no index

@@ -6,6 +6,7 @@ use std::cell::Cell;
 use glam::{DVec3, Vec2, Vec3};
 
 use super::accessor::Source;
+use super::limits::MAX_COORDINATE;
 use super::morph::{Displaced, displaced};
 use super::names::mesh_name;
 use super::not_finite::NotFinite;
@@ -14,10 +15,6 @@ use super::primitive::Primitive;
 use super::transform::Transform;
 use crate::error::SceneError;
 use crate::{Triangle, VertexAttributes};
-
-/// Maximum magnitude of a coordinate, metres. The product of three is far below the maximum of single
-/// precision.
-pub(super) const MAX_COORDINATE: f32 = 1e8;
 
 /// Maximum magnitude of a texture coordinate. There, `f32` steps are 1/16 of the image.
 const MAX_TEXTURE_COORDINATE: f32 = 1e6;
