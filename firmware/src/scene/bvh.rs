@@ -37,6 +37,19 @@ pub fn closest_hit(
     simd::run(ClosestHit { scene, memory, ray })
 }
 
+/// Calls `take` for all hits of a ray, in any order.
+///
+/// # Errors
+/// As [`closest_hit`].
+pub fn for_each_hit(
+    scene: &SceneImage,
+    memory: &mut impl MemoryPort,
+    ray: &Ray,
+    take: impl FnMut(Hit),
+) -> Result<(), Fault> {
+    simd::run(EveryHit { scene, memory, ray, take })
+}
+
 /// Fraction of a light's radiance that arrives along a ray: the product of the transmittances of the flat
 /// glass that the ray hits, 0 if the ray hits anything else.
 ///
@@ -69,6 +82,24 @@ impl<M: MemoryPort> Kernel for ClosestHit<'_, M> {
     }
 }
 
+/// Kernel of [`for_each_hit`].
+struct EveryHit<'a, M, F> {
+    scene: &'a SceneImage,
+    memory: &'a mut M,
+    ray: &'a Ray,
+    take: F,
+}
+
+impl<M: MemoryPort, F: FnMut(Hit)> Kernel for EveryHit<'_, M, F> {
+    type Output = Result<(), Fault>;
+
+    #[inline(always)]
+    fn run(self, isa: impl Isa) -> Self::Output {
+        let Self { scene, memory, ray, take } = self;
+        descend(isa, scene, memory, ray, &mut Every { take, until: ray.max_distance })
+    }
+}
+
 /// Kernel of [`transmittance`].
 pub struct ShadowRay<'a, M> {
     /// The scene.
@@ -91,7 +122,7 @@ impl<M: MemoryPort> Kernel for ShadowRay<'_, M> {
     }
 }
 
-/// State of a search along a ray: the closest hit, or the fraction of light that passes.
+/// State of a search along a ray: the closest hit, all hits, or the fraction of light that passes.
 pub(super) trait Search {
     /// Order in which a node's children are visited.
     const ORDER: Order;
@@ -132,6 +163,28 @@ impl Search for Option<Hit> {
         };
         *self = Some(Hit { intersection: found, triangle: leaf.triangle(slot), id });
         ControlFlow::Continue(nearest)
+    }
+}
+
+/// Search for all hits up to the distance `until`.
+struct Every<F> {
+    take: F,
+    until: f32,
+}
+
+impl<F: FnMut(Hit)> Search for Every<F> {
+    const ORDER: Order = Order::Any;
+    const PASSES_FLAT_GLASS: bool = false;
+
+    #[inline(always)]
+    fn meet(
+        &mut self,
+        intersection: Intersection,
+        id: TriangleId,
+        (leaf, slot): (BvhLeaf, usize),
+    ) -> ControlFlow<(), f32> {
+        (self.take)(Hit { intersection, triangle: leaf.triangle(slot), id });
+        ControlFlow::Continue(self.until)
     }
 }
 

@@ -20,7 +20,7 @@ mod triangle;
 mod triangles;
 
 pub use bundle::{BUNDLE_RAYS, Bundle, closest_hits, transmittances};
-pub use bvh::{ClosestHit, Passed, ShadowRay, closest_hit, transmittance};
+pub use bvh::{ClosestHit, Passed, ShadowRay, closest_hit, for_each_hit, transmittance};
 pub use cut_out::is_there;
 pub use reflection::{
     DecodedLobe, PartialReflection, ReflectedDirection, Reflection, Reflector, keeps_photons,

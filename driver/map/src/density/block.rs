@@ -4,25 +4,57 @@ use glam::Vec3;
 use photoncard_firmware::simd::{Isa, Kernel, LANES};
 use photoncard_shared::layout::TriangleId;
 
-use super::lanes::{LaneVector, at, cross, dot, greatest, least, minus};
+use super::lanes::{LaneVector, at, cross, dot, greatest, least, minus, set};
 use super::sides::Sides;
 
 /// Sixteen triangles. Unused lanes have coincident corners, which no ray or chord hits.
 #[derive(Default)]
 pub(super) struct Block {
     pub(super) corners: [LaneVector; 3],
+    /// Lower and upper corner of the box around the triangles.
+    bounds: [Vec3; 2],
     pub(super) triangles: [Option<TriangleId>; LANES],
+    /// Sides of the triangles, before [`Sides::placed`].
     pub(super) sides: [Sides; LANES],
     /// Bit mask of the triangles whose back faces the inside of a solid.
     pub(super) are_solid: u32,
 }
 
 impl Block {
+    /// Sets triangle `lane`, after those of all lower lanes.
+    pub(super) fn set(&mut self, lane: usize, (triangle, sides): (TriangleId, Sides), corners: &[Vec3; 3]) {
+        let [a, b, c] = *corners;
+        let own = [a.min(b).min(c), a.max(b).max(c)];
+        let [lower, upper] = if lane == 0 { own } else { self.bounds };
+        self.bounds = [lower.min(own[0]), upper.max(own[1])];
+        for (lanes, corner) in self.corners.iter_mut().zip(corners) {
+            set(lanes, lane, *corner);
+        }
+        (self.triangles[lane], self.sides[lane]) = (Some(triangle), sides);
+        self.are_solid |= u32::from(sides.is_solid) << lane;
+    }
+
+    /// Sides of a triangle of the block.
+    #[inline(always)]
+    pub(super) fn sides_of(&self, lane: usize, triangle: TriangleId) -> Sides {
+        self.sides[lane].placed(triangle, self.corners.each_ref().map(|corner| Vec3::from(at(corner, lane))))
+    }
+
+    /// Returns whether the box around the triangles overlaps the box from `lower` to `upper`.
+    fn overlaps(&self, [lower, upper]: [Vec3; 2]) -> bool {
+        self.bounds[0].cmple(upper).all() && self.bounds[1].cmpge(lower).all()
+    }
+
     /// Returns whether a triangle of the block has exactly these corners.
     pub(super) fn holds(&self, corners: &[Vec3; 3]) -> bool {
         let [a, b, c] = &self.corners;
         let [p, q, r] = corners.map(|corner| corner.to_array());
-        (0..LANES).any(|lane| a[0][lane] == p[0] && at(a, lane) == p && at(b, lane) == q && at(c, lane) == r)
+        // Most triangles differ in this coordinate; without branches, few instructions compare it.
+        let mut alike = 0;
+        for (lane, x) in a[0].iter().enumerate() {
+            alike |= u32::from(*x == p[0]) << lane;
+        }
+        alike != 0 && (0..LANES).any(|lane| at(a, lane) == p && at(b, lane) == q && at(c, lane) == r)
     }
 }
 
@@ -43,7 +75,12 @@ pub(super) struct FirstOnWay<'a> {
     pub(super) blocks: &'a [Block],
     pub(super) origin: Vec3,
     pub(super) direction: Vec3,
+    /// Distance up to which all triangles are found, in units of the direction's length.
+    pub(super) reach: f32,
 }
+
+/// Margin for rounding errors of a ray's end, in a ball's coordinates.
+const MARGIN: f32 = 1e-3;
 
 impl Kernel for FirstOnWay<'_> {
     /// Distance of the nearest triangle, in units of the direction's length, and the triangle's corners.
@@ -53,7 +90,12 @@ impl Kernel for FirstOnWay<'_> {
     fn run(self, isa: impl Isa) -> Self::Output {
         let (origin, direction) = (self.origin.to_array(), self.direction.to_array());
         let mut first = (f32::INFINITY, [Vec3::ZERO; 3]);
+        let end = self.origin + self.direction * self.reach;
+        let way = [self.origin.min(end) - MARGIN, self.origin.max(end) + MARGIN];
         for block in self.blocks {
+            if !block.overlaps(way) {
+                continue;
+            }
             let mut distances = [0.0; LANES];
             for (lane, target) in distances.iter_mut().enumerate() {
                 let ([u, v, w], volume) = seen_from(origin, block, lane);

@@ -9,10 +9,10 @@ use photoncard_firmware::simd::LANES;
 
 use super::lanes::Lane;
 
-/// Number of batches of sixteen chords.
+/// Maximum number of batches of sixteen chords.
 pub(super) const BATCHES: usize = 12;
-/// Number of chords through a ball.
-pub(super) const CHORDS: usize = BATCHES * LANES;
+/// Number of batches in a ball of many triangles. Each chord crosses many surfaces there.
+const FEW_BATCHES: usize = 2;
 
 /// Sixteen neighbouring chords: their points in the disc perpendicular to them, and the bounds of these
 /// points.
@@ -55,28 +55,44 @@ fn squares(x: &Lane, y: &Lane) -> Lane {
 
 /// Chords that are spread evenly over a disc.
 pub(super) struct Chords {
-    pub(super) batches: [Batch; BATCHES],
+    pub(super) batches: heapless::Vec<Batch, BATCHES>,
 }
 
 impl Chords {
+    /// Chords over a disc of radius 1.
+    pub(super) fn many() -> Self {
+        Self::new(BATCHES)
+    }
+
+    /// Chords over a disc of radius 1, for a ball of many triangles.
+    pub(super) fn few() -> Self {
+        Self::new(FEW_BATCHES)
+    }
+
     /// Chords over a disc of radius 1, by the sunflower spiral (Vogel 1979). Each chord represents an equal
     /// part of the disc's area.
-    pub(super) fn new() -> Self {
-        let mut points: Vec<[f32; 2]> = (0..CHORDS)
+    fn new(batches: usize) -> Self {
+        let chords = batches * LANES;
+        let mut points: Vec<[f32; 2]> = (0..chords)
             .map(|index| {
-                let distance = ((index as f32 + 0.5) / CHORDS as f32).sqrt();
+                let distance = ((index as f32 + 0.5) / chords as f32).sqrt();
                 let angle = index as f32 * 2.399_963_2;
                 [distance * libm::cosf(angle), distance * libm::sinf(angle)]
             })
             .collect();
         gather_neighbors(&mut points, 0);
         let (batches, _) = points.as_chunks::<LANES>();
-        Self { batches: std::array::from_fn(|batch| Batch::new(&batches[batch])) }
+        Self { batches: batches.iter().map(|points| Batch::new(points)).collect() }
+    }
+
+    /// Number of chords.
+    pub(super) fn number(&self) -> usize {
+        self.batches.len() * LANES
     }
 
     /// Chords over a disc of radius `radius`.
     pub(super) fn scaled(&self, radius: f32) -> Self {
-        Self { batches: self.batches.each_ref().map(|batch| batch.scaled(radius)) }
+        Self { batches: self.batches.iter().map(|batch| batch.scaled(radius)).collect() }
     }
 
     /// Point of chord `index` in the disc.

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use photoncard_firmware::memory::Lines;
-use photoncard_firmware::scene::{Ray, SceneImage, closest_hit};
+use photoncard_firmware::scene::{Hit, Ray, SceneImage, closest_hit, for_each_hit};
 use photoncard_shared::layout::TriangleId;
 use photoncard_shared::message::Fault;
 
@@ -17,32 +17,35 @@ pub(super) struct Met {
     pub(super) triangle: TriangleId,
 }
 
-/// Finds the nearest triangle along a ray.
-pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -> Result<Option<Met>, Fault> {
-    let Some(hit) = closest_hit(scene, &mut memory, ray)? else { return Ok(None) };
-    let corners = hit.triangle.vertices.map(Vec3::from);
-    let [a, b, c] = corners;
-    let normal = (b - a).cross(c - a).normalize_or_zero();
-    Ok(Some(Met { distance: hit.intersection.distance, corners, normal, triangle: hit.id }))
+impl Met {
+    fn new(hit: &Hit) -> Self {
+        let corners = hit.triangle.vertices.map(Vec3::from);
+        let [a, b, c] = corners;
+        let normal = (b - a).cross(c - a).normalize_or_zero();
+        Self { distance: hit.intersection.distance, corners, normal, triangle: hit.id }
+    }
 }
 
-/// Finds all triangles on the segment between two points. After each hit the ray continues `step` metres
-/// behind the hit.
+/// Finds the nearest triangle along a ray.
+pub(super) fn first_triangle(scene: &SceneImage, mut memory: Lines, ray: &Ray) -> Result<Option<Met>, Fault> {
+    Ok(closest_hit(scene, &mut memory, ray)?.map(|hit| Met::new(&hit)))
+}
+
+/// Finds the triangles on the segment between two points, in the order of their distances from the first
+/// point. Of triangles within `step` metres of each other only the first is found.
 pub(super) fn all_on_way(
     scene: &SceneImage,
-    memory: Lines,
+    mut memory: Lines,
     [from, to]: [Vec3; 2],
     step: f32,
 ) -> Result<Vec<Met>, Fault> {
     let length = from.distance(to);
-    let direction = (to - from) / length;
-    let (mut all, mut gone) = (Vec::new(), 0.0);
-    while gone < length {
-        let ray = Ray { origin: from + direction * gone, direction, max_distance: length - gone };
-        let Some(met) = first_triangle(scene, memory, &ray)? else { break };
-        let distance = gone + met.distance;
-        all.push(Met { distance, ..met });
-        gone = distance + step;
-    }
+    let ray = Ray { origin: from, direction: (to - from) / length, max_distance: length };
+    let mut all = Vec::new();
+    for_each_hit(scene, &mut memory, &ray, |hit| all.push(Met::new(&hit)))?;
+    all.sort_unstable_by(|one, other| {
+        one.distance.total_cmp(&other.distance).then(one.triangle.cmp(&other.triangle))
+    });
+    all.dedup_by(|next, kept| next.distance <= kept.distance + step);
     Ok(all)
 }

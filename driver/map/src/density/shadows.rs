@@ -35,7 +35,7 @@ impl Kernel for CrossAll<'_> {
                     if isa.below(&misses, 1) != 0 {
                         let is_front = shadows.is_front[triangle] != 0.0;
                         let Some(id) = block.triangles[triangle] else { continue };
-                        let face = (id, block.sides[triangle], is_front);
+                        let face = (id, block.sides_of(triangle, id), is_front);
                         layers.push(Layer::new((&heights, &misses), face, shadows.slopes[triangle]));
                     }
                 }

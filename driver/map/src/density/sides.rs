@@ -30,6 +30,12 @@ pub(super) struct Sides {
 }
 
 impl Sides {
+    /// The sides of a triangle with these corners, whose sides in its group are `self`.
+    #[inline(always)]
+    pub(super) fn placed(self, triangle: TriangleId, corners: [Vec3; 3]) -> Self {
+        if triangle.instance == NO_INSTANCE { self } else { self.turned(corners) }
+    }
+
     /// The sides with the normals of a triangle with these corners.
     fn turned(mut self, [a, b, c]: [Vec3; 3]) -> Self {
         let normal = (b - a).cross(c - a).normalize_or_zero();
@@ -123,8 +129,14 @@ impl SideTable {
     /// Sides of a triangle with these corners, in any unit; for an index out of range, sides without photons.
     #[inline(always)]
     pub(super) fn of(&self, triangle: TriangleId, corners: [Vec3; 3]) -> Sides {
-        let sides = self.sides.get(triangle.index as usize).copied().unwrap_or_default();
-        if triangle.instance == NO_INSTANCE { sides } else { sides.turned(corners) }
+        self.stored(triangle).placed(triangle, corners)
+    }
+
+    /// Sides of a triangle as in its group, before [`Sides::placed`]; for an index out of range, sides without
+    /// photons.
+    #[inline(always)]
+    pub(super) fn stored(&self, triangle: TriangleId) -> Sides {
+        self.sides.get(triangle.index as usize).copied().unwrap_or_default()
     }
 
     /// Returns whether a triangle has cut-outs.

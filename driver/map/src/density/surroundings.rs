@@ -15,12 +15,13 @@ use super::ball::{Ball, NearTriangle, for_each_near};
 use super::block::{Block, FirstOnWay};
 use super::chords::{ChordFrame, Chords};
 use super::crossings::Crossings;
-use super::lanes::set;
 use super::shadows::CrossAll;
 use super::sides::SideTable;
 
 /// Maximum number of triangles of a list. With more, a traversal per ray is faster.
-const MAX_TRIANGLES: usize = 4096;
+const MAX_TRIANGLES: usize = 1536;
+/// Number of triangles above which a ball is crowded: few chords suffice.
+const CROWD: usize = 512;
 /// Number of triangles above which repeated triangles are omitted: thousands of coincident triangles act as
 /// one.
 const MAX_WITH_TWINS: usize = 512;
@@ -94,6 +95,11 @@ impl Surroundings {
         Ok(wall.holds(ball, normal) && covers(&triangles, normal))
     }
 
+    /// Returns whether there are so many triangles that few chords suffice.
+    pub(super) fn is_crowded(&self) -> bool {
+        self.triangles > CROWD
+    }
+
     /// Adds a triangle. Returns false if the list is full or the triangle is too large.
     #[inline(always)]
     fn add(&mut self, triangle: &NearTriangle, sides: &SideTable) -> bool {
@@ -110,11 +116,7 @@ impl Surroundings {
         }
         self.triangles += 1;
         if let Some(block) = self.blocks.last_mut() {
-            for (lanes, corner) in block.corners.iter_mut().zip(corners) {
-                set(lanes, lane, *corner);
-            }
-            (block.triangles[lane], block.sides[lane]) = (Some(id), sides.of(id, *corners));
-            block.are_solid |= u32::from(block.sides[lane].is_solid) << lane;
+            block.set(lane, (id, sides.stored(id)), corners);
         }
         true
     }
@@ -128,7 +130,8 @@ impl Surroundings {
         max_distance: f32,
     ) -> Option<(f32, Vec3)> {
         let origin = (origin - self.centre) / self.radius;
-        let (distance, [a, b, c]) = run(FirstOnWay { blocks: &self.blocks, origin, direction })?;
+        let reach = max_distance / self.radius;
+        let (distance, [a, b, c]) = run(FirstOnWay { blocks: &self.blocks, origin, direction, reach })?;
         let distance = distance * self.radius;
         let normal = (b - a).cross(c - a).normalize_or_zero();
         (distance <= max_distance)

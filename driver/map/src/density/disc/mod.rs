@@ -23,7 +23,7 @@ use photoncard_shared::message::Fault;
 use rayon::prelude::*;
 
 use super::ball::Ball;
-use super::chords::{CHORDS, ChordFrame, Chords};
+use super::chords::{ChordFrame, Chords};
 use super::crossings::{Covered, Crossings, Layer};
 use super::evidence::Evidence;
 use super::rays::{Met, all_on_way, first_triangle};
@@ -124,6 +124,8 @@ struct Meter<'a> {
     /// True if [`Self::surroundings`] contains all triangles in the ball.
     is_complete: bool,
     chords: Chords,
+    /// Chords of balls of many triangles.
+    few_chords: Chords,
     crossings: Crossings,
     covered: Vec<Covered>,
     surfaces: OpenSurfaces,
@@ -174,7 +176,8 @@ impl<'a> Meter<'a> {
             evidence: Evidence::default(),
             has_evidence: false,
             is_complete: false,
-            chords: Chords::new(),
+            chords: Chords::many(),
+            few_chords: Chords::few(),
             crossings: Crossings::new(),
             covered: Vec::new(),
             surfaces: OpenSurfaces::default(),
@@ -287,7 +290,8 @@ impl<'a> Meter<'a> {
         fractions: &mut [Fraction; LEAF_PHOTONS],
     ) -> Result<(), Fault> {
         let Cluster { ball, radius, outer } = *cluster;
-        let chords = self.chords.scaled(outer / ball.radius);
+        let is_crowded = !self.is_complete || self.surroundings.is_crowded();
+        let chords = if is_crowded { &self.few_chords } else { &self.chords }.scaled(outer / ball.radius);
         if self.is_complete {
             self.surroundings.cross(frame, &chords, &mut self.crossings);
         } else {
@@ -495,7 +499,7 @@ impl<'a> Meter<'a> {
         let place =
             |x: f32, y: f32, z: f32| ball.centre + (tangent * x + bitangent * y + normal * z) * ball.radius;
         let open = place(frame.open.x, frame.open.y, frame.open.z);
-        for chord in 0..CHORDS {
+        for chord in 0..chords.number() {
             let [x, y] = chords.point(chord);
             let half = (1.0 - x * x - y * y).max(0.0).sqrt();
             for met in all_on_way(scene, *memory, [place(x, y, half), place(x, y, -half)], step)? {
