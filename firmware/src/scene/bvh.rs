@@ -1,5 +1,5 @@
-//! Ray caster: traversal of a bounding volume hierarchy. Nodes have sixteen children and leaves up to eight
-//! triangles; each is one line.
+//! Traversal of the bounding volume hierarchy by single rays. A node has up to sixteen children, a leaf up to
+//! eight triangles; each takes one line of memory.
 
 use core::ops::ControlFlow;
 
@@ -18,7 +18,7 @@ use crate::memory::MemoryPort;
 use crate::simd::{self, Isa, Kernel, LANES};
 use crate::wide_tree::{Descent, Order, Stack};
 
-/// Closest hit of a ray. The lower triangle index breaks ties between equal distances.
+/// Finds the closest hit of a ray. Of hits at equal distances, the lower triangle index wins.
 ///
 /// # Errors
 /// If the card image is invalid: a record is out of range, or the hierarchy is deeper than the stack.
@@ -31,8 +31,8 @@ pub fn closest_hit(
     simd::run(ClosestHit { scene, memory, ray })
 }
 
-/// Fraction of a light's radiance that arrives along a ray: the product of the transmittances of the flat
-/// glass that the ray hits, 0 if the ray hits anything else.
+/// Fraction of a light's radiance that arrives along a shadow ray, by channel: the product of the
+/// transmittances of all flat glass on the ray; 0 if the ray hits any other surface.
 ///
 /// # Errors
 /// As [`closest_hit`].
@@ -85,19 +85,19 @@ impl<M: MemoryPort> Kernel for ShadowRay<'_, M> {
     }
 }
 
-/// State of a search along a ray: the closest hit, or the fraction of light that passes.
+/// Result of a ray so far: the closest hit, or for a shadow ray the fraction of light that passes.
 pub(super) trait Search {
     /// Order in which a node's children are visited.
     const ORDER: Order;
     /// True if the search continues behind flat glass.
     const PASSES_FLAT_GLASS: bool;
 
-    /// Takes a hit of triangle `index`, which is in slot `at.1` of the leaf `at.0`. Returns the maximum
-    /// distance of further hits, or [`ControlFlow::Break`] if no further hit is needed.
+    /// Processes a hit of triangle `index`, which is in slot `at.1` of the leaf `at.0`. Returns the maximum
+    /// distance at which further hits are needed, metres, or [`ControlFlow::Break`] if none is needed.
     fn meet(&mut self, hit: Intersection, index: u32, at: (BvhLeaf, usize)) -> ControlFlow<(), f32>;
 
-    /// Takes a hit of flat glass with a transmittance. Returns [`ControlFlow::Break`] if no further hit is
-    /// needed.
+    /// Processes a hit of flat glass with a given transmittance. Returns [`ControlFlow::Break`] if no further
+    /// hit is needed.
     fn pass(&mut self, _transmittance: Vec3) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -131,8 +131,8 @@ impl Search for Option<Hit> {
 
 /// Fraction of the light that passes along a shadow ray.
 ///
-/// Factors are multiplied in the unsorted order of the visits. The order depends only on the tree and the
-/// ray, so that rounding is equal in all bundles and on every processor.
+/// Transmittances are multiplied in the order of traversal, which depends only on the tree and the ray. The
+/// product is therefore rounded in the same way in every bundle and on every processor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Passed(pub Vec3);
 
@@ -157,7 +157,7 @@ impl Search for Passed {
     }
 }
 
-/// Follows a ray through the hierarchy and passes its hits to `search`.
+/// Traverses the hierarchy along a ray and passes the hits to `search`.
 #[inline(always)]
 fn descend<S: Search>(
     isa: impl Isa,
@@ -199,8 +199,8 @@ fn descend<S: Search>(
 
 pub(super) type BvhStack = Stack<{ BVH_STACK + LANES }>;
 
-/// Passes the hits of a ray in a leaf, up to the distance `until`, to `search`. Returns the new maximum
-/// distance, or [`ControlFlow::Break`] if no further hit is needed.
+/// Passes the hits of a ray with a leaf's triangles, up to the distance `until`, to `search`. Returns the new
+/// maximum distance, or [`ControlFlow::Break`] if no further hit is needed.
 #[inline(always)]
 pub(super) fn meet_leaf<S: Search>(
     scene: &SceneImage,

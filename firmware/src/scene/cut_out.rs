@@ -1,4 +1,4 @@
-//! Test whether a point of a triangle is cut out.
+//! Test whether a triangle is cut out at a given position.
 
 use glam::Vec3;
 use photoncard_shared::message::Fault;
@@ -9,8 +9,8 @@ use super::coverage::coverage;
 use super::materials::read_material;
 use crate::memory::MemoryPort;
 
-/// Returns true if triangle `index` has no cut-out at a point, metres. A point off the triangle's plane is
-/// projected onto it.
+/// Returns true if triangle `index` has a coverage above 0 at the position `place`, metres: the triangle is
+/// not cut out there. A position off the triangle's plane is projected onto the plane.
 ///
 /// # Errors
 /// If the card image is invalid.

@@ -1,4 +1,4 @@
-//! A hit stored in twelve bytes, from which the surface can be read again.
+//! Hit of a ray, stored in twelve bytes, from which the surface can be read again.
 
 use photoncard_shared::message::Fault;
 
@@ -18,8 +18,8 @@ pub struct Seen {
 impl Seen {
     /// Arbitrary initial value.
     pub const NOWHERE: Self = Self { triangle: 0, weights: [0.0; 2] };
-    /// Marks a point that cannot be stored, because it lies behind specular surfaces or on a layer chosen at
-    /// random. Its eye path must be traced again.
+    /// Marks a point that cannot be stored, because its eye path passes specular surfaces or has chosen a
+    /// material layer at random. The eye path must then be traced again.
     pub const ELSEWHERE: Self = Self { triangle: u32::MAX, ..Self::NOWHERE };
 
     /// Returns true for [`Self::ELSEWHERE`].
@@ -28,14 +28,14 @@ impl Seen {
         self.triangle == u32::MAX
     }
 
-    /// The point of a hit.
+    /// Creates the stored form of a hit.
     pub fn new(hit: &Hit) -> Self {
         let [_, v, w] = hit.intersection.barycentric;
         Self { triangle: hit.index, weights: [v, w] }
     }
 
-    /// Reads the surface at the point into `surface`, on the side of the ray's origin. If the material has
-    /// several layers, the surface is the base. The surface's `distance` is 0.
+    /// Reads the surface at the point into `surface`, for the side on which the origin of `ray` lies. Of a
+    /// material with several layers, the base is read. Sets `surface.distance` to 0.
     ///
     /// # Errors
     /// If the card image is invalid.

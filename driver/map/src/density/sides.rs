@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use crate::pack::CardImage;
 
-/// Front and back of a triangle.
+/// Properties of the front and the back of a triangle.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Sides {
     /// Codes of the normals of front and back; `None` for a side where no photons are stored.
@@ -49,7 +49,8 @@ struct Finish {
     transmits: bool,
     emits: bool,
     is_double_sided: bool,
-    /// True with partial coverage (`BLEND`), which is no cut-out: the powers of photons account for it.
+    /// True with partial coverage (glTF `BLEND`). It is no cut-out, because the powers of photons account for
+    /// it.
     blends: bool,
 }
 
@@ -110,11 +111,11 @@ impl SideTable {
         self.sides.get(triangle as usize).copied().unwrap_or_default()
     }
 
-    /// Marks double-sided triangles that form closed surfaces as solid, because no light enters, unless they
-    /// emit or transmit light. A surface is closed if each edge of its triangles is shared with one other
-    /// triangle, which has the edge in the opposite direction. Where meshes touch and more than two triangles
-    /// share an edge, two triangles bound a solid together if they are neighbours by angle around the edge
-    /// and no other solid lies between them.
+    /// Marks the double-sided triangles of closed surfaces as solid, because no light enters these. Surfaces
+    /// that emit or transmit light are excluded. A surface is closed if each edge of its triangles is shared
+    /// with one other triangle, which has the edge in the opposite direction. Where meshes touch, more than
+    /// two triangles share an edge. Two of them then bound a solid together if they are neighbours by angle
+    /// around the edge and no other solid lies between them.
     fn find_closed_sheets(&mut self, leaves: &[Line], finishes: &[Finish]) {
         let mut sheets: Vec<(usize, [[u32; 3]; 3])> = Vec::new();
         let mut is_open = Vec::new();
@@ -197,8 +198,8 @@ impl Sides {
 }
 
 /// Returns, for each triangle at an edge, its index and the index of the next triangle by angle on its back
-/// side, or `None` instead if the two cannot bound a solid. An item of `triangles` is whether the triangle
-/// has the edge in the given direction, the triangle's index, and its corners.
+/// side. The latter is `None` if the two cannot bound a solid. Each item of `triangles` holds whether the
+/// triangle has the edge in the given direction, its index, and its corners.
 fn around_edge(
     edge: [[u32; 3]; 2],
     triangles: impl Iterator<Item = (bool, usize, [[u32; 3]; 3])>,

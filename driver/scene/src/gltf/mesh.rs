@@ -17,7 +17,6 @@ use super::vertex::VertexReader;
 use crate::error::SceneError;
 use crate::{Scene, Triangle};
 
-/// Conversion of meshes to triangles of the scene.
 pub(super) struct MeshPlacer<'a> {
     source: &'a Source<'a>,
     prepared: BTreeMap<usize, Rc<Vec<Primitive<'a>>>>,

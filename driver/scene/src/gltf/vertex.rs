@@ -19,7 +19,7 @@ use crate::{Triangle, VertexAttributes};
 /// precision.
 pub(super) const MAX_COORDINATE: f32 = 1e8;
 
-/// Maximum magnitude of a texture coordinate. There, `f32` steps are 1/16 of the image.
+/// Maximum magnitude of a texture coordinate. Adjacent `f32` values there differ by 1/16 of the image.
 const MAX_TEXTURE_COORDINATE: f32 = 1e6;
 
 /// Maximum distance between a unit vertex normal and the triangle's unit normal at which they count as equal:
@@ -36,7 +36,6 @@ pub(super) struct Corners<'p> {
     pub(super) weights: &'p [f32],
 }
 
-/// Reader of the vertices of one primitive.
 pub(super) struct VertexReader<'r, 'a> {
     pub(super) source: &'r Source<'a>,
     pub(super) mesh: usize,
